@@ -49,4 +49,4 @@ class Executor:
         """Give up what is still to be measured, and whatever is held for it."""
 
 
-HERE = Executor()
+THIS_PROCESS = Executor()

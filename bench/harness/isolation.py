@@ -30,8 +30,8 @@ class Outcome(NamedTuple):
         setup: how long the solver took to be set up [s].
         solved: the targets that were done, in order.
         trouble: why there are no more, or what was raised and how often; else "".
-        lost: whether the worker was lost over the next target.
-        found: what was measured, if that was the job.
+        is_lost: whether the worker was lost over the next target.
+        numbers: what was measured, if that was the job.
         silent: whether the worker was ended since it was silent.
         remark: what the solver's adapter has to say, else "".
     """
@@ -39,8 +39,8 @@ class Outcome(NamedTuple):
     setup: float
     solved: list[Solved]
     trouble: str
-    lost: bool = False
-    found: Mapping[str, Any] | None = None
+    is_lost: bool = False
+    numbers: Mapping[str, Any] | None = None
     silent: bool = False
     remark: str = ""
 
@@ -78,11 +78,11 @@ class WorkerProcess:
                     case Solved():
                         outcome.solved.append(message)
                     case Found():
-                        outcome = outcome._replace(found=message.values)
+                        outcome = outcome._replace(numbers=message.values)
                     case Unfit():
                         outcome = outcome._replace(trouble=message.why)
                     case Lost(why, silent):
-                        outcome = outcome._replace(trouble=why, lost=ready, silent=silent)
+                        outcome = outcome._replace(trouble=why, is_lost=ready, silent=silent)
                     case Done():
                         outcome = outcome._replace(trouble=raised(outcome.solved))
         return _timed_from_outside(outcome)
@@ -94,9 +94,9 @@ class WorkerProcess:
             RuntimeError: if it measures nothing; the message says why.
         """
         outcome = self.perform(job)
-        if outcome.found is None:
+        if outcome.numbers is None:
             raise RuntimeError(outcome.trouble)
-        return outcome.found
+        return outcome.numbers
 
     def stream(self, job: Work) -> Generator[Message, None, None]:
         """Perform a job and yield its messages as they come; the last is Done, Unfit or Lost.

@@ -15,7 +15,7 @@ from ..peers.ik.restarts import restarted
 from ..peers.protocol import NoAnswerError, OwnTime, describe, remark_of
 from .isolation import WorkerProcess
 from .progress import TROUBLE, Progress
-from .stopwatch import Budget, timed
+from .stopwatch import Budget, time_call
 from .worker import Done, Message, Ready, Solved, Unfit
 
 # A solve that took less [s] is made again so often, uncounted, right before the next.
@@ -62,9 +62,9 @@ class Job(NamedTuple):
         """Yield what comes of it, each part as soon as it is there."""
         try:
             adapter = importlib.import_module(self.module)
-            ask, setup = timed(lambda: self._prepared(adapter))
+            ask, setup = time_call(lambda: self._prepared(adapter))
             first = self._solved(ask(*self.targets.request(0))) if self.warms_up else None
-            if self.restarts and first is not None and first.claimed < 0:
+            if self.restarts and first is not None and first.claim < 0:
                 raise UnableError("not started again, for it claims nothing of its answers")
         except Exception as error:  # whatever an engine raises is its result
             yield from unfit(error, self.entrant)
@@ -96,13 +96,13 @@ class Job(NamedTuple):
             yield solved
 
     def _solved(self, solve: Solve) -> Solved:
-        output, seconds = timed(lambda: attempt(solve))
+        output, seconds = time_call(lambda: attempt(solve))
         nothing = np.full(self.targets.shape[1], np.nan)
         q = nothing if output.q is None else np.array(output.q, dtype=float)
         trouble = output.error
         if q.shape != nothing.shape:
             q, trouble = nothing, f"returned {q.shape} numbers, not {nothing.shape}"
-        claimed = -1 if output.claimed is None else int(output.claimed)
+        claimed = -1 if output.claim is None else int(output.claim)
         return solved_in(output.time or OwnTime(seconds), q, claimed, trouble)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import psutil
 
 from ..peers.sources import git_commit
-from .stopwatch import timed
+from .stopwatch import time_call
 
 PACKAGES = (
     "plumbob",
@@ -43,7 +43,9 @@ PRESENTATION = (
     "crosscheck/verify/output",
 )
 # Likewise in every experiment.
-PRESENTATION_FILES = ("tables.py", "tables.toml", "figures.py", "readings.py", "files.py")
+PRESENTATION_FILES = (
+    *("tables.py", "tables.toml", "participants.py", "figures.py", "readings.py", "files.py"),
+)
 
 
 @functools.cache
@@ -77,7 +79,7 @@ def conditions() -> dict[str, Any]:
 
 def pace() -> float:
     """Return how long a fixed loop takes [s], the median of nine."""
-    return statistics.median(timed(lambda: sum(range(10_000)))[1] for _ in range(9))
+    return statistics.median(time_call(lambda: sum(range(10_000)))[1] for _ in range(9))
 
 
 @functools.cache

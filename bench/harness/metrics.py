@@ -74,7 +74,7 @@ _NORMAL = 1.959963984540054
 _FEW = 12
 
 
-class Ratio(NamedTuple):
+class PairedRatio(NamedTuple):
     """By what factor one of two samples of pairs exceeds the other, with its 95 % interval."""
 
     mean: float
@@ -264,7 +264,7 @@ def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Flo
     return np.array([np.searchsorted(row, ratios, side="right") for row in slower]) / len(best)
 
 
-def paired_ratio(values: Floats, others: Floats) -> Ratio:
+def paired_ratio(values: Floats, others: Floats) -> PairedRatio:
     """Return the geometric mean of values / others over the pairs in which both are numbers.
 
     The interval is Student's, of the logarithms; a single pair leaves the factor open.
@@ -274,7 +274,7 @@ def paired_ratio(values: Floats, others: Floats) -> Ratio:
     middle, low, high = np.exp(mean_interval(logs))
     if len(logs) < 2:
         low, high = 0.0, math.inf
-    return Ratio(float(middle), float(low), float(high), len(logs))
+    return PairedRatio(float(middle), float(low), float(high), len(logs))
 
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:

@@ -13,7 +13,7 @@ from plumbob.reference.arguments import distinct_texts
 
 from .block import SCALES, Block
 from .choice import Choice
-from .executor import HERE, Executor, NotMeasured
+from .executor import THIS_PROCESS, Executor, NotMeasured
 from .experiment import blocks
 from .folder_lock import locked
 from .machine import conditions
@@ -43,7 +43,7 @@ class Event(NamedTuple):
 
 
 def run(
-    suites: Sequence[str], scale: str | Choice, folder: Path, executor: Executor = HERE
+    suites: Sequence[str], scale: str | Choice, folder: Path, executor: Executor = THIS_PROCESS
 ) -> Iterator[Event]:
     """Measure suites, yielding what happens; records already there are kept.
 

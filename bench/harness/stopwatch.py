@@ -11,7 +11,7 @@ T = TypeVar("T")
 MOST_AT_DOORS = 10.0
 
 
-def timed(call: Callable[[], T]) -> tuple[T, float]:
+def time_call(call: Callable[[], T]) -> tuple[T, float]:
     """Return what a call returns, and how long it took [s]."""
     begin = time.perf_counter()
     result = call()

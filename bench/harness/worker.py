@@ -37,7 +37,7 @@ class Solved(NamedTuple):
 
     Attributes:
         q: the coordinates, NaN if there are none.
-        claimed: 1 if the solver says that it is solved, 0 if not, -1 if it does not say.
+        claim: 1 if the solver says that it is solved, 0 if not, -1 if it does not say.
         seconds: how long it took.
         trouble: what the solver raised, else "".
         round_trip: how long its door took, 0 without one [s].
@@ -45,7 +45,7 @@ class Solved(NamedTuple):
     """
 
     q: np.ndarray
-    claimed: int
+    claim: int
     seconds: float
     trouble: str
     round_trip: float = 0.0

@@ -18,7 +18,7 @@ from .sources import commit_of, digest_of
 GROUP = "plumbob.solvers"
 
 
-class Entry(NamedTuple):
+class SolverAddress(NamedTuple):
     """A solver as it is asked for: its address, what opens it, and how the user calls it."""
 
     door: str
@@ -27,7 +27,7 @@ class Entry(NamedTuple):
     version: str = ""
 
 
-def named(words: Sequence[str], program: Sequence[str] = ()) -> list[Entry]:
+def named(words: Sequence[str], program: Sequence[str] = ()) -> list[SolverAddress]:
     """Return what --with and a program behind -- mean.
 
     Args:
@@ -35,10 +35,10 @@ def named(words: Sequence[str], program: Sequence[str] = ()) -> list[Entry]:
         program: a command and its arguments.
     """
     entries = [_entry(word) for word in words]
-    return [*entries, Entry(" ".join(program), tuple(program))] if program else entries
+    return [*entries, SolverAddress(" ".join(program), tuple(program))] if program else entries
 
 
-def _entry(word: str) -> Entry:
+def _entry(word: str) -> SolverAddress:
     called, equals, door = word.partition("=")
     if not equals or Path(word).exists():
         called, door = "", word
@@ -46,14 +46,16 @@ def _entry(word: str) -> Entry:
         raise ValueError(f"with: expected NAME=FILE, got {word!r}")
     place, colon, attribute = door.partition(":")
     is_file = Path(place).exists()
-    return Entry(door, f"{Path(place).resolve()}{colon}{attribute}" if is_file else door, called)
+    return SolverAddress(
+        door, f"{Path(place).resolve()}{colon}{attribute}" if is_file else door, called
+    )
 
 
-def installed() -> list[Entry]:
+def installed() -> list[SolverAddress]:
     """Return the solvers that installed packages offer as entry points."""
     points = importlib.metadata.entry_points(group=GROUP)
     return [
-        Entry(
+        SolverAddress(
             f"{point.name} of {point.dist.name}" if point.dist else point.name,
             point.value.replace(" ", "") + ("" if ":" in point.value else ":"),
             version=point.dist.version if point.dist else "",
@@ -62,7 +64,7 @@ def installed() -> list[Entry]:
     ]
 
 
-def opened(entries: Sequence[Entry], suites: Sequence[str]) -> list[Entrant]:
+def opened(entries: Sequence[SolverAddress], suites: Sequence[str]) -> list[Entrant]:
     """Return the solvers, each started once to say what it is.
 
     Raises:
@@ -90,7 +92,7 @@ def opened(entries: Sequence[Entry], suites: Sequence[str]) -> list[Entrant]:
 
 
 def opened_where_possible(
-    entries: Sequence[Entry], suites: Sequence[str], before: Sequence[Entrant]
+    entries: Sequence[SolverAddress], suites: Sequence[str], before: Sequence[Entrant]
 ) -> Iterator[Entrant | str]:
     """Yield each installed solver, or a sentence on why it takes no part.
 
@@ -110,7 +112,7 @@ def opened_where_possible(
             yield f"{entry.door} takes no part: {error}"
 
 
-def _opened(entry: Entry) -> Entrant:
+def _opened(entry: SolverAddress) -> Entrant:
     contestant = open_contestant(entry.spec, LIMITS)
     try:
         greeting = contestant.greeting
@@ -134,7 +136,7 @@ def _opened(entry: Entry) -> Entrant:
     )
 
 
-def _name(entry: Entry, greeting: Greeting) -> str:
+def _name(entry: SolverAddress, greeting: Greeting) -> str:
     """Return a name that is no solver's of ours or of a peer: the address is put behind it."""
     said = greeting.name
     if said == Greeting(greeting.protocol, ()).name:  # it says none

@@ -186,7 +186,7 @@ class Adapter:
 ONE_START, RESTARTS = "one start", "restarts"
 
 
-class Entry(NamedTuple):
+class PeerEntry(NamedTuple):
     """A peer with settings, as it enters the tables.
 
     Attributes:
@@ -214,13 +214,13 @@ class Peer(Adapter):
 
     license: str
     can: str
-    entries: tuple[Entry, ...]
+    entries: tuple[PeerEntry, ...]
 
-    def called(self, entry: Entry) -> str:
+    def label_of(self, entry: PeerEntry) -> str:
         """Return how an entry is written."""
         return f"{self.title}, {entry.note}" if entry.note else self.title
 
-    def entry(self, kind: str) -> Entry:
+    def entry(self, kind: str) -> PeerEntry:
         """Return the first entry of a kind."""
         return next(entry for entry in self.entries if entry.kind == kind)
 
@@ -229,10 +229,10 @@ class Peer(Adapter):
 AGAIN = 20
 
 
-def _either(iterations: int | None = None) -> tuple[Entry, Entry]:
+def _either(iterations: int | None = None) -> tuple[PeerEntry, PeerEntry]:
     """Return an entry with one start and one with restarts, of fewer iterations each if given."""
     fewer = {} if iterations is None else {"iterations": iterations}
-    return Entry(ONE_START), Entry(RESTARTS, fewer, AGAIN, f"{AGAIN} restarts")
+    return PeerEntry(ONE_START), PeerEntry(RESTARTS, fewer, AGAIN, f"{AGAIN} restarts")
 
 
 _CHAINS = "poses and limits of one chain of hinges"
@@ -246,46 +246,46 @@ _PULLED = (
 
 
 def _peer(
-    title: str, adapter: str, package: str, license: str, can: str, *entries: Entry, **more: Any
+    title: str, adapter: str, package: str, license: str, can: str, *entries: PeerEntry, **more: Any
 ) -> Peer:
     return Peer(title, f"{__package__}.ik.{adapter}", package, license, can, entries, **more)
 
 
-OURS = _peer(
+PLUMBOB_LM = _peer(
     *("Plumbob LM", "plumbob", "plumbob", "MIT", _TREES),
-    Entry(ONE_START, {"restarts": 0}),
-    Entry(RESTARTS, {"restarts": 100}, note="100 restarts"),
+    PeerEntry(ONE_START, {"restarts": 0}),
+    PeerEntry(RESTARTS, {"restarts": 100}, note="100 restarts"),
 )
 TOOLBOX = _peer(
     *("Robotics Toolbox ik_LM", "toolbox", "roboticstoolbox-python", "MIT", _CHAINS),
-    Entry(ONE_START, {"searches": 1, "iterations": 100}),
-    Entry(RESTARTS, {"searches": 100, "iterations": 30}, note="100 searches"),
+    PeerEntry(ONE_START, {"searches": 1, "iterations": 100}),
+    PeerEntry(RESTARTS, {"searches": 100, "iterations": 30}, note="100 searches"),
 )
 TRAC_IK = _peer(
     *("TRAC-IK", "trac_ik", "pytracik", "MIT", _CHAINS),
-    *(Entry(RESTARTS, {"seconds": t}, note=f"{1e3 * t:g} ms") for t in (0.005, 0.05)),
+    *(PeerEntry(RESTARTS, {"seconds": t}, note=f"{1e3 * t:g} ms") for t in (0.005, 0.05)),
 )
 DRAKE = _peer(
     *("Drake", "drake", "drake", "BSD-3-Clause", f"{_TREES}, these by three angles"),
-    Entry(ONE_START, note="SNOPT"),
-    Entry(ONE_START, {"solver": "IPOPT"}, note="IPOPT"),
-    Entry(RESTARTS, {}, AGAIN, f"SNOPT, {AGAIN} restarts"),
+    PeerEntry(ONE_START, note="SNOPT"),
+    PeerEntry(ONE_START, {"solver": "IPOPT"}, note="IPOPT"),
+    PeerEntry(RESTARTS, {}, AGAIN, f"SNOPT, {AGAIN} restarts"),
 )
 PYBULLET = _peer(
     *("PyBullet", "pybullet", "pybullet", "Zlib", _PULLED),
-    Entry(ONE_START, note="limits left out"),
-    Entry(ONE_START, {"limits": True}, note="limits in the null space"),
-    Entry(RESTARTS, {"check": True}, AGAIN, f"{AGAIN} restarts, its pose looked at"),
+    PeerEntry(ONE_START, note="limits left out"),
+    PeerEntry(ONE_START, {"limits": True}, note="limits in the null space"),
+    PeerEntry(RESTARTS, {"check": True}, AGAIN, f"{AGAIN} restarts, its pose looked at"),
 )
 TORCH = _peer(
     *("pytorch_kinematics", "pytorch_kinematics", "pytorch-kinematics", "MIT", _CHAINS),
-    Entry(ONE_START),
-    Entry(RESTARTS, {"attempts": AGAIN + 1}, note=f"{AGAIN} restarts, all at once"),
+    PeerEntry(ONE_START),
+    PeerEntry(RESTARTS, {"attempts": AGAIN + 1}, note=f"{AGAIN} restarts, all at once"),
 )
 DART = _peer("DART", "dart", "dartpy", "BSD-2-Clause", _CHAINS, *_either(100))
 PLACO = _peer("PlaCo", "placo", "placo", "MIT", _CHAINS, *_either(50), environment="placo")
 PEERS = (
-    OURS,
+    PLUMBOB_LM,
     _peer(
         "Pinocchio’s closed loop", "closed_loop", "pin", "BSD-3-Clause", _UNLIMITED, *_either(200)
     ),
@@ -294,10 +294,12 @@ PEERS = (
     _peer("mujoco.minimize", "minimize", "mujoco", "Apache-2.0", _CHAINS, *_either()),
     TOOLBOX,
     TRAC_IK,
-    _peer("ikpy", "ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims", Entry(ONE_START)),
+    _peer(
+        "ikpy", "ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims", PeerEntry(ONE_START)
+    ),
     _peer(
         *("EAIK", "eaik", "eaik", "BSD-3-Clause", _SIX),
-        Entry(RESTARTS, note="all solutions, no start"),
+        PeerEntry(RESTARTS, note="all solutions, no start"),
     ),
     DRAKE,
     DART,
@@ -476,7 +478,7 @@ def _solvers() -> Iterator[Solver]:
     yield from (*ik_solvers().values(), *step_solvers().values(), *LOOPS, *TIMED, *FACTORS)
     yield from (Solver(peer.title, peer.title, peer.engine) for peer in cloth_peers())
     for peer in PEERS:
-        names = [peer.called(entry) for entry in peer.entries]
+        names = [peer.label_of(entry) for entry in peer.entries]
         yield from (Solver(name, name, peer.package) for name in names)
 
 

@@ -114,7 +114,7 @@ class Evaluator:
         distance = np.linalg.norm(positions - targets.positions[:count], axis=-1).max(axis=-1)
         angle = angle_between(rotations, targets.rotations[:count]).max(axis=-1)
         over = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
-        errors = np.stack([distance, angle * self.robot.posed, over])
+        errors = np.stack([distance, angle * self.robot.oriented, over])
         errors[:, ~answered] = np.nan
         limits = np.array([*tolerance, LIMIT_TOLERANCE])[:, None]
         solved = np.asarray((errors <= limits).all(axis=0))

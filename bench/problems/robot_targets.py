@@ -97,7 +97,7 @@ def least_singular_values(evaluator: Evaluator, q: FloatArray) -> FloatArray:
     """Return the least singular value of each pose's Jacobian, lengths in units of the reach."""
     J = evaluator.jacobians(q).reshape(len(q), len(evaluator.robot.effectors), 2, 3, -1)
     J[:, :, 0] /= farthest(evaluator)
-    if not evaluator.robot.posed:  # the effectors' rotations do not count
+    if not evaluator.robot.oriented:  # the effectors' rotations do not count
         J = J[:, :, :1]
     values = np.linalg.svd(J.reshape(len(q), -1, J.shape[-1]), compute_uv=False)
     return np.asarray(values[:, -1], dtype=float)

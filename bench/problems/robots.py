@@ -45,7 +45,7 @@ class Robot:
         lower: least coordinates [rad], (coordinate,); -inf for those of balls.
         upper: the greatest.
         balls: where the quaternions of balls, w first, begin among the coordinates.
-        posed: whether the effectors' rotations are wanted as well as their positions.
+        oriented: whether the effectors' rotations are wanted as well as their positions.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Robot:
     lower: FloatArray
     upper: FloatArray
     balls: tuple[int, ...] = ()
-    posed: bool = True
+    oriented: bool = True
 
     @property
     def is_chain(self) -> bool:
@@ -280,7 +280,7 @@ def _character() -> Robot:
         upper += [math.inf] * 4 if hinge is None else [hinge[2]]
     hands, joints = (tuple(name for name, *_ in of) for of in (_HANDS.values(), _BONES))
     known = (CHARACTER, title(CHARACTER), _mjcf(), _PELVIS, hands, joints)
-    return Robot(*known, np.array(lower), np.array(upper), tuple(balls), posed=False)
+    return Robot(*known, np.array(lower), np.array(upper), tuple(balls), oriented=False)
 
 
 def _mjcf() -> str:

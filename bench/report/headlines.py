@@ -106,7 +106,7 @@ def not_asked(results: Results) -> list[str]:
 
 def _names() -> dict[str, set[str]]:
     """Return what records call the entries of each peer, by title."""
-    return {peer.title: set(map(peer.called, peer.entries)) for peer in registry.PEERS}
+    return {peer.title: set(map(peer.label_of, peer.entries)) for peer in registry.PEERS}
 
 
 def _for_cloth(engines: Iterable[str]) -> list[str]:

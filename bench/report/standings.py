@@ -117,7 +117,7 @@ def _fastest(rivals: Sequence[str]) -> list[str]:
     return list(dict.fromkeys((*rivals[:1], *ours[:1])))
 
 
-def speed(ratio: metrics.Ratio, rival: str) -> str:
+def speed(ratio: metrics.PairedRatio, rival: str) -> str:
     """Return how much faster than a rival a solver is, by the ratio of the rival's times to its."""
     mean, low, high, _ = ratio
     if low < 1.0 < high:
@@ -158,7 +158,7 @@ def _on_cloth(field: Sequence[Point], solver: str, name: str, phrase: str) -> tu
     times = {rival: seconds[near & (solvers == rival)].min() for rival in solvers[near].tolist()}
     own = times.pop(solver)
     rivals = _fastest(sorted(times, key=lambda rival: times[rival]))
-    speeds = [speed(metrics.Ratio(r, r, r, 1), s) for s in rivals for r in (times[s] / own,)]
+    speeds = [speed(metrics.PairedRatio(r, r, r, 1), s) for s in rivals for r in (times[s] / own,)]
     rank = 1 + len(set(solvers[errors < least]))
     result = f"{phrase.format(words(least))} in {words_in(own, 'ms')}"
     return rank, f"{field[0].cloth}: {result}, {listed(speeds) or 'nobody else as near'}"

@@ -9,6 +9,7 @@ import ast
 import io
 import re
 import string
+import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -33,6 +34,9 @@ def templates() -> dict[str, str]:
             place = path.relative_to(ROOT).as_posix()
             for template in literal_templates(path.read_text(encoding="utf-8"), place):
                 found.setdefault(template, place)
+    for path in sorted((ROOT / SOURCES[0]).rglob("*.toml")):
+        for template in table_templates(tomllib.loads(path.read_text(encoding="utf-8"))):
+            found.setdefault(template, path.relative_to(ROOT).as_posix())
     for text in _of_tasks():
         found.setdefault(text, "crosscheck/verify/task.py")
     return {text: place for text, place in found.items() if has_words(text)}
@@ -52,6 +56,16 @@ def literal_templates(source: str, place: str) -> Iterator[str]:
             if not isinstance(literal, ast.Constant) or not isinstance(literal.value, str):
                 raise ValueError(f"{place}:{node.lineno}: expected a literal template")
             yield literal.value
+
+
+def table_templates(entry: object) -> Iterator[str]:
+    """Yield the text of every key `sentence` in the content of a TOML file."""
+    if isinstance(entry, dict) and isinstance(entry.get("sentence"), str):
+        yield entry["sentence"]
+    for inner in entry.values() if isinstance(entry, dict) else ():
+        yield from table_templates(inner)
+    for inner in entry if isinstance(entry, list) else ():
+        yield from table_templates(inner)
 
 
 def _choices(node: ast.expr | None) -> list[ast.expr | None]:

@@ -53,12 +53,12 @@ class NoGreetingError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Exchange:
     """A case, and what was answered the first and the second time."""
 
     case: Case
     answer: Answer | Failure
-    again: Answer | Failure
+    repeat: Answer | Failure
 
 
 class Contestant(Protocol):

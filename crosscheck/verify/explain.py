@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .case import Case
-from .contestant import Answer, Asked
+from .contestant import Answer, Exchange
 from .judgement import LEAST_SHARE, CaseJudgement, Explanation, Verdict
 from .sentence import Sentence, sentence
 
@@ -41,7 +41,7 @@ class Match(NamedTuple):
 
 def explain(
     variants: Iterable[Variant],
-    asked: Sequence[Asked],
+    asked: Sequence[Exchange],
     tolerance: Callable[[Case], float],
     describe: Callable[[Sequence[str]], Sentence],
 ) -> tuple[tuple[Explanation, ...], int]:
@@ -79,7 +79,7 @@ def _telling(matches: Sequence[Match]) -> list[Match]:
 
 
 def _match(
-    variant: Variant, answered: Sequence[Asked], tolerance: Callable[[Case], float]
+    variant: Variant, answered: Sequence[Exchange], tolerance: Callable[[Case], float]
 ) -> Match | None:
     hits, distance = 0, 0.0
     predictions: list[Mapping[str, Any]] = []
@@ -129,7 +129,7 @@ def largest_gap(one: Any, other: Any) -> float:
 
 
 def _classes(
-    matches: Sequence[Match], answered: Sequence[Asked], tolerance: Callable[[Case], float]
+    matches: Sequence[Match], answered: Sequence[Exchange], tolerance: Callable[[Case], float]
 ) -> list[list[Match]]:
     """Return matches grouped with those of as many faults that no answer tells apart."""
 
@@ -199,10 +199,10 @@ def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -
                 return sentence(
                     "The first law to break is '{law}', at joint {joint} of the case '{case}': "
                     "{why}"
-                    if at_joints and finding.where is not None
+                    if at_joints and finding.index is not None
                     else "The first law to break is '{law}', in the case '{case}': {why}",
                     law=finding.law,
-                    joint=finding.where,
+                    joint=finding.index,
                     case=judgement.case.name,
                     why=finding.sentence,
                 )

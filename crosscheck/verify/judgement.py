@@ -34,7 +34,7 @@ class Finding:
     tolerance: float  # what rounding or the solver's own promise allows
     unit: str  # of both: "m", "rad", "" for a ratio
     sentence: Sentence  # what was seen; for a law that holds, what was tried
-    where: int | None = None  # joint, spring or particle that is worst, if one is
+    index: int | None = None  # joint, spring or particle that is worst, if one is
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class Diagnosis:
     behaviour: Sentence | None = None  # what the solver is like, where it did not declare it
     first_broken: Sentence | None = None  # the first law along the computation, if unexplained
     hints: tuple[Sentence, ...] = ()  # what no variant explains: state left over
-    tried: int = 0  # number of variants that were compared
+    variant_count: int = 0  # number of variants that were compared
 
     @property
     def explained(self) -> bool:

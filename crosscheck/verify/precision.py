@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from .contestant import Answer, Asked
+from .contestant import Answer, Exchange
 from .greeting import Greeting
 from .judgement import TaskReport
 from .sentence import Sentence, sentence
@@ -46,7 +46,7 @@ class Rounded(Greeting, frozen=True):
 
 
 def judging_greeting(
-    asked: Sequence[Asked], greeting: Greeting
+    asked: Sequence[Exchange], greeting: Greeting
 ) -> tuple[Greeting, Sentence | None]:
     """Return the greeting that answers are judged by, and why it is another than was sent."""
     outputs = [numbers for numbers in _outputs(asked).values() if len(numbers) >= LEAST]
@@ -87,7 +87,7 @@ def _decimals(numbers: np.ndarray) -> list[DecimalTuple]:
     return [Decimal(repr(x)).normalize().as_tuple() for x in numbers.tolist()]
 
 
-def _outputs(asked: Sequence[Asked]) -> dict[str, np.ndarray]:
+def _outputs(asked: Sequence[Exchange]) -> dict[str, np.ndarray]:
     """Return the numbers of each output that are not from the request, where that is not short.
 
     Of a request in short decimals a double may answer so. A residual is a claim, not an answer.

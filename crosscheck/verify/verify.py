@@ -9,7 +9,7 @@ import msgspec
 
 from . import precision
 from .case import Case
-from .contestant import Asked, Contestant, Failure, FailureKind
+from .contestant import Contestant, Exchange, Failure, FailureKind
 from .greeting import Greeting
 from .judgement import Report, TaskReport, Verdict
 from .kinematics import (
@@ -35,7 +35,7 @@ class Discipline(Protocol):
     def cases(self, greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
         """Return cases that suit the solver, from trivial to hostile, the smallest first."""
 
-    def judge(self, asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+    def judge(self, asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
         """Hold the answers against laws, the reference, and what was declared; name the faults."""
 
 
@@ -118,7 +118,7 @@ def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple
 
 def _ask(
     contestant: Contestant, cases: Sequence[Case], notify: Callable[[int, int], None]
-) -> Iterator[Asked]:
+) -> Iterator[Exchange]:
     """Ask each case, and each that has an answer once more after all the others."""
     first = []
     hangs = 0
@@ -131,4 +131,4 @@ def _ask(
     for i, (case, answer) in enumerate(zip(cases, first, strict=False)):
         notify(len(cases) + i, 2 * len(cases))
         again = answer if isinstance(answer, Failure) else contestant.answer(case)
-        yield Asked(case, with_lesser_time(answer, again), again)
+        yield Exchange(case, with_lesser_time(answer, again), again)

@@ -224,13 +224,13 @@ def _run_with_progress(
     suites: Sequence[str], scale: "str | Choice", output: Path, executor: "Executor | None"
 ) -> "list[Event]":
     from plumbob.bench.harness import run
-    from plumbob.bench.harness.executor import HERE
+    from plumbob.bench.harness.executor import THIS_PROCESS
 
     events: list[Event] = []
     with progress() as bar, lines_in_a_pipe(bar):
         task, counts = bar.add_task("starting", total=run.count(suites, scale)), Counter[str]()
-        with listening(_listener(bar, task, events if executor in (None, HERE) else ())):
-            for event in run.run(suites, scale, output, executor or HERE):
+        with listening(_listener(bar, task, events if executor in (None, THIS_PROCESS) else ())):
+            for event in run.run(suites, scale, output, executor or THIS_PROCESS):
                 events.append(event)
                 counts[event.state] += 1
                 advance = event.state in (run.KEPT, run.MEASURED, run.FAILED)

@@ -10,7 +10,7 @@ from plumbob.bench.experiments import blocks
 from plumbob.bench.harness import run
 from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.choice import Choice
-from plumbob.bench.harness.executor import HERE
+from plumbob.bench.harness.executor import THIS_PROCESS
 from plumbob.bench.harness.measure import block_key
 from plumbob.bench.harness.record import Key, Record, RecordFile
 
@@ -31,7 +31,7 @@ def planned(suites: Sequence[str], choice: Choice, folder: Path) -> Iterator[Pla
     present = {record.key: record for record in RecordFile(folder).read().records}
     for suite in suites:
         for block in filter(choice.takes, blocks(suite, choice.scale)):
-            why = run.why_again(block, present, HERE)
+            why = run.why_again(block, present, THIS_PROCESS)
             yield block if why is None else Planned(block, why, *_estimate(block, present))
 
 

@@ -18,7 +18,7 @@ from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
-from plumbob.bench.peers.registry import ONE_START, Entry, Peer
+from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
 from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robots import robot
 from plumbob.bench.tables.results import Results
@@ -120,8 +120,8 @@ def verdict(targets, solved):
 def test_a_perfect_solver_is_found_perfect_in_its_own_process(worker, targets):
     outcome = worker.perform(job(targets, "perfect"))
     assert outcome.trouble == ""
-    assert not outcome.lost
-    assert [one.claimed for one in outcome.solved] == [1] * COUNT
+    assert not outcome.is_lost
+    assert [one.claim for one in outcome.solved] == [1] * COUNT
     assert all(0 <= one.seconds < 1 for one in outcome.solved)
     assert outcome.setup > 0
     assert verdict(targets, outcome.solved).solved.all()
@@ -131,7 +131,7 @@ def test_a_perfect_solver_is_found_perfect_in_its_own_process(worker, targets):
 def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(worker, targets, manner):
     outcome = worker.perform(job(targets, manner))
     assert len(outcome.solved) == 2
-    assert outcome.lost
+    assert outcome.is_lost
     reason = {"hangs": "ended after 0.5 s of silence", "crashes": "its process ended with code 3"}
     assert outcome.trouble == reason[manner]
     again = worker.perform(job(targets, "perfect"))
@@ -148,9 +148,9 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
         nonlocal called
         counts.append(called)
         called = 0
-        return stopwatch.timed(call)
+        return stopwatch.time_call(call)
 
-    monkeypatch.setattr("plumbob.bench.harness.job.timed", timed)
+    monkeypatch.setattr("plumbob.bench.harness.job.time_call", timed)
     fake = importlib.import_module("fake_solvers")
     prepare = fake.prepare
 
@@ -233,7 +233,7 @@ def test_one_that_cannot_be_set_up_says_why(targets, manner, why):
 )
 def test_what_is_claimed_and_what_is_so_are_kept_apart(targets, manner, claimed):
     solved = [m for m in messages(targets, manner) if isinstance(m, Solved)]
-    assert {one.claimed for one in solved} == {claimed}
+    assert {one.claim for one in solved} == {claimed}
     evaluation = verdict(targets, solved)
     assert evaluation.solved.all() == (manner == "silent")
     if manner == "beyond":
@@ -299,7 +299,7 @@ def test_restarts_end_with_the_first_claim_within_the_limits(answers, count, q, 
     assert not attempts.starts
     answer = solve()
     assert (q is None) or (answer.q == q).all()
-    assert answer.claimed is claimed
+    assert answer.claim is claimed
     assert answer.error == (f"ArithmeticError: {error}" if error else "")
     assert len(attempts.asked) == 4
     assert len(attempts.starts) == count
@@ -312,7 +312,7 @@ def suite(monkeypatch, worker):
     """The suite with fakes for peers, on the iiwa and the character only."""
 
     def peer(title, package="numpy", **settings):
-        return Peer(title, "fake_solvers", package, "MIT", "", (Entry(ONE_START, settings),))
+        return Peer(title, "fake_solvers", package, "MIT", "", (PeerEntry(ONE_START, settings),))
 
     peers = [
         peer("liar", manner="liar"),

@@ -54,7 +54,9 @@ def crowded(make):
             for entry in peer.entries:
                 seconds = {"seconds": 1e-6 * 3.7 ** min(i, 7) * np.arange(1.0, 5.0)}
                 solved = {"solved": [True, True, i % 2 == 0, True]}
-                named = make.raced(peer.called(entry), entry.kind, robot=robot, **seconds, **solved)
+                named = make.raced(
+                    peer.label_of(entry), entry.kind, robot=robot, **seconds, **solved
+                )
                 yield named.__class__(**{**vars(named), "facts": {**named.facts, "title": robot}})
     for stiffness in (1e2, 1e3, 1e4):
         for i, peer in enumerate(registry.cloth_peers()):

@@ -45,11 +45,11 @@ def of_full_length(make):
                 changed |= {"seconds": generator.uniform(1, 9, 120) * 1e-5 / chance}
                 changed |= {name: generator.random(120) for name in ("position", "rotation")}
                 changed |= {"stratum": np.arange(120) % 2, "beyond": np.zeros(120)}
-                made = make.raced(peer.called(entry), entry.kind, robot=robot, **changed)
+                made = make.raced(peer.label_of(entry), entry.kind, robot=robot, **changed)
                 yield made.__class__(**{**vars(made), "size": 120.0})
     for peer in registry.PEERS[len(PRESENT) :]:
         entry = peer.entries[-1]  # with restarts: in another table than the one that is tried
-        yield make.lacking(peer.called(entry), entry.kind, f"{peer.package} is not installed")
+        yield make.lacking(peer.label_of(entry), entry.kind, f"{peer.package} is not installed")
     for stiffness in (1e2, 1e3, 1e4):
         for i, peer in enumerate(registry.cloth_peers()):
             sizes, error = (20, 40, 80), (0.5, 1e-4, 10.0**-i)

@@ -12,7 +12,7 @@ from plumbob.bench.harness.worker import Solved
 from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.protocol import OwnTime
-from plumbob.bench.peers.registry import ONE_START, OURS, PEERS, PLACO, RESTARTS
+from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, RESTARTS
 from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
 from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, is_installed, robot
@@ -63,7 +63,7 @@ def test_from_a_start_beside_the_solution_a_peer_finds_it(peer, arm, rng):
     )
     solved, verdict = answers(peer, peer.entries[0], arm, targets)
     assert verdict.solved.all()
-    assert all(one.claimed in (1, -1) for one in solved)
+    assert all(one.claim in (1, -1) for one in solved)
     assert all(one.trouble == "" for one in solved)
 
 
@@ -71,7 +71,7 @@ def test_no_peer_claims_what_is_out_of_reach(peer, arm):
     targets = unreachable_targets(arm, 2)
     solved, verdict = answers(peer, peer.entries[0], arm, targets)
     assert not verdict.solved.any()
-    assert not any(one.claimed == 1 for one in solved)
+    assert not any(one.claim == 1 for one in solved)
 
 
 def test_with_restarts_hardly_a_target_within_reach_is_missed(peer, arm):
@@ -79,7 +79,7 @@ def test_with_restarts_hardly_a_target_within_reach_is_missed(peer, arm):
     for entry in (entry for entry in peer.entries if entry.kind == RESTARTS):
         solved, verdict = answers(peer, entry, arm, uniform_targets(arm, FEW, False))
         assert verdict.solved.sum() >= FEW - 1
-        assert not any(one.claimed == 1 for one, good in zip(solved, verdict.solved, strict=True)
+        assert not any(one.claim == 1 for one, good in zip(solved, verdict.solved, strict=True)
                        if not good)  # fmt: skip
 
 
@@ -97,9 +97,11 @@ def test_the_character_is_for_those_that_take_trees(peer):
 
 
 def test_ours_finds_every_target_of_every_stratum():
-    solved, verdict = answers(OURS, OURS.entry(RESTARTS), "iiwa14", robot_targets("iiwa14", 5))
+    solved, verdict = answers(
+        PLUMBOB_LM, PLUMBOB_LM.entry(RESTARTS), "iiwa14", robot_targets("iiwa14", 5)
+    )
     assert verdict.solved.all()
-    assert all(one.claimed == 1 for one in solved)
+    assert all(one.claim == 1 for one in solved)
 
 
 def test_the_registry_says_what_the_packages_say(peer):
@@ -120,7 +122,7 @@ def test_the_answer_to_a_target_is_the_same_again_and_in_another_order(peer, arm
     orders = [targets, targets, Targets(*(part[::-1] for part in targets))]
     for entry in peer.entries:
         first, second, backwards = (
-            [(one.claimed, one.q.tobytes()) for one in answers(peer, entry, arm, order)[0]]
+            [(one.claim, one.q.tobytes()) for one in answers(peer, entry, arm, order)[0]]
             for order in orders
         )
         assert first == second
@@ -138,7 +140,7 @@ def test_limits_are_kept_by_those_that_say_so(peer, arm):
     for entry in peer.entries:
         _, verdict = answers(peer, entry, arm, uniform_targets(arm, FEW, False))
         beyond = verdict.beyond[np.isfinite(verdict.beyond)]
-        assert (beyond <= LIMIT_TOLERANCE).all(), peer.called(entry)
+        assert (beyond <= LIMIT_TOLERANCE).all(), peer.label_of(entry)
 
 
 @pytest.mark.parametrize("version", ["", "0.10.2"])
@@ -171,12 +173,12 @@ def test_times_that_a_solver_measures_are_added_over_its_restarts(each, together
     arm = robot("iiwa14")
     nowhere = np.zeros((1, 3)), np.eye(3)[None], arm.draw(np.random.default_rng(0), 1)[0]
     answer = restarted(measuring(each), arm, 5)(*nowhere)()
-    assert answer.claimed
+    assert answer.claim
     assert answer.time == (together and OwnTime(together))
 
 
 def test_every_entry_has_a_name_of_its_own_within_its_kind():
-    names = [(entry.kind, peer.called(entry)) for peer in PEERS for entry in peer.entries]
+    names = [(entry.kind, peer.label_of(entry)) for peer in PEERS for entry in peer.entries]
     assert len(set(names)) == len(names)
     assert {kind for kind, _ in names} == {ONE_START, RESTARTS}
 
@@ -189,5 +191,5 @@ def test_the_choice_among_its_solutions_is_not_charged_to_eaik():
     targets = robot_targets("ur5", 2)
     ask = eaik.prepare(robot("ur5"), TOLERANCE)
     for x, R, start in zip(targets.positions, targets.rotations, targets.starts, strict=True):
-        answer, whole = stopwatch.timed(ask(x, R, start))
+        answer, whole = stopwatch.time_call(ask(x, R, start))
         assert 0 < answer.time.seconds < whole

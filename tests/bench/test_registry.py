@@ -19,7 +19,7 @@ from plumbob.bench.harness.experiment import Experiment
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import registry
-from plumbob.bench.peers.registry import ONE_START, Entry, Peer
+from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
 from plumbob.bench.report import report
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.layout import Layout
@@ -81,7 +81,7 @@ class InThisProcess(WorkerProcess):
 def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, monkeypatch):
     (tmp_path / "stays_put.py").write_text(ADAPTER)
     monkeypatch.syspath_prepend(tmp_path)
-    line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (Entry(ONE_START),))
+    line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (PeerEntry(ONE_START),))
     monkeypatch.setattr(registry, "PEERS", (*registry.PEERS, line))
     monkeypatch.setattr(robots, "worker_process", InThisProcess)
     name = ("robots/character", "Stays put")

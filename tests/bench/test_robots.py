@@ -77,7 +77,7 @@ def test_the_character_has_twenty_joints_and_two_hands():
     assert len(known.joints) == 20
     assert 0 < len(known.balls) < 20
     assert known.effectors == ("left_hand", "right_hand")
-    assert not known.posed
+    assert not known.oriented
 
 
 def test_a_robot_that_is_not_installed_says_so(monkeypatch):

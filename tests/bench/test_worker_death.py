@@ -156,7 +156,7 @@ def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(worker, jobs
         outcome = worker.perform(jobs.Dying(MANNERS[manner][0], moment))
     assert re.fullmatch(MANNERS[manner][1], outcome.trouble)
     assert len(outcome.solved) == MOMENTS[moment]
-    assert outcome.lost == (MOMENTS[moment] > 0)
+    assert outcome.is_lost == (MOMENTS[moment] > 0)
     assert before in seen
     assert all(is_gone(process) for process in seen)
     assert_works(worker, jobs)
@@ -185,7 +185,7 @@ def test_a_death_before_the_job_is_read_is_a_sentence(worker, jobs, monkeypatch,
     monkeypatch.setattr(isolation, "_START", start)
     outcome = worker.perform(jobs.Dying("", "never", load))
     assert re.fullmatch(STARTS[start], outcome.trouble)
-    assert (outcome.solved, outcome.lost) == ([], False)
+    assert (outcome.solved, outcome.is_lost) == ([], False)
     monkeypatch.undo()
     assert_works(worker, jobs)
 

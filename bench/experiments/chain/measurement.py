@@ -17,7 +17,7 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, raised
 from ...harness.job import Job, worker_process
 from ...harness.measure import not_asked
-from ...harness.stopwatch import timed
+from ...harness.stopwatch import time_call
 from ...peers import registry
 from ...peers.entrant import CHAIN_TASK
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
@@ -121,7 +121,7 @@ def _seconds(problem: TargetsForSkeleton, solver: str, limits: Limits) -> FloatA
         for start, target in zip(problem.every_start, problem.targets, strict=True)
     ]
     solves[0]()  # may compile
-    return np.array([timed(solve)[1] for solve in solves])
+    return np.array([time_call(solve)[1] for solve in solves])
 
 
 def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) -> Measured:
@@ -130,7 +130,7 @@ def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) ->
     effector, root = problem.skeleton.joint_count - 1, problem.skeleton.offsets[0]
     targets = within_reach(problem.targets, root, problem.skeleton.reach())
     results = [
-        timed(partial(levenberg_marquardt, engine, q, target, effector, **limits._asdict()))
+        time_call(partial(levenberg_marquardt, engine, q, target, effector, **limits._asdict()))
         for q, target in zip(coordinates(engine, problem.starts), targets, strict=True)
     ]
     rotations = np.array([answer.q[engine.columns] for answer, _ in results])
@@ -159,13 +159,13 @@ def solve_one_by_one(
     done = len(outcome.solved)
     answered = np.isfinite(arrays["residual"][:done])
     arrays["solved"] = arrays["solved"][:done]
-    arrays["claimed"] = np.where(answered, [one.claimed for one in outcome.solved], -1)
+    arrays["claimed"] = np.where(answered, [one.claim for one in outcome.solved], -1)
     arrays["seconds"] = np.where(answered, [one.seconds for one in outcome.solved], 0.0)
     remarks = [outcome.note]
     if done < count:
-        why = "" if outcome.lost else f" by its time budget of {budget:g} s"
+        why = "" if outcome.is_lost else f" by its time budget of {budget:g} s"
         remarks += [f"cut{why} at {done} of {count} targets, the others count as not reached"]
-    if followed and not outcome.lost:
+    if followed and not outcome.is_lost:
         history = _followed(problem, peer, limits, budget)
         arrays |= history
         remarks += [] if history else [NOT_FOLLOWED]

@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import SystemArrays
 
 from ...harness.job import announced, solved_in, unfit
-from ...harness.stopwatch import Budget, timed
+from ...harness.stopwatch import Budget, time_call
 from ...harness.worker import Done, Message, Ready, Solved
 from ...peers.cloth.protocol import Mover
 from ...peers.protocol import OwnTime, remark_of
@@ -75,7 +75,7 @@ class ClothJob(NamedTuple):
         trial.begin(state)
         trial.advance()
         system = MassSpring(**self.system._asdict())
-        return timed(lambda: adapter.prepare(system, self.shape.frame, **self.settings))
+        return time_call(lambda: adapter.prepare(system, self.shape.frame, **self.settings))
 
     def _moved(self, mover: Mover) -> Iterator[Solved]:
         budget, nowhere = Budget(self.shape.budget), np.full_like(self.start.positions, np.nan)
@@ -91,7 +91,7 @@ class ClothJob(NamedTuple):
 
 def advanced(mover: Mover, nowhere: FloatArray) -> Solved:
     """Move on by one frame; the particles are nowhere if the solver says that it blew up."""
-    (stays_finite, own), seconds = timed(lambda: _advance(mover))
+    (stays_finite, own), seconds = time_call(lambda: _advance(mover))
     q = mover.positions() if stays_finite else nowhere
     return solved_in(own or OwnTime(seconds), q, UNKNOWN)
 

@@ -24,7 +24,7 @@ from plumbob.reference.sparse.linear_solver import factorize
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
-from ...harness.stopwatch import timed
+from ...harness.stopwatch import time_call
 from ...harness.values import read
 from ...peers import registry
 from .values import FactorCosts
@@ -91,7 +91,7 @@ def measure(size: int, library: str) -> dict[str, Any]:
         return {"before": before, **steps(system, state, rounds, say)}
     matrix = global_matrix(system, H)
     say("factor")
-    factor, seconds = timed(lambda: factorize(matrix, library))
+    factor, seconds = time_call(lambda: factorize(matrix, library))
     sides = np.array(state.positions)
     times = in_turn({"solve": lambda: factor.solve(sides)}, rounds, say)
     return {"factor": seconds, **times, "memory": memory(), "before": before}
@@ -102,9 +102,9 @@ def steps(
 ) -> dict[str, Any]:
     """Return the times of iterations and of their parts, and the final residual."""
     say("matrix")
-    matrix, assembly = timed(lambda: global_matrix(system, H))
+    matrix, assembly = time_call(lambda: global_matrix(system, H))
     say("factor")
-    factor, seconds = timed(lambda: prefactored(matrix))
+    factor, seconds = time_call(lambda: prefactored(matrix))
     assert isinstance(factor, CholeskyFactor)
     integrator = ImplicitEuler(
         system, h=H, solver="local_global", tolerance=0.0, max_iterations=ITERATIONS
@@ -121,17 +121,11 @@ def steps(
     say("second factor")
     peak, result = memory(), integrator.step(state)
     double = global_matrix(system, 2 * H)
-    _, refactor = timed(lambda: factor.refactorize(double))
+    _, refactor = time_call(lambda: factor.refactorize(double))
     sizes = {"entries": factor.entries, "matrix_entries": matrix.nnz, "memory": peak}
     errors = {"residual": result.residual, "history": result.history.tolist()}
-    return {
-        "assembly": assembly,
-        "factor": seconds,
-        "refactor": refactor,
-        **times,
-        **sizes,
-        **errors,
-    }
+    factors = {"assembly": assembly, "factor": seconds, "refactor": refactor}
+    return {**factors, **times, **sizes, **errors}
 
 
 def in_turn(
@@ -142,7 +136,7 @@ def in_turn(
     for i in range(rounds + 1):
         say(f"round {i} of {rounds}")
         for name, call in work.items():
-            times[name].append(timed(call)[1])
+            times[name].append(time_call(call)[1])
     return {name: seconds[1:] for name, seconds in times.items()}
 
 

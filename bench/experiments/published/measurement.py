@@ -12,7 +12,7 @@ from plumbob.reference import scenes, solve_ik
 
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
-from ...peers.registry import ONE_START, RESTARTS, Entry, Peer
+from ...peers.registry import ONE_START, RESTARTS, Peer, PeerEntry
 from ...problems.chains import TargetsForSkeleton, unit
 from ...problems.evaluate import Tolerance
 from ...problems.robot_targets import uniform_targets
@@ -29,7 +29,7 @@ _BUDGET = 15.0
 _SEED = 2011
 _LIMITS = Limits(published.FABRIK_TOLERANCE, published.FABRIK_ITERATIONS)
 # The solvers fast enough for 10,000 targets, with restarts as TRAC-IK has them.
-_FAST = (registry.OURS, registry.TOOLBOX, registry.TRAC_IK)
+_FAST = (registry.PLUMBOB_LM, registry.TOOLBOX, registry.TRAC_IK)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -53,14 +53,14 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield from _fabrik(stratum, distance, scale)
 
 
-def _toolbox() -> Iterator[tuple[Peer, Entry, float | None]]:
+def _toolbox() -> Iterator[tuple[Peer, PeerEntry, float | None]]:
     """Yield what makes one search, and the rate of infeasible targets that was published."""
-    ours, toolbox = registry.OURS, registry.TOOLBOX
+    ours, toolbox = registry.PLUMBOB_LM, registry.TOOLBOX
     once, iterations = ours.entry(ONE_START), {"iterations": published.TOOLBOX_ITERATIONS}
     yield ours, once._replace(settings={**once.settings, **iterations}), None
     for search in published.TOOLBOX if toolbox.is_installed else ():
         settings = {**search.settings, "searches": 1, "limits": False, **iterations}
-        yield toolbox, Entry(ONE_START, settings, note=search.title), search.infeasible
+        yield toolbox, PeerEntry(ONE_START, settings, note=search.title), search.infeasible
 
 
 def _solve(run: Run, count: int, middle: bool) -> Measured:

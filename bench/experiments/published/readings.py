@@ -51,7 +51,7 @@ def comparisons(results: Results) -> list[Comparison]:
 
 def _trac_ik(records: Sequence[Record]) -> Iterator[Comparison]:
     """Yield success rates and mean times, robot by robot, the published solvers first."""
-    titles = {peer.called(entry): peer.title for peer in registry.PEERS for entry in peer.entries}
+    titles = {peer.label_of(entry): peer.title for peer in registry.PEERS for entry in peer.entries}
     for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK):
         rates = {rate.solver: rate for rate in published.TRAC_IK if rate.robot == robot}
         here = {titles.get(r.solver, r.solver): r for r in records if r.details.robot == robot}

@@ -35,7 +35,7 @@ def blocks(suite: str) -> Iterator[Block]:
 def beside(peer: Peer, name: str) -> Measured:
     """Compare in a process of the engine's own; keep what it says where it cannot."""
     outcome = worker_process().perform(Calculation(differences, (peer.module, name)))
-    return Measured(outcome.found and RobotValues(**outcome.found), {"remark": outcome.note})
+    return Measured(outcome.numbers and RobotValues(**outcome.numbers), {"remark": outcome.note})
 
 
 def differences(module: str, name: str) -> Mapping[str, float]:

@@ -19,7 +19,7 @@ from ...harness.stopwatch import Budget
 from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.entrant import ROBOT_TASK
-from ...peers.registry import Entry, Peer
+from ...peers.registry import Peer, PeerEntry
 from ...problems.evaluate import Targets, Tolerance, evaluator_of
 from ...problems.own import OwnProblem
 from ...problems.robot_targets import STRATA, least_distances, robot_targets, unreachable_targets
@@ -47,13 +47,13 @@ class Run(NamedTuple):
 
     robot: str
     peer: Peer
-    entry: Entry
+    entry: PeerEntry
     tolerance: Tolerance
     budget: float
 
     def block(self, problem: str, measure: Any, size: float, facts: dict[str, Any]) -> Block:
         """Return the block of a problem for this solver."""
-        solver = self.peer.called(self.entry)
+        solver = self.peer.label_of(self.entry)
         settings = settings_of(self.peer, self.entry, self.tolerance)
         block = Block(SUITE, problem, solver, measure, settings, size, facts, budget=self.budget)
         return block.of(self.peer.entrant)
@@ -125,7 +125,7 @@ def _lot(block: Block) -> int:
     return zlib.crc32(f"{block.problem}, {block.solver}".encode())
 
 
-def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any]:
+def settings_of(peer: Peer, entry: PeerEntry, tolerance: Tolerance) -> dict[str, Any]:
     """Return all that changes the answers of an entry, the version included."""
     return {
         **entry.settings,
@@ -166,7 +166,7 @@ def solve(run: Run, targets: Targets) -> Measured:
             "tips": list(robot.effectors),  # as the file of records calls them
             "joints": len(robot.joints),
             "freedom": int(evaluator.model.nv),
-            "wanted": "pose" if robot.posed else "position",
+            "wanted": "pose" if robot.oriented else "position",
             "trouble": raised(outcome.solved),
         },
     )
@@ -178,7 +178,7 @@ def _performed(run: Run, targets: Targets, budget: Budget) -> Outcome:
     asked = (peer.module, robot, targets, run.tolerance, {**entry.settings, **peer.spec})
     outcome = worker_process().perform(Job(*asked, entry.restarts, run.budget, peer.entrant_name))
     count, size = targets.shape
-    if not outcome.lost or len(outcome.solved) == count:
+    if not outcome.is_lost or len(outcome.solved) == count:
         return outcome
     lost = Solved(np.full(size, np.nan), 0, worker_process().patience, outcome.trouble)
     done = [*outcome.solved, lost]
@@ -194,7 +194,7 @@ def _evaluated(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.n
     evaluation = evaluator_of(run.robot).evaluate(targets, answers, run.tolerance)
     return {
         "solved": evaluation.solved,
-        "claimed": np.array([one.claimed for one in done]),
+        "claimed": np.array([one.claim for one in done]),
         "seconds": _short(np.array([one.seconds for one in done])),
         "position": _short(evaluation.position),
         "rotation": _short(evaluation.rotation),

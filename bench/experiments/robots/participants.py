@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ...harness.record import Record
 from ...peers import registry
-from ...peers.registry import Entry, Peer
+from ...peers.registry import Peer, PeerEntry
 from ...tables.columns import text
 from ...tables.layout import Layout
 from ...tables.results import Results, counted, listed
@@ -57,7 +57,7 @@ def _participants(results: Results) -> list[Participant]:
     participants = [
         Participant(peer, tuple(r for r in asked if r.solver in names), robots)
         for peer in (*registry.PEERS, *entered.values())
-        for names in [set(map(peer.called, peer.entries))]
+        for names in [set(map(peer.label_of, peer.entries))]
     ]
     return [participant for participant in participants if participant.records]
 
@@ -65,7 +65,7 @@ def _participants(results: Results) -> list[Participant]:
 def _as_peer(record: Record) -> Peer:
     """Return what a record of a solver that was entered says of it."""
     door = str(record.facts.get("door", ""))
-    return Peer(record.solver, "", door, "", "", (Entry(record.details.kind),))
+    return Peer(record.solver, "", door, "", "", (PeerEntry(record.details.kind),))
 
 
 def _summary(participants: Sequence[Participant]) -> Summary:

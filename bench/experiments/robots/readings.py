@@ -246,7 +246,7 @@ def fields_of(results: Results, start: str, task: str = REACHABLE) -> dict[str, 
 
 def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score]]:
     """Return who has records with targets in them: as registered, and then those unknown."""
-    registered = [peer.called(entry) for peer in registry.PEERS for entry in peer.entries]
+    registered = [peer.label_of(entry) for peer in registry.PEERS for entry in peer.entries]
     places = {solver: place for place, solver in enumerate(registered)}
     robots: dict[str, list[Record]] = {}
     for record in records:
@@ -375,6 +375,6 @@ def profiles(field: Sequence[Score], ratios: Floats) -> list[tuple[Score, Floats
     return list(zip(same, metrics.performance_profiles(seconds, solved, ratios), strict=True))
 
 
-def ratio_of_times(rival: Score, score: Score) -> metrics.Ratio:
+def ratio_of_times(rival: Score, score: Score) -> metrics.PairedRatio:
     """Return by what factor a rival takes longer for the same targets, misses penalised."""
     return metrics.paired_ratio(rival.penalised + SHIFT, score.penalised + SHIFT)

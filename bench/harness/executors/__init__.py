@@ -1,6 +1,6 @@
 """Where blocks are measured, by its address: in this process, or by the workers of a cluster."""
 
-from ..executor import HERE, Executor
+from ..executor import THIS_PROCESS, Executor
 
 LOCAL, DASK = "local", "dask://"
 
@@ -13,7 +13,7 @@ def executor_at(address: str, mix_machines: bool = False) -> Executor:
             answer.
     """
     if address == LOCAL:
-        return HERE
+        return THIS_PROCESS
     scheduler = address.removeprefix(DASK)
     host, _, port = scheduler.rpartition(":")
     if scheduler == address or not (host and port.isdigit()):

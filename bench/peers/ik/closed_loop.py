@@ -29,7 +29,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 1000) -> Ask:
         def solve() -> SolverOutput:
             q = q0
             for iteration in range(iterations + 1):
-                e, J = _error(model, data, q, frames, targets, robot.posed)
+                e, J = _error(model, data, q, frames, targets, robot.oriented)
                 done = bool(np.linalg.norm(e) < tolerance.position)
                 if done or iteration == iterations:
                     break

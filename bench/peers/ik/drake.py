@@ -109,7 +109,7 @@ def _program(robot: Robot, plant: Any, targets: list[Any], tolerance: Tolerance)
     side = np.full(3, INSIDE * tolerance.position / np.sqrt(3.0))
     for effector, target in zip(map(plant.GetFrameByName, robot.effectors), targets, strict=True):
         ik.AddPositionConstraint(effector, np.zeros(3), target, -side, side)
-        if robot.posed:
+        if robot.oriented:
             angle = INSIDE * tolerance.rotation
             ik.AddOrientationConstraint(target, straight, effector, straight, angle)
     return ik

@@ -15,7 +15,7 @@ def prepare(
 ) -> Ask:
     """Return the solver, set up for a robot."""
     configuration = mink.Configuration(mujoco_model(robot))
-    limits, cost = [mink.ConfigurationLimit(configuration.model)], float(robot.posed)
+    limits, cost = [mink.ConfigurationLimit(configuration.model)], float(robot.oriented)
     tasks = [
         mink.FrameTask(effector, "body", 1.0, cost, lm_damping=lm_damping)
         for effector in robot.effectors

@@ -18,7 +18,7 @@ def prepare(
     """Return the solver, set up for a robot."""
     model = pinocchio_model(robot)
     data, limits = model.createData(), [pink.limits.ConfigurationLimit(model)]
-    tasks = [pink.FrameTask(effector, 1.0, float(robot.posed)) for effector in robot.effectors]
+    tasks = [pink.FrameTask(effector, 1.0, float(robot.oriented)) for effector in robot.effectors]
     options = {"solver": "daqp", "damping": damping, "limits": limits, "safety_break": False}
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:

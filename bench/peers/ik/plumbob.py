@@ -23,7 +23,7 @@ def prepare(
     settings |= {"tolerance_rotation": tolerance.rotation}
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        quaternions = rotation.from_matrix(rotations) if robot.posed else [None] * len(positions)
+        quaternions = rotation.from_matrix(rotations) if robot.oriented else [None] * len(positions)
         targets = [*map(Target, positions, quaternions, robot.effectors)]
 
         def solve() -> SolverOutput:

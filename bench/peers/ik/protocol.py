@@ -32,13 +32,13 @@ class SolverOutput(NamedTuple):
 
     Attributes:
         q: the coordinates, in the robot's order; None if it returns none.
-        claimed: whether it says that they solve the target; None if it does not say.
+        claim: whether it says that they solve the target; None if it does not say.
         time: what the adapter or its process has measured; None where the call is timed.
         error: what the solver raised, else "".
     """
 
     q: FloatArray | None
-    claimed: bool | None
+    claim: bool | None
     time: OwnTime | None = None
     error: str = ""
 
@@ -100,7 +100,7 @@ def robot_file(robot: Robot) -> Iterator[str]:
 def arrived(errors: Sequence[FloatArray], robot: Robot, tolerance: Tolerance) -> bool:
     """Return whether the effectors' errors, (6,) each, position first, are within the tolerance."""
     sizes = np.linalg.norm(np.reshape(errors, (-1, 2, 3)), axis=-1)
-    limits = (tolerance.position, tolerance.rotation if robot.posed else np.inf)
+    limits = (tolerance.position, tolerance.rotation if robot.oriented else np.inf)
     return bool((sizes <= limits).all())
 
 

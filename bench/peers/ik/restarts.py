@@ -19,7 +19,7 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
     """
 
     def is_success(output: SolverOutput) -> bool:
-        if not output.claimed or output.q is None:
+        if not output.claim or output.q is None:
             return False
         return bool((output.q >= robot.lower).all() and (output.q <= robot.upper).all())
 
@@ -34,7 +34,7 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
                 if is_success(outputs[-1]):
                     break
             last = next((o for o in reversed(outputs) if o.q is not None), outputs[-1])
-            claimed = None if last.claimed is None else is_success(last)
+            claimed = None if last.claim is None else is_success(last)
             error = next((o.error for o in outputs if o.error), "")
             return SolverOutput(last.q, claimed, total(o.time for o in outputs), error)
 

@@ -10,7 +10,7 @@ from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..sentence import sentence
@@ -89,7 +89,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     ]
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold positions and rotations separately against the reference; name the faults."""
     judgements = [_judged(one, greeting) for one in asked]
     wrong = [one for one, judgement in zip(asked, judgements, strict=True) if judgement.verdict > 1]
@@ -103,7 +103,7 @@ def _likeness(greeting: Greeting, case: Case) -> float:
     return max(1e-9, 4.0 * rounding.positions(greeting.epsilon, joints, 1.0))
 
 
-def _judged(one: Asked, greeting: Greeting) -> CaseJudgement:
+def _judged(one: Exchange, greeting: Greeting) -> CaseJudgement:
     skeleton = Skeleton(one.case.inputs["parents"], one.case.inputs["offsets"])
     reference = partial(forward_kinematics, skeleton, one.case.inputs["local_rotations"])
     expected, size = reference(), one.case.facts["size"]

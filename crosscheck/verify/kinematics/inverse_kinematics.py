@@ -13,7 +13,7 @@ from plumbob.reference.inverse_kinematics import solve_ik
 from plumbob.reference.skeleton import Skeleton
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -33,7 +33,7 @@ KNOWN = ("ccd", "fabrik")
 AS_SLOW = 1.5
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold poses against the laws and sweeps against the textbook's; name the faults."""
     declared = method.lower() if method.lower() in KNOWN else ""
     trials = [AnsweredCase(one) for one in asked]

@@ -7,7 +7,7 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray, distinct_texts
 
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Verdict
 from ..sentence import Sentence, sentence
@@ -17,7 +17,7 @@ HOLDS = sentence("It holds.")
 
 
 def judged(
-    asked: Asked,
+    asked: Exchange,
     greeting: Greeting,
     laws: Callable[[Mapping[str, Any]], Iterable[Finding]],
     reference: Callable[[], Any] | None = None,
@@ -38,7 +38,7 @@ def judged(
     seconds = timed(reference)[1] if reference else None
     findings: list[Finding] = []
     if isinstance(answer, Answer):
-        repeats = _repeated(answer, asked.again, case.facts["size"], greeting)
+        repeats = _repeated(answer, asked.repeat, case.facts["size"], greeting)
         findings = [*laws(answer.values), repeats, *map(_remark, answer.remarks)]
     return CaseJudgement(case, answer, tuple(findings), expected or {}, digits, seconds)
 

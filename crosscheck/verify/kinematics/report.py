@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import explain, first_broken, hints_of
 from ..judgement import CaseJudgement, Diagnosis, Explanation, TaskReport, smallest_failure
 from ..sentence import Sentence
@@ -18,8 +18,8 @@ COMPARED = 12
 
 def diagnosed(
     method: str,
-    asked: Sequence[Asked],
-    wrong: Sequence[Asked],
+    asked: Sequence[Exchange],
+    wrong: Sequence[Exchange],
     tolerance: Callable[[Case], float],
     behaviour: Sentence | None = None,
     *,
@@ -35,10 +35,10 @@ def diagnosed(
         words = partial(describe, method)
         explanations, tried = explain(variants(method, most_faults), compared, tolerance, words)
         named = tuple(one for one in explanations if one.faults != ("",))
-    return Diagnosis(named, behaviour, tried=tried)
+    return Diagnosis(named, behaviour, variant_count=tried)
 
 
-def _size(one: Asked) -> int:
+def _size(one: Exchange) -> int:
     return one.case.size
 
 

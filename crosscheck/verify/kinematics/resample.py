@@ -10,7 +10,7 @@ from plumbob.reference import curves
 from plumbob.reference.arguments import FloatArray, distinct_texts
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -83,7 +83,7 @@ def _scenes(rng: np.random.Generator) -> list[Scene]:
     ]  # fmt: skip
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold points against the laws of resampling; strokes may be bridged or kept."""
     judgements = [_judged(one, greeting) for one in asked]
     wrong = [one for one, message in zip(asked, judgements, strict=True) if message.verdict]
@@ -91,7 +91,7 @@ def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport
     return report(TASK, method, judgements, report_of_faults)
 
 
-def _strokes(asked: Sequence[Asked], greeting: Greeting) -> Sentence | None:
+def _strokes(asked: Sequence[Exchange], greeting: Greeting) -> Sentence | None:
     """Return whether strokes are bridged or kept, where an answer shows it."""
     for one in asked:
         if len(one.case.inputs["strokes"]) > 1 and isinstance(one.answer, Answer):
@@ -114,7 +114,7 @@ def _distances(points: FloatArray, line: Line, bridged: bool) -> FloatArray:
     return np.array([line.nearest(point, bridged)[0] for point in points])
 
 
-def _judged(one: Asked, greeting: Greeting) -> CaseJudgement:
+def _judged(one: Exchange, greeting: Greeting) -> CaseJudgement:
     inputs, line = one.case.inputs, one.case.facts["line"]
     if "count" in inputs:
         reference = partial(even_by_count, line, inputs["count"], True)

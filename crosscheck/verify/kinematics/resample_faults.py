@@ -9,7 +9,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import Variant, explain
 from ..greeting import Greeting
 from ..judgement import Diagnosis
@@ -83,7 +83,10 @@ def _predict(make: Callable[[Case], FloatArray], case: Case) -> Mapping[str, Any
 
 
 def diagnosis(
-    asked: Sequence[Asked], wrong: Sequence[Asked], greeting: Greeting, behaviour: Sentence | None
+    asked: Sequence[Exchange],
+    wrong: Sequence[Exchange],
+    greeting: Greeting,
+    behaviour: Sentence | None,
 ) -> Diagnosis:
     """Return the faults that reproduce the answers."""
     if not any(isinstance(one.answer, Answer) for one in wrong):
@@ -93,7 +96,7 @@ def diagnosis(
     compared = [*wrong, *(one for one in asked if one not in wrong)]
     explanations, tried = explain(variants, compared, partial(_likeness, greeting), _describe)
     named = tuple(one for one in explanations if one.faults != ("",))
-    return Diagnosis(named, behaviour, tried=tried)
+    return Diagnosis(named, behaviour, variant_count=tried)
 
 
 def _likeness(greeting: Greeting, case: Case) -> float:

@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.judging import PoseJudgement
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import either
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
@@ -93,7 +93,7 @@ FAULTS: Mapping[str, Fault] = {
 }  # fmt: skip
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold coordinates against the laws of poses; name the faults."""
     judgements = [
         laws.judged(one, greeting, partial(_findings, one.case, greeting)) for one in asked
@@ -181,11 +181,11 @@ def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:
         counts = poses
     most = max(counts.values())
     if not most:
-        return Diagnosis(tried=len(FAULTS))
+        return Diagnosis(variant_count=len(FAULTS))
     named = [key for key in counts if counts[key] == most]
     words = either([[FAULTS[key].sentence] for key in named[:3]])
     explanation = Explanation(tuple(named), words, most / len(missed), 0.0)
-    return Diagnosis((explanation,), tried=len(FAULTS))
+    return Diagnosis((explanation,), variant_count=len(FAULTS))
 
 
 def _misses(one: CaseJudgement) -> bool:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
@@ -41,7 +41,7 @@ class AnsweredCase:
         judgement: at first without findings.
     """
 
-    def __init__(self, asked: Asked) -> None:
+    def __init__(self, asked: Exchange) -> None:
         values = asked.answer.values if isinstance(asked.answer, Answer) else {}
         self.asked, self.case = asked, asked.case
         self.posed = pose_laws.understood(values, self.case.inputs, self.case.facts)
@@ -58,10 +58,10 @@ class AnsweredCase:
         return self.judgement.verdict >= Verdict.WRONG
 
     @property
-    def seen(self) -> Asked:
+    def seen(self) -> Exchange:
         """The answer as variants predict it."""
         answer = Answer(self.posed.comparable, 0.0)
-        return Asked(self.case, answer, answer)
+        return Exchange(self.case, answer, answer)
 
     def add(self, findings: Sequence[Finding]) -> None:
         """Add findings to the judgement."""

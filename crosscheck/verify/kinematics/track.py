@@ -13,7 +13,7 @@ from plumbob.reference.skeleton import Skeleton
 from plumbob.reference.tracking import track
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
@@ -107,7 +107,7 @@ FAMILIES = (
 )  # fmt: skip
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold each frame against the laws of poses, and frames against one another."""
     judgements = [_judged(one, method.lower(), greeting) for one in asked]
     seen = {one.case.name: _seen(one) for one in asked if frames_of(one)}
@@ -128,7 +128,7 @@ def _is_wrong(judgement: CaseJudgement) -> bool:
 
 
 def _diagnosis(
-    seen: Sequence[Asked], wrong: Sequence[Asked], method: str, greeting: Greeting
+    seen: Sequence[Exchange], wrong: Sequence[Exchange], method: str, greeting: Greeting
 ) -> Diagnosis:
     alike = partial(_likeness, greeting)
     methods = (method,) if method in KNOWN else KNOWN
@@ -144,7 +144,7 @@ def _likeness(greeting: Greeting, case: Case) -> float:
     return max(1e-8, 16.0 * sweeps.likeness(greeting, case))
 
 
-def frames_of(one: Asked) -> list[tuple[Case, AnsweredPose]]:
+def frames_of(one: Exchange) -> list[tuple[Case, AnsweredPose]]:
     """Return each frame as a case of inverse kinematics, and its pose; none if there are none."""
     values = one.answer.values if isinstance(one.answer, Answer) else {}
     names, frames = {"local_rotations", "positions"} & values.keys(), []
@@ -155,15 +155,15 @@ def frames_of(one: Asked) -> list[tuple[Case, AnsweredPose]]:
     return frames
 
 
-def _seen(one: Asked) -> Asked:
+def _seen(one: Exchange) -> Exchange:
     """Return the answer as variants predict it."""
     parts = [posed.comparable for _, posed in frames_of(one)]
     values = {name: np.array([part[name] for part in parts]) for name in parts[0]}
     answer = Answer(values, 0.0)
-    return Asked(one.case, answer, answer)
+    return Exchange(one.case, answer, answer)
 
 
-def _judged(one: Asked, method: str, greeting: Greeting) -> CaseJudgement:
+def _judged(one: Exchange, method: str, greeting: Greeting) -> CaseJudgement:
     skeleton = Skeleton(one.case.inputs["parents"], one.case.inputs["offsets"])
     reference = partial(
         track, skeleton, one.case.inputs["curve"], method if method in KNOWN else "ccd",
@@ -181,7 +181,7 @@ def _judged(one: Asked, method: str, greeting: Greeting) -> CaseJudgement:
     return laws.judged(one, greeting, findings, reference)
 
 
-def _goes_on(one: Asked, method: str, greeting: Greeting) -> Finding:
+def _goes_on(one: Exchange, method: str, greeting: Greeting) -> Finding:
     """Return whether each frame starts from the one before, as far as a textbook's solver shows."""
     answer, bound = _seen(one).answer, _likeness(greeting, one.case)
     assert isinstance(answer, Answer)

@@ -14,7 +14,7 @@ import numpy as np
 from plumbob.reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
@@ -24,7 +24,7 @@ from . import laws
 from .cases import task_cases
 from .faults import GRAVITY, SPRINGS, Option, combined, faults_of
 from .problem import (
-    Problem,
+    SpringProblem,
     all_forces,
     elastic_energy,
     problem_of,
@@ -65,13 +65,13 @@ def _displaced(case: Case, seed: int) -> Case:
     )
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold the energies against formulas and the work of forces, and name the faults."""
     judgements = [_judge_case(one, asked, greeting) for one in asked]
     return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
 
 
-def right(p: Problem) -> dict[str, float]:
+def right(p: SpringProblem) -> dict[str, float]:
     """Return all energies by the formulas [J]."""
     kinetic = 0.5 * float((p.masses[:, None] * p.velocities**2).sum())
     return _sums(kinetic, elastic_energy(p), -float((p.constant * p.positions).sum()))
@@ -83,7 +83,7 @@ def _sums(kinetic: float, elastic: float, gravitational: float) -> dict[str, flo
     return dict(zip(PARTS, values, strict=True))
 
 
-def tolerance(p: Problem, epsilon: float) -> float:
+def tolerance(p: SpringProblem, epsilon: float) -> float:
     """Return how far rounding may take an energy [J]."""
     x, v = np.abs(p.positions), np.abs(p.velocities)
     size = float(x.max() + p.rest_lengths.max(initial=0.0))
@@ -94,7 +94,7 @@ def tolerance(p: Problem, epsilon: float) -> float:
     return ROUNDINGS * epsilon * terms + 1e-300
 
 
-def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJudgement:
+def _judge_case(one: Exchange, asked: Sequence[Exchange], greeting: Greeting) -> CaseJudgement:
     p = problem_of(one.case.inputs)
     system, state = system_of(p), state_of(p)
     _, seconds = timed(
@@ -112,7 +112,7 @@ def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJ
 
 
 def _findings(
-    one: Asked, answer: Answer, asked: Sequence[Asked], p: Problem, allowed: float
+    one: Exchange, answer: Answer, asked: Sequence[Exchange], p: SpringProblem, allowed: float
 ) -> list[Finding]:
     given, expected = answer.values, right(p)
     if not np.isfinite(list(given.values())).all():
@@ -147,7 +147,9 @@ def _sum_laws(given: Values, allowed: float) -> list[Finding]:
     return found
 
 
-def _work(p: Problem, q: Problem, before: Values, after: Values, allowed: float) -> list[Finding]:
+def _work(
+    p: SpringProblem, q: SpringProblem, before: Values, after: Values, allowed: float
+) -> list[Finding]:
     """Return whether energies change by the work of forces between the two states."""
     found = []
     for name, work in works(p, q).items():
@@ -164,7 +166,7 @@ def _work(p: Problem, q: Problem, before: Values, after: Values, allowed: float)
     return found
 
 
-def works(p: Problem, q: Problem) -> dict[str, float]:
+def works(p: SpringProblem, q: SpringProblem) -> dict[str, float]:
     """Return the work of forces along the line from one state to the other, by energy [J]."""
     d = q.positions - p.positions
     still = p.changed(velocities=0.0 * p.velocities)
@@ -210,7 +212,7 @@ FAULTS = (
 )  # fmt: skip
 
 
-def predict(faults: Sequence[Option], p: Problem) -> dict[str, float]:
+def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
     """Return the energies that a solver with these faults answers."""
     factors = np.ones(3)
     for fault in faults:
@@ -222,7 +224,7 @@ def predict(faults: Sequence[Option], p: Problem) -> dict[str, float]:
 
 
 def _diagnose(
-    asked: Sequence[Asked], judgements: Sequence[CaseJudgement], greeting: Greeting
+    asked: Sequence[Exchange], judgements: Sequence[CaseJudgement], greeting: Greeting
 ) -> Diagnosis:
     answered = [
         (problem_of(one.case.inputs), one.answer.values)
@@ -241,11 +243,11 @@ def _diagnose(
         if matches:
             keys = tuple(" + ".join(one.key for one in faults) for faults in matches)[:3]
             said = either([[one.sentence for one in faults] for faults in matches])
-            return Diagnosis((Explanation(keys, said, 1.0, 0.0),), tried=tried)
-    return Diagnosis(first_broken=first_broken(judgements), tried=tried)
+            return Diagnosis((Explanation(keys, said, 1.0, 0.0),), variant_count=tried)
+    return Diagnosis(first_broken=first_broken(judgements), variant_count=tried)
 
 
-def _matches(faults: Sequence[Option], p: Problem, given: Values, epsilon: float) -> bool:
+def _matches(faults: Sequence[Option], p: SpringProblem, given: Values, epsilon: float) -> bool:
     expected = predict(faults, p)
     limit = 8.0 * tolerance(p, epsilon)
     return all(abs(given[name] - expected[name]) <= limit for name in PARTS if name in given)

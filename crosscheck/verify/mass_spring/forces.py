@@ -9,7 +9,7 @@ import numpy as np
 from plumbob.reference.mass_spring import forces as reference_forces
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
@@ -18,9 +18,9 @@ from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
-from .model import Model
+from .model import StepModel
 from .problem import (
-    Problem,
+    SpringProblem,
     all_forces,
     damper_forces,
     problem_of,
@@ -40,13 +40,13 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return task_cases(TASK, greeting, seed, thorough)
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold the forces against the formula and the balance of momentum, and name the faults."""
     judgements = [_judge_case(one, asked, greeting) for one in asked]
     return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
 
 
-def tolerance(p: Problem, epsilon: float) -> float:
+def tolerance(p: SpringProblem, epsilon: float) -> float:
     """Return how far rounding may take a force [N]."""
     size = float(np.abs(p.positions).max() + p.rest_lengths.max(initial=0.0))
     speed = float(np.abs(p.velocities).max())
@@ -55,7 +55,7 @@ def tolerance(p: Problem, epsilon: float) -> float:
     return ROUNDINGS * epsilon * float((springs + weights).max())
 
 
-def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJudgement:
+def _judge_case(one: Exchange, asked: Sequence[Exchange], greeting: Greeting) -> CaseJudgement:
     p = problem_of(one.case.inputs)
     system, state = system_of(p), state_of(p)
     forces, seconds = timed(lambda: reference_forces(system, state))
@@ -70,7 +70,12 @@ def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJ
 
 
 def _findings(
-    one: Asked, answer: Answer, asked: Sequence[Asked], p: Problem, expected: Any, allowed: float
+    one: Exchange,
+    answer: Answer,
+    asked: Sequence[Exchange],
+    p: SpringProblem,
+    expected: Any,
+    allowed: float,
 ) -> list[Finding]:
     given = answer.values["forces"]
     if not np.isfinite(given).all():
@@ -86,7 +91,7 @@ def _findings(
     ]
 
 
-def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:
+def _formula(p: SpringProblem, given: Any, expected: Any, allowed: float) -> Finding:
     gap = np.abs(given - expected).max(axis=1)
     where, worst = int(gap.argmax()), float(gap.max())
     said = sentence(
@@ -98,7 +103,7 @@ def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:
     return laws.bounded("force formula", worst, allowed, "N", said, where)
 
 
-def _term(p: Problem, error: Any) -> Sentence:
+def _term(p: SpringProblem, error: Any) -> Sentence:
     """Return which term's force looks most like the error."""
     x, v = p.positions, p.velocities
     terms = (
@@ -115,7 +120,7 @@ def _term(p: Problem, error: Any) -> Sentence:
     return terms[best][1] if likeness[best] > 0.7 else sentence("(an error like no single term)")
 
 
-def _balance(p: Problem, given: Any, allowed: float) -> Finding:
+def _balance(p: SpringProblem, given: Any, allowed: float) -> Finding:
     """Springs and dampers pull both ends alike: the sum of forces is the weight."""
     gap = float(np.abs(given.sum(0) - p.constant.sum(0)).max())
     said = sentence("The sum of all forces is {gap:.2g} N off the weight.", gap=gap)
@@ -123,7 +128,7 @@ def _balance(p: Problem, given: Any, allowed: float) -> Finding:
 
 
 def _predict(faults: tuple[Option, ...], case: Case) -> Mapping[str, Any]:
-    return {"forces": all_forces(apply(faults, problem_of(case.inputs), Model())[0])}
+    return {"forces": all_forces(apply(faults, problem_of(case.inputs), StepModel())[0])}
 
 
 def variants() -> Iterator[Variant]:
@@ -141,7 +146,7 @@ def describe(keys: Sequence[str]) -> Sentence:
 
 
 def _diagnose(
-    asked: Sequence[Asked], judgements: Sequence[CaseJudgement], greeting: Greeting
+    asked: Sequence[Exchange], judgements: Sequence[CaseJudgement], greeting: Greeting
 ) -> Diagnosis:
     wrong = [one.verdict >= Verdict.WRONG for one in judgements]
     if not any(wrong):

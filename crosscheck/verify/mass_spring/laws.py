@@ -10,12 +10,12 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.judging import StepJudgement, judge_step
 
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import largest_gap
 from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
-from .model import Model
-from .problem import Problem, accelerations, damper_forces, frames, state_of, system_of
+from .model import StepModel
+from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of
 from .rounding import SOLVED, Rounding, apart, difference
 
 # Up to this share of what a step changes, an answer is called imprecise; beyond it is another step.
@@ -30,10 +30,10 @@ CONSISTENT = 0.1
 class Context:
     """What the laws of one answer need."""
 
-    problem: Problem
+    problem: SpringProblem
     answered: Mapping[str, Any]  # by the names of the outputs
     allowed: Rounding
-    model: Model  # the step that is declared, completed by what was inferred
+    model: StepModel  # the step that is declared, completed by what was inferred
     known: bool  # whether that model is declared or was recognised
     says: Sentence  # the model in words
     expected: Mapping[str, Any]  # its prediction, or {} if it has none
@@ -248,9 +248,9 @@ def consistency(one: Context) -> Finding | None:
     return bounded("consistency", gap, tolerance, "m/s²", said)
 
 
-def equal_requests(asked: Asked, allowed: Mapping[str, float]) -> Finding:
+def equal_requests(asked: Exchange, allowed: Mapping[str, float]) -> Finding:
     """Return how far two answers to one request are apart, in the outputs that are named."""
-    answer, again = asked.answer, asked.again
+    answer, again = asked.answer, asked.repeat
     if not isinstance(answer, Answer) or not isinstance(again, Answer):
         said = sentence("Asked a second time, it gave no answer.")
         return Finding("equal requests", Verdict.BROKEN, np.inf, 0.0, "", said)
@@ -269,7 +269,9 @@ def equal_requests(asked: Asked, allowed: Mapping[str, float]) -> Finding:
     return bounded("equal requests", gap, tolerance, "", said)
 
 
-def symmetry(asked: Asked, every: Sequence[Asked], allowed: Mapping[str, float]) -> Finding | None:
+def symmetry(
+    asked: Exchange, every: Sequence[Exchange], allowed: Mapping[str, float]
+) -> Finding | None:
     """Return how far the answer is from the transformed answer to the untransformed case."""
     facts = asked.case.facts
     base = next((one.answer for one in every if one.case.name == facts.get("of")), None)

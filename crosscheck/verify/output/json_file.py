@@ -48,7 +48,7 @@ def _task(task: TaskReport, say: Say) -> Record:
             for one in found.explanations
         ],
         "behaviour": _said(found.behaviour, say), "first_broken": _said(found.first_broken, say),
-        "hints": list(map(say, found.hints)), "tried": found.tried,
+        "hints": list(map(say, found.hints)), "tried": found.variant_count,
         "smallest_failure": task.smallest_failure.case.name if task.smallest_failure else None,
         "cases": [_case(one, say) for one in task.judgements],
     }  # fmt: skip
@@ -77,5 +77,5 @@ def _case(one: CaseJudgement, say: Say) -> Record:
 def _finding(one: Finding, say: Say) -> Record:
     return {
         "law": one.law, "verdict": _name(one), "error": one.error, "tolerance": one.tolerance,
-        "unit": one.unit, "text": say(one.sentence), "where": one.where,
+        "unit": one.unit, "text": say(one.sentence), "where": one.index,
     }  # fmt: skip

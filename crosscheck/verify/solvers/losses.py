@@ -27,7 +27,7 @@ _SIGNALS: Mapping[int, Sentence] = {
 }
 
 
-class Limits(NamedTuple):
+class ProcessLimits(NamedTuple):
     """What a program may take.
 
     Attributes:
@@ -47,7 +47,7 @@ class Limits(NamedTuple):
     prints: int = 10_000
 
 
-LIMITS = Limits()
+LIMITS = ProcessLimits()
 
 
 class FailureError(Exception):
@@ -86,7 +86,9 @@ _WORDS = {
 }
 
 
-def failure_of(loss: Loss, process: ChildProcess, limits: Limits, patience: float) -> FailureError:
+def failure_of(
+    loss: Loss, process: ChildProcess, limits: ProcessLimits, patience: float
+) -> FailureError:
     """Return why a process was lost, after so much patience [s]."""
     part = process.partial[-400:] if loss is Loss.CUT else process.partial[:400]
     values = {

@@ -399,7 +399,7 @@ def test_the_rest_of_the_cases_goes_on(start, monkeypatch):
     contestant.close()
     kinds = [type(question.answer) for question in judged]
     assert kinds == [Answer, Failure, Answer, Failure, Answer]
-    assert [type(question.again) for question in judged] == kinds
+    assert [type(question.repeat) for question in judged] == kinds
     assert [str(one) for one in contestant.remarks] == ["It does not leave when its input ends."]
 
 

@@ -115,7 +115,7 @@ def test_a_law_is_kept_to_rounding(case, name, precision):
     for share, expected in ((0.5, RIGHT), (2.0, verdict)):
         found = findings(case, precision, **change(case, share * 5 * 16.0 * EPSILON[precision]))
         assert found[law].verdict is expected
-        assert found[law].where == where
+        assert found[law].index == where
         others = {"root in place", "link lengths", "branches", "unit quaternions"} - {law}
         assert {found[other].verdict for other in others} == {RIGHT}
 
@@ -132,7 +132,7 @@ def test_positions_are_where_the_rotations_put_them_to_rounding(
     gap = roundings * 5 * 16.0 * EPSILON[precision] * SIZE + dead_angles * DEAD[precision] * REACH
     found = findings(case, precision, positions=moved(4, [0.0, 0.0, gap]))
     assert found["rotations agree with positions"].verdict is verdict
-    assert found["rotations agree with positions"].where == 4
+    assert found["rotations agree with positions"].index == 4
 
 
 def test_what_lacks_numbers_is_judged_where_it_has_some(case):
@@ -143,7 +143,7 @@ def test_what_lacks_numbers_is_judged_where_it_has_some(case):
         posed = pose_laws.understood({"local_rotations": local}, case.inputs, case.facts)
         assert posed.finite is placed
         (found,) = pose_laws.all_of(posed, case, GREETING)
-        assert (found.law, found.verdict, found.where) == ("numbers", Verdict.BROKEN, joint)
+        assert (found.law, found.verdict, found.index) == ("numbers", Verdict.BROKEN, joint)
 
 
 # ---- targets and claims

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.engines import MujocoRobot
-from plumbob.crosscheck.verify.contestant import Answer, Asked
+from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
@@ -35,7 +35,7 @@ def misled(case, key):
         target = rotation.multiply(target, rotation.random(np.random.default_rng(3)))
     inputs |= {"target_position": pose.positions, "target_rotation": target}
     answer = Answer({"q": q}, 0.0)
-    return Asked(replace(case, inputs=inputs), answer, answer)
+    return Exchange(replace(case, inputs=inputs), answer, answer)
 
 
 def judged(function):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Answer, Asked
+from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.explain import Match, Variant, _telling
 from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import (
@@ -79,7 +79,7 @@ def test_forces_are_those_of_the_formula_and_add_up_to_the_weight_to_rounding(
     given = expected.copy()
     given[1, 2] += share * allowed
     found = forces._formula(spring, given, expected, allowed)
-    assert (found.verdict, found.where) == (verdict, 1)
+    assert (found.verdict, found.index) == (verdict, 1)
     given = expected.copy()
     given[:, 1] += share * allowed * np.sqrt(2.0)
     assert forces._balance(spring, given, allowed).verdict is verdict
@@ -176,7 +176,7 @@ def test_a_single_frame_that_breaks_a_law_breaks_it(motion, frame):
     lengthened[frame, -1] += 1e-6
     findings = []
     for x in (positions, lengthened):
-        asked = Asked(case, Answer({"positions": x}, 0.0), Answer({"positions": x}, 0.0))
+        asked = Exchange(case, Answer({"positions": x}, 0.0), Answer({"positions": x}, 0.0))
         poses = track.frames_of(asked)
         findings.append(by_law(track._frame_laws(poses, Greeting(1, ("track",)))))
     assert findings[0]["link lengths"].verdict is RIGHT
@@ -190,10 +190,10 @@ def test_a_joint_that_moves_more_than_a_metre_in_a_frame_has_jumped(motion, dist
     case, positions = motion
     moved = np.repeat(positions[:1], len(positions), axis=0)
     moved[5:, 2, 1] += distance
-    asked = Asked(case, Answer({"positions": moved}, 0.0), None)
+    asked = Exchange(case, Answer({"positions": moved}, 0.0), None)
     poses = [posed for _, posed in track.frames_of(asked)]
     (found,) = track._continuity(poses)
-    assert (found.verdict, found.where) == (verdict, 2)
+    assert (found.verdict, found.index) == (verdict, 2)
     assert found.error == pytest.approx(distance)
 
 
@@ -217,7 +217,7 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
     q = robot.inputs["start"].copy()
     q[3] = robot.inputs[side][3] + sign * share * 16 * EPSILON * 2.4
     (found, *_) = robot_inverse_kinematics._findings(robot, ROBOTS, {"q": q})
-    assert (found.law, found.verdict, found.where) == ("limits kept", verdict, 3)
+    assert (found.law, found.verdict, found.index) == ("limits kept", verdict, 3)
 
 
 @pytest.mark.parametrize(
@@ -288,10 +288,10 @@ def test_the_least_precise_output_is_what_all_answers_are_judged_by(rng, single)
     case = Case("", "mass_spring_step", {"positions": rng.standard_normal(30)}, "", sentence(""))
     answer = {name: rng.standard_normal(30) for name in ("positions", "velocities")}
     greeting = Greeting(1, ("mass_spring_step",))
-    whole = Asked(case, Answer(answer, 0.0), None)
+    whole = Exchange(case, Answer(answer, 0.0), None)
     assert judging_greeting([whole], greeting) == (greeting, None)
     answer = answer | {single: answer[single].astype(np.float32).astype(float)}
-    coarse, reason = judging_greeting([Asked(case, Answer(answer, 0.0), None)], greeting)
+    coarse, reason = judging_greeting([Exchange(case, Answer(answer, 0.0), None)], greeting)
     assert coarse.epsilon == pytest.approx(2.0**-23, rel=0.1)
     assert reason is AS_SINGLE
 
