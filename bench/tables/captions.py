@@ -38,7 +38,9 @@ class Captions:
         """
         texts = {**self._tables[name]}
         how = texts.pop("measured")
-        captions = {key: _on_one_line(text, self._constants) for key, text in texts.items()}
+        captions: dict[str, Any] = {
+            key: _on_one_line(text, self._constants) for key, text in texts.items()
+        }
         if name in self._columns[0]:
             captions["columns"] = self.columns(name)
         names = {field for _, field, _, _ in Formatter().parse(how) if field}

@@ -121,7 +121,7 @@ def _steps_of(count: int) -> str:
 
 def _swing(record: Record) -> Row:
     solved = [outcome for outcome in Outcome if outcome.solved]
-    cells = {"converged steps": metrics.share(np.isin(record.values.outcome, solved))}
+    cells: Row = {"converged steps": metrics.share(np.isin(record.values.outcome, solved))}
     for title, name in (("iterations", "iterations"), ("residual", "residual")):
         median, _, largest = spread_of(record, name)
         cells |= {f"{title} of converged steps, median": median}

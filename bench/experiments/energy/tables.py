@@ -33,7 +33,7 @@ def energy_chart(results: Results) -> Sketch | None:
             "same method.",
             tuple(panels),
             Axis("time [s]", limits=(0, None)),
-            Axis("energy above rest, relative to the start", limits=(0, None)),
+            Axis("relative energy above rest", limits=(0, None)),
             columns=2,
             better=GREATER,
             entrants=results.entrants,

@@ -105,14 +105,14 @@ def _rows(subject: str, results: Results) -> list[Row]:
 def _row(record: Record, compiled: Record | None, copy: Record | None) -> Row:
     median, low, high, rounds, interval = metrics.timing(record.values.seconds)
     half = (interval.high - interval.low) / (2.0 * median)
-    is_rival = compiled is not None and compiled is not record
+    baseline = None if compiled in (None, record) else compiled
     row = {
         "record": record,
         "work": record.title,
         "implementation": record.solver,
         "median": median,
         "95 % interval of the median, ±": None if math.isnan(half) else half,
-        "relative to compiled": metrics.ratio(median, median_time(compiled)) if is_rival else None,
+        "relative to compiled": baseline and metrics.ratio(median, median_time(baseline)),
         "remark": "noisy" if record.details.noise > PRECISION else "",
         "10th percentile": low,
         "90th percentile": high,
