@@ -17,7 +17,8 @@ from plumbob.bench.experiments.robots.tables import (
 )
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.tables.results import Results
-from plumbob.bench.tables.table import best_cells, markdown
+from plumbob.bench.tables.table import best_cells
+from plumbob.bench.tables.writers import markdown
 
 ONE, AGAIN = "one start", "restarts"
 MANY = 120
