@@ -95,7 +95,7 @@ INTERNAL = {
     "reference.backend.compiled.bind": "for kernels",
     "reference.backend.compiled.compiled_in": "for kernels",
     "reference.backend.threads.in_slices": "for kernels",
-    "crosscheck.verdict.Verdict": "made only by check_claim",
+    "crosscheck.verdict.ClaimVerdict": "made only by check_claim",
     "crosscheck.verdict.Claim": "made by claims",
     "crosscheck.samples.generator": "of names in the sources",
     "crosscheck.samples.particles": "of a case that is checked already",
@@ -733,7 +733,7 @@ def _files():
 
     pose = {name: moved[name] for name in ("skeleton", "local_rotations", "offsets")}
     return {
-        f + "bvh.motion.Motion.pose": Call(posed, pose),
+        f + "bvh.reader.Motion.pose": Call(posed, pose),
         f + "bvh.reader.read": named(bvh.read, text),
         f + "bvh.reader.parse": Call(bvh.parse, {"text": text}, names="BVH"),
         f + "bvh.writer.format": Call(bvh.format, moved, free="local_rotations"),

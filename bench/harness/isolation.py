@@ -143,7 +143,7 @@ def _received(worker: ChildProcess, patience: float) -> Message:
     except LostError as error:
         if error.loss in SILENT:
             return Lost(f"ended after {patience:g} s of silence", silent=True)
-        if error.loss in (Loss.ENDED, Loss.CUT):
+        if error.loss in (Loss.ENDED, Loss.TRUNCATED):
             was = "was " if worker.code < 0 else ""
             return Lost(f"its process {was}ended {worker.ending}")
         message = None

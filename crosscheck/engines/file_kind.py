@@ -20,8 +20,7 @@ XML = (".xml", ".mjcf")
 def xml_root(path: Path) -> ElementTree.Element:
     """Return the root element of an XML file; white space before the declaration is allowed.
 
-    Raises:
-        ValueError: if it cannot be opened, or is not well-formed.
+    Raise a ValueError if it cannot be opened, or is not well-formed.
     """
     try:
         return ElementTree.fromstring(read_bytes(path).lstrip())
@@ -33,17 +32,14 @@ def file_kind(path: Path) -> str:
     """Return URDF, MJCF, BVH or FRAGMENT, or "" for other formats.
 
     An MJCF file without <worldbody> and <include> is a fragment; a <robot> without a <link> is
-    another format.
-
-    Raises:
-        ValueError: if it cannot be read.
+    another format. Raise a ValueError if it cannot be read.
     """
     suffix = path.suffix.lower()
     if suffix in BY_SUFFIX or suffix not in XML:
         return BY_SUFFIX.get(suffix, "")
     text = read_bytes(path).decode(errors="replace").removeprefix("\ufeff")
-    found = FIRST.match(text)
-    kind = BY_ROOT.get(found[1], "") if found else ""
+    root = FIRST.match(text)
+    kind = BY_ROOT.get(root[1], "") if root else ""
     if kind == MJCF and not ("<worldbody" in text or "<include" in text):
         return FRAGMENT
     return "" if kind == URDF and "<link" not in text else kind

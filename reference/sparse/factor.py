@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from ..arguments import FLOAT64, FloatArray, floats, instance, shape, shown
 from ..backend.compiled import Kernel
-from .analysis import analyse
 from .dissection import Graph
 from .multifrontal import factorize
+from .symbolic import analyse
 from .triangular import REGISTER, RIGHT_HAND_SIDES, solve
 
 
@@ -18,18 +18,17 @@ class NotPositiveDefiniteError(ValueError):
     """The matrix has no Cholesky factor: it is indefinite, singular or not finite."""
 
 
-class Pattern:
+class SymbolicFactor:
     """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
 
     def __init__(self, indptr: Any, indices: Any) -> None:
         """Order the columns and find the pattern of L.
 
-        Raises:
-            ValueError: if the pattern is not symmetric.
+        Raise a ValueError if the pattern is not symmetric.
         """
         n = len(indptr) - 1
-        ones = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
-        if (ones != ones.T).nnz:
+        pattern = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
+        if (pattern != pattern.T).nnz:
             raise ValueError("matrix: expected both triangles with the same pattern")
         self.graph = Graph(indptr, indices)
         self.order, self.place, self.blocks, self.family = _analyse(
@@ -38,15 +37,13 @@ class Pattern:
 
     def fits(self, indptr: Any, indices: Any) -> bool:
         """Return whether the pattern is the same."""
-        return np.array_equal(indptr, self.graph.indptr) and np.array_equal(
-            indices, self.graph.indices
-        )
+        return all(map(np.array_equal, self.graph, (indptr, indices)))
 
 
 class CholeskyFactor:
     """P A P' = L L', L in supernodes."""
 
-    def __init__(self, matrix: Any, pattern: Pattern | None = None) -> None:
+    def __init__(self, matrix: Any, pattern: SymbolicFactor | None = None) -> None:
         """Factorise a sparse symmetric matrix, both triangles given.
 
         `pattern` is the analysis of an earlier matrix; it is used if the matrix has that pattern.
@@ -60,8 +57,10 @@ class CholeskyFactor:
             columns = columns.copy()
             columns.sum_duplicates()
         indptr, indices = columns.indptr.astype(np.int32), columns.indices.astype(np.int32)
-        if pattern is None or not instance("pattern", pattern, Pattern).fits(indptr, indices):
-            pattern = Pattern(indptr, indices)
+        if pattern is None or not instance("pattern", pattern, SymbolicFactor).fits(
+            indptr, indices
+        ):
+            pattern = SymbolicFactor(indptr, indices)
         self.pattern = pattern
         self._values = np.empty(pattern.family.entries)
         self._spare: list[FloatArray] = []  # workspaces for the unknowns, one a thread
@@ -78,22 +77,20 @@ class CholeskyFactor:
 
     @property
     def entries(self) -> int:
-        """How many entries of L are stored."""
+        """The number of stored entries of L."""
         return len(self._values)
 
     def refactorize(self, matrix: Any) -> "CholeskyFactor":
-        """Return the factor of another matrix, with this one's analysis if the pattern is the same.
+        """Return the factor of another matrix, with the same analysis if the pattern is the same.
 
-        Raises:
-            NotPositiveDefiniteError: if the matrix is not positive definite.
+        Raise a NotPositiveDefiniteError if the matrix is not positive definite.
         """
         return CholeskyFactor(matrix, self.pattern)
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side).
 
-        Raises:
-            ValueError: if b has another shape or is not numeric.
+        Raise a ValueError if b has another shape or is not numeric.
         """
         n, pattern = len(self.pattern.order), self.pattern
         if type(b) is not np.ndarray or b.dtype != FLOAT64 or not b.flags.carray:
@@ -128,11 +125,7 @@ class CholeskyFactor:
 
 
 def square(matrix: Any) -> Any:
-    """Return a matrix that is sparse, square and real.
-
-    Raises:
-        ValueError: if it is not.
-    """
+    """Return a matrix that is sparse, square and real; raise a ValueError if it is not."""
     if not scipy.sparse.issparse(matrix):
         raise ValueError(f"matrix: expected a square sparse matrix, got {shown(matrix)}")
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.dtype.kind not in "fiu":
@@ -142,16 +135,15 @@ def square(matrix: Any) -> Any:
 
 
 def right_sides(b: ArrayLike, n: int) -> FloatArray:
-    """Return right-hand sides, (n,) or (n, right-hand side), whatever numbers they hold.
+    """Return right-hand sides, (n,) or (n, right-hand side), as floats.
 
-    Raises:
-        ValueError: if they are no numbers or have another shape.
+    Raise a ValueError if they are no numbers or have another shape.
     """
-    given = floats("b", b, "...")
-    if given.ndim not in (1, 2) or len(given) != n:
-        got = shape(given.shape)
+    columns = floats("b", b, "...")
+    if columns.ndim not in (1, 2) or len(columns) != n:
+        got = shape(columns.shape)
         raise ValueError(f"b: expected shape ({n},) or ({n}, right-hand side), got {got}")
-    return given
+    return columns
 
 
 _analyse = Kernel(analyse, label="the analysis of sparse matrices")

@@ -1,7 +1,7 @@
 """Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
 
-Three solvers stand behind one interface: our own `cholesky`, the default, CHOLMOD through cholespy
-where that is installed, and SciPy's SuperLU. cholespy prints a warning at an indefinite matrix.
+Three solvers have the same interface: our own `CholeskyFactor`, the default, CHOLMOD through
+cholespy where that is installed, and SciPy's SuperLU. cholespy warns of an indefinite matrix.
 """
 
 from collections.abc import Callable
@@ -24,8 +24,7 @@ class Factor(Protocol):
     def refactorize(self, matrix: Any) -> "Factor":
         """Return the factor of another matrix, quicker where its pattern is the same.
 
-        Raises:
-            NotPositiveDefiniteError: if the matrix is not positive definite.
+        Raise a NotPositiveDefiniteError if the matrix is not positive definite.
         """
 
 
@@ -63,7 +62,7 @@ class SuperLUFactor:
 
     @property
     def entries(self) -> int:
-        """How many entries of L are stored."""
+        """The number of stored entries of L."""
         return self._lu.L.nnz
 
     def solve(self, b: FloatArray) -> FloatArray:

@@ -14,14 +14,15 @@ import numpy as np
 
 from ..arguments import FloatArray, IndexArray
 from ..articulation import FREEDOMS
+from ..inverse_kinematics.box_step import fill_errors, fill_jacobian
 from ..inverse_kinematics.mechanism import (
     LEVER,
     effector_position,
     new_data,
     update_forward_kinematics,
 )
-from ..inverse_kinematics.task_jacobian import fill_errors, fill_jacobian
-from ..motion_subspace import motion, velocity_at
+from ..inverse_kinematics.restarts import copy_row
+from ..jacobians import motion, velocity_at
 from ..quaternion import add, cross, dot, load_vector, scale, store_vector, subtract
 
 
@@ -36,21 +37,13 @@ class Motions(NamedTuple):
     moments: FloatArray
 
 
-def new_motions(joints):
-    """Return motions to be filled."""
-    count = 0
-    for j in range(len(joints)):
-        count += FREEDOMS[joints["kind"][j]]
-    owners = np.empty((count, 2), dtype=np.int64)
-    return Motions(owners, np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)))
-
-
 def fill_errors_and_jacobians(problem, q, e, J):
     """Fill errors e [m], (frame, equation), and J = -de/dq, (frame, equation, freedom)."""
     mechanism, targets = problem.mechanism, problem.targets
     data = new_data(mechanism)
     for f in range(len(q)):
-        set_frame(mechanism, q[f], data)
+        copy_row(q[f], data.q)
+        update_forward_kinematics(mechanism, data)
         fill_errors(mechanism, targets[f], data, e[f])
         fill_jacobian(mechanism, targets[f], data, J[f].T)
 
@@ -58,20 +51,16 @@ def fill_errors_and_jacobians(problem, q, e, J):
 def subtract_second_derivatives(problem, q, m, diagonal):
     """Subtract m, (frame, equation), times the second derivatives of the effectors."""
     mechanism = problem.mechanism
-    data, motions = new_data(mechanism), new_motions(mechanism.joints)
+    data, count = new_data(mechanism), FREEDOMS[mechanism.joints["kind"]].sum()
+    angular, linear, moments = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    motions = Motions(np.empty((count, 2), dtype=np.int64), angular, linear, moments)
     for f in range(len(q)):
-        set_frame(mechanism, q[f], data)
+        copy_row(q[f], data.q)
+        update_forward_kinematics(mechanism, data)
         fill_motions(mechanism, data, motions)
         for e in range(len(mechanism.effectors)):
             fill_moments(mechanism, problem.targets[f], data, motions, m[f], e)
             subtract_effector(mechanism, motions, e, diagonal[f])
-
-
-def set_frame(mechanism, q, data):
-    """Compute the forward kinematics of one frame."""
-    for c in range(len(q)):
-        data.q[c] = q[c]
-    update_forward_kinematics(mechanism, data)
 
 
 def fill_motions(mechanism, data, motions):
@@ -90,20 +79,16 @@ def fill_moments(mechanism, target, data, motions, m, e):
     """Fill the moments of all motions for an effector."""
     effectors = mechanism.effectors
     row, root = effectors["row"][e], np.sqrt(target["weight"][e])
-    force, x = scale(root, vector_from(m, row)), effector_position(mechanism, data, e)
+    force, x = scale(root, (m[row], m[row + 1], m[row + 2])), effector_position(mechanism, data, e)
     for b in range(len(motions.owners)):
         angular, linear = load_vector(motions.angular, b), load_vector(motions.linear, b)
         arm = subtract(x, load_vector(data.positions, motions.owners[b, 0]))
         moment = cross(velocity_at(angular, linear, arm), force)
         if effectors["oriented"][e]:
             lever = 0.5 * root * LEVER * mechanism.reach
-            moment = add(moment, cross(angular, scale(lever, vector_from(m, row + 3))))
+            torque = scale(lever, (m[row + 3], m[row + 4], m[row + 5]))
+            moment = add(moment, cross(angular, torque))
         store_vector(motions.moments, b, moment)
-
-
-def vector_from(m, i):
-    """Return three entries from the i-th on."""
-    return m[i], m[i + 1], m[i + 2]
 
 
 def subtract_effector(mechanism, motions, e, diagonal):
@@ -117,14 +102,9 @@ def subtract_effector(mechanism, motions, e, diagonal):
             above, i = owners[a]
             if mechanism.moves[above, e]:
                 second = dot(load_vector(angular, a), load_vector(moments, b))
-                if above == j and is_rotation(motions, a):
+                rotates = dot(load_vector(angular, a), load_vector(angular, a)) > 0.0
+                if above == j and rotates:
                     second = 0.5 * (second + dot(load_vector(angular, b), load_vector(moments, a)))
                 diagonal[i, k] -= second
                 if a != b:
                     diagonal[k, i] -= second
-
-
-def is_rotation(motions, a):
-    """Return whether a motion is a rotation."""
-    x, y, z = load_vector(motions.angular, a)
-    return x != 0.0 or y != 0.0 or z != 0.0

@@ -18,23 +18,19 @@ from plumbob.reference import (
 )
 from plumbob.reference.formats import urdf
 from plumbob.reference.implicit_euler.certificate import Certificate, Coverage
-from plumbob.reference.inverse_kinematics.box_step import (
-    activate_limits,
-    new_task_system,
-    take_step,
-)
+from plumbob.reference.inverse_kinematics.box_step import activate_limits, take_step
 from plumbob.reference.inverse_kinematics.mechanism import new_data
 from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.restarts import (
     COST,
     GIVEN_UP,
-    SETTLED,
+    STALLED,
     STATE,
     WAIT,
     Limits,
     most_promising,
 )
-from plumbob.reference.inverse_kinematics.solve_mechanism import mechanism_criteria
+from plumbob.reference.inverse_kinematics.solve_mechanism import mechanism_criteria, new_workspace
 from plumbob.reference.judging import judge_pose
 
 # ---- limits
@@ -48,7 +44,7 @@ def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_ci
     arm = Articulation(chain, ["hinge", "hinge", "fixed"], lower=-4.0, upper=4.0, mimics=mimics)
     mechanism = prepare(arm, (2,), (False,)).mechanism
     for step, expected in ((0.3, end), (-7.8, -3.9)):
-        data, system = new_data(mechanism), new_task_system(mechanism)
+        data, system = new_data(mechanism), new_workspace(mechanism).system
         data.q[:], system.step[:], system.J[:], system.e[:] = 0.0, 0.0, 1.0, 0.0
         system.active[:] = 0.0
         data.q[0], system.step[0] = 3.9, step
@@ -62,13 +58,13 @@ def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_ci
 
 def test_of_attempts_given_up_the_least_patient_goes_on_and_then_the_nearest():
     progress = np.empty((6, WAIT + 1))
-    progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, SETTLED, GIVEN_UP, GIVEN_UP
+    progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, STALLED, GIVEN_UP, GIVEN_UP
     progress[:, WAIT] = 12.0, 3.0, 3.0, 3.0, 3.0, 0.0
     progress[:, COST] = 0.1, 0.5, 0.3, 0.2, 0.4, 0.0
     order = []
     while (k := most_promising(progress)) >= 0:
         order.append(k)
-        progress[k, STATE] = SETTLED
+        progress[k, STATE] = STALLED
     assert order == [2, 4, 1, 0]
 
 

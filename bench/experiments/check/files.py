@@ -7,13 +7,21 @@ from typing import NamedTuple
 
 from plumbob.crosscheck.engines.file_kind import FRAGMENT
 from plumbob.crosscheck.robots import files
-from plumbob.crosscheck.robots.files import AGREES, DIFFERS, ENGINES, Checked, Found, Reading
+from plumbob.crosscheck.robots.files import (
+    AGREES,
+    DIFFERS,
+    ENGINES,
+    CheckedFile,
+    FileReading,
+    FileSelection,
+)
 
 from ...tables.columns import text
 from ...tables.table import Column, Summary, Table, cells, words
 
 # Outcomes by which files are counted; the first two are shown even where there are none.
-OUTCOMES = (AGREES, DIFFERS, files.DEVIATES, files.UNREAD, files.REFUSED, files.NEITHER, files.LOST)
+READ = (AGREES, DIFFERS, files.DEVIATES)
+OUTCOMES = (*READ, files.UNREAD, files.REFUSED, files.NEITHER, files.CRASHED)
 SHOWS = (
     "Differences are the largest in random configurations, or frames: of positions and linear "
     "velocities over the extent of the links, of rotation matrices and angular velocities."
@@ -33,10 +41,10 @@ class FileGroup(NamedTuple):
 
     kind: str
     engine: str
-    readings: list[Reading]
+    readings: list[FileReading]
 
 
-def report(scan: Found, checked: Sequence[Checked]) -> FileReport:
+def report(scan: FileSelection, checked: Sequence[CheckedFile]) -> FileReport:
     """Return the tables of files that were checked."""
     groups = [
         FileGroup(kind, engine, readings)
@@ -58,7 +66,7 @@ def report(scan: Found, checked: Sequence[Checked]) -> FileReport:
     return FileReport(table, _summary(groups, {*outcomes}, summary), disagreements)
 
 
-def _readings(kind: str, engine: str, checked: Sequence[Checked]) -> list[Reading]:
+def _readings(kind: str, engine: str, checked: Sequence[CheckedFile]) -> list[FileReading]:
     of_kind = [r for file in checked if file.file.kind == kind for r in file.readings]
     return [reading for reading in of_kind if reading.engine == engine]
 
@@ -80,7 +88,7 @@ def _summary(groups: Sequence[FileGroup], outcomes: set[str], summary: Summary) 
     return Table("summary", title, columns, cells(columns, groups), summary=summary)
 
 
-def _outcome(engine: str, checked: Checked) -> str | None:
+def _outcome(engine: str, checked: CheckedFile) -> str | None:
     """Return the outcome of an engine's reading, with the difference; None without a reading."""
     reading = next((r for r in checked.readings if r.engine == engine), None)
     if reading is None or reading.difference is None:
@@ -93,19 +101,19 @@ def _largest_difference(group: FileGroup) -> float | None:
     return max((r.difference or 0.0 for r in group.readings if r.outcome == AGREES), default=None)
 
 
-def _name(checked: Checked) -> str:
+def _name(checked: CheckedFile) -> str:
     root = checked.file.root
     return (Path(root.resolve().name) / checked.file.path.relative_to(root)).as_posix()
 
 
-def _points(checked: Checked) -> Iterator[str]:
+def _points(checked: CheckedFile) -> Iterator[str]:
     """Return the reasons and notes that a file's row has no space for."""
     reasons = [f"{r.engine}: {r.outcome}: {r.why}" for r in checked.readings if r.why]
     notes = dict.fromkeys(note for reading in checked.readings for note in reading.notes)
     return (f"{_name(checked)}: {sentence}" for sentence in (*reasons, *notes))
 
 
-def _sentence(scan: Found, checked: Sequence[Checked], disagreements: int) -> str:
+def _sentence(scan: FileSelection, checked: Sequence[CheckedFile], disagreements: int) -> str:
     def counted(count: int, singular: str, plural: str) -> str:
         return f"{count:,} {singular if count == 1 else plural}"
 
@@ -115,7 +123,7 @@ def _sentence(scan: Found, checked: Sequence[Checked], disagreements: int) -> st
     silent = f", {counted(unread, 'is', 'are')} read by none" if unread else ""
     differ = counted(disagreements, "reading disagrees", "readings disagree")
     parts = counted(fragments, "is a part", "are parts")
-    ignored = counted(scan.others, "XML file is", "XML files are")
+    ignored = counted(scan.ignored, "XML file is", "XML files are")
     return (
         f"Of {len(checked) - fragments:,} files {differ if disagreements else 'nothing disagrees'}"
         f"{silent}; {parts} that others include, {ignored} of other kinds"

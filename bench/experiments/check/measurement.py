@@ -12,7 +12,7 @@ from .values import ClaimValues
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every claim, whose number of cases is the same at every scale."""
     for claim in CLAIMS.values():
-        yield Block("check", claim.name, claim.theirs, partial(evaluate, claim.name))
+        yield Block("check", claim.name, claim.counterpart, partial(evaluate, claim.name))
 
 
 def evaluate(name: str) -> Measured:
@@ -20,5 +20,5 @@ def evaluate(name: str) -> Measured:
     (verdict,) = run_claims([name])
     claim = verdict.claim
     numbers = (verdict.cases, verdict.difference, claim.tolerance.value, verdict.displacement)
-    notes = {"ours": claim.ours, "reason": claim.tolerance.reason, "missed": verdict.failure}
+    notes = {"ours": claim.quantity, "reason": claim.tolerance.reason, "missed": verdict.failure}
     return Measured(ClaimValues(*numbers, verdict.holds), notes)
