@@ -18,7 +18,7 @@ class OwnTime(NamedTuple):
     doubt: str = ""
 
     @property
-    def at_door(self) -> float:
+    def overhead(self) -> float:
         """What requests have cost beside the solver [s], which is charged to no budget."""
         return max(0.0, self.round_trip - self.seconds)
 

@@ -12,9 +12,9 @@ from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots.tables import outcomes
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
-from plumbob.bench.harness.job import AGAIN, Job
+from plumbob.bench.harness.job import REPEATS, Job
 from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
+from plumbob.bench.harness.worker import Finished, Ready, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
@@ -173,7 +173,7 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
     messages(targets, "slow", at=1)
     setup, warm, *each = counts
     assert (setup, warm) == (0, 0)
-    assert each == [1, 1 + AGAIN, 1, 1 + AGAIN]
+    assert each == [1, 1 + REPEATS, 1, 1 + REPEATS]
 
 
 @pytest.mark.parametrize("again", [1, 7])
@@ -185,7 +185,7 @@ def test_the_answers_are_the_same_however_often_a_quick_solve_is_made_again(
 
     def answers(quick, again):
         monkeypatch.setattr("plumbob.bench.harness.job.QUICK", quick)
-        monkeypatch.setattr("plumbob.bench.harness.job.AGAIN", again)
+        monkeypatch.setattr("plumbob.bench.harness.job.REPEATS", again)
         said = messages(targets, manner, restarts=restarts)
         return np.array([one.q for one in said if isinstance(one, Solved)])
 
@@ -208,7 +208,7 @@ def messages(targets, manner, **more):
 
 def test_the_worker_says_when_it_is_ready_each_target_and_the_end(targets):
     said = messages(targets, "perfect")
-    assert [type(message) for message in said] == [Ready, *[Solved] * COUNT, Done]
+    assert [type(message) for message in said] == [Ready, *[Solved] * COUNT, Finished]
 
 
 def test_one_that_raises_loses_one_target_and_says_why(targets):
@@ -224,8 +224,8 @@ def test_one_that_raises_loses_one_target_and_says_why(targets):
 )
 def test_one_that_cannot_be_set_up_says_why(targets, manner, why):
     (said,) = messages(targets, manner)
-    assert isinstance(said, Unfit)
-    assert said.why.startswith(why)
+    assert isinstance(said, Finished)
+    assert said.trouble.startswith(why)
 
 
 @pytest.mark.parametrize(
@@ -249,7 +249,7 @@ def test_an_answer_of_another_shape_is_none(targets):
 
 def test_a_solver_without_time_left_begins_no_further_target(targets):
     said = messages(targets, "slow", at=0, budget=0.2)
-    assert [type(message) for message in said] == [Ready, Solved, Done]
+    assert [type(message) for message in said] == [Ready, Solved, Finished]
 
 
 class Attempts:

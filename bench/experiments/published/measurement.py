@@ -57,7 +57,7 @@ def _toolbox() -> Iterator[tuple[Peer, PeerEntry, float | None]]:
     """Yield what makes one search, and the rate of infeasible targets that was published."""
     ours, toolbox = registry.PLUMBOB_LM, registry.TOOLBOX
     once, iterations = ours.entry(ONE_START), {"iterations": published.TOOLBOX_ITERATIONS}
-    yield ours, once._replace(settings={**once.settings, **iterations}), None
+    yield ours, replace(once, settings={**once.settings, **iterations}), None
     for search in published.TOOLBOX if toolbox.is_installed else ():
         settings = {**search.settings, "searches": 1, "limits": False, **iterations}
         yield toolbox, PeerEntry(ONE_START, settings, note=search.title), search.infeasible
