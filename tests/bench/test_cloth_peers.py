@@ -483,7 +483,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
     class Silent:
         def perform(self, job):
             tried.append(job)
-            return Outcome(0.0, [], "ended after 300 s of silence", silent=True)
+            return Outcome(0.0, [], "ended after 300 s of silence", is_silent=True)
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
