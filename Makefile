@@ -5,6 +5,7 @@
 # make lint     ruff and mypy
 # make bench    every benchmark at full length, then the report
 # make sample   every benchmark, quick, with every peer, as docs/sample
+# make docs     the documentation, as a site in build/docs that works offline
 # make drawing  draw the pictures of docs/ anew, the architecture's from the imports
 # make messages renew the translations of `plumbob verify` from its sentences
 # make locks    renew the lock files after a change of pyproject.toml; UPGRADE=--upgrade
@@ -26,7 +27,7 @@ PARALLEL = -n auto --dist worksteal
 UV ?= build/uv/bin/uv
 export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: help report test test-all peers lint bench sample drawing messages locks wheels test-pythons test-lowest clean
+.PHONY: help report test test-all peers lint bench sample docs drawing messages locks wheels test-pythons test-lowest clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' $(MAKEFILE_LIST)
@@ -55,6 +56,9 @@ sample: .venv/peers/installed
 	$(BIN)/plumbob bench --quick --output build/sample
 	$(BIN)/python docs/write_sample.py build/sample
 
+docs: .venv/docs-installed
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs build/docs
+
 drawing: .venv/installed
 	$(BIN)/python docs/draw_architecture.py
 	$(BIN)/python docs/draw_lab.py
@@ -72,6 +76,11 @@ messages: .venv/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 
+.venv/docs-installed: requirements-docs.lock .venv/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    --only-binary :all: --require-hashes -r requirements-docs.lock
+	@touch $@
+
 # PlaCo's wheels pin a Pinocchio older than ours: it has an environment of its own.
 .venv/peers/installed: requirements-peers.lock requirements-placo.lock .venv/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
@@ -87,6 +96,7 @@ COMPILE = $(UV) pip compile pyproject.toml $(PINS)
 
 locks: $(UV)
 	$(COMPILE) --extra robots --extra fast --extra test -o requirements.lock
+	$(COMPILE) --extra docs -c requirements.lock -o requirements-docs.lock
 	$(COMPILE) --all-extras -c requirements.lock -o requirements-peers.lock
 	$(UV) pip compile --group pyproject.toml:placo $(PINS) -o requirements-placo.lock
 

@@ -24,6 +24,7 @@ PLATFORMS = ("x86_64-manylinux_2_28", "aarch64-manylinux_2_28", "aarch64-apple-d
 LATER = ("x86_64-manylinux_2_35", "aarch64-manylinux_2_35", "aarch64-apple-darwin")
 LOCKS = {
     LOCK: PLATFORMS,
+    ROOT / "requirements-docs.lock": PLATFORMS,
     ROOT / "requirements-peers.lock": LATER,
     ROOT / "requirements-placo.lock": LATER,
 }

@@ -1,4 +1,4 @@
-"""A program in a process of its own: one that crashes, hangs or talks nonsense costs no other.
+"""A program in a process of its own: it may crash, hang or send garbage without harming others.
 
 Pipes are read and written as they allow, so that neither a program that does not read nor one that
 prints without end blocks anything. Memory is limited by watching what is resident: limits of the
@@ -27,20 +27,20 @@ from typing import Any, TypeVar
 
 from .process_tree import Process, carry, end_group, family, guard, new_marker
 
-Result = TypeVar("Result")
+CallResult = TypeVar("CallResult")
 
-# How often a process that lets one wait is looked at [s].
+# Period of the checks of a process while it is awaited [s].
 TICK = 0.05
-# How much of standard error is kept [B].
-STDERR_KEPT = 4096
+# Length of the end of standard error that is kept [B].
+STDERR_LENGTH = 4096
 # Below this share of a processor a program waits rather than computes.
 IDLE = 0.1
-# How long what closed one of its pipes may still take to answer, or to end [s].
-SHUT = 1.0
+# Time for a process that closed one of its pipes to answer, or to end [s].
+GRACE = 1.0
 _CHUNK = 1 << 18
-# A call may last so many times its limit of processor time: others may use the processor, too.
+# Limit of the duration of a call over its limit of processor time: the processor is shared.
 _WALL = 10
-# What a process may take to load and compile before its first call [s].
+# Limit of the time to load and compile before the first call [s].
 _START = 300.0
 # In safe-path mode (-P) nothing is imported from the working directory; our packages come from
 # where this file is, before any other that the path may lead to.
@@ -49,16 +49,16 @@ _PATH = "import sys; sys.path.insert(0, sys.argv[1]); "
 
 
 class Loss(Enum):
-    """Why a process is of no more use."""
+    """Why a process is lost."""
 
     ENDED = auto()
-    CUT = auto()  # it ended in the middle of a message
+    TRUNCATED = auto()  # it ended in the middle of a message
     CLOSED = auto()  # it closed its output, but runs on
-    GARBLED = auto()  # what it sent is no message
+    GARBLED = auto()  # its output is no message
     TOO_LONG = auto()  # a message without an end
     MEMORY = auto()
     PROCESSOR = auto()  # it took too much time of a processor
-    # Nothing came in time:
+    # No message came in time:
     DEAF = auto()  # it closed its input before it had read the request
     UNFINISHED = auto()  # it sent a part of a message
     UNREAD = auto()  # it did not read the whole request
@@ -66,23 +66,19 @@ class Loss(Enum):
     WAITING = auto()
 
 
-# No message came in time.
 SILENT = (Loss.DEAF, Loss.UNFINISHED, Loss.UNREAD, Loss.COMPUTING, Loss.WAITING)
 
 
 class LostError(Exception):
-    """A process is of no more use; `loss` says why, the message where there is one for people."""
+    """A process is lost for the reason `loss`; the message is for people."""
 
     def __init__(self, loss: Loss, message: str = "") -> None:
         super().__init__(message or loss.name)
         self.loss = loss
 
 
-# Codecs take the first message from what was received, and return it, or () if there is none yet.
-
-
 def take_line(received: bytearray) -> tuple[bytes, ...]:
-    """Take the first line of bytes, without its end, which can only be in the last chunk."""
+    """Remove the first line, whose end can only be in the last chunk; return () without one."""
     end = received.find(b"\n", max(0, len(received) - _CHUNK))
     if end < 0:
         return ()
@@ -92,7 +88,7 @@ def take_line(received: bytearray) -> tuple[bytes, ...]:
 
 
 def take_pickle(received: bytearray) -> tuple[Any, ...]:
-    """Take the first object, as `multiprocessing.connection.Connection` sends it."""
+    """Remove the first object, as `multiprocessing.connection.Connection` sends it."""
     if len(received) < 4:
         return ()
     size: int = struct.unpack_from("!i", received)[0]
@@ -100,26 +96,26 @@ def take_pickle(received: bytearray) -> tuple[Any, ...]:
         raise ValueError(f"expected a length, got {size}")
     if len(received) < 4 + size:
         return ()
-    data = bytes(received[4 : 4 + size])
+    message = pickle.loads(bytes(received[4 : 4 + size]))
     del received[: 4 + size]
-    return (pickle.loads(data),)
+    return (message,)
 
 
 def pickled(message: object) -> bytes:
     """Return an object as `take_pickle` and a Connection read it."""
-    data = pickle.dumps(message)
-    return struct.pack("!i", len(data)) + data
+    content = pickle.dumps(message)
+    return struct.pack("!i", len(content)) + content
 
 
 class ChildProcess:
-    """A program in a session of its own, which is talked with by messages on its three pipes.
+    """A program in a session of its own, with messages on its three pipes.
 
-    It ends with this object, and with this process, by whatever means that ends.
+    It ends with this object, and with this process, however this process ends.
 
     Attributes:
         pid: its process.
-        partial: what was received after the last message.
-        sent: the length of the last message to it [B].
+        partial: the bytes received after the last message.
+        request_length: the length of the last message to it [B].
         last_words: the end of its standard error.
     """
 
@@ -136,16 +132,17 @@ class ChildProcess:
 
         Args:
             command: the program and its arguments.
-            take: the codec; with pickled objects, what the program prints goes nowhere.
-            folder: where it works.
+            take: removes the first message from the received bytes and returns it, or () if there
+                is none yet; with pickled objects, prints of the program are discarded.
+            folder: its working directory.
             environment: ours if None.
-            memory: what it may take, with all that it starts [B]. Where there is a limit nothing
-                of the program is trusted: what leaves its group and session is ended with it.
-            longest: the longest message that it may send [B].
+            memory: limit of its memory, with all that it starts [B]. A limited program is not
+                trusted: processes that leave its group and session are ended with it.
+            longest: limit of the length of its messages [B].
 
         Raises:
             OSError: if it cannot be started.
-            ValueError: if the command holds what no command can.
+            ValueError: if the command holds a NUL character.
         """
         self._take, self._memory, self._longest = take, memory, longest
         self._marker = new_marker() if memory < math.inf else 0
@@ -164,7 +161,7 @@ class ChildProcess:
         )
         self.pid: int = self._process.pid
         self.partial, self.last_words = bytearray(), bytearray()
-        self._unsent, self.sent = bytearray(), 0
+        self._unsent, self.request_length = bytearray(), 0
         self._is_deaf = False
         self._looks: list[tuple[float, list[Process]]] = []
         self._selector = selectors.DefaultSelector()
@@ -177,7 +174,7 @@ class ChildProcess:
 
     @property
     def code(self) -> int:
-        """The code that it ended with, or minus the signal; only of one that has ended."""
+        """The exit code of a process that has ended, or minus the signal."""
         return int(self._process.returncode)
 
     @property
@@ -185,13 +182,15 @@ class ChildProcess:
         """How it ended: "with code 3" or "by SIGSEGV"."""
         if self.code >= 0:
             return f"with code {self.code}"
-        names = {-known: known.name for known in signal.Signals}
-        return f"by {names.get(self.code, f'signal {-self.code}')}"
+        try:
+            return f"by {signal.Signals(-self.code).name}"
+        except ValueError:
+            return f"by signal {-self.code}"
 
     def send(self, message: bytes) -> None:
-        """Let a message be written while the answer is awaited."""
+        """Queue a message, which is written while the answer is awaited."""
         self._unsent += message
-        self.sent = len(message)
+        self.request_length = len(message)
         if not self._is_deaf:
             self._forget(self._process.stdin)
             self._selector.register(self._process.stdin, selectors.EVENT_WRITE)
@@ -200,17 +199,17 @@ class ChildProcess:
         """Return the next message.
 
         Args:
-            seconds: how long to wait [s].
-            processor: how much time of processors the program may take for it, after a `TICK` [s].
+            seconds: limit of the time to wait [s].
+            processor: limit of the processor time of the program, after a `TICK` [s].
 
         Raises:
-            LostError: if none comes in time, the program ended, or takes too much.
+            LostError: if none comes in time, the program ended, or exceeds a limit.
         """
         start = looked = time.monotonic()
         self._looks.clear()
         while not (message := self._next_message()):
             now = time.monotonic()
-            limit = start + (min(seconds, SHUT) if self._is_deaf else seconds)
+            limit = start + (min(seconds, GRACE) if self._is_deaf else seconds)
             if now - looked >= TICK or now >= limit:
                 looked = now
                 self._look(processor)
@@ -222,10 +221,10 @@ class ChildProcess:
         return message[0]
 
     def leave(self, seconds: float) -> tuple[bool, int]:
-        """End its input, and after so long [s] all that still runs.
+        """Close its input and kill it if it still runs after some time [s].
 
         Returns:
-            Whether it ended in time, and how many processes it then left running.
+            Whether it ended in time, and the number of processes that it left running.
         """
         self._forget(self._process.stdin)
         with contextlib.suppress(OSError):
@@ -236,7 +235,7 @@ class ChildProcess:
         return has_left, strays
 
     def end(self) -> None:
-        """End it and whatever it has started."""
+        """Kill it and all that it has started."""
         self._end()
 
     def _next_message(self) -> tuple[Any, ...]:
@@ -246,14 +245,14 @@ class ChildProcess:
             raise LostError(Loss.GARBLED) from None
 
     def _exchange(self, seconds: float) -> None:
-        """Write and read what the pipes allow; return after so many seconds if they allow none."""
+        """Write and read without blocking, or wait for a pipe for so long [s]."""
         if not self._pump(seconds):
             raise self._ended()
         if len(self.partial) > self._longest:
             raise LostError(Loss.TOO_LONG)
 
     def _pump(self, seconds: float) -> bool:
-        """Write and read what the pipes allow; return whether standard output is still open."""
+        """Do what `_exchange` does, and return whether standard output is still open."""
         is_open = True
         for key, _ in self._selector.select(seconds):
             if key.fileobj is self._process.stdin:
@@ -267,17 +266,17 @@ class ChildProcess:
                 self.partial += chunk or b""
             else:
                 self.last_words += chunk or b""
-                del self.last_words[:-STDERR_KEPT]
+                del self.last_words[:-STDERR_LENGTH]
         return is_open
 
     def _write(self) -> None:
         try:
             with _no_signal_of_pipes():
-                written = os.write(self._process.stdin.fileno(), self._unsent[:_CHUNK])
-            del self._unsent[:written]
+                count = os.write(self._process.stdin.fileno(), self._unsent[:_CHUNK])
+            del self._unsent[:count]
         except BlockingIOError:
             return
-        except OSError:  # it does not read, or is no more
+        except OSError:  # it does not read, or has ended
             self._is_deaf = True
             self._unsent.clear()
         if not self._unsent:
@@ -288,7 +287,7 @@ class ChildProcess:
             self._selector.unregister(pipe)
 
     def _ends_within(self, seconds: float) -> bool:
-        """Return whether it ends in time; throw away what it prints until then."""
+        """Return whether it ends in time; discard its output until then."""
         deadline, length = time.monotonic() + seconds, len(self.partial)
         while not (has_ended := self._has_ended()) and time.monotonic() < deadline:
             self._pump(TICK / 10)
@@ -296,20 +295,20 @@ class ChildProcess:
         return has_ended
 
     def _has_ended(self) -> bool:
-        """Return whether the program ended, leaving its number its own where that can be had."""
+        """Return whether the program ended; keep its process number reserved where possible."""
         if not hasattr(os, "waitid") or self._process.returncode is not None:
             return self._process.poll() is not None
         options = os.WEXITED | os.WNOWAIT | os.WNOHANG
         return os.waitid(os.P_PID, self.pid, options) is not None
 
     def _look(self, processor: float) -> None:
-        """Raise if it ended or takes too much; note what it does."""
-        if self._has_ended():  # while something else holds its pipes
+        """Raise if it ended or exceeds a limit; record its processes."""
+        if self._has_ended():  # while another process holds its pipes
             before = len(self.partial)
             self._exchange(0.0)
             if len(self.partial) == before:
                 raise self._ended()
-        if min(self._memory, processor) == math.inf:  # what is timed is not disturbed
+        if min(self._memory, processor) == math.inf:  # a timed program is not disturbed
             return
         members = family(self.pid, self._marker)
         self._looks.append((time.monotonic(), members))
@@ -319,22 +318,22 @@ class ChildProcess:
             raise LostError(Loss.PROCESSOR)
 
     def _used(self) -> float:
-        """Return how much time of processors it has used since it was first looked at [s]."""
+        """Return the processor time that it used since its first record [s]."""
         first, last = (sum(p.seconds for p in self._looks[i][1]) for i in (0, -1))
         return last - first
 
     def _ended(self) -> LostError:
-        """Return why nothing more will come."""
-        has_ended = self._ends_within(SHUT)
+        """Return the error of a program whose output has ended."""
+        has_ended = self._ends_within(GRACE)
         for _ in range(8):  # more than the pipe of its last words holds
             self._pump(0.0)
         self.end()
         if not has_ended:
             return LostError(Loss.CLOSED)
-        return LostError(Loss.CUT if self.partial else Loss.ENDED)
+        return LostError(Loss.TRUNCATED if self.partial else Loss.ENDED)
 
     def _silence(self) -> Loss:
-        """Return why nothing came in time."""
+        """Return why no message came in time."""
         if self._is_deaf:
             return Loss.DEAF
         if self.partial:
@@ -344,7 +343,7 @@ class ChildProcess:
         return Loss.COMPUTING if self._computes() else Loss.WAITING
 
     def _computes(self) -> bool:
-        """Return whether it computed rather than waited, most times when it was looked at."""
+        """Return whether it computed, rather than waited, in most of its records."""
         if not self._looks:
             return False
         runs = [any(process.runs for process in members) for _, members in self._looks]
@@ -357,7 +356,7 @@ def _pipes(process: Any) -> list[Any]:
 
 
 def _read(pipe: Any) -> bytes | None:
-    """Return what is there, b"" if there never will be anything more, None if there is nothing."""
+    """Return the next bytes, b"" at the end of the stream, None if there are none yet."""
     try:
         return os.read(pipe.fileno(), _CHUNK)
     except BlockingIOError:
@@ -368,8 +367,8 @@ def _end(
     process: Any, watch: subprocess.Popen[bytes], marker: int, selector: selectors.BaseSelector
 ) -> None:
     end_group(process.pid, marker)
-    with contextlib.suppress(subprocess.TimeoutExpired):  # what the system does not let go
-        process.wait(SHUT)
+    with contextlib.suppress(subprocess.TimeoutExpired):  # stuck in the kernel
+        process.wait(GRACE)
     watch.kill()
     watch.communicate()
     selector.close()
@@ -379,7 +378,7 @@ def _end(
 
 @contextlib.contextmanager
 def _no_signal_of_pipes() -> Iterator[None]:
-    """Let writing where nobody reads be an error only, whatever SIGPIPE is set to do."""
+    """Make a write to a closed pipe an error, whatever the handler of SIGPIPE."""
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
     try:
         yield
@@ -391,26 +390,26 @@ def _no_signal_of_pipes() -> Iterator[None]:
 
 
 def python_process(statement: str) -> ChildProcess:
-    """Start a Python that finds our packages, on one thread; it gets and sends pickled objects."""
+    """Start Python with our packages, on one thread, for pickled objects."""
     command = [sys.executable, "-P", "-c", _PATH + statement, str(_ROOT)]
     return ChildProcess(command, take_pickle, environment=one_thread())
 
 
 def one_thread() -> dict[str, str]:
-    """Return an environment in which the linear algebra of NumPy and SciPy keeps to one core."""
+    """Return an environment that limits the linear algebra of NumPy and SciPy to one core."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     return {**os.environ, **dict.fromkeys(names, "1")}
 
 
 def take_streams() -> tuple[int, int]:
-    """Return the descriptors of requests and answers, and keep solvers away from them.
+    """Return the descriptors of requests and answers, and hide them from solvers.
 
-    These read nothing, and print to standard error.
+    Solvers then read an empty input, and print to standard error.
     """
     requests, answers = os.dup(0), os.dup(1)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
+    empty_input = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(empty_input, 0)
+    os.close(empty_input)
     os.dup2(2, 1)
     return requests, answers
 
@@ -423,15 +422,15 @@ def connect() -> tuple[Connection, Connection]:
 
 
 class CallProcess:
-    """A process that performs calls one by one, started when one comes, and anew after a loss."""
+    """A process that performs calls one by one; it starts at the first one and after a loss."""
 
     def __init__(self, prepare: Callable[[], object], patience: float) -> None:
-        """Let each process begin with `prepare`, and a call take so much processor time [s]."""
+        """Set the first call of each process, and the limit of processor time of a call [s]."""
         self._prepare, self._patience = prepare, patience
         self._child: ChildProcess | None = None
 
-    def call(self, function: Callable[..., Result], *arguments: object) -> Result:
-        """Return what a function of a module returns, which must not raise.
+    def call(self, function: Callable[..., CallResult], *arguments: object) -> CallResult:
+        """Return the result of a function of a module, which must not raise.
 
         Raises:
             LostError: if the process ended, or the call took too much processor time or too long.
@@ -440,8 +439,7 @@ class CallProcess:
             if self._child is None:
                 self._child = python_process(f"import {__name__} as c; c.perform_calls()")
                 _perform(self._child, _START, self._prepare)
-            result: Result = _perform(self._child, self._patience, function, *arguments)
-            return result
+            return _perform(self._child, self._patience, function, *arguments)
         except BaseException:
             self.close()
             raise
@@ -459,16 +457,18 @@ def _perform(child: ChildProcess, patience: float, *call: object) -> Any:
         return child.receive(_WALL * patience, patience)
     except LostError as error:
         loss = error.loss
+    message = "the process ends the connection"
     if loss is Loss.PROCESSOR:
-        raise LostError(loss, f"it takes more than {patience:g} s of processor time")
-    if loss in SILENT:
-        raise LostError(loss, f"it gives no answer within {_WALL * patience:g} s")
-    ended = loss in (Loss.ENDED, Loss.CUT)
-    raise LostError(loss, f"the process ends {child.ending if ended else 'the connection'}")
+        message = f"it takes more than {patience:g} s of processor time"
+    elif loss in SILENT:
+        message = f"it gives no answer within {_WALL * patience:g} s"
+    elif loss in (Loss.ENDED, Loss.TRUNCATED):
+        message = f"the process ends {child.ending}"
+    raise LostError(loss, message)
 
 
 def perform_calls() -> None:
-    """Perform calls of the parent until there are no more."""
+    """Perform the calls of the parent process."""
     requests, answers = connect()
     with contextlib.suppress(EOFError):
         while True:

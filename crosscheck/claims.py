@@ -11,27 +11,26 @@ from .engines import SKELETON_ENGINES
 from .mass_spring.claims import MASS_SPRING_CLAIMS
 from .robots.claims import ROBOT_CLAIMS
 from .tolerances import POSITION, ROTATION
-from .verdict import Claim, Verdict, check_claim, each_case
+from .verdict import Claim, ClaimVerdict, check_claim, each_case
 
 
 def skeleton_claims(engine: str) -> list[Claim]:
     """Return the claims about kinematics against one engine."""
     poses = "forward_kinematics on random chains and trees of 2 to 50 joints"
     joints = f"{engine}'s ball joints, matched by name"
-    derived = f"local_from_global of the rotations {engine} computes"
-    given = f"the local rotations given to {engine}"
-    solved = f"solve_ik by {', '.join(IK_SOLVERS)}: all joints' positions and the residual"
-    found = f"{engine}'s forward kinematics of the local rotations found"
+    local = f"local_from_global of the rotations {engine} computes"
+    inputs = f"the local rotations given to {engine}"
+    solutions = f"solve_ik by {', '.join(IK_SOLVERS)}: all joints' positions and the residual"
+    forward = f"{engine}'s forward kinematics of the local rotations found"
+    rows = (
+        ("joint positions", poses, joints, kinematics.joint_positions, POSITION, 100),
+        ("joint rotations", poses, joints, kinematics.joint_rotations, ROTATION, 100),
+        ("local rotations", local, inputs, kinematics.back_to_local, ROTATION, 100),
+        ("IK answers", solutions, forward, kinematics.ik_answers, POSITION, 50 * len(IK_SOLVERS)),
+    )
     return [
-        Claim(
-            f"{name}, {engine}", ours, theirs, each_case(partial(compare, engine)), tolerance, cases
-        )
-        for name, ours, theirs, compare, tolerance, cases in (
-            ("joint positions", poses, joints, kinematics.joint_positions, POSITION, 100),
-            ("joint rotations", poses, joints, kinematics.joint_rotations, ROTATION, 100),
-            ("local rotations", derived, given, kinematics.back_to_local, ROTATION, 100),
-            ("IK answers", solved, found, kinematics.ik_answers, POSITION, 50 * len(IK_SOLVERS)),
-        )
+        Claim(f"{name}, {engine}", quantity, counterpart, each_case(partial(f, engine)), t, cases)
+        for name, quantity, counterpart, f, t, cases in rows
     ]
 
 
@@ -47,7 +46,7 @@ CLAIMS: dict[str, Claim] = {
 
 def run_claims(
     names: Sequence[str] | None = None, progress: Callable[[Claim], None] | None = None
-) -> list[Verdict]:
+) -> list[ClaimVerdict]:
     """Check the named claims in their order, by default all.
 
     Args:
@@ -57,13 +56,15 @@ def run_claims(
     Raises:
         ValueError: if a name is unknown or the list is empty.
     """
-    asked = CLAIMS if names is None else names
-    chosen = [arguments.choice("names", name, CLAIMS) for name in asked]
-    if not chosen:
+    claims = [
+        CLAIMS[arguments.choice("names", name, CLAIMS)]
+        for name in (CLAIMS if names is None else names)
+    ]
+    if not claims:
         raise ValueError("names: expected at least one claim, got none")
     verdicts = []
-    for name in chosen:
+    for claim in claims:
         if progress is not None:
-            progress(CLAIMS[name])
-        verdicts.append(check_claim(CLAIMS[name]))
+            progress(claim)
+        verdicts.append(check_claim(claim))
     return verdicts

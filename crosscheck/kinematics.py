@@ -20,10 +20,10 @@ POSES = 4
 
 def joint_positions(engine: str, case: int) -> Comparison:
     """Compare all joints' global positions, relative to the reach."""
-    skeleton, local = _posed(case)
+    skeleton, local = _skeleton_and_rotations(case)
     return Comparison(
-        ours=forward_kinematics(skeleton, local).positions,
-        theirs=_engine_pose(engine, case).positions,
+        forward_kinematics(skeleton, local).positions,
+        _engine_pose(engine, case).positions,
         baseline=forward_kinematics(skeleton, rotation.identity(*local.shape[:-1])).positions,
         scale=full_reach(skeleton),
     )
@@ -31,15 +31,15 @@ def joint_positions(engine: str, case: int) -> Comparison:
 
 def joint_rotations(engine: str, case: int) -> Comparison:
     """Compare all joints' global rotations, as quaternions."""
-    ours = forward_kinematics(*_posed(case)).rotations
-    return _rotations(ours, _engine_pose(engine, case).rotations)
+    pose = forward_kinematics(*_skeleton_and_rotations(case))
+    return _compare_rotations(pose.rotations, _engine_pose(engine, case).rotations)
 
 
 def back_to_local(engine: str, case: int) -> Comparison:
     """Compare the local rotations that we derive from an engine's global ones with its input."""
-    skeleton, local = _posed(case)
-    ours = local_from_global(skeleton, _engine_pose(engine, case).rotations)
-    return _rotations(ours, local)
+    skeleton, local = _skeleton_and_rotations(case)
+    derived = local_from_global(skeleton, _engine_pose(engine, case).rotations)
+    return _compare_rotations(derived, local)
 
 
 def ik_answers(engine: str, case: int) -> Comparison:
@@ -50,11 +50,12 @@ def ik_answers(engine: str, case: int) -> Comparison:
     solution = solve_ik(
         skeleton, start, target, names[solver], effector, tolerance=1e-6 * reach, max_iterations=50
     )
-    theirs = _by(engine, skeleton, solution.local_rotations).positions
+    kinematics = SKELETON_ENGINES[engine](skeleton)
+    expected = forward_kinematics_by(kinematics, solution.local_rotations).positions
     initial = forward_kinematics(skeleton, start).positions
     return Comparison(
-        ours=np.append(solution.positions, solution.residual),
-        theirs=np.append(theirs, np.linalg.norm(theirs[effector] - target)),
+        np.append(solution.positions, solution.residual),
+        np.append(expected, np.linalg.norm(expected[effector] - target)),
         baseline=np.append(initial, np.linalg.norm(initial[effector] - target)),
         scale=reach,
     )
@@ -68,7 +69,7 @@ def full_reach(skeleton: Skeleton) -> float:
     return float(distances.max())
 
 
-def _posed(case: int) -> tuple[Skeleton, FloatArray]:
+def _skeleton_and_rotations(case: int) -> tuple[Skeleton, FloatArray]:
     skeleton = samples.skeleton(case)
     return skeleton, samples.local_rotations(case, skeleton, POSES)
 
@@ -76,18 +77,15 @@ def _posed(case: int) -> tuple[Skeleton, FloatArray]:
 @functools.cache
 def _engine_pose(engine: str, case: int) -> Pose:
     """Return the engine's poses of a case, cached for other claims."""
-    return _by(engine, *_posed(case))
-
-
-def _by(engine: str, skeleton: Skeleton, local: FloatArray) -> Pose:
+    skeleton, local = _skeleton_and_rotations(case)
     return forward_kinematics_by(SKELETON_ENGINES[engine](skeleton), local)
 
 
-def _rotations(ours: FloatArray, theirs: FloatArray) -> Comparison:
-    identity = rotation.identity(*ours.shape[:-1])
-    return Comparison(ours, _same_sign(theirs, ours), _same_sign(identity, ours), scale=1.0)
+def _compare_rotations(actual: FloatArray, expected: FloatArray) -> Comparison:
+    identity = rotation.identity(*actual.shape[:-1])
+    return Comparison(actual, _aligned(expected, actual), _aligned(identity, actual), scale=1.0)
 
 
-def _same_sign(q: FloatArray, other: FloatArray) -> FloatArray:
-    """Return q or -q, the same rotation, whichever is closer to the other."""
-    return np.where(np.sum(q * other, axis=-1, keepdims=True) < 0.0, -q, q)
+def _aligned(q: FloatArray, nearby: FloatArray) -> FloatArray:
+    """Return q or -q, the same rotation, whichever is closer to the other quaternion."""
+    return np.where(np.sum(q * nearby, axis=-1, keepdims=True) < 0.0, -q, q)

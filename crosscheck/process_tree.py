@@ -1,9 +1,9 @@
-"""What a program has started: found, measured and ended.
+"""Find, measure and kill the processes that a program has started.
 
-A program's tree is its process group and session, all that descend from it and, on Linux, all that
-carry its marker: those that fork twice and leave the session are found by it. The marker is a limit
-of real-time computing: processes inherit limits through every fork, setsid and exec, and one of
-tens of thousands of years limits nothing.
+A program's tree is its process group and session, its descendants and, on Linux, the processes with
+its marker, which finds those that fork twice and leave the session. The marker is a limit of
+real-time computing: processes inherit limits through every fork, setsid and exec, and a limit of
+tens of thousands of years has no effect.
 """
 
 import contextlib
@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import psutil
 
-# What forks while it is being ended is looked for again, so often and after so long [s].
+# Searches for processes that fork while they are killed, and the pause between two [s].
 ROUNDS, PAUSE = 200, 0.005
 LIMIT = getattr(resource, "RLIMIT_RTTIME", None)
-# Until the input ends; then the group, and thrice, for those that fork meanwhile, what carries $2.
+# Wait for the end of the input; then kill the group and, thrice, the processes with marker $2.
 _GUARD = (
     'read line || { kill -KILL "-$1"; [ "$2" = 0 ] || for again in 1 2 3; do '
     'for file in $(grep -ls " $2 " /proc/[0-9]*/limits); do '
@@ -33,9 +33,9 @@ class Process(NamedTuple):
     """A process that runs.
 
     Attributes:
-        memory: what it holds of the machine's memory [B].
-        seconds: of a processor that it has used [s].
-        runs: whether it is on a processor, or waits for one.
+        memory: its resident memory [B].
+        seconds: the processor time that it has used [s].
+        runs: whether it uses a processor, or waits for one.
     """
 
     pid: int
@@ -45,15 +45,15 @@ class Process(NamedTuple):
 
 
 def new_marker() -> int:
-    """Return a number that no other program carries, at most a limit that this process has."""
+    """Return a unique number, at most the limit of this process."""
     hard = resource.getrlimit(LIMIT)[1] if LIMIT is not None else 0
     return (hard if hard >= 1 << 60 else 1 << 61) - secrets.randbits(48)
 
 
 def carry(marker: int) -> None:
-    """Let this process and all that it starts carry a marker, and leave no core where they crash.
+    """Mark this process and all that it will start; switch core dumps off.
 
-    A child calls this between fork and exec, where other threads' locks stay locked: so it does
+    A child calls this between fork and exec, where locks of other threads stay locked: it must do
     nothing else.
     """
     with contextlib.suppress(OSError, ValueError):
@@ -67,7 +67,7 @@ def family(leader: int, marker: int = 0) -> list[Process]:
 
     Args:
         leader: the program's process, leader of its group and session.
-        marker: what the program carries, 0 if nothing.
+        marker: that of the program, 0 if it has none.
     """
     members: set[int] = set()
     for pid in [leader, *filter(lambda pid: _belongs(pid, leader, marker), psutil.pids())]:
@@ -106,9 +106,9 @@ def _measured(pid: int) -> Process | None:
 
 
 def main_thread_seconds(process: int) -> float:
-    """Return how long the first thread of a process has computed, to the nanosecond [s].
+    """Return the processor time of the first thread of a process, to the nanosecond [s].
 
-    It is 0 where the process has ended, or the system does not tell. psutil counts ticks of 10 ms.
+    It is 0 if the process has ended, or where it is unknown. psutil counts ticks of 10 ms.
     """
     with contextlib.suppress(OSError), open(f"/proc/{process}/schedstat", "rb") as file:
         return 1e-9 * int(file.read().split()[0])
@@ -116,16 +116,16 @@ def main_thread_seconds(process: int) -> float:
 
 
 def end_group(leader: int, marker: int = 0) -> None:
-    """Kill a program's group and, if it carries a marker, all that it has started.
+    """Kill a program's group and, if it has a marker, all that it has started.
 
-    The leader must not have been waited for, so that its number is still its own.
+    The leader must not have been waited for, so that its process number is not reused.
     """
-    for again in range(ROUNDS if marker else 1):
+    for attempt in range(ROUNDS if marker else 1):
         pids = [process.pid for process in family(leader, marker)] if marker else []
-        _kill(os.killpg, leader)  # at once, for those that fork while they are listed
+        _kill(os.killpg, leader)  # at once, as they may fork while they are listed
         for pid in pids:
             _kill(os.kill, pid)
-        if again and not pids:
+        if attempt and not pids:
             break
         time.sleep(PAUSE if marker else 0.0)
 
@@ -136,7 +136,7 @@ def _kill(kill: Callable[[int, int], None], target: int) -> None:
 
 
 def guard(leader: int, marker: int) -> subprocess.Popen[bytes]:
-    """Start a process that ends the same, should this process die by whatever means."""
+    """Start a process that kills the same when this process ends, for whatever reason."""
     return subprocess.Popen(
         ["/bin/sh", "-c", _GUARD, "sh", str(leader), str(marker)],
         stdin=subprocess.PIPE,

@@ -9,13 +9,13 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import MassSpring, State
 from plumbob.reference.skeleton import Skeleton, checked_skeleton
 
-MOST_JOINTS = 50
-LEAST_PARTICLES, MOST_PARTICLES = 5, 500
+MAXIMUM_JOINTS = 50
+MINIMUM_PARTICLES, MAXIMUM_PARTICLES = 5, 500
 # Number of cases after which the sizes repeat.
 SIZES = 10
 # h omega of a smooth problem, with omega its highest rate.
 RESOLVED = 0.04
-# What all springs of a uniform network share.
+# Quantities that all springs of a uniform network share.
 ALIKE = ("stiffnesses", "dampings")
 
 
@@ -32,7 +32,7 @@ def skeleton(case: int) -> Skeleton:
     skeletons are more frequent because Pinocchio's memory grows with the cube of the joints.
     """
     rng = generator("skeleton", case)
-    joints = MOST_JOINTS if case < 2 else int(2 * (MOST_JOINTS / 2) ** rng.uniform())
+    joints = MAXIMUM_JOINTS if case < 2 else int(2 * (MAXIMUM_JOINTS / 2) ** rng.uniform())
     parents = np.arange(joints) - 1
     if case % 2:
         parents[1:] = [rng.integers(max(0, j - 6), j) for j in range(1, joints)]
@@ -46,24 +46,18 @@ def local_rotations(case: int, skeleton: Skeleton, *batch: int) -> FloatArray:
     return rotation.random(generator("pose", case), *batch, joints)
 
 
-class Reach(NamedTuple):
-    """An inverse kinematics problem: move the effector from its start to the target."""
+def reach(case: int) -> tuple[Skeleton, FloatArray, int, FloatArray]:
+    """Return an IK problem: a skeleton, its start, the effector and its target.
 
-    skeleton: Skeleton
-    start: FloatArray
-    effector: int
-    target: FloatArray
-
-
-def reach(case: int) -> Reach:
-    """Return a problem whose effector is any joint but the root; some targets are beyond reach."""
+    The effector is any joint but the root; some targets are beyond reach.
+    """
     rng = generator("target", case)
     tree = skeleton(case)
     effector = int(rng.integers(1, tree.joint_count))
     direction = rotation.rotate(rotation.random(rng), [1.0, 0.0, 0.0])
     distance = rng.uniform(0.05, 1.3) * tree.reach(effector)
     target = tree.offsets[0] + distance * direction
-    return Reach(tree, local_rotations(case, tree), effector, target)
+    return tree, local_rotations(case, tree), effector, target
 
 
 class StepProblem(NamedTuple):
@@ -88,8 +82,8 @@ def network(case: int, *, damped: bool = True) -> StepProblem:
     )
     if arguments.boolean("damped", damped):
         return problem
-    none = np.zeros_like(problem.system.dampings)
-    return problem._replace(system=problem.system.replaced(dampings=none))
+    undamped = problem.system.replaced(dampings=np.zeros_like(problem.system.dampings))
+    return problem._replace(system=undamped)
 
 
 def uniform(case: int) -> StepProblem:
@@ -126,23 +120,18 @@ def _resolved(quantity: str, case: int, **options: Any) -> StepProblem:
     return problem._replace(h=RESOLVED / highest_rate(problem.system))
 
 
-class Oscillator(NamedTuple):
-    """One particle on a spring without a rest length, pinned at the origin; the step [s]."""
+def oscillator(case: int) -> tuple[MassSpring, State, float]:
+    """Return an oscillator at a random phase and a step h [s], with h omega from 0.01 to 1.
 
-    system: MassSpring
-    state: State
-    h: float
-
-
-def oscillator(case: int) -> Oscillator:
-    """Return an oscillator at a random phase, with h omega from 0.01 to 1."""
+    It is one particle on a spring without a rest length, pinned at the origin.
+    """
     rng = generator("oscillator", case)
     mass, stiffness = rng.uniform(0.2, 2.0), 10.0 ** rng.uniform(1.0, 3.0)
     system = MassSpring([1.0, mass], [[0, 1]], 0.0, stiffness, pinned=[0], gravity=(0, 0, 0))
     x, v = np.zeros((2, 2, 3))
     x[1], v[1] = rng.standard_normal((2, 3))
     h = 10.0 ** rng.uniform(-2.0, 0.0) / np.sqrt(stiffness / mass)
-    return Oscillator(system, State(x, v), float(h))
+    return system, State(x, v), float(h)
 
 
 def line(case: int) -> StepProblem:
@@ -166,7 +155,7 @@ def line(case: int) -> StepProblem:
 def particles(case: int) -> int:
     """Return the number of particles of a case, spread evenly on a logarithmic scale."""
     share = arguments.integer("case", case, least=0) * 3 % SIZES / (SIZES - 1)
-    return round(LEAST_PARTICLES * (MOST_PARTICLES / LEAST_PARTICLES) ** share)
+    return round(MINIMUM_PARTICLES * (MAXIMUM_PARTICLES / MINIMUM_PARTICLES) ** share)
 
 
 def highest_rate(system: MassSpring) -> float:
@@ -223,6 +212,6 @@ def _springs(rng: np.random.Generator, springs: np.ndarray, lengths: FloatArray)
 def _network(rng: np.random.Generator, n: int) -> np.ndarray:
     """Return a spanning tree and as many other springs, with shuffled ends, (spring, 2)."""
     tree = [(int(rng.integers(i)), i) for i in range(1, n)]
-    others = [tuple(map(int, rng.choice(n, 2, replace=False))) for _ in range(n)]
-    pairs = sorted({(min(pair), max(pair)) for pair in tree + others})
+    chords = [tuple(map(int, rng.choice(n, 2, replace=False))) for _ in range(n)]
+    pairs = sorted({(min(pair), max(pair)) for pair in tree + chords})
     return rng.permuted(np.array(pairs), axis=1)

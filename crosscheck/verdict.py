@@ -19,26 +19,26 @@ LEAST_DISPLACEMENT = 1e-4
 class Comparison(NamedTuple):
     """One case: a quantity computed by the reference and independently, of any shape."""
 
-    ours: FloatArray
-    theirs: FloatArray
+    actual: FloatArray  # by the reference
+    expected: FloatArray  # by the independent computation
     baseline: FloatArray  # its value without motion and forces
     scale: float  # the positive number to which differences are relative
 
 
 @dataclass(frozen=True)
 class Claim:
-    """Our quantity equals theirs, in every case, to a tolerance."""
+    """A quantity of the reference equals an independent one, in every case, to a tolerance."""
 
     name: str  # unique, for tables and the command line
-    ours: str  # description of our quantity
-    theirs: str  # of the independent one
+    quantity: str  # what the reference computes
+    counterpart: str  # what it is compared with
     compare: Callable[[int], Iterable[Comparison]]  # yields those of the first n cases
     tolerance: Tolerance  # the largest difference allowed, with its reason
     cases: int  # number of cases in a full check
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ClaimVerdict:
     """The result of checking a claim; numbers are NaN if a value is not finite."""
 
     claim: Claim
@@ -58,7 +58,7 @@ def each_case(compare: Callable[[int], Comparison]) -> Callable[[int], Iterable[
     return lambda cases: map(compare, range(cases))
 
 
-def check_claim(claim: Claim, cases: int | None = None) -> Verdict:
+def check_claim(claim: Claim, cases: int | None = None) -> ClaimVerdict:
     """Compare all cases of a claim, or the first few, and return the verdict.
 
     Raises:
@@ -66,13 +66,21 @@ def check_claim(claim: Claim, cases: int | None = None) -> Verdict:
     """
     arguments.instance("claim", claim, Claim)
     count = claim.cases if cases is None else arguments.integer("cases", cases, least=0)
-    compared = list(claim.compare(count))
-    differences = [_relative_difference(c.ours, c.theirs, c.scale) for c in compared]
-    displacements = [_relative_difference(c.ours, c.baseline, c.scale) for c in compared]
+    comparisons = list(claim.compare(count))
+    differences = [_relative_difference(c.actual, c.expected, c.scale) for c in comparisons]
+    displacements = [_relative_difference(c.actual, c.baseline, c.scale) for c in comparisons]
     difference = float(np.max(differences, initial=0.0))
     displacement = float(np.min(displacements or [0.0]))
-    failure = _failure(len(compared), difference, displacement, claim.tolerance.value)
-    return Verdict(claim, len(compared), difference, displacement, failure)
+    failure = ""
+    if not comparisons:
+        failure = "no cases"
+    elif not np.isfinite([difference, displacement]).all():
+        failure = "not a number"
+    elif difference > claim.tolerance.value:
+        failure = "they differ"
+    elif displacement < LEAST_DISPLACEMENT:
+        failure = "nothing moved"
+    return ClaimVerdict(claim, len(comparisons), difference, displacement, failure)
 
 
 def _relative_difference(a: FloatArray, b: FloatArray, scale: float) -> float:
@@ -86,15 +94,3 @@ def _relative_difference(a: FloatArray, b: FloatArray, scale: float) -> float:
     if not (np.isfinite(a).all() and np.isfinite(b).all() and 0.0 < scale < np.inf):
         return np.nan
     return float(np.max(np.abs(a - b))) / scale
-
-
-def _failure(cases: int, difference: float, displacement: float, tolerance: float) -> str:
-    if cases == 0:
-        return "no cases"
-    if not np.isfinite([difference, displacement]).all():
-        return "not a number"
-    if difference > tolerance:
-        return "they differ"
-    if displacement < LEAST_DISPLACEMENT:
-        return "nothing moved"
-    return ""

@@ -1,6 +1,6 @@
-"""Write docs/sample and the README's headlines from records: `python docs/write_sample.py FOLDER`.
+"""Write docs/sample and the README's table of the best from records: `write_sample.py FOLDER`.
 
-The records are those of `plumbob bench --quick` with every peer (`make sample` does all).
+The records are those of `plumbob bench --quick` with every peer; `make sample` does both.
 """
 
 import re
@@ -10,54 +10,52 @@ import tempfile
 from pathlib import Path
 
 from plumbob.bench.harness.record import FILE_NAME, RecordFile
-from plumbob.bench.report.headlines import Headline
 from plumbob.bench.report.report import Written, write
 from plumbob.bench.tables.provenance import provenance
 from plumbob.bench.tables.results import listed
 from plumbob.bench.tables.table import words
 
 DOCS = Path(__file__).parent
-SAMPLE, README = DOCS / "sample", DOCS.parent / "README.md"
-HEADLINES = "headlines.md"
-BEGIN = "<!-- Written by docs/write_sample.py: the headlines of docs/sample. -->"
+SAMPLE, README, CHART = DOCS / "sample", DOCS.parent / "README.md", DOCS / "best.svg"
+PAGE, HEADLINES, FIGURE = "index.html", "headlines.md", "robots_map_one_start.svg"
+BEGIN = "<!-- Written by docs/write_sample.py: who is best in docs/sample. -->"
+FILES = re.compile(r'\s*<a href="(?:tables|figures)/[^>]*>[^<]*</a>')  # left out of the sample
 END = "<!-- The end of what docs/write_sample.py writes. -->"
 
 
 def write_sample(folder: Path) -> None:
-    """Write the page, tables, figures and headlines of a folder's records, without these."""
-    with tempfile.TemporaryDirectory() as made:
-        shutil.copy(folder / FILE_NAME, made)
-        written = write(Path(made))
+    """Write the page, the headlines and the chart of a folder's records."""
+    with tempfile.TemporaryDirectory() as temporary:
+        shutil.copy(folder / FILE_NAME, temporary)
+        report = write(Path(temporary))
         shutil.rmtree(SAMPLE, ignore_errors=True)
-        shutil.copytree(made, SAMPLE, ignore=shutil.ignore_patterns("records.*"))
-    text = headlines(written, folder)
+        SAMPLE.mkdir()
+        page = (Path(temporary) / PAGE).read_text(encoding="utf-8")
+        (SAMPLE / PAGE).write_text(FILES.sub("", page), encoding="utf-8")
+        figure = Path(temporary) / "figures" / FIGURE
+        if figure.exists():
+            shutil.copy(figure, CHART)
+    text = headlines(report, folder)
     (SAMPLE / HEADLINES).write_text(text, encoding="utf-8")
     README.write_text(with_headlines(README.read_text(encoding="utf-8"), text), encoding="utf-8")
 
 
-def headlines(written: Written, folder: Path) -> str:
-    """Return the headlines in Markdown, with what they come from."""
-    verdict = written.answers.verdict
-    right = (
-        [f"- Right: {verdict.held} of {verdict.total} claims hold; the narrowest uses "
-         f"{words(100 * verdict.used)} % of its tolerance."]
-        if verdict
-        else []
-    )  # fmt: skip
-    lines = [*right, *map(_line, written.answers.headlines)]
-    absent = written.answers.absent
-    lines.append(f"- Absent: {listed(absent)}." if absent else "- Every peer took part.")
-    made = [record for record in RecordFile(folder).read().records if record.suite == "timing"]
-    scale = written.answers.scale
-    return "\n".join([*lines, "", f"{scale}; {provenance(made)}.".lstrip("; "), ""])
-
-
-def _line(headline: Headline) -> str:
-    return (
-        f"- {headline.chapter.capitalize()}, {headline.asked[:1].lower()}{headline.asked[1:]}: "
-        f"**{headline.answer}**, {headline.detail} "
-        f"([table](docs/sample/tables/{headline.table}.md))."
-    )
+def headlines(report: Written, folder: Path) -> str:
+    """Return the headlines as a Markdown table, with the machine and the versions below it."""
+    rows = ["| question | best | by how much |", "|---|---|---|"]
+    if verdict := report.answers.verdict:
+        rows.append(
+            f"| Is the reference right? | {verdict.held} of {verdict.total} claims hold "
+            f"| the narrowest uses {words(100 * verdict.used)} % of its tolerance |"
+        )
+    rows += [
+        f"| {line.chapter.capitalize()}, {line.asked.lower()} | {line.answer} | {line.detail} |"
+        for line in report.answers.headlines
+    ]
+    timing = [record for record in RecordFile(folder).read().records if record.suite == "timing"]
+    absent = f"Absent: {listed(report.answers.absent)}. " if report.answers.absent else ""
+    source = f"{report.answers.scale}; {provenance(timing)}.".lstrip("; ")
+    return "\n".join([*rows, "", absent + source, ""])
 
 
 def with_headlines(text: str, lines: str) -> str:

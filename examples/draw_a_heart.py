@@ -6,10 +6,11 @@ from plumbob import curves, formats, forward_kinematics, scenes, track
 
 arm, _ = scenes.lab_arm()
 heart = curves["heart"]()
-for name, options in {"frame by frame": {}, "coherent": {"coherent": True, "closed": True}}.items():
-    motion = track(arm, heart, **options)
+frame_by_frame = track(arm, heart)
+coherent = track(arm, heart, coherent=True, closed=True)
+for name, motion in {"frame by frame": frame_by_frame, "coherent": coherent}.items():
     joints = forward_kinematics(arm, motion.local_rotations).positions
     moves = joints - np.roll(joints, 1, axis=0)  # from the last frame to the first as well
     jumps = np.linalg.norm(moves, axis=-1)
     print(f"{name}: {len(joints)} frames, a joint jumps {1e3 * jumps.max():.1f} mm at most")
-formats.bvh.write("heart.bvh", arm, motion.local_rotations)  # opens in an animation program
+formats.bvh.write("heart.bvh", arm, coherent.local_rotations)  # opens in an animation program

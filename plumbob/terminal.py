@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from plumbob.bench.report.report import Written
     from plumbob.bench.tables.results import Results
     from plumbob.bench.tables.table import Table
-    from plumbob.crosscheck.verdict import Verdict as ClaimVerdict
+    from plumbob.crosscheck.verdict import ClaimVerdict
 
 # In a pipe no line is broken: each row and each sentence stands in one.
 IN_A_PIPE = 10**6

@@ -63,12 +63,12 @@ class Joint(IntEnum):
 
 FIXED, HINGE, SLIDE, BALL, FREE = (int(kind) for kind in Joint)
 KINDS = tuple(kind.name.lower() for kind in Joint)
-# How many coordinates and how many degrees of freedom each kind has.
+# The number of coordinates and of degrees of freedom of each kind.
 WIDTHS = np.array([0, 1, 1, 4, 7])
 FREEDOMS = np.array([0, 1, 1, 3, 6])
 # A coordinate may be so far outside its limits [rad or m] and still count as within.
 LIMIT_TOLERANCE = 1e-9
-# What the kernels read of each joint, a record a joint.
+# A record of a joint, for kernels.
 JOINT = np.dtype(
     [
         ("kind", np.int64),
@@ -109,12 +109,11 @@ class Mimic(NamedTuple):
 class Articulation(KeepsReadOnly):
     """A tree of joints of several kinds, with limits.
 
-    Its coordinates q, shape (..., coordinate), take the place of local rotations wherever a
-    Skeleton's would be given. They hold, joint after joint, nothing for a fixed or mimic joint, an
-    angle [rad] for a hinge, a displacement [m] for a slide, a unit quaternion, w first, for a ball,
-    and a position [m] and a quaternion for a free joint. Methods raise a ValueError for a joint
-    that does not exist, and for q of another shape, not finite, or with a quaternion further than
-    1e-6 from unit length.
+    Its coordinates q, shape (..., coordinate), take the place of the local rotations of a Skeleton.
+    Joint after joint, they hold an angle [rad] of a hinge, a displacement [m] of a slide, a unit
+    quaternion, w first, of a ball, and a position [m] and a quaternion of a free joint; a fixed or
+    mimic joint has none. Methods raise a ValueError for a joint that does not exist, and for q of
+    another shape, not finite, or with a quaternion further than 1e-6 from unit length.
 
     Attributes:
         skeleton: the tree: parents, offsets [m], names.
@@ -124,10 +123,10 @@ class Articulation(KeepsReadOnly):
         axes: unit axes of hinges and slides, and those about which balls twist, (joint, 3).
         lower: least coordinate of hinges and slides, least twist of balls, (joint,).
         upper: greatest of the same.
-        cones: how far the axis of a ball may tilt [rad], (joint,).
-        mimics: the joints that move with others.
-        joints: what the kernels read, a record a joint (JOINT); never to be written to.
-        mechanisms: what inverse kinematics has prepared, by effectors.
+        cones: greatest tilt of the axis of a ball [rad], (joint,).
+        mimics: the joints that move with their leaders.
+        joints: the records (JOINT) that the kernels read, a record a joint; do not write to them.
+        mechanisms: cache of inverse kinematics, by effectors.
     """
 
     skeleton: Skeleton
@@ -153,7 +152,7 @@ class Articulation(KeepsReadOnly):
         cones: ArrayLike = np.inf,
         mimics: Mapping[int | str, Mimic] | None = None,
     ) -> None:
-        """Check and copy; one value serves all joints.
+        """Check and copy; a single value holds for all joints.
 
         Args:
             skeleton: the tree; the offsets are those of the joints' frames.
@@ -172,19 +171,20 @@ class Articulation(KeepsReadOnly):
         """
         count = checked_skeleton(skeleton).joint_count
         names = _checked_kinds(kinds, count)
-        lower, upper = _checked_limits(lower, upper, count)
-        follows = _checked_mimics({} if mimics is None else mimics, skeleton, names)
-        joints = _records(skeleton, np.array([KINDS.index(kind) for kind in names]), follows)
-        joints["lower"], joints["upper"] = lower, upper
+        bounds = _checked_limits(lower, upper, count)
+        leaders = _checked_mimics({} if mimics is None else mimics, skeleton, names)
+        joints = _records(skeleton, np.array([KINDS.index(kind) for kind in names]), leaders)
+        joints["lower"], joints["upper"] = bounds
         _check_twists(joints)
-        joints["frame"], joints["axis"] = _checked_frames(frames, count), _checked_axes(axes, count)
-        joints["rotated"], joints["cone"] = rotated_by_pi(joints), _checked_cones(cones, count)
-        shown = {name: frozen(joints[name].copy()) for name in ("lower", "upper")}
+        joints["frame"] = _per_joint("frames", rotation.unit("frames", frames), count, 4)
+        joints["axis"], joints["cone"] = _checked_axes(axes, count), _checked_cones(cones, count)
+        joints["rotated"] = rotated_by_pi(joints)
+        fields = zip(("lower", "upper", "frame", "axis", "cone"),
+                     ("lower", "upper", "frames", "axes", "cones"), strict=True)  # fmt: skip
+        arrays = {name: frozen(joints[field].copy()) for field, name in fields}
         self.__dict__.update(
-            skeleton=skeleton, kinds=names, mimics=follows, joints=joints, mechanisms={}, **shown,
-            frames=frozen(joints["frame"].copy()), axes=frozen(joints["axis"].copy()),
-            cones=frozen(joints["cone"].copy()),
-        )  # fmt: skip
+            arrays, skeleton=skeleton, kinds=names, mimics=leaders, joints=joints, mechanisms={}
+        )
 
     @functools.cached_property
     def joint_count(self) -> int:
@@ -198,12 +198,12 @@ class Articulation(KeepsReadOnly):
 
     @functools.cached_property
     def coordinate_count(self) -> int:
-        """How many coordinates q has."""
+        """The number of coordinates q."""
         return int(WIDTHS[self.joints["kind"][self._leading]].sum())
 
     @functools.cached_property
     def freedom_count(self) -> int:
-        """How many degrees of freedom there are: what a velocity has."""
+        """The number of degrees of freedom, the entries of a velocity."""
         return int(FREEDOMS[self.joints["kind"][self._leading]].sum())
 
     @property
@@ -216,11 +216,11 @@ class Articulation(KeepsReadOnly):
         return self.skeleton.index(joint, argument)
 
     def coordinates_of(self, joint: int | str) -> slice:
-        """Return where a joint's coordinates are in q, of a mimic joint its leader's."""
+        """Return the slice of a joint's coordinates in q, of a mimic joint its leader's."""
         return self._range("coordinate", WIDTHS, joint)
 
     def freedoms_of(self, joint: int | str) -> slice:
-        """Return where a joint's degrees of freedom are in a velocity, likewise."""
+        """Return the slice of a joint's degrees of freedom in a velocity, likewise."""
         return self._range("freedom", FREEDOMS, joint)
 
     def _range(self, field: str, counts: IndexArray, joint: int | str) -> slice:
@@ -235,8 +235,8 @@ class Articulation(KeepsReadOnly):
     def zero(self) -> FloatArray:
         """Return the coordinates in which every joint is at zero, limits or not."""
         q = np.zeros(self.coordinate_count)
-        for where in self._quaternions:
-            q[where.start] = 1.0
+        for quaternion in self.quaternions:
+            q[quaternion.start] = 1.0
         return q
 
     def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
@@ -249,57 +249,53 @@ class Articulation(KeepsReadOnly):
         shape = arguments.lengths("shape", shape, self.coordinate_count)
         q = np.empty((math.prod(shape), self.coordinate_count))
         for j in self._leading:
-            where = self.coordinates_of(int(j))
-            q[:, where] = _drawn(rng, self, int(j), len(q))
+            q[:, self.coordinates_of(int(j))] = _drawn(rng, self, int(j), len(q))
         return q.reshape(*shape, self.coordinate_count)
 
     def clamp(self, q: ArrayLike) -> FloatArray:
         """Return coordinates with each joint brought to the nearest within its limits."""
-        given = self.checked("q", q)
-        result = given.copy()
+        result = self.checked("q", q).copy()
         _clamp(self.joints, one_batch(result))
         return result
 
     def within_limits(self, q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> np.ndarray:
         """Return whether each q keeps all limits to a tolerance [rad or m], shape (...)."""
-        given = self.checked("q", q)
-        excess = np.empty(given.shape[:-1])
-        _excess(self.joints, one_batch(given), excess.reshape(-1))
+        q = self.checked("q", q)
+        excess = np.empty(q.shape[:-1])
+        _excess(self.joints, one_batch(q), excess.reshape(-1))
         return excess <= arguments.number("tolerance", tolerance, least=0.0)
 
     def local_transforms(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return positions (..., joint, 3) [m] and rotations (..., joint, 4) in parents' frames."""
-        return self._posed(_locals, q)
+        return self._transforms(_locals, q)
 
     def forward(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4)."""
-        return self._posed(_forward, q)
+        return self._transforms(_forward, q)
 
-    def _posed(self, kernel: Kernel, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        given = self.checked("q", q)
-        shape = (*given.shape[:-1], self.joint_count)
+    def _transforms(self, kernel: Kernel, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        q = self.checked("q", q)
+        shape = (*q.shape[:-1], self.joint_count)
         positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        kernel(self.joints, one_batch(given), one_batch(positions, 2), one_batch(rotations, 2))
+        kernel(self.joints, one_batch(q), one_batch(positions, 2), one_batch(rotations, 2))
         return positions, rotations
 
     def checked(self, name: str, q: ArrayLike) -> FloatArray:
         """Return coordinates (..., coordinate), their quaternions made unit."""
-        given = arguments.coordinates(name, q, "...", self.coordinate_count)
-        if not self._quaternions:
-            return given
-        result = given.copy()
-        for where in self._quaternions:
-            result[..., where] = rotation.unit(name, given[..., where])
+        q = arguments.coordinates(name, q, "...", self.coordinate_count)
+        if not self.quaternions:
+            return q
+        result = q.copy()
+        for quaternion in self.quaternions:
+            result[..., quaternion] = rotation.unit(name, q[..., quaternion])
         return result
 
     @functools.cached_property
-    def _quaternions(self) -> list[slice]:
-        """Where in q quaternions are."""
-        ends = [self.coordinates_of(int(j)).stop for j in self._leading if self._has_quaternion(j)]
+    def quaternions(self) -> list[slice]:
+        """The slices of q that hold quaternions."""
+        rotating = [int(j) for j in self._leading if self.kinds[j] in ("ball", "free")]
+        ends = [self.coordinates_of(j).stop for j in rotating]
         return [slice(end - 4, end) for end in ends]
-
-    def _has_quaternion(self, j: int) -> bool:
-        return self.kinds[j] in ("ball", "free")
 
     @functools.cached_property
     def _leading(self) -> IndexArray:
@@ -313,7 +309,7 @@ class Articulation(KeepsReadOnly):
 
 
 def one_batch(values: np.ndarray, axes: int = 1) -> np.ndarray:
-    """Return a view whose leading axes, all but the last so many, are joined into one."""
+    """Return a view with all leading axes but the last `axes` joined into one."""
     return values.reshape(math.prod(values.shape[:-axes]), *values.shape[-axes:])
 
 
@@ -342,9 +338,9 @@ def rotated_by_pi(joints: RecordArray) -> FloatArray:
 
 
 def rotated_by_half(R, rotated, half):
-    """Return R rotated about the axis about which `rotated` is R rotated by pi.
+    """Return R rotated about an axis, c R + s (R axis), `half` being c, s of half the angle.
 
-    With c, s of half the angle, R (c + s axis) is c R + s (R axis).
+    `rotated` is R axis: R rotated by pi about the axis.
     """
     c, s = half
     return (
@@ -358,7 +354,7 @@ def rotated_by_half(R, rotated, half):
 def swing_twist(Q, axis):
     """Return swing S and twist angle t [rad] of Q = S exp(t axis): first t about the axis."""
     along = dot((Q[1], Q[2], Q[3]), axis)
-    if Q[0] == 0.0 and along == 0.0:  # a rotation by pi about an axis across: any twist would do
+    if Q[0] == 0.0 and along == 0.0:  # by pi about a perpendicular axis any twist is right
         return Q, 0.0
     twist = 2.0 * math.atan2(along, Q[0])
     if twist > math.pi:
@@ -395,7 +391,7 @@ def clamp_joint(joints, j, q):
 
 
 def joint_excess(joints, j, q):
-    """Return by how much [rad or m] the coordinates of one joint are outside its limits."""
+    """Return the excess [rad or m] of a joint's coordinates over its limits."""
     kind, at = joints["kind"][j], joints["coordinate"][j]
     if joints["leader"][j] != j:
         return 0.0
@@ -404,8 +400,8 @@ def joint_excess(joints, j, q):
     if kind == BALL:
         swing, twist = swing_twist(load_quaternion_from(q, at), load_vector(joints["axis"], j))
         tilt = logarithm(swing)
-        over = math.sqrt(dot(tilt, tilt)) - joints["cone"][j]
-        return max(joints["lower"][j] - twist, twist - joints["upper"][j], over, 0.0)
+        excess = math.sqrt(dot(tilt, tilt)) - joints["cone"][j]
+        return max(joints["lower"][j] - twist, twist - joints["upper"][j], excess, 0.0)
     return 0.0
 
 
@@ -424,18 +420,25 @@ def normalise_start(joints, q):
 
 
 def ball_coordinate(joints, j):
-    """Return where the quaternion of a ball or free joint begins in q."""
+    """Return the index in q of the quaternion of a ball or free joint."""
     return joints["coordinate"][j] + (3 if joints["kind"][j] == FREE else 0)
+
+
+def joint_in_world(joints, j, q, positions, rotations):
+    """Return a joint's position and rotation in the world, given those of its parent."""
+    x, R = joint_transform(joints, j, q)
+    parent = joints["parent"][j]
+    if parent >= 0:
+        R_parent = load_quaternion(rotations, parent)
+        x = add(load_vector(positions, parent), rotate(R_parent, x))
+        R = multiply(R_parent, R)
+    return x, R
 
 
 def articulated_pose(joints, q, positions, rotations):
     """Fill global positions (joint, 3) and rotations (joint, 4) of one q."""
     for j in range(len(joints)):
-        x, R = joint_transform(joints, j, q)
-        if joints["parent"][j] >= 0:
-            R_parent = load_quaternion(rotations, joints["parent"][j])
-            x = add(load_vector(positions, joints["parent"][j]), rotate(R_parent, x))
-            R = multiply(R_parent, R)
+        x, R = joint_in_world(joints, j, q, positions, rotations)
         store_vector(positions, j, x)
         store_quaternion(rotations, j, R)
 
@@ -473,52 +476,51 @@ _forward = Kernel(_forward_batch, label="forward_kinematics of articulations")
 
 
 def _checked_kinds(kinds: str | Sequence[str], count: int) -> tuple[str, ...]:
-    one = isinstance(kinds, str)
-    given = (kinds,) * count if one else arguments.sequence("kinds", kinds, count, "a joint")
-    return tuple(arguments.choice("kinds", kind, KINDS) for kind in given)
+    if isinstance(kinds, str):
+        kinds = (kinds,) * count
+    kinds = arguments.sequence("kinds", kinds, count, "a joint")
+    return tuple(arguments.choice("kinds", kind, KINDS) for kind in kinds)
 
 
-def _checked_frames(frames: ArrayLike, count: int) -> FloatArray:
-    given = rotation.unit("frames", frames)
-    _one_a_joint("frames", given.shape[:-1], count)
-    return arguments.spread(given, (count, 4))
+def _per_joint(name: str, values: FloatArray, count: int, *axes: int) -> FloatArray:
+    """Return values, (joint, *axes), of which one may stand for all joints."""
+    batch = values.shape[: values.ndim - len(axes)]
+    if batch not in ((), (count,)):
+        raise ValueError(f"{name}: expected one, or one for each of {count} joints, got {batch}")
+    return arguments.spread(values, (count, *axes))
 
 
 def _checked_axes(axes: ArrayLike, count: int) -> FloatArray:
-    given = arguments.coordinates("axes", axes, "...", 3)
-    _one_a_joint("axes", given.shape[:-1], count)
-    lengths = np.linalg.norm(given, axis=-1, keepdims=True)
+    vectors = _per_joint("axes", arguments.coordinates("axes", axes, "...", 3), count, 3)
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     if (lengths < SMALLEST_POSITIVE).any():
         raise ValueError(
             f"axes: expected lengths of at least {SMALLEST_POSITIVE:g}, got {lengths.min():g}"
         )
-    return arguments.spread(given / lengths, (count, 3))
+    return vectors / lengths
 
 
 def _checked_limits(
     lower: ArrayLike, upper: ArrayLike, count: int
 ) -> tuple[FloatArray, FloatArray]:
-    bounds = []
-    for name, value in (("lower", lower), ("upper", upper)):
-        bounds.append(_checked_bound(name, value, count))
-    crossed = np.flatnonzero(bounds[0] > bounds[1])
+    lower, upper = _checked_bound("lower", lower, count), _checked_bound("upper", upper, count)
+    crossed = np.flatnonzero(lower > upper)
     if len(crossed):
         j = crossed[0]
-        number, limit = arguments.distinct_texts(bounds[0][j], bounds[1][j])
+        number, limit = arguments.distinct_texts(lower[j], upper[j])
         raise ValueError(
             f"lower: expected at most the upper limit, {limit}, got {number} for joint {j}"
         )
-    return bounds[0], bounds[1]
+    return lower, upper
 
 
 def _checked_bound(name: str, value: ArrayLike, count: int) -> FloatArray:
     """Return numbers, one a joint, of which any may be infinite."""
-    given = arguments.floats(name, value, "...")
-    _one_a_joint(name, given.shape, count)
-    if np.isnan(given).any():
+    bounds = _per_joint(name, arguments.floats(name, value, "..."), count)
+    if np.isnan(bounds).any():
         raise ValueError(f"{name}: expected numbers or infinity, got NaN")
-    arguments.array(name, given[np.isfinite(given)], "...")
-    return arguments.spread(given, (count,))
+    arguments.array(name, bounds[np.isfinite(bounds)], "...")
+    return bounds
 
 
 def _check_twists(joints: RecordArray) -> None:
@@ -536,14 +538,9 @@ def _check_twists(joints: RecordArray) -> None:
 
 
 def _checked_cones(cones: ArrayLike, count: int) -> FloatArray:
-    given = _checked_bound("cones", cones, count)
-    arguments.sizes("cones", np.where(given == np.inf, 0.0, given), "...")
-    return given
-
-
-def _one_a_joint(name: str, batch: tuple[int, ...], count: int) -> None:
-    if batch not in ((), (count,)):
-        raise ValueError(f"{name}: expected one, or one for each of {count} joints, got {batch}")
+    bounds = _checked_bound("cones", cones, count)
+    arguments.sizes("cones", np.where(bounds == np.inf, 0.0, bounds), "...")
+    return bounds
 
 
 def _checked_mimics(
@@ -552,18 +549,18 @@ def _checked_mimics(
     """Return the mimics by index, each with a leader that is no mimic joint itself."""
     if not isinstance(mimics, Mapping):
         raise ValueError(f"mimics: expected a mapping of joints, got {arguments.shown(mimics)}")
-    named = {skeleton.index(j, "mimics"): _checked_mimic(mimic) for j, mimic in mimics.items()}
-    leaders = {joint: skeleton.index(mimic.leader, "mimics") for joint, mimic in named.items()}
+    followers = {skeleton.index(j, "mimics"): _checked_mimic(m) for j, m in mimics.items()}
+    leaders = {joint: skeleton.index(mimic.leader, "mimics") for joint, mimic in followers.items()}
     checked: dict[int, Mimic] = {}
-    for joint in named:
+    for joint in followers:
         for j in reversed(_chain_to_leader(joint, leaders, checked, skeleton)):
-            multiplier = arguments.number("mimics", named[j].multiplier)
-            shift = arguments.number("mimics", named[j].shift)
-            first, factor, further = checked.get(leaders[j], Mimic(leaders[j]))
+            multiplier = arguments.number("mimics", followers[j].multiplier)
+            shift = arguments.number("mimics", followers[j].shift)
+            first, factor, offset = checked.get(leaders[j], Mimic(leaders[j]))
             checked[j] = Mimic(
                 first,
                 arguments.number("mimics", multiplier * factor),
-                arguments.number("mimics", multiplier * further + shift),
+                arguments.number("mimics", multiplier * offset + shift),
             )
             for k in (j, leaders[j]):
                 if kinds[k] not in ("hinge", "slide"):
@@ -605,7 +602,7 @@ def _records(skeleton: Skeleton, kinds: IndexArray, mimics: Mapping[int, Mimic])
 
 
 def number_coordinates(joints: RecordArray) -> IndexArray:
-    """Fill where the coordinates and freedoms of joints begin; return the coordinates' counts."""
+    """Fill the first coordinate and freedom of joints; return their numbers of coordinates."""
     leads = joints["leader"] == np.arange(len(joints))
     for field, counts in (("freedom", FREEDOMS), ("coordinate", WIDTHS)):
         own = np.where(leads, counts[joints["kind"]], 0)
@@ -617,9 +614,8 @@ def _drawn(rng: np.random.Generator, joints: Articulation, j: int, count: int) -
     """Return random coordinates of one joint, (count, width)."""
     kind, lower, upper = joints.kinds[j], joints.lower[j], joints.upper[j]
     if kind in ("hinge", "slide"):
-        most = np.pi if kind == "hinge" else 1.0
-        lower, upper = _interval(lower, upper, most)
-        return rng.uniform(lower, upper, (count, 1))
+        interval = _interval(lower, upper, np.pi if kind == "hinge" else 1.0)
+        return rng.uniform(*interval, (count, 1))
     if kind == "free":
         return np.hstack([rng.uniform(-1.0, 1.0, (count, 3)), rotation.random(rng, count)])
     if not np.isfinite([lower, upper, joints.cones[j]]).any():
@@ -633,10 +629,10 @@ def _drawn(rng: np.random.Generator, joints: Articulation, j: int, count: int) -
     return rotation.multiply(rotation.exponential(tilt * across), rotation.exponential(twist))
 
 
-def _interval(lower: float, upper: float, most: float) -> tuple[float, float]:
-    """Return the limits, or where one is missing so far from the other, or from zero."""
+def _interval(lower: float, upper: float, span: float) -> tuple[float, float]:
+    """Return the limits; a missing one is a span from the other one, or from zero."""
     if np.isinf(lower) and np.isinf(upper):
-        return -most, most
+        return -span, span
     if np.isinf(lower):
-        return min(-most, upper - most), upper
-    return lower, (max(most, lower + most) if np.isinf(upper) else upper)
+        return min(-span, upper - span), upper
+    return lower, (max(span, lower + span) if np.isinf(upper) else upper)

@@ -1,14 +1,16 @@
-"""Jacobians of a tree of joints, and the steps on its coordinates that they are derivatives by.
+"""Jacobians of a tree of joints, and steps of its coordinates along velocities.
 
-A velocity v, (..., freedom), holds joint after joint what its kind may do: the rate of a
-hinge [rad/s] or a slide [m/s]; of a ball the angular velocity in its own, moved frame; of a free
-joint the rate of its position coordinates, then the angular velocity in its own frame. So a step
-rotates a quaternion from the right: Q exp(v). A mimic joint has no velocity of its own: it adds to
-its leader's column.
+A velocity v, (..., freedom), holds joint after joint the rate of a hinge [rad/s] or a slide [m/s];
+of a ball the angular velocity in its own, moved frame; of a free joint the rate of its position
+coordinates, then the angular velocity in its own frame. So a step rotates a quaternion from the
+right: Q exp(v). A mimic joint has no velocity of its own: it adds to its leader's column.
 
 Coordinates q have the shape (..., coordinate), of a Skeleton (..., joint, 4); leading axes
-broadcast. Functions raise a ValueError if an argument has another shape, is not finite, or holds no
-unit quaternion where one is expected, and if there is no such joint.
+broadcast. Functions raise a ValueError if an argument has another shape, is not finite, or holds a
+quaternion that is not unit, and if there is no such joint.
+
+The kernel `motion` gives the motion subspace of a joint (Featherstone 2008) in the world's axes: a
+freedom rotates the joints below about an axis through the joint's origin, or translates them.
 """
 
 import numpy as np
@@ -16,21 +18,37 @@ from numpy.typing import ArrayLike
 
 from . import arguments
 from .arguments import FloatArray
-from .articulation import BALL, FIXED, FREE, FREEDOMS, Articulation, articulated_pose, one_batch
+from .articulation import (
+    BALL,
+    FIXED,
+    FREE,
+    FREEDOMS,
+    HINGE,
+    SLIDE,
+    Articulation,
+    articulated_pose,
+    one_batch,
+)
 from .backend.compiled import Kernel
 from .model import Model, checked_model, effector_of
-from .motion_subspace import accumulate, motion, velocity_at
 from .quaternion import (
+    add,
     conjugate,
+    cross,
     exponential,
+    load_quaternion,
     load_quaternion_from,
     load_vector,
     logarithm,
     multiply,
+    rotate,
+    scale,
     store_quaternion_to,
     subtract,
 )
 from .skeleton import Skeleton
+
+ZERO = (0.0, 0.0, 0.0)
 
 
 def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = None) -> FloatArray:
@@ -40,9 +58,9 @@ def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = Non
     taken at its origin, along the axes of the world. The effector is a joint by name or index; by
     default as for `solve_ik`.
     """
-    model, given = _coordinates("q", articulation, q)
-    one = np.array([effector_of(checked_model(articulation), effector)])
-    return _jacobians(model, one, given)[..., 0, :, :]
+    model, coordinates = _coordinates("q", articulation, q)
+    joint = effector_of(checked_model(articulation), effector)
+    return _jacobians(model, np.array([joint]), coordinates)[..., 0, :, :]
 
 
 def jacobians(articulation: Model, q: ArrayLike, joints: ArrayLike | None = None) -> FloatArray:
@@ -75,6 +93,52 @@ def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
     v = np.empty((*start.shape[:-1], model.freedom_count))
     _difference(model.joints, one_batch(end), one_batch(start), one_batch(v))
     return v
+
+
+def axis_of(joints, j, R):
+    """Return a joint's axis in the world, given its rotation R there."""
+    return rotate(R, load_vector(joints["axis"], j))
+
+
+def frame_of(joints, j, rotations):
+    """Return the rotation in the world that a joint has where its coordinates are zero."""
+    frame = load_quaternion(joints["frame"], j)
+    if joints["parent"][j] < 0:
+        return frame
+    return multiply(load_quaternion(rotations, joints["parent"][j]), frame)
+
+
+def motion(joints, j, i, rotations, length):
+    """Return the angular velocity [rad] and the linear one [m] by the i-th freedom of joint j.
+
+    A mimic joint's freedom is its leader's; a free joint's translations come first. `rotations` are
+    those of all joints in the world, and a unit of a translation is `length` [m].
+    """
+    kind, R = joints["kind"][j], load_quaternion(rotations, j)
+    if kind in (HINGE, SLIDE):
+        unit = length if joints["kind"][joints["leader"][j]] == SLIDE else 1.0
+        axis = scale(joints["multiplier"][j] * unit, axis_of(joints, j, R))
+        return (axis, ZERO) if kind == HINGE else (ZERO, axis)
+    if kind == FREE and i < 3:
+        return ZERO, rotate(frame_of(joints, j, rotations), unit_vector(i, length))
+    return rotate(R, unit_vector(i % 3, 1.0)), ZERO
+
+
+def unit_vector(i, length):
+    """Return a vector along the i-th axis."""
+    return length * (i == 0), length * (i == 1), length * (i == 2)
+
+
+def velocity_at(angular, linear, arm):
+    """Return the linear velocity of a point at an arm [m] from the joint's origin."""
+    return add(cross(angular, arm), linear)
+
+
+def accumulate(row, i, v):
+    """Add a vector to three entries of a row or column of a Jacobian, from the i-th on."""
+    row[i] += v[0]
+    row[i + 1] += v[1]
+    row[i + 2] += v[2]
 
 
 def fill_jacobian(joints, effector, positions, rotations, J):
@@ -164,9 +228,9 @@ def _jacobians(model: Articulation, effectors: np.ndarray, q: FloatArray) -> Flo
     return J
 
 
-def _coordinates(name: str, given: Model, q: ArrayLike) -> tuple[Articulation, FloatArray]:
+def _coordinates(name: str, articulation: Model, q: ArrayLike) -> tuple[Articulation, FloatArray]:
     """Return the articulation, and its coordinates checked, (..., coordinate)."""
-    model = checked_model(given, "articulation")
+    model = checked_model(articulation, "articulation")
     if isinstance(model, Articulation):
         return model, model.checked(name, q)
     balls = Articulation(model)

@@ -8,11 +8,13 @@ import numpy as np
 
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers import Limits
+from plumbob.crosscheck.verify.solvers import ProcessLimits
 from plumbob.crosscheck.verify.solvers.program import ProgramContestant
 
 # The first request may wait for a busy machine; the others come when the program is warm.
-LIMITS = Limits(first=20.0, request=0.5, leave=0.4, memory=250 << 20, line=1 << 20, prints=100)
+LIMITS = ProcessLimits(
+    first=20.0, request=0.5, leave=0.4, memory=250 << 20, line=1 << 20, prints=100
+)
 
 PRELUDE = """\
 import json, os, resource, signal, subprocess, sys, time

@@ -95,7 +95,7 @@ INTERNAL = {
     "reference.backend.compiled.bind": "for kernels",
     "reference.backend.compiled.compiled_in": "for kernels",
     "reference.backend.threads.in_slices": "for kernels",
-    "crosscheck.verdict.Verdict": "made only by check_claim",
+    "crosscheck.verdict.ClaimVerdict": "made only by check_claim",
     "crosscheck.verdict.Claim": "made by claims",
     "crosscheck.samples.generator": "of names in the sources",
     "crosscheck.samples.particles": "of a case that is checked already",

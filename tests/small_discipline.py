@@ -3,7 +3,7 @@
 import numpy as np
 
 from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Answer, Asked
+from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.explain import Variant, difference, explain
 from plumbob.crosscheck.verify.judgement import (
     CaseJudgement,
@@ -38,7 +38,7 @@ class SmallDiscipline:
         wrong = [a for a, j in zip(asked, judgements, strict=True) if j.verdict is Verdict.WRONG]
         return TaskReport(self.task, method, judgements, self._why(wrong))
 
-    def _judged(self, one: Asked):
+    def _judged(self, one: Exchange):
         expected = self.right(one.case)
         if not isinstance(one.answer, Answer):
             return CaseJudgement(one.case, one.answer, (), expected, None, 1e-5)

@@ -16,7 +16,7 @@ from plumbob.bench.figures import sketch
 from plumbob.bench.harness.record import Record, RecordFile
 from plumbob.commands import bench, report
 from plumbob.crosscheck.claims import CLAIMS
-from plumbob.crosscheck.verdict import Verdict
+from plumbob.crosscheck.verdict import ClaimVerdict
 
 
 @pytest.fixture(autouse=True)
@@ -310,7 +310,7 @@ def judged(missed):
     """Stand for `run_claims`, with every claim missed or held."""
 
     def run_claims(names, progress=None):
-        return [Verdict(CLAIMS[name], 3, 1e-3, 1.0, missed) for name in names]
+        return [ClaimVerdict(CLAIMS[name], 3, 1e-3, 1.0, missed) for name in names]
 
     return run_claims
 

@@ -1,1 +1,1 @@
-"""Compare two revisions or two runs: what got faster, slower, more or less right; and over time."""
+"""Compare runs and revisions: faster, slower, more or less accurate; and follow many runs."""

@@ -1,116 +1,232 @@
-"""Compare two runs row by row, and decide which rows a gate stops at."""
+"""Compare two runs row by row, and find the rows that fail a gate."""
 
+import json
+import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from textwrap import wrap
+from typing import NamedTuple
 
 from ..harness.metrics import adjusted
 from ..harness.record import Record
-from .answers import chance_by_clock, compare_answers, compare_cut_answers
-from .rows import Pair, Ratio, Row, RowKey, Verdict, by_row, come_and_gone, pairs, worst_first
-from .times import ERROR_RATE, Drift, clocked, drift, has_rounds, judged, time_ratios
+from ..tables.columns import text
+from ..tables.results import counted
+from ..tables.table import Summary, Table, cells
+from ..text import visible
+from .answers import chance_by_time_limit, compare_answers, compare_limited_answers
+from .rows import (
+    ORDER,
+    ChangeVerdict,
+    Pair,
+    RowChange,
+    RowKey,
+    TimeRatio,
+    by_row,
+    distinguishing,
+    match_rows,
+    worst_first,
+)
+from .times import (
+    ERROR_RATE,
+    ROUNDS,
+    Drift,
+    common_times,
+    has_rounds,
+    machine_drift,
+    time_change,
+    time_ratios,
+)
 
-ACCURACY, TIME, GONE = "accuracy", "time", "gone"
-
-
-class Comparison(NamedTuple):
-    """What two runs differ in.
-
-    Attributes:
-        rows: the worst first.
-        drift: by how much the machine differs from itself.
-        how: a sentence on how times were decided.
-        is_rerun: whether both were measured side by side.
-        short: how many times have too few rounds to be compared.
-    """
-
-    rows: list[Row]
-    drift: Drift
-    how: str
-    is_rerun: bool = False
-    short: int = 0
-
-
-class Limits(NamedTuple):
-    """At what a gate stops: the least relative change of answers and of times; None never."""
-
-    accuracy: float | None = None
-    time: float | None = None
-    gone: bool = False
-
-
-HOW = (
+# Lines of the summary on a terminal; rows of the table in a pull request.
+MAX_LINES, MAX_ROWS = 10, 50
+# Indentation of the second line of a row on a terminal, as wide as its verdict.
+_INDENT = " " * (3 + max(map(len, ORDER)))
+METHOD = (
     "Answers are compared to the bit. Times are ratios of medians with 95 % block-bootstrap "
-    "intervals, widened by the machine's drift; the chance of calling any row wrongly is held at "
+    "intervals, widened by the machine's drift; the probability of any wrong verdict is at most "
     f"{100 * ERROR_RATE:g} % over all rows (Holm)."
 )
 
 
-def compare(old: Iterable[Record], new: Iterable[Record]) -> Comparison:
-    """Return what two runs differ in, by their records."""
+class RunComparison(NamedTuple):
+    """Differences between two runs.
+
+    Attributes:
+        rows: the worst first.
+        drift: of the machine between both runs.
+        method: a sentence on how times were compared.
+        is_rerun: whether both were measured side by side.
+        short: number of times with too few rounds to be compared.
+    """
+
+    rows: list[RowChange]
+    drift: Drift
+    method: str
+    is_rerun: bool = False
+    short: int = 0
+
+
+def compare(old: Iterable[Record], new: Iterable[Record]) -> RunComparison:
+    """Return the differences between the records of two runs."""
     before, after = by_row(old), by_row(new)
-    both = pairs(before, after)
-    machine = drift(both)
-    rows = [*come_and_gone(before, after), *decide(both, time_ratios(both, machine))]
-    short = sum(not has_rounds(pair, name) for pair in both.values() for name in clocked(pair))
-    return Comparison(worst_first(rows), machine, HOW, short=short)
+    pairs, changes = match_rows(before, after)
+    drift = machine_drift(pairs)
+    rows = [*changes, *row_changes(pairs, time_ratios(pairs, drift))]
+    short = sum(not has_rounds(p, name) for p in pairs.values() for name in common_times(p))
+    return RunComparison(worst_first(rows), drift, METHOD, short=short)
 
 
-def decide(
-    both: Mapping[RowKey, Pair], ratios: Mapping[tuple[RowKey, str], Ratio | str]
-) -> list[Row]:
-    """Return a row on the answers of each pair, and one on each of its times."""
-    cut = {key: chance for key, pair in both.items()
-           if (chance := chance_by_clock(pair)) is not None}  # fmt: skip
-    known = {at: ratio.chance for at, ratio in ratios.items() if isinstance(ratio, Ratio)}
-    chances = iter(adjusted([*cut.values(), *known.values()]).tolist())
-    rows = [compare_cut_answers(key, both[key], next(chances), ERROR_RATE) for key in cut]
-    rows += [compare_answers(key, pair) for key, pair in both.items() if key not in cut]
-    for at, ratio in ratios.items():
-        rows.append(
-            judged(*at, ratio, next(chances))
-            if isinstance(ratio, Ratio)
-            else Row(*at, Verdict.UNDECIDED, why=ratio)
-        )
+def row_changes(
+    pairs: Mapping[RowKey, Pair], ratios: Mapping[tuple[RowKey, str], TimeRatio | str]
+) -> list[RowChange]:
+    """Return the change of the answers of each pair, and of each of its times."""
+    limited = {
+        key: chance for key, pair in pairs.items()
+        if (chance := chance_by_time_limit(pair)) is not None
+    }  # fmt: skip
+    tested = {time: ratio for time, ratio in ratios.items() if isinstance(ratio, TimeRatio)}
+    raw = [*limited.values(), *(ratio.chance for ratio in tested.values())]
+    chances = iter(adjusted(raw).tolist())
+    rows = [compare_limited_answers(k, pairs[k], next(chances), ERROR_RATE) for k in limited]
+    rows += [compare_answers(key, pair) for key, pair in pairs.items() if key not in limited]
+    for (key, name), ratio in ratios.items():
+        if isinstance(ratio, str):
+            rows.append(RowChange(key, name, ChangeVerdict.UNDECIDED, why=ratio))
+        else:
+            rows.append(time_change(key, name, ratio, next(chances)))
     return rows
 
 
-def limits(text: str) -> Limits:
-    """Return the limits that a text such as "accuracy,time:10%" sets.
+def gate_limits(request: str) -> dict[str, float]:
+    """Return the least relative changes that fail a gate, from a text such as "accuracy,time:10%".
 
     Raises:
-        ValueError: if it is none.
+        ValueError: if a part of it is no limit.
     """
-    found: dict[str, Any] = {}
-    for part in filter(None, (part.strip() for part in text.split(","))):
-        name, _, value = part.partition(":")
-        if name not in Limits._fields or (name == GONE and value):
+    limits: dict[str, float] = {}
+    for part in filter(None, (part.strip() for part in request.split(","))):
+        name, _, share = part.partition(":")
+        if name not in ("accuracy", "time", "gone") or (name == "gone" and share):
             raise ValueError(
                 f"--fail: expected accuracy, accuracy:SHARE, time:SHARE or gone, got {part!r}"
             )
-        found[name] = True if name == GONE else _share(part, value)
-    return Limits(**found)
+        try:
+            limits[name] = float(share.removesuffix("%") or 0) / (100 if "%" in share else 1)
+        except ValueError:
+            limits[name] = math.nan
+        if not 0 <= limits[name] < math.inf:
+            raise ValueError(f"--fail: expected a share such as 10% or 0.1, got {part!r}")
+    return limits
 
 
-def _share(part: str, value: str) -> float:
-    if not value:
-        return 0.0
-    try:
-        share = float(value.removesuffix("%")) / (100 if value.endswith("%") else 1)
-    except ValueError:
-        share = -1.0
-    if not 0 <= share < float("inf"):
-        raise ValueError(f"--fail: expected a share such as 10% or 0.1, got {part!r}")
-    return share
+def failing(rows: Iterable[RowChange], limits: Mapping[str, float]) -> list[RowChange]:
+    """Return the rows that fail a gate."""
+    accuracy, time = (limits.get(name, math.inf) for name in ("accuracy", "time"))
+    return [
+        row for row in rows
+        if (row.verdict in (ChangeVerdict.LESS_RIGHT, ChangeVerdict.CHANGED)
+            and row.change >= accuracy)
+        or (row.verdict == ChangeVerdict.SLOWER and row.ratio and row.ratio.ratio >= 1 + time)
+        or (row.verdict == ChangeVerdict.GONE and "gone" in limits)
+    ]  # fmt: skip
 
 
-def stops_at(rows: Sequence[Row], limit: Limits) -> list[Row]:
-    """Return the rows that a gate stops at."""
-    return [row for row in rows if _stops(row, limit)]
+def headline(comparison: RunComparison, failed: Sequence[RowChange]) -> str:
+    """Return the result in one sentence."""
+    if failed:
+        return f"STOP: {counted(len(failed), 'row')} beyond the limits of --fail"
+    bad = (ChangeVerdict.LESS_RIGHT, ChangeVerdict.SLOWER)
+    worse = sum(row.verdict in bad for row in comparison.rows)
+    return f"{counted(worse, 'row')} worse" if worse else "Nothing is less right or slower"
 
 
-def _stops(row: Row, limit: Limits) -> bool:
-    if row.verdict in (Verdict.LESS_RIGHT, Verdict.CHANGED):
-        return limit.accuracy is not None and row.change >= limit.accuracy
-    if row.verdict == Verdict.SLOWER and row.ratio:
-        return limit.time is not None and row.ratio.value >= 1 + limit.time
-    return row.verdict == Verdict.GONE and limit.gone
+def verdict_counts(comparison: RunComparison) -> str:
+    """Return the number of rows of each verdict, the worst first."""
+    counts = Counter(row.verdict for row in comparison.rows)
+    listed = ", ".join(f"{counts[verdict]} {verdict}" for verdict in ORDER if counts[verdict])
+    return listed or "No rows in common"
+
+
+def summary(comparison: RunComparison, failed: Sequence[RowChange], width: int) -> list[str]:
+    """Return at most ten lines of at most this width, with as many rows as fit, the worst first."""
+    rows = [row for row in comparison.rows if row.verdict != ChangeVerdict.SAME]
+    settings = distinguishing(row.key for row in comparison.rows)
+    first = [headline(comparison, failed), verdict_counts(comparison)]
+    last = [f"Drift of the machine: {comparison.drift.sentence}"]
+    if any(row.verdict == ChangeVerdict.UNDECIDED for row in rows) and not comparison.is_rerun:
+        last[0] += "; --rerun REV decides"
+    if comparison.short:
+        last.append(_not_compared(comparison))
+    for count in range(min(MAX_LINES, len(rows)), -1, -1):
+        more = [f"  and {len(rows) - count} more: --markdown FILE or --json FILE writes all"]
+        texts = [*first, *(_line(row, settings[row.key]) for row in rows[:count])]
+        texts += [*(more if count < len(rows) else ()), *last]
+        lines = [line for text in texts for line in wrap(text, width, subsequent_indent=_INDENT)]
+        if len(lines) <= MAX_LINES:
+            break
+    return lines
+
+
+def _line(row: RowChange, settings: str) -> str:
+    name = f"{row.title} ({settings})" if settings else row.title
+    return f"  {row.verdict:<{len(_INDENT) - 2}}" + visible(f"{name}: {row.why}")
+
+
+def _not_compared(comparison: RunComparison) -> str:
+    return (
+        f"Not compared: {counted(comparison.short, 'time')} with fewer than {ROUNDS} rounds, "
+        "for which there is no interval"
+    )
+
+
+def table(comparison: RunComparison, failed: Sequence[RowChange], old: str, new: str) -> Table:
+    """Return the rows that differ or are undecided, with the reasons."""
+    rows = [row for row in comparison.rows if row.verdict != ChangeVerdict.SAME]
+    settings = distinguishing(row.key for row in comparison.rows)
+    points = [f"{counted(len(rows) - MAX_ROWS, 'more row')} in the JSON"] * (len(rows) > MAX_ROWS)
+    points += [_not_compared(comparison)] if comparison.short else []
+    columns = (
+        text("verdict", lambda row: str(row.verdict)),
+        text("problem", lambda row: row.key[1]),
+        text("solver", lambda row: row.key[2]),
+        text("settings", lambda row: settings[row.key]),
+        text("quantity", lambda row: row.quantity),
+        text("change", lambda row: row.why),
+    )
+    return Table(
+        "compare",
+        f"plumbob compare: {headline(comparison, failed)}",
+        columns,
+        cells(columns, rows[:MAX_ROWS]),
+        shows=f"{old} beside {new}.",
+        measured=f"{comparison.method} Drift of the machine: {comparison.drift.sentence}.",
+        summary=Summary(verdict_counts(comparison), tuple(points)),
+    )
+
+
+def as_json(comparison: RunComparison, failed: Sequence[RowChange], old: str, new: str) -> str:
+    """Return all rows as standard JSON."""
+    content = {
+        "format": 1,
+        "old": old,
+        "new": new,
+        "stop": len(failed),
+        "drift": comparison.drift.half_width,
+        "drift_source": comparison.drift.source,
+        "how": comparison.method,
+        "short": comparison.short,
+        "counts": Counter(str(row.verdict) for row in comparison.rows),
+        "rows": [_row_as_json(row, row in failed) for row in comparison.rows],
+    }
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def _row_as_json(row: RowChange, stops: bool) -> dict[str, object]:
+    suite, problem, solver, settings = row.key
+    numbers = dict(zip(("ratio", "low", "high", "chance"), row.ratio or [None] * 4, strict=True))
+    return {
+        "verdict": str(row.verdict), "stops": stops, "suite": suite, "problem": problem,
+        "solver": solver, "settings": json.loads(settings), "quantity": row.quantity,
+        "change": row.change, "why": row.why,
+        **{name: x if x is None or math.isfinite(x) else None for name, x in numbers.items()},
+    }  # fmt: skip

@@ -1,7 +1,6 @@
-"""Measure another revision and ours side by side, the order of each pair drawn by lot.
+"""Measure another revision beside the working copy, the order of each pair drawn at random.
 
-Both run in processes of their own, which are fresh for each round of pairs, since a process is
-fast or slow by the accident of its addresses too.
+Each round of pairs uses fresh processes: the speed of a process depends on its addresses too.
 """
 
 import contextlib
@@ -25,43 +24,34 @@ from plumbob.crosscheck.child_process import ChildProcess, LostError, one_thread
 from ..harness.metrics import adjusted
 from ..harness.record import Record, untyped
 from . import revision_process
-from .answers import is_clocked
-from .compare import Comparison, decide
-from .rows import Pair, Ratio, RowKey, by_row, come_and_gone, is_meant, pairs, row_key, worst_first
-from .times import (
-    ERROR_RATE,
-    FLOOR,
-    UNKNOWN,
-    Deviation,
-    Drift,
-    known_drift,
-    pairs_needed,
-    ratio_of_pairs,
-)
+from .answers import is_time
+from .compare import RunComparison, row_changes
+from .rows import Pair, RowKey, TimeRatio, by_row, contains_any, match_rows, row_key, worst_first
+from .times import ERROR_RATE, FLOOR, UNKNOWN, Drift, assumed_drift, pairs_needed, ratio_of_pairs
 
 # Pairs of median times, old and new, of each time of each row.
-Taken = dict[tuple[RowKey, str], list[tuple[float, float]]]
-Ratios = dict[tuple[RowKey, str], Ratio]
+TimePairs = dict[tuple[RowKey, str], list[tuple[float, float]]]
+TimeRatios = dict[tuple[RowKey, str], TimeRatio]
 
 SEED = 20130
 PREFIX = "plumbob-rerun-"
-HOW = (
-    "Both revisions are measured side by side in fresh processes, {pairs} times each, the order "
-    "drawn by lot. Answers are compared to the bit. Times are decided by Wilcoxon's signed-rank "
-    "test, exact by that lot; the chance of calling any row wrongly is held at "
-    f"{100 * ERROR_RATE:g} % over all rows (Holm), and what is called is measured a second time."
+METHOD = (
+    "Both revisions are measured side by side in fresh processes, {pairs} times each, in random "
+    "order. Answers are compared to the bit. Times are compared by Wilcoxon's signed-rank test, "
+    "exact by that order; the probability of any wrong verdict is at most "
+    f"{100 * ERROR_RATE:g} % over all rows (Holm), and each difference is measured a second time."
 )
 
 
 class Plan(NamedTuple):
-    """What is measured again.
+    """A comparison of two revisions.
 
     Attributes:
-        revision: what git knows the other revision by.
-        suites: the suites.
-        words: only problems or solvers that contain one of these; all if there are none.
-        pairs: how many pairs; 0 for as many as the number of rows needs.
-        scale: how much is measured each time.
+        revision: the name of the other revision in git.
+        suites: to measure.
+        words: only problems or solvers that contain one of these; all if empty.
+        pairs: number of pairs; 0 for as many as the number of rows needs.
+        scale: of each measurement.
         seed: of the order.
     """
 
@@ -73,8 +63,8 @@ class Plan(NamedTuple):
     seed: int = SEED
 
 
-def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) -> Comparison:
-    """Return what the working copy at a root does otherwise than another revision of it.
+def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) -> RunComparison:
+    """Return the differences between the working copy at a root and another revision of it.
 
     Raises:
         ValueError: if there is no such revision, nothing to measure in both, or a process ends
@@ -84,17 +74,17 @@ def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) 
         old, new = folder / "old", folder / "new"
         _check_out(root, plan.revision, old)
         new.symlink_to(root, target_is_directory=True)  # so that both paths are as long
-        return _measured((old, new), plan, tell)
+        return _measure(_Bench((old, new), plan, tell))
 
 
 def clone_root(folder: Path) -> Path:
-    """Return the root of the clone of Plumbob that holds a folder.
+    """Return the root of the clone of Plumbob that contains a folder.
 
     Raises:
         ValueError: if the folder is in no clone of Plumbob.
     """
-    top_level = ["git", "-C", str(folder), "rev-parse", "--show-toplevel"]
-    git = subprocess.run(top_level, capture_output=True, check=False)
+    command = ["git", "-C", str(folder), "rev-parse", "--show-toplevel"]
+    git = subprocess.run(command, capture_output=True, check=False)
     root = folder / os.fsdecode(git.stdout.removesuffix(b"\n"))
     project = root / "pyproject.toml"
     if project.is_file() and b'\nname = "plumbob"\n' in project.read_bytes():
@@ -107,30 +97,21 @@ def clone_root(folder: Path) -> Path:
 
 @contextlib.contextmanager
 def _temporary_folder() -> Iterator[Path]:
-    """Yield a locked folder; remove those whose process was killed, which ended its lock."""
+    """Yield a locked folder; remove folders of this user whose process was killed."""
     for old in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/old"):
         with contextlib.suppress(OSError):
-            _remove_abandoned(old.parent)
+            status = old.parent.lstat()
+            if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid():
+                with Path(old.parent, "lock").open() as lock:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    shutil.rmtree(old.parent)
     with tempfile.TemporaryDirectory(prefix=PREFIX) as name, Path(name, "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield Path(name)
 
 
-def _remove_abandoned(folder: Path) -> None:
-    """Remove a folder of this user's that no process holds; others may have put any there."""
-    status = folder.lstat()
-    if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid():
-        with Path(folder, "lock").open() as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            shutil.rmtree(folder)
-
-
 def _check_out(root: Path, revision: str, folder: Path) -> None:
-    """Write the files of a revision to a new folder, of which the repository knows nothing.
-
-    Raises:
-        ValueError: if there is no such revision, or no room to write it.
-    """
+    """Write the files of a revision to a new folder, without a trace in the repository."""
     archive, commit = f"{folder}.zip", f"{revision}^{{commit}}"
     command = ["git", "-C", str(root), "archive", "-o", archive, "--end-of-options", commit]
     git = subprocess.run(command, capture_output=True, check=False)
@@ -149,160 +130,157 @@ def _check_out(root: Path, revision: str, folder: Path) -> None:
 class Revision:
     """A process that measures blocks of one revision, by the sources in a folder."""
 
-    def __init__(self, folder: Path, suites: Sequence[str], scale: str) -> None:
-        command = [sys.executable, "-P", revision_process.__file__, str(folder), scale, *suites]
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        program = [sys.executable, "-P", revision_process.__file__]
+        command = [*program, str(folder), plan.scale, *plan.suites]
         environment = {**one_thread(), "PYTHONPATH": str(folder)}
         self._process = ChildProcess(command, folder=folder.parent, environment=environment)
 
     def blocks(self) -> list[list[str]]:
-        """Return the keys of what there is to be measured: suite, problem, solver, settings."""
+        """Return the keys of all blocks: suite, problem, solver, settings."""
         return json.loads(self._answer())
 
     def measure(self, key: Sequence[str]) -> Record:
-        """Return a fresh record of a block."""
+        """Return a new record of a block."""
         self._process.send(f"{json.dumps(key)}\n".encode())
         return untyped(self._answer())
 
     def _answer(self) -> str:
         try:
-            line: bytes = self._process.receive()
+            return self._process.receive().decode()
         except LostError:
             last = self._process.last_words.decode(errors="replace").strip().splitlines()[-1:]
-            why = " ".join(last) or "without a word"
-            raise ValueError(f"a process of the rerun ended: {why}") from None
-        return line.decode()
+            reason = " ".join(last) or "without a word"
+            raise ValueError(f"a process of the rerun ended: {reason}") from None
 
     def close(self) -> None:
-        """End the process and what it has started."""
+        """End the process and its children."""
         self._process.end()
 
 
-@contextlib.contextmanager
-def _both(
-    folders: tuple[Path, Path], plan: Plan, order: tuple[int, ...] = (0, 1)
-) -> Iterator[tuple[Revision, Revision]]:
-    """Yield a process of each revision, begun in this order: the first may find a cold machine."""
-    with contextlib.ExitStack() as stack:
-        made: dict[int, Revision] = {}
-        for i in order:
-            made[i] = Revision(folders[i], plan.suites, plan.scale)
-            stack.callback(made[i].close)
-        yield made[0], made[1]
+class _Bench(NamedTuple):
+    """The folders of both revisions, the plan, and what shows its progress."""
+
+    folders: tuple[Path, Path]
+    plan: Plan
+    tell: Callable[[str], None]
+
+    @contextlib.contextmanager
+    def processes(self, order: Sequence[int] = (0, 1)) -> Iterator[tuple[Revision, Revision]]:
+        """Yield a process of each revision, started in this order."""
+        with contextlib.ExitStack() as stack:
+            revisions = {}
+            for i in order:
+                revisions[i] = Revision(self.folders[i], self.plan)
+                stack.callback(revisions[i].close)
+            yield revisions[0], revisions[1]
 
 
-def _drawn(lot: np.random.Generator) -> tuple[int, ...]:
-    """Return the order of old, 0, and new, 1, drawn by lot."""
-    return (1, 0) if lot.integers(2) else (0, 1)
-
-
-def _measured(folders: tuple[Path, Path], plan: Plan, tell: Callable[[str], None]) -> Comparison:
+def _measure(bench: _Bench) -> RunComparison:
     """Measure once for the answers, which also compiles, and then pair by pair for the times."""
-    old, new = (by_row(records) for records in _answers(folders, plan, tell))
-    rows = pairs(old, new)
-    taken = _take_pairs(folders, plan, rows, tell)
-    ratios = _ratios(taken)
-    count = max(map(len, taken.values()), default=0)
-    if called := _called(ratios):
-        again = plan._replace(seed=plan.seed + 1, pairs=count)
-        few = {key: rows[key] for key, _ in called}
-        ratios |= _confirmed(called, _ratios(_take_pairs(folders, again, few, tell)))
-    decided = [*come_and_gone(old, new), *decide(rows, ratios)]
-    return Comparison(worst_first(decided), _drift(taken, count), HOW.format(pairs=count), True)
+    old, new = _measure_answers(bench)
+    pairs, changes = match_rows(old, new)
+    times = _measure_times(bench, pairs)
+    count = max(map(len, times.values()), default=0)
+    ratios = _ratios(times)
+    if decided := _decided(ratios):
+        again = bench._replace(plan=bench.plan._replace(seed=bench.plan.seed + 1, pairs=count))
+        repeated = _measure_times(again, {key: pairs[key] for key, _ in decided})
+        ratios |= _confirmed(decided, _ratios(repeated))
+    rows = worst_first([*changes, *row_changes(pairs, ratios)])
+    return RunComparison(rows, _drift(times, count), METHOD.format(pairs=count), is_rerun=True)
 
 
-def _answers(
-    folders: tuple[Path, Path], plan: Plan, tell: Callable[[str], None]
-) -> list[list[Record]]:
-    """Return the records of both revisions.
-
-    Raises:
-        ValueError: if there is nothing to measure.
-    """
-    with _both(folders, plan) as both:
-        keys = [[key for key in one.blocks() if is_meant(key, plan.words)] for one in both]
+def _measure_answers(bench: _Bench) -> list[dict[RowKey, Record]]:
+    """Return the records of both revisions by row."""
+    rows = []
+    with bench.processes() as revisions:
+        keys = [
+            [key for key in revision.blocks() if contains_any(key, bench.plan.words)]
+            for revision in revisions
+        ]
         if not any(keys):
             raise ValueError(
                 "--rerun: expected something to measure in both revisions, got nothing"
             )
-        records = []
-        for one, wanted in zip(both, keys, strict=True):
-            tell(f"answers of {len(wanted)} rows")
-            records.append(list(map(one.measure, wanted)))
-    return records
+        for revision, blocks in zip(revisions, keys, strict=True):
+            bench.tell(f"answers of {len(blocks)} rows")
+            rows.append(by_row(map(revision.measure, blocks)))
+    return rows
 
 
-def _ratios(taken: Taken) -> Ratios:
-    """Return the ratio of each time; one too near to 1 to matter counts as chance."""
-    ratios = {at: ratio_of_pairs(*np.array(values).T) for at, values in taken.items()}
+def _measure_times(bench: _Bench, rows: Mapping[RowKey, Pair]) -> TimePairs:
+    """Return pairs of median times of each time of each row, in random order."""
+    timed = [pair for pair in rows.values() if all(map(_median_times, pair))]
+    needed = pairs_needed(sum(len(_median_times(pair.old)) for pair in timed))
+    count = (bench.plan.pairs or needed) if timed else 0
+    rng = np.random.default_rng(bench.plan.seed)
+    times: TimePairs = {}
+    for i in range(count):
+        bench.tell(f"pair {i + 1} of {count}, {len(timed)} rows")
+        with bench.processes(_random_order(rng)) as revisions:
+            for revision in revisions:
+                revision.blocks()
+            for j in rng.permutation(len(timed)):
+                pair = timed[j]
+                order = _random_order(rng)
+                medians = {k: _median_times(revisions[k].measure(pair[k].key)) for k in order}
+                for name in medians[0].keys() & medians[1].keys():
+                    time = row_key(pair.old), name
+                    times.setdefault(time, []).append((medians[0][name], medians[1][name]))
+    return times
+
+
+def _random_order(rng: np.random.Generator) -> tuple[int, int]:
+    return (1, 0) if rng.integers(2) else (0, 1)
+
+
+def _median_times(record: Record) -> dict[str, float]:
+    """Return the medians of a record's positive times [s]."""
+    medians = {
+        name: float(np.median(array)) for name, array in record.arrays.items()
+        if is_time(record.suite, name) and array.size
+    }  # fmt: skip
+    return {name: median for name, median in medians.items() if median > 0}
+
+
+def _ratios(times: TimePairs) -> TimeRatios:
+    """Return the ratio of each time; a ratio near 1 counts as chance."""
+    ratios = {time: ratio_of_pairs(*np.array(pairs).T) for time, pairs in times.items()}
     return {
-        at: ratio._replace(chance=1.0) if abs(math.log(ratio.value)) < FLOOR else ratio
-        for at, ratio in ratios.items()
+        time: ratio._replace(chance=1.0) if abs(math.log(ratio.ratio)) < FLOOR else ratio
+        for time, ratio in ratios.items()
     }
 
 
-def _called(ratios: Ratios) -> Ratios:
-    """Return what would be called faster or slower."""
+def _decided(ratios: TimeRatios) -> TimeRatios:
+    """Return the ratios that are faster or slower beyond chance."""
     chances = adjusted([ratio.chance for ratio in ratios.values()])
-    return {at: ratios[at] for at, chance in zip(ratios, chances, strict=True)
+    return {time: ratios[time] for time, chance in zip(ratios, chances, strict=True)
             if chance <= ERROR_RATE}  # fmt: skip
 
 
-def _confirmed(called: Ratios, again: Ratios) -> Ratios:
-    """Return what was called as it was measured again; where that says otherwise, as chance.
+def _confirmed(first: TimeRatios, second: TimeRatios) -> TimeRatios:
+    """Return the second ratios of what was decided twice alike; the others count as chance.
 
-    The second estimate is not one of those that were chosen for being large.
+    The second estimate is unbiased: it was not selected for its size.
     """
-    known = _called({at: ratio for at, ratio in again.items() if at in called})
+    repeated = _decided({time: ratio for time, ratio in second.items() if time in first})
     return {
-        at: known[at]._replace(chance=first.chance)
-        if at in known and (known[at].value > 1) == (first.value > 1)
-        else first._replace(chance=1.0)
-        for at, first in called.items()
+        time: repeated[time]._replace(chance=ratio.chance)
+        if time in repeated and (repeated[time].ratio > 1) == (ratio.ratio > 1)
+        else ratio._replace(chance=1.0)
+        for time, ratio in first.items()
     }
 
 
-def _drift(taken: Taken, count: int) -> Drift:
-    """Return by how much the old revision's times differ among themselves."""
-    if not taken:
-        return known_drift(0.0, "no times were compared")
+def _drift(times: TimePairs, count: int) -> Drift:
+    """Return how much the old revision's times differ among themselves."""
+    if not times:
+        return assumed_drift(0.0, "no times were compared")
     if count < 2:
-        return known_drift(UNKNOWN, "assumed, for one pair does not tell")
-    variances = [np.var(np.log(np.array(values)[:, 0]), ddof=1) for values in taken.values()]
-    deviation = Deviation(math.sqrt(2 * np.mean(variances)), len(taken) * (count - 1))
-    return Drift(deviation, f"the old revision beside itself, {count} times")
-
-
-def _take_pairs(
-    folders: tuple[Path, Path], plan: Plan, rows: Mapping[RowKey, Pair], tell: Callable[[str], None]
-) -> Taken:
-    """Return pairs of median times, old and new, of each time of each row."""
-    timed = [pair for pair in rows.values() if all(map(_times, pair))]
-    count = plan.pairs or pairs_needed(sum(len(_times(pair.old)) for pair in timed))
-    lot = np.random.default_rng(plan.seed)
-    taken: Taken = {}
-    for i in range(count if timed else 0):
-        tell(f"pair {i + 1} of {count}, {len(timed)} rows")
-        with _both(folders, plan, _drawn(lot)) as both:
-            for one in both:
-                one.blocks()
-            for j in lot.permutation(len(timed)):
-                _take_pair(both, timed[j], _drawn(lot), taken)
-    return taken
-
-
-def _take_pair(
-    both: tuple[Revision, Revision], pair: Pair, order: tuple[int, ...], taken: Taken
-) -> None:
-    medians = {i: _times(both[i].measure(pair[i].key)) for i in order}
-    for name in medians[0].keys() & medians[1].keys():
-        times = medians[0][name], medians[1][name]
-        taken.setdefault((row_key(pair.old), name), []).append(times)
-
-
-def _times(record: Record) -> dict[str, float]:
-    """Return the medians of the times of a record."""
-    medians = {
-        name: float(np.median(values)) for name, values in record.arrays.items()
-        if is_clocked(record.suite, name) and values.size
-    }  # fmt: skip
-    return {name: value for name, value in medians.items() if value > 0}
+        return assumed_drift(UNKNOWN, "assumed: one pair does not measure it")
+    variances = [np.var(np.log(np.array(pairs)[:, 0]), ddof=1) for pairs in times.values()]
+    sigma = math.sqrt(2 * np.mean(variances))
+    freedom = len(times) * (count - 1)
+    return Drift(sigma, freedom, f"the old revision beside itself, {count} times")

@@ -1,7 +1,7 @@
-"""Measure blocks of the revision in a folder, as lines of a program's input ask for them.
+"""Measure blocks of the revision in a folder, one for each line of standard input.
 
-This is a program of its own, run by path: it imports the revision's bench, whatever revision it is,
-and uses only what the bench had from its first records on.
+A program of its own, run by path: it imports the bench of any revision, and uses only what the
+bench has had since its first records.
 """
 
 import importlib
@@ -13,13 +13,12 @@ from pathlib import Path
 
 def main(folder: str, scale: str, *suites: str) -> None:
     """Write the keys of all blocks, and then a record for each key that is read."""
-    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what an engine prints is no answer
+    output = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what an engine prints is no record
     bench = "plumbob.bench" if Path(folder, "plumbob", "bench").exists() else "bench"
     experiments = importlib.import_module(f"{bench}.experiments")
     record = importlib.import_module(f"{bench}.harness.record")
     run = importlib.import_module(f"{bench}.harness.run")
-
     if not Path(str(run.__file__)).resolve().is_relative_to(Path(folder).resolve()):
         sys.exit(f"expected the bench of {folder}, got {run.__file__}")
     blocks = {
@@ -27,10 +26,10 @@ def main(folder: str, scale: str, *suites: str) -> None:
         for suite in suites if suite in experiments.SUITES
         for block in experiments.blocks(suite, experiments.SCALES[scale])
     }  # fmt: skip
-    print(json.dumps(list(blocks)), file=answers, flush=True)
+    print(json.dumps(list(blocks)), file=output, flush=True)
     for line in sys.stdin:
-        key = tuple(json.loads(line))
-        print(record.encode(run.measure(blocks[key])), file=answers, flush=True)
+        block = blocks[tuple(json.loads(line))]
+        print(record.encode(run.measure(block)), file=output, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Compare times of two runs: how sure a ratio is, and how far the machine drifts of itself.
+"""Compare times of two runs: confidence intervals of ratios, and the drift of the machine.
 
-Times are compared by the logarithm of a ratio, so that twice and half are equally far from 1.
+Times are compared by the logarithm of their ratio, so that twice and half are equally far from 1.
 """
 
 import math
@@ -12,92 +12,102 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from ..peers import registry
-from .answers import SOLVED, is_clocked
-from .rows import Pair, Ratio, Row, RowKey, Verdict
+from .answers import SOLVED, is_time
+from .rows import ChangeVerdict, Pair, RowChange, RowKey, TimeRatio
 
 Floats = NDArray[np.float64]
 
-# The chance that any row at all is called faster or slower though none is.
+# The probability that any row is called faster or slower although none is.
 ERROR_RATE = 0.05
 CONFIDENCE = 0.95
 RESAMPLES = 200
-# Two runs are not told apart below this, however calm the machine seems; nor below that where
-# nothing says how calm it is.
+# The least drift, however steady the machine seems; and the drift if nothing measures it.
 FLOOR, UNKNOWN = 0.01, 0.1
-# Times that are surely within so much of each other are the same.
+# Times whose ratio is surely within this margin of 1 are the same.
 MARGIN = 0.1
-# Of fewer rounds nothing is said.
+# Fewer rounds have no interval, and are not compared.
 ROUNDS = 5
 
 
-class Deviation(NamedTuple):
-    """A standard deviation, and the degrees of freedom that it is known by."""
+class Drift(NamedTuple):
+    """Standard deviation [log] of a time between two runs, degrees of freedom, and its source."""
 
-    value: float
+    sigma: float
     freedom: float
+    source: str = ""
 
     @property
     def half_width(self) -> float:
-        """How far from 0 all but 5 % lie."""
-        return float(stats.t.ppf((1 + CONFIDENCE) / 2, self.freedom) * self.value)
+        """Half the width of the 95 % interval around 0 [log]."""
+        return float(stats.t.ppf((1 + CONFIDENCE) / 2, self.freedom) * self.sigma)
+
+    @property
+    def sentence(self) -> str:
+        """The drift in percent and its source."""
+        return f"{100 * math.expm1(self.half_width):.1f} % ({self.source})"
+
+
+def assumed_drift(half_width: float, source: str) -> Drift:
+    """Return a drift of known size."""
+    return Drift(half_width / float(stats.norm.ppf((1 + CONFIDENCE) / 2)), 1e6, source)
 
 
 def ratio_of_medians(
-    old: Floats, new: Floats, drift: Deviation, paired: bool, rng: np.random.Generator
-) -> Ratio:
-    """Return the ratio of two medians by the block bootstrap, and by the drift [log] of a machine.
+    old: Floats, new: Floats, drift: Drift, paired: bool, rng: np.random.Generator
+) -> TimeRatio:
+    """Return the ratio of two medians by the block bootstrap, and by the machine's drift [log].
 
-    Rounds that follow each other are alike, so blocks of them are drawn (Künsch 1989). What a
-    machine drifts between two runs shows in neither of them, so its variance is added, by the
-    degrees of freedom of Welch (1947).
+    Rounds that follow each other are correlated, so blocks of them are resampled (Künsch 1989). The
+    drift between two runs shows in neither of them, so its variance is added, with the degrees of
+    freedom of Welch (1947).
     """
-    middle = math.log(np.median(new) / np.median(old))
-    picks = [_blocks(len(values), rng) for values in (old, new)]
-    draws = [np.median(old[picks[0]], axis=1), np.median(new[picks[0 if paired else 1]], axis=1)]
-    rounds = Deviation(
-        float(np.std(np.log(draws[1] / draws[0]), ddof=1)), min(len(old), len(new)) - 1
+    centre = math.log(np.median(new) / np.median(old))
+    resamples = [_block_resamples(len(times), rng) for times in (old, new)]
+    medians = [
+        np.median(old[resamples[0]], axis=1),
+        np.median(new[resamples[0 if paired else 1]], axis=1),
+    ]
+    sigma = float(np.std(np.log(medians[1] / medians[0]), ddof=1))
+    freedom = min(len(old), len(new)) - 1
+    squares = sigma**2, drift.sigma**2  # one of them is not zero
+    total = Drift(
+        math.sqrt(sum(squares)),
+        sum(squares) ** 2 / (squares[0] ** 2 / freedom + squares[1] ** 2 / drift.freedom),
     )
-    total = _sum(rounds, drift)
-    chance = 2 * stats.t.sf(abs(middle) / total.value, total.freedom)
-    return _of_logs(middle, middle - total.half_width, middle + total.half_width, float(chance))
+    chance = float(2 * stats.t.sf(abs(centre) / total.sigma, total.freedom))
+    return _from_logs(centre, centre - total.half_width, centre + total.half_width, chance)
 
 
-def _sum(a: Deviation, b: Deviation) -> Deviation:
-    """Return the deviation of a sum; one of the two is not zero."""
-    squares = a.value**2, b.value**2
-    freedom = sum(squares) ** 2 / (squares[0] ** 2 / a.freedom + squares[1] ** 2 / b.freedom)
-    return Deviation(math.sqrt(sum(squares)), freedom)
-
-
-def _blocks(size: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return indices of resamples, (resample, size), in runs of the root of the size."""
+def _block_resamples(size: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return indices, (resample, size), in blocks as long as the square root of the size."""
     length = max(1, round(math.sqrt(size)))
     starts = rng.integers(size, size=(RESAMPLES, -(-size // length), 1))
     return ((starts + np.arange(length)) % size).reshape(RESAMPLES, -1)[:, :size]
 
 
-def ratio_of_pairs(old: Floats, new: Floats) -> Ratio:
-    """Return the ratio over pairs measured side by side, the order of each pair drawn by lot.
+def ratio_of_pairs(old: Floats, new: Floats) -> TimeRatio:
+    """Return the ratio over pairs measured side by side, each in random order.
 
-    By that lot old and new may be exchanged if they are alike, whatever the machine does, so
-    the signed-rank test (Wilcoxon 1945) is exact. Estimate and interval are order
-    statistics of the means of all pairs of differences (Hodges & Lehmann 1963).
+    The random order makes the signed-rank test (Wilcoxon 1945) exact, whatever the machine does.
+    Estimate and interval are order statistics of the means of all pairs of differences
+    (Hodges & Lehmann 1963).
     """
-    apart = np.log(new / old)
-    means = np.sort([(a + b) / 2 for i, a in enumerate(apart) for b in apart[i:]])
-    nonzero = apart[apart != 0]
+    differences = np.log(new / old)
+    first, second = np.triu_indices(len(differences))
+    means = np.sort((differences[first] + differences[second]) / 2)
+    nonzero = differences[differences != 0]
     chance = stats.wilcoxon(nonzero, method="exact").pvalue if len(nonzero) else 1.0
-    cut = _signed_rank_quantile(len(apart))
+    cut = _signed_rank_quantile(len(differences))
     low, high = (means[cut], means[-1 - cut]) if cut >= 0 else (-math.inf, math.inf)
-    return _of_logs(float(np.median(means)), low, high, float(chance))
+    return _from_logs(float(np.median(means)), low, high, float(chance))
 
 
-def _of_logs(middle: float, low: float, high: float, chance: float) -> Ratio:
-    return Ratio(math.exp(middle), math.exp(low), math.exp(high), chance)
+def _from_logs(centre: float, low: float, high: float, chance: float) -> TimeRatio:
+    return TimeRatio(math.exp(centre), math.exp(low), math.exp(high), chance)
 
 
 def _signed_rank_quantile(count: int) -> int:
-    """Return how many of the sorted means lie below the interval, -1 if all pairs are too few."""
+    """Return how many sorted means lie below the 95 % interval, -1 if there are too few pairs."""
     subsets = np.ones(1)
     for rank in range(1, count + 1):
         subsets = np.convolve(subsets, [1, *[0] * (rank - 1), 1])
@@ -106,78 +116,65 @@ def _signed_rank_quantile(count: int) -> int:
 
 
 def pairs_needed(rows: int) -> int:
-    """Return how many pairs let one of so many rows be called though some of them disagree."""
+    """Return how many pairs can decide one of so many rows though a few pairs disagree."""
     return math.ceil(math.log2(2 * max(rows, 1) / ERROR_RATE)) + 6
 
 
-class Drift(NamedTuple):
-    """By how much a machine differs from itself between two runs [log], and how that is known."""
+def machine_drift(rows: Mapping[RowKey, Pair]) -> Drift:
+    """Return the drift between two runs, by the larger of two estimates.
 
-    deviation: Deviation
-    source: str
-
-    @property
-    def value(self) -> float:
-        """What all but 5 % of the differences are below."""
-        return self.deviation.half_width
-
-    @property
-    def sentence(self) -> str:
-        """What a reader is told."""
-        return f"{100 * math.expm1(self.value):.1f} % ({self.source})"
-
-
-def known_drift(half_width: float, source: str) -> Drift:
-    """Return a drift that is taken for granted."""
-    return Drift(Deviation(half_width / float(stats.norm.ppf((1 + CONFIDENCE) / 2)), 1e6), source)
-
-
-def drift(rows: Mapping[RowKey, Pair]) -> Drift:
-    """Return how far apart two runs are where nothing has changed.
-
-    Either by solvers whose code is the same in both runs, engines and copies of memory, or by the
-    fixed loop that is timed beside every record, whichever says more.
+    One is by solvers whose code did not change, such as engines and copies of memory; the other by
+    the fixed loop that is timed beside every record.
     """
-    known = [*_by_controls(rows), *_by_paces(rows)]
-    if not known:
-        return known_drift(UNKNOWN, "assumed, for the records do not tell")
-    least = known_drift(FLOOR, "the least that is told apart")
-    return max(*known, least, key=lambda one: one.value)
+    estimates = [*_drift_by_controls(rows), *_drift_by_fixed_loop(rows)]
+    if not estimates:
+        return assumed_drift(UNKNOWN, "assumed: the records do not measure it")
+    floor = assumed_drift(FLOOR, "the least that is distinguished")
+    return max(*estimates, floor, key=lambda drift: drift.half_width)
 
 
-def _by_controls(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
-    controls = [pair for pair in rows.values() if _is_control(pair)]
-    if controls:
+def _drift_by_controls(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
+    if controls := [pair for pair in rows.values() if _is_control(pair)]:
         medians = [[np.median(record.arrays["seconds"]) for record in pair] for pair in controls]
-        apart = np.diff(np.log(medians))
-        deviation = Deviation(float(np.sqrt(np.mean(apart**2))), len(apart))
-        yield Drift(deviation, f"{len(apart)} times of code that did not change")
+        differences = np.diff(np.log(medians))
+        sigma, count = float(np.sqrt(np.mean(differences**2))), len(differences)
+        yield Drift(sigma, count, f"{count} times of unchanged code")
 
 
-def _by_paces(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
-    found = [record.conditions.get("pace") for pair in rows.values() for record in pair]
-    paces = [pace for pace in found if isinstance(pace, float) and 0 < pace < math.inf]
-    if len(paces) > 1:  # of two moments, hence the root of two
-        deviation = math.sqrt(2) * float(np.std(np.log(paces), ddof=1))
-        yield Drift(
-            Deviation(deviation, len(paces) - 1), f"a fixed loop beside {len(paces)} records"
-        )
+def _drift_by_fixed_loop(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
+    conditions = [record.conditions.get("pace") for pair in rows.values() for record in pair]
+    paces = [pace for pace in conditions if isinstance(pace, float) and 0 < pace < math.inf]
+    if len(paces) > 1:  # a difference of two moments, hence the root of two
+        sigma = math.sqrt(2) * float(np.std(np.log(paces), ddof=1))
+        yield Drift(sigma, len(paces) - 1, f"a fixed loop beside {len(paces)} records")
+
+
+def _is_control(pair: Pair) -> bool:
+    """Return whether a row times code that no revision of Plumbob changes."""
+    versions = [record.stamp.get("versions") for record in pair]
+    if pair.old.suite != "timing" or versions[0] != versions[1]:
+        return False
+    engine = registry.find(pair.old.solver).engine
+    is_foreign = pair.old.solver == registry.LIMIT.name or engine not in ("", registry.PLUMBOB)
+    return is_foreign and not _why_not_compared(pair, "seconds")
 
 
 def time_ratios(
-    rows: Mapping[RowKey, Pair], machine: Drift
-) -> dict[tuple[RowKey, str], Ratio | str]:
-    """Return the ratio of each time of each row, or why there is none."""
+    rows: Mapping[RowKey, Pair], drift: Drift
+) -> dict[tuple[RowKey, str], TimeRatio | str]:
+    """Return the ratio of each time that has enough rounds, or why it is not compared."""
     return {
-        (key, name): _why_not(pair, name) or _ratio(pair, name, machine)
-        for key, pair in rows.items() for name in clocked(pair) if has_rounds(pair, name)
-    }  # fmt: skip
+        (key, name): _why_not_compared(pair, name) or _time_ratio(pair, name, drift)
+        for key, pair in rows.items()
+        for name in common_times(pair)
+        if has_rounds(pair, name)
+    }
 
 
-def clocked(pair: Pair) -> list[str]:
+def common_times(pair: Pair) -> list[str]:
     """Return the names of the times that both runs have."""
-    both = pair.old.arrays.keys() & pair.new.arrays.keys()
-    return [n for n in pair.old.arrays if n in both and is_clocked(pair.old.suite, n)]
+    suite, new = pair.old.suite, pair.new.arrays
+    return [name for name in pair.old.arrays if name in new and is_time(suite, name)]
 
 
 def has_rounds(pair: Pair, name: str) -> bool:
@@ -185,44 +182,34 @@ def has_rounds(pair: Pair, name: str) -> bool:
     return all(record.arrays[name].size >= ROUNDS for record in pair)
 
 
-def judged(key: RowKey, name: str, ratio: Ratio, chance: float) -> Row:
-    """Return a row on a time, given its chance over all rows."""
-    why = f"{ratio.value:.3f} times as long ({ratio.low:.3f} to {ratio.high:.3f})"
-    return Row(key, name, _verdict(ratio, chance), abs(math.log(ratio.value)), why, ratio)
-
-
-def _verdict(ratio: Ratio, chance: float) -> Verdict:
+def time_change(key: RowKey, name: str, ratio: TimeRatio, chance: float) -> RowChange:
+    """Return the change of a time, by its probability adjusted for all rows."""
+    why = f"{ratio.ratio:.3f} times as long ({ratio.low:.3f} to {ratio.high:.3f})"
+    verdict = ChangeVerdict.UNDECIDED
     if chance <= ERROR_RATE:
-        return Verdict.SLOWER if ratio.value > 1 else Verdict.FASTER
-    within = ratio.low * (1 + MARGIN) >= 1 and ratio.high <= 1 + MARGIN
-    return Verdict.SAME if within else Verdict.UNDECIDED
+        verdict = ChangeVerdict.SLOWER if ratio.ratio > 1 else ChangeVerdict.FASTER
+    elif ratio.low * (1 + MARGIN) >= 1 and ratio.high <= 1 + MARGIN:
+        verdict = ChangeVerdict.SAME
+    return RowChange(key, name, verdict, abs(math.log(ratio.ratio)), why, ratio)
 
 
-def _why_not(pair: Pair, name: str) -> str:
-    old, new = pair.old.arrays[name], pair.new.arrays[name]
+def _why_not_compared(pair: Pair, name: str) -> str:
     if pair.old.stamp.get("machine") != pair.new.stamp.get("machine"):
         return "measured on different machines"
-    if not all(np.all((values > 0) & np.isfinite(values)) for values in (old, new)):
-        return "times of zero or none"
+    for record in pair:
+        times = record.arrays[name]
+        if not np.all((times > 0) & np.isfinite(times)):
+            return "a time is zero or missing"
     return ""
 
 
-def _ratio(pair: Pair, name: str, machine: Drift) -> Ratio:
+def _time_ratio(pair: Pair, name: str, drift: Drift) -> TimeRatio:
     old, new = (record.arrays[name].ravel() for record in pair)
     if np.array_equal(old, new):
-        return Ratio(1.0, 1.0, 1.0, 1.0)
-    paired = all(SOLVED in record.arrays for record in pair)  # by targets, the same in both runs
-    if paired:
+        return TimeRatio(1.0, 1.0, 1.0, 1.0)
+    has_targets = all(SOLVED in record.arrays for record in pair)  # a time each, in both runs
+    if has_targets:
         count = min(len(old), len(new))
         old, new = old[:count], new[:count]
-    return ratio_of_medians(old, new, machine.deviation, paired, np.random.default_rng(len(old)))
-
-
-def _is_control(pair: Pair) -> bool:
-    """Return whether a row times code that no revision of ours changes."""
-    versions = [record.stamp.get("versions") for record in pair]
-    if pair.old.suite != "timing" or versions[0] != versions[1]:
-        return False
-    engine = registry.find(pair.old.solver).engine
-    is_foreign = pair.old.solver == registry.LIMIT.name or engine not in ("", registry.PLUMBOB)
-    return is_foreign and not _why_not(pair, "seconds")
+    rng = np.random.default_rng(len(old))
+    return ratio_of_medians(old, new, drift, has_targets, rng)

@@ -2,6 +2,8 @@
 
 import re
 import zlib
+from collections import Counter, defaultdict
+from itertools import count
 
 from markupsafe import Markup
 
@@ -19,7 +21,13 @@ _DECIMALS = re.compile(r"(?<![\w#])-?\d+\.\d\d+(?![\w])")
 _FONT = re.compile(r"font: (?:(\d+) )?([\d.]+px) [^;\"]*")
 # Between the letters and numbers of a path, and within a style.
 _SPACES = re.compile(r"(?<=[MLCQz:;]) | (?=[MLCQz][ \d\"-])| (?=\")")
-_IDS = re.compile(r'((?<= )id="|href="#|url\(#)')
+# Points of a polyline on one horizontal or vertical line, all but the first and the last.
+_STRAIGHT = re.compile(
+    r"([ML]-?[\d.]+ (-?[\d.]+))(?:L-?[\d.]+ \2)+(?=L-?[\d.]+ \2(?![\d.]))"
+    r"|([ML](-?[\d.]+) -?[\d.]+)(?:L\4 -?[\d.]+)+(?=L\4 )"
+)
+_POINT = re.compile(r"([MLCQ])([^MLCQz]*)|z")
+_IDS = re.compile(r'((?<= )id="|href="#|url\(#)([^")]+)')
 _COLOURS = re.compile("|".join(COLOURS.values()))
 _NAMES = {colour: name for name, colour in COLOURS.items()}
 
@@ -33,15 +41,48 @@ def inline(drawing: Drawing) -> Markup:
     text = re.sub("<title>.*?</title>", "", text, count=1, flags=re.DOTALL)
     text = re.sub(r"(?<=>)\s+(?=<(?!tspan))", "", text)
     prefix = f"f{zlib.crc32(drawing.name.encode()):x}"[:6]
-    text = re.sub("<[^>]+>", lambda tag: _shorter_tag(tag[0], prefix), text)
+    text = re.sub("<[^>]+>", lambda tag: _shorter_tag(tag[0]), text)
+    numbers: dict[str, int] = defaultdict(count().__next__)
+    text = _IDS.sub(lambda match: f"{match[1]}{prefix}-{numbers[match[2]]}", text)
+    text = _with_classes(text, prefix)
     label = Markup.escape(drawing.title)
     return Markup(text.strip().replace("<svg", f'<svg role="img" aria-label="{label}"', 1))
 
 
-def _shorter_tag(tag: str, prefix: str) -> str:
-    """Return a tag in few digits, its ids behind a prefix."""
+def _shorter_tag(tag: str) -> str:
+    """Return a tag in few digits, its colours by name."""
     tag = _OF_A_TAG.sub("", re.sub(r"\s+", " ", tag))
     tag = _DECIMALS.sub(lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), tag)
     tag = _FONT.sub(r"font-size: \2; font-weight: \1", tag).replace("; font-weight: ;", ";")
     tag = _COLOURS.sub(lambda colour: f"var(--{_NAMES[colour[0]]})", tag)
-    return _SPACES.sub("", _IDS.sub(rf"\g<1>{prefix}-", tag))
+    return re.sub(r'(?<= d=")[^"]*', lambda path: _shorter_path(path[0]), _SPACES.sub("", tag))
+
+
+def _with_classes(text: str, prefix: str) -> str:
+    """Return an SVG whose repeated styles are classes, declared once behind its first tag."""
+    text = re.sub(r' clip-path="([^"]*)" style="', r' style="clip-path:\1;', text)
+    counts = Counter(re.findall(r' style="([^"]*)"', text))
+    repeated = [style for style, count in counts.items() if count > 1]
+    classes = {style: f"{prefix}-{number}" for number, style in enumerate(repeated)}
+    declared = "".join(f".{name}{{{style}}}" for style, name in classes.items())
+
+    def classed(tag: re.Match[str]) -> str:
+        style = re.search(r' style="([^"]*)"', tag[0])
+        if not style or style[1] not in classes or " class=" in tag[0]:
+            return tag[0]
+        return tag[0].replace(style[0], f' class="{classes[style[1]]}"')
+
+    text = re.sub("<[^>]+>", classed, text)
+    return text.replace(">", f"><style>{declared}</style>", 1) if declared else text
+
+
+def _shorter_path(path: str) -> str:
+    """Return a path without needless points, each line relative to the point before it."""
+    path = _STRAIGHT.sub(lambda run: run[1] or run[3], path)
+    commands, last = [], [0.0, 0.0]
+    for command in _POINT.finditer(path):
+        letter, numbers = command[1], [float(number) for number in (command[2] or "").split()]
+        steps = [f"{a - b:.1f}".removesuffix(".0") for a, b in zip(numbers, last, strict=False)]
+        commands.append("l" + " ".join(steps) if letter == "L" else command[0])
+        last = numbers[-2:]
+    return "".join(commands).replace(" -", "-").replace("-0.0", "0")

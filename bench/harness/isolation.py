@@ -151,7 +151,7 @@ def _receive(child: ChildProcess, patience: float) -> Message:
     except LostError as error:
         if error.loss in SILENT:
             return Finished(f"ended after {patience:g} s of silence", is_lost=True, is_silent=True)
-        if error.loss in (Loss.ENDED, Loss.CUT):
+        if error.loss in (Loss.ENDED, Loss.TRUNCATED):
             trouble = f"its process {'was ' if child.code < 0 else ''}ended {child.ending}"
     return Finished(trouble, is_lost=True)
 

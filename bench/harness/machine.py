@@ -43,7 +43,9 @@ PRESENTATION = (
     "crosscheck/verify/output",
 )
 # Likewise in every experiment.
-PRESENTATION_FILES = ("tables.py", "participants.py", "figures.py", "readings.py", "files.py")
+PRESENTATION_FILES = (
+    *("tables.py", "tables.toml", "participants.py", "figures.py", "readings.py", "files.py"),
+)
 
 
 @functools.cache

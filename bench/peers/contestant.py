@@ -9,13 +9,13 @@ from plumbob.crosscheck.verify.contestant import Failure
 from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.message import NO_SECONDS
 from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers import Limits, open_contestant
+from plumbob.crosscheck.verify.solvers import ProcessLimits, open_contestant
 
 from .entrant import Spec
 from .protocol import NoAnswerError, OwnTime
 
 # The bench itself loses patience with a silent worker sooner.
-LIMITS = Limits(first=900.0, request=900.0, line=1 << 26)
+LIMITS = ProcessLimits(first=900.0, request=900.0, line=1 << 26)
 _ABOUT = sentence("")
 ROUND_TRIPS = 'timed by the round trip of a request, for want of valid "seconds"'
 

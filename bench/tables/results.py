@@ -1,10 +1,10 @@
 """The records of a report, and how problems and solvers are written."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ..harness.metrics import Ranking
 from ..harness.record import Record, on_record
@@ -16,6 +16,9 @@ from .table import words
 PRECISION = 0.05
 # Of more solvers that tie with the first a sentence gives only the number.
 NAMED_TIES = 3
+
+Subject = TypeVar("Subject")
+Key = TypeVar("Key", bound=Hashable)
 
 
 class Results:
@@ -75,12 +78,17 @@ def label(solver: str) -> str:
     return registry.find(solver).label
 
 
+def grouped(subjects: Iterable[Subject], key: Callable[[Subject], Key]) -> dict[Key, list[Subject]]:
+    """Return the subjects of each key, in order."""
+    groups: dict[Key, list[Subject]] = {}
+    for subject in subjects:
+        groups.setdefault(key(subject), []).append(subject)
+    return groups
+
+
 def by_problem(records: Iterable[Record]) -> dict[str, list[Record]]:
     """Return the records of each problem, in order."""
-    groups: dict[str, list[Record]] = {}
-    for record in records:
-        groups.setdefault(record.problem, []).append(record)
-    return groups
+    return grouped(records, lambda record: record.problem)
 
 
 def problems(records: Iterable[Record]) -> list[str]:

@@ -1,8 +1,6 @@
 """Our models in other engines, and the translation of all conventions."""
 
-from .mujoco_flex import MujocoFlex
-from .mujoco_joint_chain import MujocoJointChain
-from .mujoco_mass_spring import MujocoMassSpring
+from .mujoco_mass_spring import MujocoFlex, MujocoJointChain, MujocoMassSpring
 from .mujoco_robot import MujocoRobot
 from .pinocchio_robot import PinocchioRobot
 from .robot_engine import RobotEngine

@@ -42,8 +42,8 @@ def file_kind(path: Path) -> str:
     if suffix in BY_SUFFIX or suffix not in XML:
         return BY_SUFFIX.get(suffix, "")
     text = read_bytes(path).decode(errors="replace").removeprefix("\ufeff")
-    found = FIRST.match(text)
-    kind = BY_ROOT.get(found[1], "") if found else ""
+    root = FIRST.match(text)
+    kind = BY_ROOT.get(root[1], "") if root else ""
     if kind == MJCF and not ("<worldbody" in text or "<include" in text):
         return FRAGMENT
     return "" if kind == URDF and "<link" not in text else kind

@@ -1,4 +1,4 @@
-"""Mass-spring systems in MuJoCo, with point masses on slides and tendons as springs."""
+"""Mass-spring systems in MuJoCo: with tendons, the edges of a flex or joints as springs."""
 
 import mujoco
 import numpy as np
@@ -15,10 +15,13 @@ INTEGRATORS = {
     "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
 }
 
+JOINTS = {"slide": mujoco.mjtJoint.mjJNT_SLIDE, "hinge": mujoco.mjtJoint.mjJNT_HINGE}
 # Above this number of particles MuJoCo's default estimate of its memory is excessive. The actual
 # use, measured for up to 10,000 particles, is two bytes for each pair.
-MANY = 1000
+LARGE_SYSTEM = 1000
 BASE_MEMORY, PAIR_MEMORY = 2**27, 8
+# Radius of the edges of a flex [m], required although collisions are disabled.
+FLEX_RADIUS = 1e-4
 
 
 class MujocoMassSpring:
@@ -166,6 +169,114 @@ class MujocoMassSpring:
         return np.array(self.data.ten_length)
 
 
+class MujocoFlex(MujocoMassSpring):
+    """A mass-spring system in MuJoCo whose springs are the edges of a flex of dimension one.
+
+    All edges of a flex have the same stiffness and damping, and none is tension-only. An edge
+    between two pinned particles is rigid and stores no energy. The integrator "discrete" does not
+    support such a flex.
+    """
+
+    def lengths(self) -> FloatArray:
+        """Read the springs' lengths [m], shape (spring,)."""
+        return self.data.flexedge_length[self._edges]
+
+    def _build(self, system: MassSpring) -> mujoco.MjModel:
+        """Return the model.
+
+        MuJoCo computes the rest lengths of edges from the initial positions and does not accept
+        zero: the bodies start at distinct positions, which are then reset to the origin while the
+        rest lengths are overwritten. MuJoCo sorts the edges.
+
+        Raises:
+            ValueError: if the springs differ in stiffness or in damping, or there are none.
+        """
+        spec = particles_spec(system)
+        for i in range(system.particle_count):
+            spec.body(particle_name(i)).pos = (i, 0.0, 0.0)
+        flex = spec.add_flex(name="springs", dim=1, radius=FLEX_RADIUS, contype=0, conaffinity=0)
+        flex.edgestiffness = _common("stiffnesses", system.stiffnesses)
+        flex.edgedamping = _common("dampings", system.dampings)
+        flex.vertbody = [particle_name(i) for i in range(system.particle_count)]
+        flex.vert = np.zeros(3 * system.particle_count)
+        flex.elem = system.springs.ravel()
+        model = spec.compile()
+        model.body_pos[:] = 0.0
+        edges = {frozenset(ends): edge for edge, ends in enumerate(model.flex_edge.tolist())}
+        self._edges = np.array([edges[frozenset(ends)] for ends in system.springs.tolist()])
+        model.flexedge_length0[self._edges] = system.rest_lengths
+        return model
+
+
+class MujocoJointChain:
+    """A chain of particles on the x axis, each joined to the one before it; the first is pinned.
+
+    Each particle is a child body of the previous one, connected by a joint with a spring and a
+    damper. The coordinate of the joint is the length of the spring, and the mass matrix couples all
+    joints. With hinges about a common axis, masses become moments of inertia [kg m²], coordinates
+    angles [rad] and forces torques in the same equations.
+
+    The forces of springs are linear in the coordinates as long as the ends of no spring swap; then
+    "discrete" equals implicit Euler.
+
+    Attributes:
+        model: the mujoco.MjModel.
+        data: its mujoco.MjData.
+    """
+
+    def __init__(self, system: MassSpring, *, h: float, joint: str) -> None:
+        """Build the model for the integrator "discrete".
+
+        Args:
+            system: particle 0 pinned, spring i from particle i to i + 1, gravity along x.
+            h: time step [s].
+            joint: one of `JOINTS`.
+
+        Raises:
+            ValueError: if there is no such joint.
+        """
+        self._weights = system.masses[1:] * system.gravity[0]
+        self.model = _nested_joints(system, JOINTS[choice("joint", joint, JOINTS)])
+        self.model.opt.timestep = h
+        self.data = mujoco.MjData(self.model)
+
+    def step(
+        self, state: State, external_forces: ArrayLike, *, steps: int = 1
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return positions and velocities along x after some steps, each of shape (particle,).
+
+        Only the x components of the state are used. Gravity is applied as a force because MuJoCo's
+        gravity exerts no torque on these hinges.
+        """
+        start = state.positions[0, 0]
+        forces = np.asarray(external_forces)[1:, 0] + self._weights
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = np.diff(state.positions[:, 0])
+        self.data.qvel[:] = np.diff(state.velocities[:, 0], prepend=0.0)[1:]
+        self.data.qfrc_applied[:] = np.cumsum(forces[::-1])[::-1]
+        mujoco.mj_step(self.model, self.data, steps)
+        x, v = np.cumsum(self.data.qpos), np.cumsum(self.data.qvel)
+        return np.append(start, start + x), np.append(0.0, v)
+
+
+def _nested_joints(system: MassSpring, kind: mujoco.mjtJoint) -> mujoco.MjModel:
+    spec = mujoco.MjSpec()
+    spec.option.gravity = np.zeros(3)
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    spec.option.tolerance = 1e-15
+    spec.option.iterations = 5000
+    body = spec.worldbody
+    for i, mass in enumerate(system.masses[1:], 1):
+        body = add_point_mass(body, f"particle{i}", np.zeros(3), mass)
+        body.inertia = np.full(3, mass)
+        body.add_joint(type=kind, axis=(1.0, 0.0, 0.0))
+    model = spec.compile()
+    model.jnt_stiffness[:] = system.stiffnesses
+    model.dof_damping[:] = system.dampings
+    model.qpos_spring[:] = system.rest_lengths
+    return model
+
+
 def particles_spec(system: MassSpring) -> mujoco.MjSpec:
     """Return the bodies of the system, each with a site; energies are computed in forward passes.
 
@@ -175,7 +286,7 @@ def particles_spec(system: MassSpring) -> mujoco.MjSpec:
     spec.option.gravity = system.gravity
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    if system.particle_count > MANY:
+    if system.particle_count > LARGE_SYSTEM:
         spec.memory = BASE_MEMORY + PAIR_MEMORY * system.particle_count**2
     for i, (mass, free) in enumerate(zip(system.masses, system.free, strict=True)):
         body = add_point_mass(spec.worldbody, particle_name(i), np.zeros(3), mass)
@@ -198,3 +309,11 @@ def add_point_mass(
 def particle_name(i: int) -> str:
     """Return the name of a particle's body and site."""
     return f"particle{i}"
+
+
+def _common(name: str, per_spring: FloatArray) -> float:
+    """Return the number that all springs share; a ValueError if they differ."""
+    if len(np.unique(per_spring)) != 1:
+        distinct = np.unique(per_spring)
+        raise ValueError(f"{name}: expected the same for all springs, got {distinct}")
+    return float(per_spring[0])

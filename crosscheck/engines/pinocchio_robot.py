@@ -49,11 +49,20 @@ class PinocchioRobot(RobotEngine):
         root = xml_root(path)
         _check_freedoms(root)
         is_urdf = file_kind(path) == URDF
-        self.model = pinocchio_urdf(path, root, mimic) if is_urdf else _mjcf(path, root)
+        if is_urdf:
+            if root.find("link") is None:  # about which Pinocchio would print a message
+                raise ValueError("there is no link in it")
+            self.model = pinocchio.buildModelFromUrdf(str(path), mimic=mimic)
+        else:
+            self.model = _mjcf(path, root)
         self.data = self.model.createData()
         frames = enumerate(self.model.frames)
         self.links = {f.name: i for i, f in frames if f.type == pinocchio.FrameType.BODY}
-        self.joints = dict(_indices(self.model) if is_urdf else _indices_by_body(self.model, root))
+        by_name = zip(self.model.names[1:], list(self.model.joints)[1:], strict=True)
+        self.joints = {
+            name: JointIndices(joint.idx_q, joint.nq, joint.idx_v, joint.nv)
+            for name, joint in (by_name if is_urdf else _joints_by_body(self.model, root))
+        }
         self.columns = {name: indices.v for name, indices in self.joints.items()}
         self._free_rotations: dict[str, FloatArray] = {}
 
@@ -65,7 +74,7 @@ class PinocchioRobot(RobotEngine):
         q = pinocchio.neutral(self.model)
         for name in values.keys() & self.joints.keys():
             indices = self.joints[name]
-            q[indices.q : indices.q + indices.nq] = _theirs(values[name], indices.nq)
+            q[indices.q : indices.q + indices.nq] = _pinocchio_coordinates(values[name], indices.nq)
         self._free_rotations = {
             name: rotation.to_matrix(value[3:])
             for name, value in values.items()
@@ -109,18 +118,6 @@ def _check_freedoms(root: ElementTree.Element) -> None:
         raise ValueError(f"it takes 64 n³ bytes for n freedoms: {limit}")
 
 
-def pinocchio_urdf(path: Path, root: ElementTree.Element, mimic: bool) -> pinocchio.Model:
-    """Return the model of a URDF file.
-
-    Raises:
-        ValueError: if it has no link, about which Pinocchio would print a message.
-        RuntimeError: if Pinocchio refuses it.
-    """
-    if root.find("link") is None:
-        raise ValueError("there is no link in it")
-    return pinocchio.buildModelFromUrdf(str(path), mimic=mimic)
-
-
 def _mjcf(path: Path, root: ElementTree.Element) -> pinocchio.Model:
     """Return the model of an MJCF file.
 
@@ -136,25 +133,19 @@ def _mjcf(path: Path, root: ElementTree.Element) -> pinocchio.Model:
     return pinocchio.buildModelFromMJCF(str(path))
 
 
-def _theirs(value: FloatArray, nq: int) -> FloatArray:
+def _pinocchio_coordinates(q: FloatArray, nq: int) -> FloatArray:
     """Return our coordinates of one joint as Pinocchio's, nq of them."""
     if nq == 2:
-        return np.array([np.cos(value[0]), np.sin(value[0])])
+        return np.array([np.cos(q[0]), np.sin(q[0])])
     if nq in (4, 7):
-        return np.concatenate([value[:-4], np.roll(value[-4:], -1)])
-    return value
+        return np.concatenate([q[:-4], np.roll(q[-4:], -1)])
+    return q
 
 
-def _indices(model: pinocchio.Model) -> Iterator[tuple[str, JointIndices]]:
-    """Yield each joint's name and indices."""
-    for name, joint in zip(model.names[1:], list(model.joints)[1:], strict=True):
-        yield name, _joint_indices(joint)
-
-
-def _indices_by_body(
+def _joints_by_body(
     model: pinocchio.Model, root: ElementTree.Element
-) -> Iterator[tuple[str, JointIndices]]:
-    """Yield the name and indices of each joint of an MJCF file that is a child of a body."""
+) -> Iterator[tuple[str, pinocchio.JointModel]]:
+    """Yield each joint of an MJCF file that is a child of a body, with its name."""
     joints = {f.name: f.parentJoint for f in model.frames if f.type == pinocchio.FrameType.BODY}
     for body in root.iter("body"):
         name = body.get("name", "")
@@ -163,11 +154,7 @@ def _indices_by_body(
             joint = model.joints[joints[name]]
             parts = joint.extract().joints if joint.shortname() == COMPOSITE else [joint]
             for i, (element, part) in enumerate(zip(elements, parts, strict=True), 1):
-                yield element.get("name") or f"{name}/{_kind(part)}{i}", _joint_indices(part)
-
-
-def _joint_indices(joint: pinocchio.JointModel) -> JointIndices:
-    return JointIndices(joint.idx_q, joint.nq, joint.idx_v, joint.nv)
+                yield element.get("name") or f"{name}/{_kind(part)}{i}", part
 
 
 def _kind(joint: pinocchio.JointModel) -> str:

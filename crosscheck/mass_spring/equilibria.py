@@ -1,7 +1,5 @@
 """Equilibria: minima of the potential energy against MuJoCo's damped motion and closed forms."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from plumbob.reference import scenes
@@ -19,30 +17,23 @@ from ..verdict import Comparison
 LONG_STEP = 1e3
 LONG_STEPS, ITERATIONS = 3, 25
 
-
-class Relaxation(NamedTuple):
-    """Settings of the relaxation in MuJoCo: step [s], drag on each particle [N s/m], steps."""
-
-    h: float
-    drag: float
-    steps: int
-
-
-ROPE = Relaxation(h=0.005, drag=0.8, steps=4000)
-CLOTH = Relaxation(h=0.03, drag=1.0, steps=6000)
-FALL_STEPS = 67
+# The relaxation in MuJoCo: step [s], drag on each particle [N s/m], number of steps.
+ROPE = (0.005, 0.8, 4000)
+CLOTH = (0.03, 1.0, 6000)
+# The fall of a cloth, of two seconds: step [s], number of steps.
+FALL_STEP, FALL_STEPS = 0.03, 67
 
 
 def ropes_in_closed_form(case: int) -> Comparison:
     """Compare our equilibrium of a rope with the load of each spring over its stiffness."""
     system, state = rope(case)
-    return _comparison(equilibrium(system, state), hanging(system, state), state)
+    return _compare(equilibrium(system, state), hanging(system, state), state)
 
 
 def ropes(case: int) -> Comparison:
     """Compare our equilibrium of a rope with the end of MuJoCo's damped motion."""
     system, state = rope(case)
-    return _comparison(equilibrium(system, state), relaxed(system, state, ROPE), state)
+    return _compare(equilibrium(system, state), relaxed(system, state, *ROPE), state)
 
 
 def cloths(case: int) -> Comparison:
@@ -51,7 +42,7 @@ def cloths(case: int) -> Comparison:
     A cloth has several equilibria: both start from the state after a fall of two seconds.
     """
     system, state = cloth(case)
-    return _comparison(equilibrium(system, state), relaxed(system, state, CLOTH), state)
+    return _compare(equilibrium(system, state), relaxed(system, state, *CLOTH), state)
 
 
 def equilibrium(system: MassSpring, state: State) -> FloatArray:
@@ -69,11 +60,11 @@ def equilibrium(system: MassSpring, state: State) -> FloatArray:
     return state.positions
 
 
-def relaxed(system: MassSpring, state: State, relaxation: Relaxation) -> FloatArray:
+def relaxed(system: MassSpring, state: State, h: float, drag: float, steps: int) -> FloatArray:
     """Return the end of a motion by MuJoCo's Euler with drag on every particle."""
-    engine = MujocoMassSpring(system, h=relaxation.h)
-    engine.model.dof_damping[:] = relaxation.drag
-    return engine.step(state, steps=relaxation.steps).positions
+    engine = MujocoMassSpring(system, h=h)
+    engine.model.dof_damping[:] = drag
+    return engine.step(state, steps=steps).positions
 
 
 def hanging(system: MassSpring, state: State) -> FloatArray:
@@ -96,9 +87,9 @@ def cloth(case: int) -> tuple[MassSpring, State]:
     """Return a cloth of 5 x 5 particles or more that has fallen for two seconds."""
     system, state = scenes.lab_cloth(size=5 + 2 * case, damping=0.2)
     for _ in range(FALL_STEPS):
-        state = symplectic_euler(system, state, CLOTH.h)
+        state = symplectic_euler(system, state, FALL_STEP)
     return system, state
 
 
-def _comparison(ours: FloatArray, theirs: FloatArray, start: State) -> Comparison:
-    return Comparison(ours, theirs, start.positions, scale=float(np.abs(theirs).max()))
+def _compare(actual: FloatArray, expected: FloatArray, start: State) -> Comparison:
+    return Comparison(actual, expected, start.positions, scale=float(np.abs(expected).max()))

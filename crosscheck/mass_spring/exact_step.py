@@ -18,20 +18,22 @@ from plumbob.reference.mass_spring import MassSpring, State
 
 DIGITS, REFINEMENTS = 40, 20
 # Refinement ends with a correction that is smaller than this, over the norm of the positions.
-ENOUGH = 1e-26
+CORRECTION_LIMIT = 1e-26
 
 
 class ExactStep(NamedTuple):
-    """The end x* of a step: rounded, what rounding left, and a bound of its error [m]."""
+    """The end x* of a step as rounded positions and their remainder, and a bound of its error."""
 
     positions: FloatArray
     remainder: FloatArray
     bound: float
 
     def error(self, x: FloatArray, y: FloatArray) -> float:
-        """Return |x - x*| / |y - x*|, at least the bound: what is left of the error of y."""
-        left, start = (float(np.linalg.norm((z - self.positions) - self.remainder)) for z in (x, y))
-        return max(left, self.bound) / start
+        """Return |x - x*| / |y - x*|, at least the bound: relative to the error of y."""
+        error, start = (
+            float(np.linalg.norm((z - self.positions) - self.remainder)) for z in (x, y)
+        )
+        return max(error, self.bound) / start
 
 
 def exact_step(system: MassSpring, state: State, h: float, x: FloatArray) -> ExactStep:
@@ -42,14 +44,14 @@ def exact_step(system: MassSpring, state: State, h: float, x: FloatArray) -> Exa
         for _ in range(REFINEMENTS):
             correction = -solve(gradient(exact).astype(float).ravel()).reshape(x.shape)
             exact, bound = exact + _decimals(correction), float(np.linalg.norm(correction))
-            if bound <= ENOUGH * np.linalg.norm(x):
+            if bound <= CORRECTION_LIMIT * np.linalg.norm(x):
                 break
         rounded = exact.astype(float)
         return ExactStep(rounded, (exact - _decimals(rounded)).astype(float), bound)
 
 
 def _gradient(system: MassSpring, state: State, h: Decimal) -> Callable[[Any], Any]:
-    """Return what maps decimals x to M (x - y) - h² f(x) [kg m], zero at the pins."""
+    """Return the function of decimals x, M (x - y) - h² f(x) [kg m], zero at the pins."""
     (i, j), free = system.springs.T, system.free[:, None]
     x_n, masses = _decimals(state.positions), _decimals(system.masses)[:, None]
     k, c, rest = map(_decimals, (system.stiffnesses, system.dampings, system.rest_lengths))

@@ -1,7 +1,10 @@
 """Comparisons of forces, energies and stiffness with MuJoCo's tendons and flex edges."""
 
+import functools
+
 import numpy as np
 
+from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import (
     State,
     damper_forces,
@@ -12,9 +15,8 @@ from plumbob.reference.mass_spring import (
 )
 
 from .. import samples
-from ..engines import MujocoMassSpring
+from ..engines import MujocoFlex, MujocoMassSpring
 from ..verdict import Comparison
-from .comparison import engine_at_start, engine_of, flex, forces, numbers
 
 # Central differences of order 6: offsets in steps, and weights. The step is short compared with
 # springs and long compared with the rounding error of their lengths.
@@ -23,18 +25,34 @@ WEIGHTS = np.array([-1, 9, -45, 45, -9, 1]) / 60.0
 DIFFERENCE_STEP = 5e-4
 
 
+@functools.cache
+def engine_of(case: int, *, damped: bool = True) -> MujocoMassSpring:
+    """Return the engine of a random network, cached for all claims; they set its state."""
+    system, _, _, h = samples.network(case, damped=damped)
+    return MujocoMassSpring(system, h=h)
+
+
+@functools.cache
+def flex(case: int) -> MujocoFlex:
+    """Return the flex of a uniform network, with forces and energies at its initial state."""
+    system, state, _, h = samples.uniform(case)
+    engine = MujocoFlex(system, h=h)
+    engine.update_forces(state)
+    return engine
+
+
 def tendon_springs(case: int) -> Comparison:
     """Compare the springs' forces on the free particles, relative to the largest."""
     system, state, _, _ = samples.network(case)
-    ours = spring_forces(system, state.positions)[system.free]
-    return forces(ours, engine_at_start(case).spring_forces())
+    actual = spring_forces(system, state.positions)[system.free]
+    return _compare_forces(actual, _engine_at_start(case).spring_forces())
 
 
 def tendon_dampers(case: int) -> Comparison:
     """Compare the dampers' forces on the free particles, relative to the largest."""
     system, state, _, _ = samples.network(case)
-    ours = damper_forces(system, state)[system.free]
-    return forces(ours, engine_at_start(case).damper_forces())
+    actual = damper_forces(system, state)[system.free]
+    return _compare_forces(actual, _engine_at_start(case).damper_forces())
 
 
 def tendon_stiffness(case: int) -> Comparison:
@@ -45,44 +63,62 @@ def tendon_stiffness(case: int) -> Comparison:
     smooth = case + (case + 3) // 4  # 0, 2, 3, 4, 5, 7, ...
     system, state, along, _ = samples.network(smooth)
     d = np.where(system.free[:, None], along, 0.0)
-    pulls = []
+    engine, pulls = engine_of(smooth), []
     for offset in OFFSETS * DIFFERENCE_STEP:
-        engine = engine_of(smooth)
         engine.update_forces(State(state.positions + offset * d, state.velocities))
         pulls.append(engine.spring_forces())
-    theirs = -np.tensordot(WEIGHTS, pulls, 1) / DIFFERENCE_STEP
-    ours = (stiffness_matrix(system, state.positions) @ d.ravel()).reshape(-1, 3)
-    return forces(ours[system.free], theirs)
+    expected = -np.tensordot(WEIGHTS, pulls, 1) / DIFFERENCE_STEP
+    actual = (stiffness_matrix(system, state.positions) @ d.ravel()).reshape(-1, 3)
+    return _compare_forces(actual[system.free], expected)
 
 
 def tendon_potential(case: int) -> Comparison:
     """Compare the energy of springs and gravity, relative to the sum of its terms' magnitudes."""
-    return _potential(samples.network(case), engine_at_start(case))
+    return _compare_potential(samples.network(case), _engine_at_start(case))
 
 
 def point_kinetic(case: int) -> Comparison:
     """Compare the kinetic energy, relative to itself."""
     system, state, _, _ = samples.network(case)
-    theirs = engine_at_start(case).kinetic_energy()
-    return numbers(kinetic_energy(system, state), theirs, scale=theirs)
+    expected = _engine_at_start(case).kinetic_energy()
+    return _compare_numbers(kinetic_energy(system, state), expected, scale=expected)
 
 
 def flex_forces(case: int) -> Comparison:
     """Compare the forces of springs and dampers with those of the edges of a flex."""
     system, state, _, _ = samples.uniform(case)
-    ours = spring_forces(system, state.positions) + damper_forces(system, state)
+    actual = spring_forces(system, state.positions) + damper_forces(system, state)
     engine = flex(case)
-    return forces(ours[system.free], engine.spring_forces() + engine.damper_forces())
+    return _compare_forces(actual[system.free], engine.spring_forces() + engine.damper_forces())
 
 
 def flex_potential(case: int) -> Comparison:
     """Compare the energy of springs and gravity with that of a flex, like `tendon_potential`."""
-    return _potential(samples.uniform(case), flex(case))
+    return _compare_potential(samples.uniform(case), flex(case))
 
 
-def _potential(problem: samples.StepProblem, engine: MujocoMassSpring) -> Comparison:
+def _engine_at_start(case: int) -> MujocoMassSpring:
+    """Return the engine of a random network, with forces and energies at its initial state."""
+    engine = engine_of(case)
+    engine.update_forces(samples.network(case).state)
+    return engine
+
+
+def _compare_forces(actual: FloatArray, expected: FloatArray) -> Comparison:
+    scale = float(np.abs(expected).max())
+    return Comparison(actual, expected, np.zeros_like(expected), scale)
+
+
+def _compare_numbers(actual: float, expected: float, scale: float) -> Comparison:
+    return Comparison(np.array(actual), np.array(expected), np.array(0.0), scale)
+
+
+def _compare_potential(problem: samples.StepProblem, engine: MujocoMassSpring) -> Comparison:
     system, state, _, _ = problem
     stored = 0.5 * system.stiffnesses * (engine.lengths() - system.rest_lengths) ** 2
     raised = np.abs(system.masses[:, None] * system.gravity * state.positions)
-    ours = potential_energy(system, state.positions)
-    return numbers(ours, engine.potential_energy(), scale=float(stored.sum() + raised.sum()))
+    return _compare_numbers(
+        potential_energy(system, state.positions),
+        engine.potential_energy(),
+        scale=float(stored.sum() + raised.sum()),
+    )

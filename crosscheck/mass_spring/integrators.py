@@ -1,30 +1,28 @@
-"""Simulations of many steps by our integrators and MuJoCo's, and comparisons of the results."""
+"""Simulations of many steps by our integrators and MuJoCo's, their ends and their energies."""
 
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
+from plumbob.reference.arguments import FloatArray, integer
 from plumbob.reference.explicit import runge_kutta, symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
-from plumbob.reference.mass_spring import MassSpring, State
+from plumbob.reference.mass_spring import MassSpring, State, kinetic_energy, potential_energy
 
 from .. import samples
 from ..engines import MujocoMassSpring
+from ..engines.mujoco_mass_spring import JOINTS, MujocoJointChain
 from ..verdict import Comparison
-from .comparison import states
+from .steps import compare_states
+
+# Steps of a chain on a line, and the residual of each: a few rounding errors.
+LINE_STEPS, LINE_TOLERANCE = 100, 1e-14
 
 # Returns the state after a number of steps from a state under constant external forces.
 Simulation = Callable[[State, ArrayLike | None, int], State]
-
-
-def _repeated(step: Callable[[State, ArrayLike | None], State]) -> Simulation:
-    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
-        for _ in range(steps):
-            state = step(state, external_forces)
-        return state
-
-    return simulate
 
 
 def explicit(
@@ -48,6 +46,15 @@ def mujoco(integrator: str, system: MassSpring, h: float) -> Simulation:
     return lambda state, loads, steps: engine.step(state, loads, steps=steps)
 
 
+def _repeated(step: Callable[[State, ArrayLike | None], State]) -> Simulation:
+    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
+        for _ in range(steps):
+            state = step(state, external_forces)
+        return state
+
+    return simulate
+
+
 SIMULATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
     "symplectic Euler": partial(explicit, symplectic_euler),
     "Runge-Kutta": partial(explicit, runge_kutta),
@@ -60,8 +67,72 @@ SIMULATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
 }
 
 
-def long_simulations(ours: str, theirs: str, steps: int, case: int) -> Comparison:
+def compare_long_runs(ours: str, counterpart: str, steps: int, case: int) -> Comparison:
     """Compare the states after many steps of two integrators of the same method."""
     system, state, external, h = samples.smooth(case)
-    one, other = (SIMULATORS[name](system, h)(state, external, steps) for name in (ours, theirs))
-    return states(one, other, state)
+    actual, expected = (
+        SIMULATORS[name](system, h)(state, external, steps) for name in (ours, counterpart)
+    )
+    return compare_states(actual, expected, state)
+
+
+def joint_chains(case: int) -> Comparison:
+    """Compare 100 steps of implicit Euler with those of nested slides and of nested hinges.
+
+    On a line springs are linear and MuJoCo's discrete equals implicit Euler. Positions and
+    velocities are relative to the largest of each.
+    """
+    system, state, external, h = samples.line(case)
+    end = implicit("newton", system, h, tolerance=LINE_TOLERANCE)(state, external, LINE_STEPS)
+    chains = [MujocoJointChain(system, h=h, joint=joint) for joint in JOINTS]
+    expected = np.array([chain.step(state, external, steps=LINE_STEPS) for chain in chains])
+    scales = np.abs(expected).max(axis=(0, 2))[:, None]
+    actual, start = (
+        np.tile([s.positions[:, 0], s.velocities[:, 0]], (len(JOINTS), 1, 1)) for s in (end, state)
+    )
+    return Comparison(actual / scales, expected / scales, start / scales, scale=1.0)
+
+
+class EnergySeries(NamedTuple):
+    """The energy of a system over time."""
+
+    times: FloatArray  # [s], shape (sample,), from zero
+    energies: FloatArray  # kinetic and potential [J], shape (sample,)
+
+
+def energy_series(
+    integrator: Callable[[MassSpring, float], Simulation],
+    system: MassSpring,
+    state: State,
+    h: float,
+    *,
+    steps: int,
+    every: int = 1,
+) -> EnergySeries:
+    """Return the energy at the start and after every `every` steps.
+
+    Args:
+        integrator: one of `SIMULATORS`, or a function of the same form.
+        system: particles and springs, without external forces.
+        state: the initial state.
+        h: the step [s].
+        steps: number of steps, a multiple of `every`.
+        every: steps between two samples.
+
+    Raises:
+        ValueError: if `steps` is no multiple of `every`.
+    """
+    count, remainder = divmod(integer("steps", steps, least=1), integer("every", every, least=1))
+    if remainder:
+        raise ValueError(f"steps: expected a multiple of {every}, got {steps}")
+    simulate = integrator(system, h)
+    energies = [mechanical_energy(system, state)]
+    for _ in range(count):
+        state = simulate(state, None, every)
+        energies.append(mechanical_energy(system, state))
+    return EnergySeries(h * every * np.arange(count + 1, dtype=np.float64), np.array(energies))
+
+
+def mechanical_energy(system: MassSpring, state: State) -> float:
+    """Return the kinetic energy plus that of springs and gravity [J]."""
+    return kinetic_energy(system, state) + potential_energy(system, state.positions)

@@ -1,4 +1,4 @@
-"""Comparisons of single explicit, semi-implicit and linearised steps with MuJoCo's."""
+"""Comparisons of single steps with MuJoCo's: their ends, or the balance of forces there."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,8 +10,12 @@ from plumbob.reference.mass_spring import MassSpring, State, damping_matrix
 from plumbob.reference.mass_spring import forces as all_forces
 
 from .. import samples
+from ..engines import MujocoMassSpring
 from ..verdict import Comparison
-from .comparison import engine_of, flex, states
+from .forces import engine_of, flex
+
+# The slowest case needs 6 iterations to reach rounding error.
+NEWTON_ITERATIONS = 12
 
 
 def symplectic_steps(case: int) -> Comparison:
@@ -23,8 +27,8 @@ def symplectic_steps(case: int) -> Comparison:
 def flex_steps(case: int) -> Comparison:
     """Compare the state after one step of symplectic Euler with MuJoCo's Euler on a flex."""
     system, state, external, h = samples.uniform(case)
-    ours = symplectic_euler(system, state, h, external)
-    return states(ours, flex(case).step(state, external), state)
+    end = symplectic_euler(system, state, h, external)
+    return compare_states(end, flex(case).step(state, external), state)
 
 
 def runge_kutta_steps(case: int) -> Comparison:
@@ -50,8 +54,37 @@ def damper_block_steps(case: int) -> Comparison:
 def gauss_newton_steps(case: int, *, damped: bool) -> Comparison:
     """Compare the state after one Gauss-Newton step with one of MuJoCo's discrete."""
     system, state, external, h = samples.network(case, damped=damped)
-    ours = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
-    return _compare_with("discrete", case, ours, damped=damped)
+    end = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
+    return _compare_with("discrete", case, end, damped=damped)
+
+
+def implicit_balances(case: int, *, damped: bool) -> Comparison:
+    """Compare M (x - y) of our converged step with h² f(x), with MuJoCo's forces at our x.
+
+    The scale is |M (x - y)| + h² sum |spring force|.
+    """
+    system, state, external, h = samples.network(case, damped=damped)
+    euler = ImplicitEuler(
+        system, h=h, solver="newton", tolerance=0.0, max_iterations=NEWTON_ITERATIONS
+    )
+    return _balance(system, state, euler.step(state, external).state.positions, h, external)
+
+
+def balance_residual(
+    system: MassSpring,
+    state: State,
+    x: FloatArray,
+    h: float,
+    external_forces: ArrayLike | None = None,
+) -> float:
+    """Return the relative residual of the balance of forces at the end x of a step, (particle, 3).
+
+    It is |M (x - y) - h² f(x)| / (|M (x - y)| + h² sum |spring force|) over the free particles,
+    where f are MuJoCo's forces at x; see `_forces_at_end` for the dampers. Pins affect the forces
+    only; x contains their positions at the end of the step.
+    """
+    inertia, impulse, _, scale = _balance(system, state, x, h, external_forces)
+    return float(np.linalg.norm(inertia - impulse) / scale)
 
 
 def semi_implicit(
@@ -78,8 +111,70 @@ def damper_blocks(system: MassSpring, state: State) -> FloatArray:
     return blocks
 
 
-def _compare_with(integrator: str, case: int, ours: State, *, damped: bool = True) -> Comparison:
+def compare_states(actual: State, expected: State, start: State) -> Comparison:
+    """Compare all positions and velocities, relative to the largest expected ones."""
+    scales = [[[np.abs(expected.positions).max()]], [[np.abs(expected.velocities).max()]]]
+    actual_rows, expected_rows, start_rows = (
+        np.stack([state.positions, state.velocities]) / scales
+        for state in (actual, expected, start)
+    )
+    return Comparison(actual_rows, expected_rows, start_rows, scale=1.0)
+
+
+def _compare_with(integrator: str, case: int, end: State, *, damped: bool = True) -> Comparison:
     _, state, external, _ = samples.network(case, damped=damped)
     engine = engine_of(case, damped=damped)
     engine.set_integrator(integrator)
-    return states(ours, engine.step(state, external), state)
+    return compare_states(end, engine.step(state, external), state)
+
+
+def _balance(
+    system: MassSpring, state: State, x: FloatArray, h: float, external_forces: ArrayLike | None
+) -> Comparison:
+    """Compare M (x - y) and h² f(x) by MuJoCo at the end x of a step, for the free particles."""
+    y = state.positions + h * state.velocities
+    inertia = (system.masses[:, None] * (x - y))[system.free]
+    loads = np.zeros_like(x) if external_forces is None else np.asarray(external_forces)
+    forces, tension = _forces_at_end(system, state, x, h)
+    return Comparison(
+        inertia,
+        h**2 * (forces + loads[system.free]),
+        baseline=np.zeros_like(inertia),
+        scale=float(np.linalg.norm(inertia) + h**2 * tension),
+    )
+
+
+def _forces_at_end(
+    system: MassSpring, state: State, x: FloatArray, h: float
+) -> tuple[FloatArray, float]:
+    """Return MuJoCo's forces at the end x of an implicit step, and the springs' total tension.
+
+    Springs and gravity are MuJoCo's at x. The damper of the step is -c (l(x) - l_n)/h, a tendon of
+    stiffness c/h and rest length l_n in MuJoCo, with l_n its own length of the spring at x_n.
+    MuJoCo's damper at the velocity (x - x_n)/h is another one: it takes the component of the
+    velocity along the spring at x, which is not zero for a spring that only rotates.
+
+    Returns:
+        Forces on the free particles [N], shape (free, 3); sum of |force| over all springs [N].
+    """
+    dampers = MassSpring(
+        system.masses,
+        system.springs,
+        _engine_at(system, state).lengths(),
+        system.dampings / h,
+        pinned=system.pinned,
+        gravity=(0.0, 0.0, 0.0),
+    )
+    forces, tension = np.zeros((1, 3)), 0.0
+    for springs in (system, dampers):
+        engine = _engine_at(springs, State(x, np.zeros_like(x)))
+        forces = forces + engine.spring_forces() + engine.gravity_forces()
+        stretch = np.abs(engine.lengths() - springs.rest_lengths)
+        tension += float((springs.stiffnesses * stretch).sum())
+    return forces, tension
+
+
+def _engine_at(system: MassSpring, state: State) -> MujocoMassSpring:
+    engine = MujocoMassSpring(system)
+    engine.update_forces(state)
+    return engine

@@ -10,26 +10,26 @@ from .models import CHARACTERS, PACKAGES, ROBOTS, comparable, models
 
 READS = {ROBOTS: "formats.urdf.read", CHARACTERS: "formats.mjcf.read"}
 FILES = {ROBOTS: "the URDFs of example-robot-data", CHARACTERS: "characters in MJCF"}
+POSES = "forward_kinematics in random configurations"
+QUANTITIES = {
+    "positions": (comparisons.positions, POSES, POSITION),
+    "rotations": (comparisons.rotations, POSES, ROTATION),
+    "Jacobians": (comparisons.jacobians, "jacobians.jacobians", JACOBIAN),
+}
 
 
 def robot_claims(family: str, engine: str) -> list[Claim]:
     """Return the claims about one family of files against one engine."""
-    poses = "forward_kinematics in random configurations"
-    quantities = {
-        "positions": (comparisons.positions, poses, POSITION),
-        "rotations": (comparisons.rotations, poses, ROTATION),
-        "Jacobians": (comparisons.jacobians, "jacobians.jacobians", JACOBIAN),
-    }
     return [
         Claim(
-            f"{family[:-1]} {quantity}, {engine}",
-            f"{READS[family]}, {ours}: all links",
+            f"{family[:-1]} {name}, {engine}",
+            f"{READS[family]}, {function}: all links",
             f"{FILES[family]} as {engine} reads them, links and joints matched by name",
-            partial(comparisons.compare, compared, family, engine),
+            partial(comparisons.compare, quantity, family, engine),
             tolerance,
-            cases=len(comparable(family, engine, moving=quantity == "positions")),
+            cases=len(comparable(family, engine, moving=name == "positions")),
         )
-        for quantity, (compared, ours, tolerance) in quantities.items()
+        for name, (quantity, function, tolerance) in QUANTITIES.items()
     ]
 
 

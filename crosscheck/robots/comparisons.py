@@ -18,7 +18,7 @@ from .. import samples
 from ..engines import ROBOT_ENGINES
 from ..engines.robot_engine import RobotEngine, UnreadableError
 from ..verdict import Comparison
-from .models import Model, comparable, random_coordinates, slots
+from .models import RobotFile, comparable, moving_joints, random_coordinates
 
 CONFIGURATIONS = 5
 # Jacobians are compared for so many links at a time that they hold at most this many numbers.
@@ -39,11 +39,11 @@ class Sweep(NamedTuple):
     robot: Robot  # as the reference reads it
     q: FloatArray  # the configurations, (configuration, coordinate)
     links: np.ndarray  # indices of our joints whose links the engine knows
-    theirs: LinkKinematics  # of those links
+    expected: LinkKinematics  # of those links by the engine
     free_mimics: str  # why mimic joints move independently; empty if they follow their leaders
 
 
-def sweep_in_parts(engine: str, model: Model, part: float = PART) -> Iterator[Sweep]:
+def sweep_in_parts(engine: str, model: RobotFile, part: float = PART) -> Iterator[Sweep]:
     """Read a model and evaluate it by an engine in random configurations, some links at a time.
 
     If the reference or the engine refuses the mimic joints, these move independently for both.
@@ -60,7 +60,7 @@ def sweep_in_parts(engine: str, model: Model, part: float = PART) -> Iterator[Sw
 
 
 @functools.cache  # because there are several claims about every model
-def sweep(engine: str, model: Model) -> Sweep:
+def sweep(engine: str, model: RobotFile) -> Sweep:
     """Return the sweep of all links; raise as `sweep_in_parts` does."""
     return next(sweep_in_parts(engine, model, np.inf))
 
@@ -75,59 +75,59 @@ def reference_kinematics(robot: Robot, q: FloatArray, links: np.ndarray) -> Link
     )
 
 
-def _sweep(engine: str, model: Model, part: float, free_mimics: str = "") -> Iterator[Sweep]:
-    theirs = ROBOT_ENGINES[engine](model.path, mimic=not free_mimics)
+def _sweep(engine: str, model: RobotFile, part: float, free_mimics: str = "") -> Iterator[Sweep]:
+    adapter = ROBOT_ENGINES[engine](model.path, mimic=not free_mimics)
     robot = model.read(mimic=not free_mimics)
     articulation = robot.articulation
     q = random_coordinates(articulation, samples.generator(model.name, 0), CONFIGURATIONS)
-    known = [j for j, name in enumerate(articulation.names) if name in theirs.links]
-    if not known:
+    matched = [j for j, name in enumerate(articulation.names) if name in adapter.links]
+    if not matched:
         raise UnreadableError("it gives none of the links its name")
-    numbers = len(known) * CONFIGURATIONS * 6 * articulation.freedom_count
-    for links in np.array_split(known, min(len(known), math.ceil(numbers / part) or 1)):
+    numbers = len(matched) * CONFIGURATIONS * 6 * articulation.freedom_count
+    for links in np.array_split(matched, min(len(matched), math.ceil(numbers / part) or 1)):
         names = [articulation.names[j] for j in links]
-        yield Sweep(robot, q, links, _kinematics(theirs, robot, q, names), free_mimics)
+        yield Sweep(robot, q, links, _engine_kinematics(adapter, robot, q, names), free_mimics)
 
 
-def _kinematics(
-    engine: RobotEngine, robot: Robot, q: FloatArray, links: list[str]
+def _engine_kinematics(
+    adapter: RobotEngine, robot: Robot, q: FloatArray, links: list[str]
 ) -> LinkKinematics:
-    joints = slots(robot)
-    freedoms = {slot.name: slot.freedoms.stop - slot.freedoms.start for slot in joints}
+    joints = moving_joints(robot)
+    freedoms = {joint.name: joint.freedoms.stop - joint.freedoms.start for joint in joints}
     rows = []
     for row in q:
-        engine.update_kinematics({slot.name: row[slot.coordinates] for slot in joints})
-        rows.append((*engine.link_poses(links), engine.jacobians(links, freedoms)))
+        adapter.update_kinematics({joint.name: row[joint.coordinates] for joint in joints})
+        rows.append((*adapter.link_poses(links), adapter.jacobians(links, freedoms)))
     return LinkKinematics(*map(np.array, zip(*rows, strict=True)))
 
 
 Quantity = Callable[[Sweep, LinkKinematics], Comparison]
 
 
-def positions(swept: Sweep, ours: LinkKinematics) -> Comparison:
+def positions(sweep: Sweep, actual: LinkKinematics) -> Comparison:
     """Compare the positions of all links, relative to their extent."""
-    at_zero = _at_zero(swept).positions
-    return Comparison(ours.positions, swept.theirs.positions, at_zero, extent(ours))
+    zero = _at_zero(sweep).positions
+    return Comparison(actual.positions, sweep.expected.positions, zero, extent(actual))
 
 
-def rotations(swept: Sweep, ours: LinkKinematics) -> Comparison:
+def rotations(sweep: Sweep, actual: LinkKinematics) -> Comparison:
     """Compare the rotation matrices of all links."""
-    return Comparison(ours.matrices, swept.theirs.matrices, _at_zero(swept).matrices, 1.0)
+    return Comparison(actual.matrices, sweep.expected.matrices, _at_zero(sweep).matrices, 1.0)
 
 
-def jacobians(swept: Sweep, ours: LinkKinematics) -> Comparison:
+def jacobians(sweep: Sweep, actual: LinkKinematics) -> Comparison:
     """Compare the Jacobians of all links, linear velocities relative to the links' extent."""
-    size: FloatArray = np.repeat([extent(ours) or 1.0, 1.0], 3)[:, None]  # of the rows, (6, 1)
-    theirs = swept.theirs.jacobians / size
-    return Comparison(ours.jacobians / size, theirs, np.zeros_like(theirs), 1.0)
+    size: FloatArray = np.repeat([extent(actual) or 1.0, 1.0], 3)[:, None]  # of the rows, (6, 1)
+    expected = sweep.expected.jacobians / size
+    return Comparison(actual.jacobians / size, expected, np.zeros_like(expected), 1.0)
 
 
 def compare(quantity: Quantity, family: str, engine: str, cases: int) -> Iterator[Comparison]:
     """Yield the comparisons of the first few models, except those that the engine cannot read."""
     for model in comparable(family, engine, moving=quantity is positions)[:cases]:
         with contextlib.suppress(UnreadableError):
-            swept = sweep(engine, model)
-            yield quantity(swept, reference_kinematics(swept.robot, swept.q, swept.links))
+            part = sweep(engine, model)
+            yield quantity(part, reference_kinematics(part.robot, part.q, part.links))
 
 
 class Differences(NamedTuple):
@@ -142,9 +142,9 @@ def differences(parts: Iterable[Sweep]) -> Differences:
     """Return the largest differences between the reference and the engine in parts of a model."""
     boxes, largest = [], []
     for part in parts:
-        ours = reference_kinematics(part.robot, part.q, part.links)
-        x, R, J = (np.abs(a - b) for a, b in zip(ours, part.theirs, strict=True))
-        boxes += [ours.positions.min(axis=(0, 1)), ours.positions.max(axis=(0, 1))]
+        actual = reference_kinematics(part.robot, part.q, part.links)
+        x, R, J = (np.abs(a - b) for a, b in zip(actual, part.expected, strict=True))
+        boxes += [actual.positions.min(axis=(0, 1)), actual.positions.max(axis=(0, 1))]
         largest.append([e.max(initial=0.0) for e in (x, R, J[..., :3, :], J[..., 3:, :])])
     size = np.ptp(boxes, axis=0).max() or 1.0
     position, rotation, linear, angular = np.max(largest, axis=0)
@@ -157,7 +157,7 @@ def extent(links: LinkKinematics) -> float:
     return float(np.ptp(links.positions.reshape(-1, 3), axis=0).max())
 
 
-def _at_zero(swept: Sweep) -> LinkKinematics:
+def _at_zero(sweep: Sweep) -> LinkKinematics:
     """Return the kinematics by the reference with all coordinates at zero."""
-    zero = np.tile(swept.robot.articulation.zero(), (len(swept.q), 1))
-    return reference_kinematics(swept.robot, zero, swept.links)
+    zero = np.tile(sweep.robot.articulation.zero(), (len(sweep.q), 1))
+    return reference_kinematics(sweep.robot, zero, sweep.links)

@@ -3,14 +3,12 @@
 A test reproduces each deviation with a minimal file.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from ..engines.file_kind import MJCF, file_kind, xml_root
 
 JOINTS = ("joint", "freejoint")
-DEFAULTS = ".//default/joint"
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
 OUTER_ROOT = "a first body without a joint is put at the world's origin"
@@ -25,51 +23,43 @@ NAMELESS = "bodies without a name are passed over, or taken for each other"
 def known_deviations(path: Path) -> list[str]:
     """Return a sentence for each known deviation that affects a file; none for a URDF."""
     try:
-        root = xml_root(path) if file_kind(path) == MJCF else Element("robot")
+        if file_kind(path) != MJCF:
+            return []
+        root = xml_root(path)
     except (ValueError, OSError):
         return []
-    return [sentence for sentence, affects in DEVIATIONS.items() if affects(root)]
+    return [sentence for sentence, is_affected in _deviations(root).items() if is_affected]
 
 
-def _outer_root(root: Element) -> bool:
-    body = root.find("worldbody/body")
-    return body is not None and not _joints(body) and _has(body, "pos", *ORIENTATIONS)
-
-
-def _rotated_root(root: Element) -> bool:
-    return any(
-        _has(body, *ORIENTATIONS)
-        and any(joint.tag == "freejoint" or joint.get("type") == "free" for joint in _joints(body))
-        for body in root.iter("body")
-    )
-
-
-def _shared_ref(root: Element) -> bool:
-    by_class = any(_has(joint, "ref") for joint in root.iterfind(DEFAULTS))
-    return any(
-        len(joints) > 1 and (by_class or any(_has(joint, "ref") for joint in joints))
-        for joints in map(_joints, root.iter("body"))
-    )
-
-
-def _joints(body: Element) -> list[Element]:
-    return [child for child in body if child.tag in JOINTS]
+def _deviations(root: Element) -> dict[str, bool]:
+    """Return whether each deviation affects the file of a root element."""
+    first = root.find("worldbody/body")
+    defaults = root.findall(".//default/joint")
+    bodies = [
+        (body, [child for child in body if child.tag in JOINTS]) for body in root.iter("body")
+    ]
+    moving = ("body", *JOINTS)
+    return {
+        OUTER_ROOT: first is not None
+        and _has(first, "pos", *ORIENTATIONS)
+        and all(child.tag not in JOINTS for child in first),
+        ROTATED_ROOT: any(
+            _has(body, *ORIENTATIONS)
+            and any(joint.tag == "freejoint" or joint.get("type") == "free" for joint in joints)
+            for body, joints in bodies
+        ),
+        CLASS_ANCHOR: any(_has(joint, "pos") for joint in defaults),
+        SHARED_REF: any(
+            len(joints) > 1 and any(_has(joint, "ref") for joint in (*defaults, *joints))
+            for _, joints in bodies
+        ),
+        FRAME: any(
+            frame.find(f".//{tag}") is not None for frame in root.iter("frame") for tag in moving
+        ),
+        INCLUDE: root.find(".//include") is not None,
+        NAMELESS: any(not body.get("name") for body, _ in bodies),
+    }
 
 
 def _has(element: Element, *attributes: str) -> bool:
     return any(name in element.attrib for name in attributes)
-
-
-DEVIATIONS: dict[str, Callable[[Element], bool]] = {
-    OUTER_ROOT: _outer_root,
-    ROTATED_ROOT: _rotated_root,
-    CLASS_ANCHOR: lambda root: any(_has(joint, "pos") for joint in root.iterfind(DEFAULTS)),
-    SHARED_REF: _shared_ref,
-    FRAME: lambda root: any(
-        frame.find(f".//{tag}") is not None
-        for frame in root.iter("frame")
-        for tag in ("body", *JOINTS)
-    ),
-    INCLUDE: lambda root: root.find(".//include") is not None,
-    NAMELESS: lambda root: any(not body.get("name") for body in root.iter("body")),
-}

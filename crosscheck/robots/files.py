@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree.ElementTree import Element, ElementTree
+from xml.etree.ElementTree import ElementTree
 
 import numpy as np
 
@@ -23,24 +23,25 @@ from ..tolerances import POSITION
 from .comparisons import differences, sweep_in_parts
 from .deviations import known_deviations
 from .independent_bvh import global_poses
-from .models import Model
+from .models import RobotFile
 
 SECOND_READER = "second reader"
-# Elements of an MJCF file whose attributes are some obsolete: MuJoCo refuses files for them.
+# Elements of an MJCF file with attributes that are obsolete: MuJoCo refuses files for them.
 SETTINGS = ("option", "size", "visual", "statistic")
+SUFFIXES = (".urdf", ".bvh", ".xml", ".mjcf")
 ENGINES = {URDF: tuple(ROBOT_ENGINES), MJCF: tuple(ROBOT_ENGINES), BVH: (SECOND_READER,)}
 AGREES, DIFFERS, DEVIATES = "agrees", "differs", "reads otherwise"
-UNREAD, REFUSED, NEITHER, LOST = "not read", "not read by us", "read by neither", "lost"
+UNREAD, REFUSED, NEITHER, CRASHED = "not read", "not read by us", "read by neither", "lost"
 
 
-class Reading(NamedTuple):
+class FileReading(NamedTuple):
     """The comparison of the reference and an engine on one file.
 
     The outcome is AGREES or DIFFERS if both read it, DEVIATES if they differ for a known reason;
     UNREAD if only the engine does not read it, REFUSED if only the reference does not, NEITHER if
-    both do not; LOST if the process crashed or took too long. The difference is the largest one of
-    positions and linear velocities, relative to the extent of the links, and of rotation matrices
-    and angular velocities; None unless both read it.
+    both do not; CRASHED if the process crashed or took too long. The difference is the largest one
+    of positions and linear velocities, relative to the extent of the links, and of rotation
+    matrices and angular velocities; None unless both read it.
     """
 
     engine: str
@@ -50,7 +51,7 @@ class Reading(NamedTuple):
     notes: tuple[str, ...] = ()  # the warnings of the reference
 
 
-class File(NamedTuple):
+class ModelFile(NamedTuple):
     """A file, its kind, and the folder that must contain the files it includes."""
 
     path: Path
@@ -58,47 +59,46 @@ class File(NamedTuple):
     root: Path
 
 
-class Checked(NamedTuple):
+class CheckedFile(NamedTuple):
     """A file and its readings; a fragment has none."""
 
-    file: File
-    readings: tuple[Reading, ...]
+    file: ModelFile
+    readings: tuple[FileReading, ...]
 
 
-class Found(NamedTuple):
+class FileSelection(NamedTuple):
     """The files to read in some folders, and the number of XML files of other kinds."""
 
-    files: tuple[File, ...]
-    others: int
+    files: tuple[ModelFile, ...]
+    ignored: int
 
 
-def find(paths: Iterable[str | Path]) -> Found:
+def find(paths: Iterable[str | Path]) -> FileSelection:
     """Return the URDF, MJCF and BVH files at some paths and in folders below them, in order.
 
     Raises:
         ValueError: if a path does not exist, or there are no such files.
     """
-    files: dict[Path, File] = {}
-    others = 0
-    for path in map(Path, paths):
+    files: dict[Path, ModelFile] = {}
+    ignored, roots = 0, list(map(Path, paths))
+    for path in roots:
         if not path.exists():
             raise ValueError(f"{path}: there is no such file or folder")
         root = path if path.is_dir() else path.parent
-        for name in _below(path):
+        for candidate in _files_below(path):
             kind = ""
             with contextlib.suppress(ValueError):
-                kind = file_kind(name)
-            others += not kind
+                kind = file_kind(candidate)
+            ignored += not kind
             if kind:
-                files.setdefault(name.resolve(), File(name, kind, root))
+                files.setdefault(candidate.resolve(), ModelFile(candidate, kind, root))
     if not files:
-        raise ValueError(
-            f"{', '.join(map(str, paths))}: expected URDF, MJCF or BVH files, got none"
-        )
-    return Found(tuple(files.values()), others)
+        names = ", ".join(map(str, roots))
+        raise ValueError(f"{names}: expected URDF, MJCF or BVH files, got none")
+    return FileSelection(tuple(files.values()), ignored)
 
 
-def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
+def check(files: Iterable[ModelFile], patience: float = 60.0) -> Iterator[CheckedFile]:
     """Yield the readings of each file, in a child process that survives crashes and time-outs.
 
     Args:
@@ -111,29 +111,30 @@ def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
         for file in files:
             readings = [_read(child, engine, file) for engine in ENGINES.get(file.kind, ())]
             if file.path.resolve() in included and all(r.outcome == NEITHER for r in readings):
-                yield Checked(file._replace(kind=FRAGMENT), ())
+                yield CheckedFile(file._replace(kind=FRAGMENT), ())
             else:
-                yield Checked(file, _with_causes(child, file, readings))
+                yield CheckedFile(file, _with_causes(child, file, readings))
 
 
-def compare(engine: str, file: File) -> Reading:
+def compare(engine: str, file: ModelFile) -> FileReading:
     """Read a file by the reference and an engine and compare them; exceptions become outcomes."""
-    with warnings.catch_warnings(record=True) as caught:
+    difference, why = None, ""
+    with warnings.catch_warnings(record=True) as messages:
         warnings.simplefilter("always")
         try:
             difference = _largest_difference(engine, file)
-            outcome, why = (AGREES if difference <= POSITION.value else DIFFERS), ""
+            outcome = AGREES if difference <= POSITION.value else DIFFERS
         except UnreadableError as error:
-            ours = _refusal(file)
-            difference, outcome = None, NEITHER if ours else UNREAD
-            why = "; ".join(filter(None, [_sentence(error, file), ours]))
+            refusal = _refusal(file)
+            outcome = NEITHER if refusal else UNREAD
+            why = "; ".join(filter(None, [_one_line(error, file), refusal]))
         except ValueError as error:
-            difference, outcome, why = None, REFUSED, _sentence(error, file)
+            outcome, why = REFUSED, _one_line(error, file)
         except Exception as error:
-            difference, outcome = None, LOST
-            why = f"it ends in {type(error).__name__}: {_sentence(error, file)}"
-    notes = dict.fromkeys(_sentence(warning.message, file) for warning in caught)
-    return Reading(engine, outcome, difference, why, tuple(notes))
+            outcome = CRASHED
+            why = f"it ends in {type(error).__name__}: {_one_line(error, file)}"
+    notes = dict.fromkeys(_one_line(message.message, file) for message in messages)
+    return FileReading(engine, outcome, difference, why, tuple(notes))
 
 
 def prepare() -> None:
@@ -143,53 +144,55 @@ def prepare() -> None:
     jacobians.jacobians(arm, arm.neutral()[None])
 
 
-def _largest_difference(engine: str, file: File) -> float:
+def _largest_difference(engine: str, file: ModelFile) -> float:
     """Return the largest difference in random configurations or frames, or NaN."""
     if engine == SECOND_READER:
         return _compare_motions(file)
-    parts = sweep_in_parts(engine, Model(file.path.name, file.path, file.root))
+    parts = sweep_in_parts(engine, RobotFile(file.path.name, file.path, file.root))
     return float(np.max(differences(parts)))
 
 
-def _compare_motions(file: File) -> float:
+def _compare_motions(file: ModelFile) -> float:
     """Return the largest difference over all frames of a motion, or NaN."""
     motion = bvh.read(file.path)
     pose = motion.pose()
     extent = float(np.ptp(pose.positions.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
-    largest, found = 0.0, 0
+    largest, joints = 0.0, 0
     try:
         for name, x, R in global_poses(read_text(file.path)):
             if name in motion.skeleton.names:
                 j = motion.skeleton.index(name)
-                found += 1
+                joints += 1
                 errors = [np.abs(x - pose.positions[:, j]) / extent]
                 errors += [np.abs(R - rotation.to_matrix(pose.rotations[:, j]))]
                 largest = np.max([largest, *(part.max(initial=0.0) for part in errors)])
     except Exception as error:
         raise UnreadableError(f"it ends in {type(error).__name__}: {error}") from None
-    return float(largest) if found == motion.skeleton.joint_count else np.nan
+    return float(largest) if joints == motion.skeleton.joint_count else np.nan
 
 
-def _refusal(file: File) -> str:
+def _refusal(file: ModelFile) -> str:
     """Return the reason why the reference does not read a file, or ""."""
     try:
         if file.kind == BVH:
             bvh.read(file.path)
         else:
-            Model(file.path.name, file.path, file.root).read(mimic=False)
+            RobotFile(file.path.name, file.path, file.root).read(mimic=False)
     except ValueError as error:
-        return f"the reference: {_sentence(error, file)}"
+        return f"the reference: {_one_line(error, file)}"
     return ""
 
 
-def _read(child: CallProcess, engine: str, file: File) -> Reading:
+def _read(child: CallProcess, engine: str, file: ModelFile) -> FileReading:
     try:
         return child.call(compare, engine, file)
     except LostError as error:
-        return Reading(engine, LOST, why=str(error))
+        return FileReading(engine, CRASHED, why=str(error))
 
 
-def _with_causes(child: CallProcess, file: File, readings: list[Reading]) -> tuple[Reading, ...]:
+def _with_causes(
+    child: CallProcess, file: ModelFile, readings: list[FileReading]
+) -> tuple[FileReading, ...]:
     """Explain a difference of Pinocchio by known causes if MuJoCo agrees with the reference.
 
     Where MuJoCo refuses the file, it reads a copy without settings, which kinematics does not need.
@@ -202,14 +205,14 @@ def _with_causes(child: CallProcess, file: File, readings: list[Reading]) -> tup
         with tempfile.TemporaryDirectory() as folder:
             copy = _without_settings(file, Path(folder))
             outcomes["MuJoCo"] = _read(child, "MuJoCo", copy).outcome
-    excused = outcomes["MuJoCo"] == AGREES
+    is_excused = outcomes["MuJoCo"] == AGREES
     return tuple(
-        r._replace(outcome=DEVIATES, why=causes) if excused and r.outcome == DIFFERS else r
+        r._replace(outcome=DEVIATES, why=causes) if is_excused and r.outcome == DIFFERS else r
         for r in readings
     )
 
 
-def _without_settings(file: File, folder: Path) -> File:
+def _without_settings(file: ModelFile, folder: Path) -> ModelFile:
     """Return a copy, in a folder, of an MJCF file and those that it includes without `SETTINGS`."""
     top, main = file.root.resolve(), file.path.parent.resolve() / file.path.name
     for path in (main, *_includes(file)):
@@ -219,29 +222,28 @@ def _without_settings(file: File, folder: Path) -> File:
         copy = folder / path.relative_to(top)
         copy.parent.mkdir(parents=True, exist_ok=True)
         ElementTree(root).write(copy)
-    return File(folder / main.relative_to(top), MJCF, folder)
+    return ModelFile(folder / main.relative_to(top), MJCF, folder)
 
 
-def _below(path: Path) -> list[Path]:
+def _files_below(path: Path) -> list[Path]:
     """Return the regular files with known suffixes at a path or below it, in order."""
     if not path.is_dir():
         return [path] if path.is_file() else []
-    found = [Path(folder) / name for folder, _, names in os.walk(path) for name in names]
-    suffixes = (".urdf", ".bvh", ".xml", ".mjcf")
-    return sorted(name for name in found if name.suffix.lower() in suffixes and name.is_file())
+    files = (Path(folder) / name for folder, _, names in os.walk(path) for name in names)
+    return sorted(file for file in files if file.suffix.lower() in SUFFIXES and file.is_file())
 
 
-def _includes(file: File) -> list[Path]:
+def _includes(file: ModelFile) -> list[Path]:
     """Return the files that an MJCF file includes, relative to its folder."""
-    try:
-        root = xml_root(file.path) if file.kind == MJCF else Element("")
-    except ValueError:
+    if file.kind != MJCF:
         return []
-    names = [include.get("file", "") for include in root.iter("include")]
-    return [(file.path.parent / name).resolve() for name in names]
+    with contextlib.suppress(ValueError):
+        includes = xml_root(file.path).iter("include")
+        return [(file.path.parent / tag.get("file", "")).resolve() for tag in includes]
+    return []
 
 
-def _sentence(error: object, file: File) -> str:
+def _one_line(error: object, file: ModelFile) -> str:
     """Return a message as one line, without the folder of the file."""
     message = str(error).replace(f"{file.path}", file.path.name)
     return " ".join(message.split())[:300]

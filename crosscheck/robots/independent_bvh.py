@@ -42,23 +42,23 @@ def _local_pose(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the offsets and rotation matrices of a joint from its OFFSET and its channels."""
     offset, local = np.tile(x, (len(columns), 1)), np.tile(np.eye(3), (len(columns), 1, 1))
-    for channel, values in zip(channels, columns.T, strict=False):
+    for channel, column in zip(channels, columns.T, strict=False):
         axis = "XYZ".index(channel[0].upper())
         if channel[1:].upper() == "POSITION":
-            offset[:, axis] = values
+            offset[:, axis] = column
         else:
-            local = local @ _about(axis, np.radians(values))
+            local = local @ _about(axis, np.radians(column))
     return offset, local
 
 
 def _columns(motion: str) -> FloatArray:
     """Return the numbers after the header of a motion, (frame, channel)."""
-    found = FRAMES.search(motion)
-    assert found is not None
-    count = int(found[1])
-    rows = motion[found.end() :].split("\n")
-    values = [row.split() for row in rows if row.strip()][:count]
-    return np.array(values, dtype=float).reshape(count, -1 if count else 0)
+    header = FRAMES.search(motion)
+    assert header is not None
+    count = int(header[1])
+    rows = motion[header.end() :].split("\n")
+    words = [row.split() for row in rows if row.strip()][:count]
+    return np.array(words, dtype=float).reshape(count, -1 if count else 0)
 
 
 def _joint(words: list[str]) -> tuple[str, FloatArray, list[str]]:

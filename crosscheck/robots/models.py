@@ -2,8 +2,10 @@
 
 import functools
 import importlib.metadata
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,52 +15,33 @@ from plumbob.reference.formats import mjcf, urdf
 from plumbob.reference.formats.robot import Robot
 
 from ..engines.file_kind import URDF, file_kind
-from .deviations import CLASS_ANCHOR, OUTER_ROOT, ROTATED_ROOT
+from . import deviations
 
 ROBOTS, CHARACTERS = "robots", "characters"
 # dm_control needs labmaze, of which there are no wheels from Python 3.13 on.
 PACKAGES = {ROBOTS: ("example-robot-data",), CHARACTERS: ("gymnasium", "dm_control")}
+FOLDERS = {"example-robot-data": "cmeel.prefix/share/example-robot-data/robots"}
 EXTRA = "robots"
 
-# Models with several bodies; those that only vary another are left out.
-_CHARACTERS = """
-    envs/mujoco/assets/ant.xml envs/mujoco/assets/half_cheetah.xml envs/mujoco/assets/hopper.xml
-    envs/mujoco/assets/humanoid.xml envs/mujoco/assets/pusher.xml envs/mujoco/assets/reacher.xml
-    envs/mujoco/assets/swimmer.xml envs/mujoco/assets/walker2d.xml suite/humanoid.xml
-    suite/dog.xml suite/humanoid_CMU.xml suite/quadruped.xml suite/walker.xml suite/cheetah.xml
-    suite/hopper.xml suite/fish.xml suite/manipulator.xml suite/stacker.xml
-    locomotion/walkers/assets/humanoid_CMU_V2019.xml
-    locomotion/walkers/assets/humanoid_CMU_V2020.xml locomotion/walkers/assets/rodent.xml
-    locomotion/walkers/assets/dog_v2/dog.xml locomotion/walkers/assets/fruitfly_v2/fruitfly.xml
-    locomotion/walkers/assets/jumping_ball/jumping_ball_with_head.xml
-    locomotion/soccer/assets/boxhead/boxhead.xml third_party/ant/ant.xml
-    third_party/kinova/jaco_arm.xml mujoco/testing/assets/model_with_ball_joints.xml
-"""
-# Models that an engine is known to read differently, and why; a test reproduces each cause.
+_CATALOGUE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+def _by_engine(table: str) -> Iterator[tuple[tuple[str, str], Any]]:
+    for engine, entries in _CATALOGUE[table].items():
+        for name, entry in entries.items():
+            yield (engine, name), entry
+
+
+# Reasons by the engine and the name of the model.
 CAUSES = {
-    ("Pinocchio", "suite/dog.xml"): CLASS_ANCHOR,
-    ("Pinocchio", "suite/humanoid_CMU.xml"): ROTATED_ROOT,
-    ("Pinocchio", "locomotion/walkers/assets/rodent.xml"): f"{OUTER_ROOT}; {CLASS_ANCHOR}",
-    ("Pinocchio", "locomotion/walkers/assets/dog_v2/dog.xml"): CLASS_ANCHOR,
-    ("Pinocchio", "third_party/ant/ant.xml"): OUTER_ROOT,
+    key: "; ".join(getattr(deviations, cause) for cause in causes)
+    for key, causes in _by_engine("deviating")
 }
-# Models that an engine is known not to read, and why.
-UNREAD = {
-    ("Pinocchio", "suite/quadruped.xml"): "height fields are refused",
-    ("Pinocchio", "mujoco/testing/assets/model_with_ball_joints.xml"): "its bodies have no names",
-}
-# Models whose links rotate but do not change position: rotors on a rigid frame.
-ROTATING_IN_PLACE = ("iris_description/robots/iris.urdf",)
-# Models without movable joints.
-IMMOBILE = (
-    "hector_description/robots/quadrotor_base.urdf",
-    "iris_description/robots/iris_simple.urdf",
-    "ur_description/urdf/ur3.urdf",
-)
+UNREAD: dict[tuple[str, str], str] = dict(_by_engine("unread"))
+IMMOBILE: list[str] = _CATALOGUE["immobile"]
 
 
-@dataclass(frozen=True)
-class Model:
+class RobotFile(NamedTuple):
     """A file with a robot or a character."""
 
     name: str  # its path below the folder of its package
@@ -77,36 +60,36 @@ class Model:
 
 
 @functools.cache
-def models(family: str) -> tuple[Model, ...]:
+def models(family: str) -> tuple[RobotFile, ...]:
     """Return all models of a family, those of packages that are not installed left out."""
     roots = [root for package in PACKAGES[family] if (root := folder(package))]
-    return tuple(Model(name, root / name) for root in roots for name in _names(family, root))
+    return tuple(RobotFile(name, root / name) for root in roots for name in _names(family, root))
 
 
 def _names(family: str, root: Path) -> list[str]:
     if family == CHARACTERS:
-        return [name for name in _CHARACTERS.split() if (root / name).exists()]
+        return [name for name in _CATALOGUE["characters"] if (root / name).exists()]
     return sorted(path.relative_to(root).as_posix() for path in root.rglob("*.urdf"))
 
 
-def comparable(family: str, engine: str, *, moving: bool = False) -> list[Model]:
+def comparable(family: str, engine: str, *, moving: bool = False) -> list[RobotFile]:
     """Return the models that an engine reads without known deviations and that have freedoms.
 
     With `moving`, leave out models whose links only rotate in place.
     """
-    known = {name for by, name in (*CAUSES, *UNREAD) if by == engine}
-    left_out = {*IMMOBILE, *known, *(ROTATING_IN_PLACE if moving else ())}
-    return [model for model in models(family) if model.name not in left_out]
+    excluded = {*IMMOBILE, *(name for by, name in (*CAUSES, *UNREAD) if by == engine)}
+    if moving:
+        excluded.update(_CATALOGUE["rotating_in_place"])
+    return [model for model in models(family) if model.name not in excluded]
 
 
 def folder(package: str) -> Path | None:
-    """Return where a package has its files, None if it is not installed."""
+    """Return the folder of a package's files, None if it is not installed."""
     try:
-        found = importlib.metadata.distribution(package)
+        distribution = importlib.metadata.distribution(package)
     except importlib.metadata.PackageNotFoundError:
         return None
-    inside = {"example-robot-data": "cmeel.prefix/share/example-robot-data/robots"}
-    return Path(str(found.locate_file(inside.get(package, package))))
+    return Path(str(distribution.locate_file(FOLDERS.get(package, package))))
 
 
 def left_out() -> str:
@@ -121,24 +104,23 @@ def left_out() -> str:
     )
 
 
-@dataclass(frozen=True)
-class Slot:
-    """A joint of the file with its own coordinates: the slices of these and of its freedoms."""
+class JointSlices(NamedTuple):
+    """A joint of the file with the slices of its coordinates and of its freedoms."""
 
     name: str
     coordinates: slice
     freedoms: slice
 
 
-def slots(robot: Robot) -> list[Slot]:
-    """Return the joints with their own coordinates, in the order of their freedoms."""
+def moving_joints(robot: Robot) -> list[JointSlices]:
+    """Return the joints with coordinates of their own, in the order of their freedoms."""
     model = robot.articulation
-    found = [
-        Slot(name, model.coordinates_of(j), model.freedoms_of(j))
+    joints = [
+        JointSlices(name, model.coordinates_of(j), model.freedoms_of(j))
         for name, j in robot.joints.items()
         if model.kinds[j] != "fixed" and j not in model.mimics
     ]
-    return sorted(found, key=lambda slot: slot.freedoms.start)
+    return sorted(joints, key=lambda joint: joint.freedoms.start)
 
 
 def random_coordinates(model: Articulation, rng: np.random.Generator, count: int) -> FloatArray:

@@ -11,7 +11,7 @@ from .functions import FunctionContestant
 from .judgement import LEAST_SHARE, CaseJudgement, TaskReport, Verdict
 from .message import decode_greeting
 from .sentence import Sentence
-from .solvers.host import Solver
+from .solvers.host import PythonSolver
 from .verify import DISCIPLINES, judge_cases, trials
 
 
@@ -43,7 +43,7 @@ def laws(
     found = functions if solver is None else solver
     name = getattr(solver, "__name__", "") or "solver"
     declared = functions.get("PLUMBOB") or getattr(solver, "PLUMBOB", None) or {}
-    offered = Solver(found, name, declared)
+    offered = PythonSolver(found, name, declared)
     contestant = FunctionContestant(offered.functions, decode_greeting(offered.greeting))
     groups = {
         (task, method): DISCIPLINES[task].cases(contestant.greeting, method, seed, thorough)

@@ -28,7 +28,7 @@ from .kinematics.robot_inverse_kinematics import FAULTS as ROBOT_FAULTS
 from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
 from .kinematics.robot_solver import solve_by_reference, solve_wrongly
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
-from .mass_spring.model import Integrator, Model, simulate
+from .mass_spring.model import Integrator, StepModel, simulate
 from .mass_spring.problem import all_forces, problem_of, state_of, system_of
 from .sentence import sentence
 from .verify import verify
@@ -142,20 +142,20 @@ def _followed(method: str, /, **inputs: Any) -> Mapping[str, Any]:
 
 
 # Models of the step, and how they declare themselves.
-LINEARISED = Model(Integrator("newton", "x_n", 1), damper="explicit")
-CONVERGED = Model(Integrator("converged", "y"))
-LOCAL_GLOBAL = Model(Integrator("local_global", "y", 10))
-SYMPLECTIC = Model(Integrator("symplectic"), 10, "explicit", velocity="separate")
+LINEARISED = StepModel(Integrator("newton", "x_n", 1), damper="explicit")
+CONVERGED = StepModel(Integrator("converged", "y"))
+LOCAL_GLOBAL = StepModel(Integrator("local_global", "y", 10))
+SYMPLECTIC = StepModel(Integrator("symplectic"), 10, "explicit", velocity="separate")
 
 
-def _declared(model: Model, method: Method, iterations: int | None = None) -> Step:
+def _declared(model: StepModel, method: Method, iterations: int | None = None) -> Step:
     velocity: Any = "separate" if model.velocity == "separate" else "displacement"
     said: Any = {"start": model.integrator.start} if method != "symplectic" else {}
     said |= {"damper": model.damper, "substeps": model.substeps, "iterations": iterations}
     return Step(method, pins="eliminated", velocity=velocity, **said)
 
 
-DECLARED: dict[str, tuple[Model, Step]] = {
+DECLARED: dict[str, tuple[StepModel, Step]] = {
     "linearised": (LINEARISED, _declared(LINEARISED, "linearised", 1)),
     "converged": (CONVERGED, _declared(CONVERGED, "converged")),
     "local/global": (LOCAL_GLOBAL, _declared(LOCAL_GLOBAL, "local_global", 10)),
@@ -177,7 +177,7 @@ class Stepper:
     """A step with faults; it remembers the first h of each system, for factors that are kept."""
 
     def __init__(
-        self, model: Model, faults: Sequence[Option] = (), precision: type = np.float64
+        self, model: StepModel, faults: Sequence[Option] = (), precision: type = np.float64
     ) -> None:
         self.model, self.faults, self.precision = model, tuple(faults), precision
         self.first_h: dict[tuple[bytes, bytes], float] = {}

@@ -35,7 +35,7 @@ def check(
 
     if names:
         for claim in CLAIMS.values():
-            print(f"{claim.name}: {claim.ours}, against {claim.theirs}")
+            print(f"{claim.name}: {claim.quantity}, against {claim.counterpart}")
         return SUCCESS
     chosen = [known("claim", name, CLAIMS) for name in claims or CLAIMS]
     with progress() as bar:

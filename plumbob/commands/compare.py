@@ -12,7 +12,7 @@ from ..terminal import print_aligned, width
 from .options import MISSED, SUCCESS, known
 
 if TYPE_CHECKING:
-    from plumbob.bench.comparison.compare import Comparison
+    from plumbob.bench.comparison.compare import RunComparison
 
 _File = Path | None
 _Words = list[str] | None
@@ -55,10 +55,9 @@ def compare(
     Answers are compared to the bit, times by intervals. What lies within the machine's drift is
     undecided; --rerun REV decides it. Exit code 1 if --fail stops at a row.
     """
-    from plumbob.bench.comparison import output
-    from plumbob.bench.comparison.compare import limits, stops_at
+    from plumbob.bench.comparison import compare as comparison
 
-    limit = limits(fail)
+    limit = comparison.gate_limits(fail)
     two = list(folders or [])
     if rerun and not two:
         made = _side_by_side(rerun, suites or ["timing"], only or [], pairs)
@@ -68,14 +67,14 @@ def compare(
         old, new = map(str, two)
     else:
         raise ValueError(f"compare: expected OLD and NEW, or --rerun REV, got {len(two)} folders")
-    stopped = stops_at(made.rows, limit)
-    print("\n".join(output.summary(made, stopped, width())))
+    stopped = comparison.failing(made.rows, limit)
+    print("\n".join(comparison.summary(made, stopped, width())))
     if markdown:
         from plumbob.bench.tables import table as tables
 
-        _write(markdown, tables.markdown(output.table(made, stopped, old, new)))
+        _write(markdown, tables.markdown(comparison.table(made, stopped, old, new)))
     if json:
-        _write(json, output.as_json(made, stopped, old, new))
+        _write(json, comparison.as_json(made, stopped, old, new))
     return MISSED if stopped else SUCCESS
 
 
@@ -87,14 +86,16 @@ COMPARE_EXAMPLES = block(
 )
 
 
-def _of_folders(old: Path, new: Path) -> "Comparison":
+def _of_folders(old: Path, new: Path) -> "RunComparison":
     from plumbob.bench.comparison.compare import compare as compare_records
     from plumbob.bench.harness.record import on_record
 
     return compare_records(*(on_record(folder, typed=False).records for folder in (old, new)))
 
 
-def _side_by_side(revision: str, suites: list[str], words: list[str], pairs: int) -> "Comparison":
+def _side_by_side(
+    revision: str, suites: list[str], words: list[str], pairs: int
+) -> "RunComparison":
     from plumbob.bench.comparison.rerun import Plan, clone_root, rerun
     from plumbob.bench.experiments import SUITES
 

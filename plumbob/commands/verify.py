@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from plumbob.crosscheck.verify.output.files import Files
     from plumbob.crosscheck.verify.output.question import Question
     from plumbob.crosscheck.verify.output.words import Say
-    from plumbob.crosscheck.verify.solvers import Limits
+    from plumbob.crosscheck.verify.solvers import ProcessLimits
 
 RIGHT, WRONG = 0, 1
 PROGRAM = "plumbob.program"
@@ -144,7 +144,7 @@ def _keep_to_one_thread() -> None:
 
 
 def _judge(
-    words: list[str], limits: "Limits", question: "Question", files: "Files", language: str
+    words: list[str], limits: "ProcessLimits", question: "Question", files: "Files", language: str
 ) -> int:
     """Ask a solver, print the verdict, and write the files that are wanted."""
     from plumbob.crosscheck.verify.contestant import NoGreetingError

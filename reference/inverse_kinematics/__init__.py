@@ -2,7 +2,8 @@
 
 The route of a call: `solve_ik` checks settings, model and targets; `solve.py` hands arrays to the
 kernel of a solver; that begins from each start (`solve_chain.py`, `solve_mechanism.py`) and runs
-the two loops of `restarts.py`, which call the solver's update in the file that bears its name.
+the two loops of `restarts.py`, which call the solver's sweep or update (`fabrik.py`, `ccd.py`,
+`jacobian_methods.py`).
 """
 
 from collections.abc import Sequence
@@ -35,13 +36,13 @@ def solve_ik(
     """Return the pose that brings effectors to targets, from a start pose.
 
     The root of a Skeleton rotates but does not move. Joints that move no effector keep their
-    rotation, as does an effector whose own rotation is not asked for. An answer is always given;
-    `outcome` says what it is. A start that is stuck, such as a straight chain whose target lies on
-    its own line, is first bent, always alike. Limits are kept; a start outside of them
-    is brought within.
+    rotation, as does an effector whose own rotation is free. A pose is always returned; `outcome`
+    says how the solve ended. A start that is stuck, such as a straight chain whose target lies on
+    its own line, is first bent, always alike. Limits are kept; a start outside of them is brought
+    within.
 
-    Restarts never make an answer worse: what is reached with fewer is reached with more, else the
-    merit is no greater than with fewer, or than that of one attempt given (1 + restarts)
+    Restarts never make a solution worse: a target reached with fewer is reached with more, else the
+    merit is no greater than with fewer, or than that of one attempt of (1 + restarts)
     `max_iterations`. An attempt that was given up early is finished if no other reaches the target,
     and the first goes on for as many iterations as all may make: up to (1 + 2 restarts)
     `max_iterations` in all, for one position on a Skeleton (2 + 3 restarts). Attempts at a target
@@ -73,8 +74,8 @@ def solve_ik(
             several tips and no effector is named.
     """
     if solver is None:
-        solver, most = default_solver(skeleton, target)
-        restarts = most if restarts is None else restarts
+        solver, default_restarts = default_solver(skeleton, target)
+        restarts = default_restarts if restarts is None else restarts
     settings = checked_settings(
         solver, tolerance, tolerance_rotation, max_iterations,
         0 if restarts is None else restarts, seed, record,

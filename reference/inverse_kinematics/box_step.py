@@ -1,7 +1,11 @@
-"""Steps of the Jacobian methods within the limits of hinges and slides, by an active set.
+"""The linear system of a task, and the steps of the Jacobian methods within limits, by active sets.
+
+The errors of all effectors are stacked: the vector from an effector to its target [m] and, where
+its rotation matters, the rotation vector to its target's times a lever [m], each times the root of
+the effector's weight. The Jacobian, transposed, holds a row a freedom: how its unit moves them.
 
 The damped step J' (J J' + damping 1)^-1 e needs a matrix of the size of e only, however many joints
-there are. A freedom that a limit stops is active: the others are asked again without it.
+there are. A freedom that a limit stops is active: the others are solved for again without it.
 """
 
 import math
@@ -10,25 +14,33 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import FloatArray
-from ..articulation import BALL, FREE, HINGE, SLIDE, clamp_joint
-from ..jacobians import move_joint
-from ..quaternion import normalised
-from .jacobian import LEAST_DAMPING
-from .joint_updates import load_ball, store_ball
-from .mechanism import least_residual, update_forward_kinematics
-from .task_jacobian import clear, fill_errors, fill_jacobian
+from ..articulation import BALL, FREE, FREEDOMS, HINGE, SLIDE, clamp_joint
+from ..jacobians import accumulate, motion, move_joint, velocity_at
+from ..quaternion import load_vector, logarithm, normalised, scale, subtract
+from .mechanism import (
+    LEVER,
+    effector_position,
+    least_residual,
+    load_ball,
+    position_error,
+    rotation_error,
+    store_ball,
+    update_forward_kinematics,
+)
 
 FULL_CIRCLE = 2.0 * math.pi
+# Where J J' is singular, a damping of so much of its trace keeps its factors above rounding.
+ROUNDING_DAMPING = 1e-14
 # The damping towards a target out of reach, over the reach times the error: of the first step, the
 # least, by how much it grows where the error rose and shrinks where it fell.
-FAR_DAMPING, LEAST_FAR_DAMPING, GROWTH, DECAY = 0.2, 0.001, 8.0, 1.3
+FAR_DAMPING, SMALLEST_FAR_DAMPING, GROWTH, DECAY = 0.2, 0.001, 8.0, 1.3
 
 
 class TaskSystem(NamedTuple):
     """The linear system of a task, and a step."""
 
-    e: FloatArray  # errors [m], (equation,)
-    J: FloatArray  # the Jacobian transposed, see `task_jacobian.py`, (freedom, equation)
+    e: FloatArray  # stacked errors [m], (equation,)
+    J: FloatArray  # the Jacobian transposed, -de/dq, lengths over the reach, (freedom, equation)
     A: FloatArray  # J J' + damping and then its factors, (equation, equation)
     z: FloatArray  # A^-1 e, (equation,)
     step: FloatArray  # of the freedoms, lengths over the reach, (freedom,)
@@ -50,18 +62,54 @@ def linearise_task(mechanism, target, data, system):
     fill_jacobian(mechanism, target, data, system.J)
 
 
+def fill_errors(mechanism, target, data, e):
+    """Fill the errors, (equation,)."""
+    effectors, lever = mechanism.effectors, LEVER * mechanism.reach
+    for i in range(len(effectors)):
+        row, root = effectors["row"][i], math.sqrt(target["weight"][i])
+        store(e, row, scale(root, position_error(mechanism, target, data, i)))
+        if effectors["oriented"][i]:
+            error = logarithm(rotation_error(mechanism, target, data, i))
+            store(e, row + 3, scale(root * lever, error))
+
+
+def fill_jacobian(mechanism, target, data, J):
+    """Fill the Jacobian transposed, (freedom, equation)."""
+    joints = mechanism.joints
+    for k in range(len(J)):
+        clear(J[k])
+    for j in range(len(joints)):
+        for i in range(FREEDOMS[joints["kind"][j]]):
+            angular, linear = motion(joints, j, i, data.rotations, mechanism.reach)
+            row = J[joints["freedom"][j] + i]
+            add_motion(mechanism, target, data, j, angular, linear, row)
+
+
+def add_motion(mechanism, target, data, j, angular, linear, row):
+    """Add to a row what a motion of joint j does to the effectors below."""
+    effectors, lever = mechanism.effectors, LEVER * mechanism.reach
+    x = load_vector(data.positions, j)
+    for e in range(len(effectors)):
+        if mechanism.moves[j, e]:
+            at, root = effectors["row"][e], math.sqrt(target["weight"][e])
+            arm = subtract(effector_position(mechanism, data, e), x)
+            accumulate(row, at, scale(root, velocity_at(angular, linear, arm)))
+            if effectors["oriented"][e]:
+                accumulate(row, at + 3, scale(root * lever, angular))
+
+
 def damped_step(mechanism, data, system, damping):
     """Fill the step that minimises |e - J q|^2 + damping |q|^2 within the limits.
 
-    A freedom that the step would take beyond its limit becomes active: it goes to the limit, what
-    that does is taken from e, and the others are asked again. One that would then rather step back
-    is released.
+    A freedom that the step would take beyond its limit becomes active: it goes to the limit, its
+    effect is taken from e, and the others are solved for again. One that would then rather step
+    back is released.
     """
     clear(system.active)
     clear(system.step)
     any_active = False
     for _ in range(2 * len(system.step) + 1):
-        solve_damped(system, damping)
+        solve_system(system, damping)
         for k in range(len(system.step)):
             if system.active[k] == 0.0:
                 system.step[k] = inner(system.J[k], system.z)
@@ -82,7 +130,7 @@ def far_damping(mechanism, target, data, system, damping):
     if least_residual(mechanism, target) <= 0.0:
         return damping
     square, factor, last_square = squared(system.e), data.far_step[0], data.far_step[1]
-    factor = factor * GROWTH if square > last_square else max(factor / DECAY, LEAST_FAR_DAMPING)
+    factor = factor * GROWTH if square > last_square else max(factor / DECAY, SMALLEST_FAR_DAMPING)
     if last_square == 0.0:
         factor = FAR_DAMPING
     data.far_step[0], data.far_step[1] = factor, square
@@ -96,12 +144,12 @@ def activate_limits(mechanism, data, system):
         k = joints["freedom"][j]
         if not has_bounds(joints, j) or system.active[k] != 0.0:
             continue
-        q, scale = data.q[joints["coordinate"][j]], freedom_scale(mechanism, j)
-        wanted = q + scale * system.step[k]
-        bounded = min(max(wanted, joints["lower"][j]), joints["upper"][j])
-        if bounded != wanted and not covers_circle(joints, j):
-            system.active[k] = 1.0 if wanted > bounded else -1.0
-            system.step[k] = (bounded - q) / scale
+        q, unit = data.q[joints["coordinate"][j]], freedom_unit(mechanism, j)
+        unbounded = q + unit * system.step[k]
+        bounded = min(max(unbounded, joints["lower"][j]), joints["upper"][j])
+        if bounded != unbounded and not covers_circle(joints, j):
+            system.active[k] = 1.0 if unbounded > bounded else -1.0
+            system.step[k] = (bounded - q) / unit
             for i in range(len(system.e)):
                 system.e[i] -= system.step[k] * system.J[k, i]
             any_active = True
@@ -113,12 +161,12 @@ def release(system):
 
     With z = (e - J q) / damping, a freedom k that is free steps J_k z.
     """
-    worst, most = -1, 0.0
+    worst, largest = -1, 0.0
     for k in range(len(system.step)):
         if system.active[k] != 0.0:
             back = system.active[k] * (system.step[k] - inner(system.J[k], system.z))
-            if back > most:
-                worst, most = k, back
+            if back > largest:
+                worst, largest = k, back
     if worst < 0:
         return False
     system.active[worst] = 0.0
@@ -166,8 +214,8 @@ def stop_at_limits(mechanism, data, system):
     return any_active
 
 
-def freedom_scale(mechanism, j):
-    """Return what a unit of a hinge's or slide's freedom stands for: 1 rad, or the reach [m]."""
+def freedom_unit(mechanism, j):
+    """Return the unit of a hinge's or slide's freedom: 1 rad, or the reach [m]."""
     return mechanism.reach if mechanism.joints["kind"][j] == SLIDE else 1.0
 
 
@@ -176,7 +224,7 @@ def has_bounds(joints, j):
     return joints["kind"][j] in (HINGE, SLIDE) and joints["leader"][j] == j
 
 
-def solve_damped(system, damping):
+def solve_system(system, damping):
     """Fill z of (J J' + damping 1) z = e over the freedoms that are not active."""
     m = len(system.e)
     if m == 6:  # the compiler lays out what is of known size
@@ -205,7 +253,7 @@ def fill_matrix(system, damping, m):
                 for j in range(i + 1):
                     A[i, j] += J[k, i] * J[k, j]
     for i in range(m):
-        damping += LEAST_DAMPING * A[i, i]
+        damping += ROUNDING_DAMPING * A[i, i]
     for i in range(m):
         A[i, i] += damping
 
@@ -230,6 +278,17 @@ def solve(system, m):
         z[i] *= A[i, i]
         for j in range(i + 1, m):
             z[i] -= A[j, i] * z[j]
+
+
+def clear(row):
+    """Set all entries of a row to zero."""
+    for i in range(len(row)):
+        row[i] = 0.0
+
+
+def store(row, i, v):
+    """Write a vector into three entries of a row."""
+    row[i], row[i + 1], row[i + 2] = v
 
 
 def squared(v):

@@ -3,7 +3,7 @@
 import math
 
 from ..articulation import BALL, FREE, HINGE, SLIDE
-from ..motion_subspace import axis_of, frame_of
+from ..jacobians import ZERO, axis_of, frame_of
 from ..quaternion import (
     IDENTITY,
     add,
@@ -20,31 +20,34 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .box_step import freedom_scale, inner, linearise_task, squared
+from .box_step import freedom_unit, inner, linearise_task, squared
 from .chain import update_positions
-from .joint_updates import load_ball, move_by, rotate_to, store_ball, translate_free
 from .mechanism import (
     cost,
     effector_position,
     effector_rotation,
+    load_ball,
+    move_by,
     position_error,
+    rotate_to,
     rotation_error,
     rotation_weight,
+    store_ball,
     store_effector,
+    translate_free,
     update_forward_kinematics,
 )
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, best_rotation
 
-# A step of a joint that others follow is halved at most so often.
+# The step of a joint with followers is halved at most so often.
 HALVINGS = 20
 
 
 def ccd_sweep(chain, target):
     """Point each joint, from the effector's parent to the root, so that its effector is nearest.
 
-    A joint moves what lies below it only. The joints still to come lie above and stay, so that on
-    that path only the effector needs to be followed; the rotations are then applied from the root
-    down, each to its joint and to all below it.
+    A joint moves the joints below it only, so that on the way up only the effector needs to be
+    followed; the rotations are then applied from the root down, each to its joint and all below.
     """
     n = len(chain.lengths)
     effector = load_vector(chain.positions, n)
@@ -64,7 +67,7 @@ def pointing(joint, effector, target):
     """Return the shortest rotation about a joint that brings the effector nearest to the target.
 
     The effector moves on a sphere about the joint, and the point nearest to the target lies on the
-    ray from the joint to the target: the distance cannot grow. Returns where it goes as well.
+    ray from the joint to the target: the distance cannot grow. Returns that point as well.
     """
     arm, direction = subtract(effector, joint), subtract(target, joint)
     square = dot(direction, direction)
@@ -77,7 +80,7 @@ def pointing(joint, effector, target):
 def ccd_update(state, target):
     """Move each joint, from the effectors to the root, to bring all effectors below it nearest.
 
-    A joint rotates what is below it as one body: Wahba's problem, for a hinge about its axis. A
+    A joint rotates all below it as one body: Wahba's problem, for a hinge about its axis. A
     hinge or slide stops at its limit; a ball whose limits leave only worse rotations stays.
     """
     mechanism, data, work = state.mechanism, state.data, state.workspace
@@ -127,7 +130,7 @@ def attitude_profile(mechanism, target, data, j):
 
 def mean_error(mechanism, target, data, j):
     """Return the weighted mean of the vectors from the effectors below joint j to their targets."""
-    total, error = 0.0, (0.0, 0.0, 0.0)
+    total, error = 0.0, ZERO
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             weight = target["weight"][e]
@@ -189,13 +192,13 @@ def translate_effectors(mechanism, data, j, v):
 
 
 def descend(mechanism, target, data, work, j):
-    """Move a joint that others follow down the gradient, half as far until that is no worse."""
+    """Move a joint with followers down the gradient, half as far until the cost does not rise."""
     q, at, k = data.q, mechanism.joints["coordinate"][j], mechanism.joints["freedom"][j]
     update_forward_kinematics(mechanism, data)
     linearise_task(mechanism, target, data, work.system)
     slope, square = inner(work.system.J[k], work.system.e), squared(work.system.J[k])
     before, start = cost(mechanism, target, data), q[at]
-    step = freedom_scale(mechanism, j) * slope / square if square > 0.0 else 0.0
+    step = freedom_unit(mechanism, j) * slope / square if square > 0.0 else 0.0
     for _ in range(HALVINGS):
         move_by(mechanism.joints, q, j, step)
         update_forward_kinematics(mechanism, data)

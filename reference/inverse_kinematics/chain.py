@@ -1,4 +1,4 @@
-"""The chain from the root to the effector: what every solver works on, and its geometry."""
+"""The chain from the root to the effector: its arrays and its geometry, for all solvers."""
 
 from typing import NamedTuple
 
@@ -39,7 +39,7 @@ class Chain(NamedTuple):
     lengths: FloatArray  # link lengths [m], (n,)
     positions: FloatArray  # global joint positions [m], (n + 1, 3)
     rotations: FloatArray  # global joint rotations, (n + 1, 4)
-    deltas: FloatArray  # where a sweep notes the rotation of each joint, (n, 4)
+    deltas: FloatArray  # the rotation of each joint in a sweep, (n, 4)
     reach: float  # total length [m]
     longest: float  # the longest link [m]
     row: FloatArray  # positions and rotations, one number after the other
@@ -113,7 +113,7 @@ def root_distance(chain, target):
 
 
 def least_distance(chain, d):
-    """Return how close the effector can come to a target at distance d from the root [m].
+    """Return the least distance of the effector from a target at distance d from the root [m].
 
     It reaches all of the shell between its reach and the inner radius that the longest link leaves
     when all others fold back: max(0, d - reach, 2 longest - reach - d).
@@ -122,7 +122,7 @@ def least_distance(chain, d):
 
 
 def rounding(chain, d):
-    """Return how exactly a distance to a target at distance d is known [m]."""
+    """Return the rounding error of the distance to a target at distance d from the root [m]."""
     return POSITION_ROUNDING * (chain.reach + d)
 
 
@@ -141,14 +141,14 @@ def drawn_near(chain, target, beyond):
     root = load_vector(chain.positions, 0)
     direction = subtract(target, root)
     d = norm(direction)
-    least = least_distance(chain, d) - beyond
-    if least <= 0.0:
+    excess = least_distance(chain, d) - beyond
+    if excess <= 0.0:
         return target
     if d <= rounding(chain, d):  # all directions are as near: the effector keeps its own
         direction = subtract(load_vector(chain.positions, len(chain.lengths)), root)
         d = norm(direction)
-        return add(root, scale(least / d, direction)) if d > 0.0 else target
-    return add(root, scale((d - least if d > chain.reach else d + least) / d, direction))
+        return add(root, scale(excess / d, direction)) if d > 0.0 else target
+    return add(root, scale((d - excess if d > chain.reach else d + excess) / d, direction))
 
 
 def is_collinear(chain, target):
@@ -174,13 +174,11 @@ def bend(chain):
     direction = (0.0, 0.0, 0.0)
     for k in range(n):
         if norm(direction) == 0.0:
-            direction = rotate(
-                load_quaternion(chain.rotations, k), load_vector(chain.offsets, k + 1)
-            )
+            R = load_quaternion(chain.rotations, k)
+            direction = rotate(R, load_vector(chain.offsets, k + 1))
     axis = perpendicular(direction)
     for k in range(n):
+        R = load_quaternion(chain.rotations, k)
         Q = exponential(scale(BEND * (k + 1) / n, axis))
-        store_quaternion(
-            chain.rotations, k, renormalised(multiply(Q, load_quaternion(chain.rotations, k)))
-        )
+        store_quaternion(chain.rotations, k, renormalised(multiply(Q, R)))
     update_positions(chain)

@@ -1,15 +1,15 @@
 """Forward and backward reaching (Aristidou & Lasenby 2011, Algorithm 1).
 
-The backward pass finds where each joint should be, its backward position. On mechanisms the forward
-pass rotates and translates joints instead of moving points, each to bring its children nearest to
-their backward positions: a hinge about its axis, a ball within its limits, one rotation for all
-children of a branch, a free joint as one body. What that cannot meet remains as the residual.
+The backward pass gives each joint a backward position. On mechanisms the forward pass rotates and
+translates joints instead of moving points, each to bring its children nearest to their backward
+positions: a hinge about its axis, a ball within its limits, one rotation for all children of a
+branch, a free joint as one body. The remaining distances are the residual.
 """
 
 import numpy as np
 
-from ..articulation import BALL, FREE, HINGE, SLIDE, joint_transform
-from ..motion_subspace import axis_of, frame_of
+from ..articulation import BALL, FREE, HINGE, SLIDE, joint_in_world, joint_transform
+from ..jacobians import ZERO, axis_of, frame_of
 from ..quaternion import (
     IDENTITY,
     add,
@@ -29,15 +29,19 @@ from ..quaternion import (
     subtract,
 )
 from .chain import is_beyond_reach, is_inside_inner_radius, root_distance
-from .joint_updates import move_by, rotate_to, translate_free
-from .mechanism import rotation_weight, update_forward_kinematics
+from .mechanism import (
+    move_by,
+    rotate_to,
+    rotation_weight,
+    translate_free,
+    update_forward_kinematics,
+)
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
 
-ZERO = (0.0, 0.0, 0.0)
-# The weight of no rotation at all, beside that of one arm as long as the reach, in fitting a free
-# joint: the fit is unique up to rounding, and unchanged where the arms are where they should be.
-LEAST_ROTATION = 1e-6
-# Where the backward pass puts a joint [m], and the weight of that, 0 where it puts it nowhere.
+# The weight of the identity, beside that of one arm as long as the reach, in fitting a free joint:
+# the fit is unique up to rounding, and unchanged where the arms are right already.
+IDENTITY_WEIGHT = 1e-6
+# A joint's backward position [m], and its weight, 0 where it has none.
 BACKWARD = np.dtype([("position", np.float64, 3), ("weight", np.float64)], align=True)
 
 
@@ -74,19 +78,19 @@ def reach_forward(chain):
         store_vector(chain.positions, k + 1, point)
 
 
-def lay_on_line(chain, target, others):
-    """Lay the longest link towards the target and the others towards it (1) or back (-1).
+def lay_on_line(chain, target, sign):
+    """Lay the longest link towards the target and all other links towards it (1) or back (-1).
 
     Beyond reach all point at the target; nearer than the longest link allows all others
     fold back, and the effector comes to rest on the inner radius.
     """
     root = load_vector(chain.positions, 0)
     direction = subtract(point_towards(root, target, 1.0), root)
-    found = False
+    passed = False
     for k in range(len(chain.lengths)):
-        longest = chain.lengths[k] == chain.longest and not found
-        found |= longest
-        step = scale(chain.lengths[k] if longest else others * chain.lengths[k], direction)
+        longest = chain.lengths[k] == chain.longest and not passed
+        passed |= longest
+        step = scale(chain.lengths[k] if longest else sign * chain.lengths[k], direction)
         store_vector(chain.positions, k + 1, add(load_vector(chain.positions, k), step))
 
 
@@ -111,9 +115,9 @@ def fabrik_update(state, target):
 
 
 def backward_pass(mechanism, target, data, backward):
-    """Fill where each joint would be if the effectors were on their targets, the lengths kept.
+    """Fill the joints' positions with the effectors on their targets and all lengths kept.
 
-    A joint with several children takes the weighted mean of what each would pull it to.
+    A joint with several children takes the weighted mean of the positions that they pull it to.
     """
     parents = mechanism.joints["parent"]
     for j in range(len(backward)):
@@ -136,7 +140,7 @@ def backward_pass(mechanism, target, data, backward):
 
 
 def backward_from_target(mechanism, target, data, e, j):
-    """Return where the joint of an effector would be with the effector on its target [m]."""
+    """Return the position of an effector's joint with the effector on its target [m]."""
     x = load_vector(target["position"], e)
     arm = load_vector(mechanism.effectors["position"], e)
     if mechanism.effectors["oriented"][e]:
@@ -148,23 +152,17 @@ def backward_from_target(mechanism, target, data, e, j):
 
 def add_backward(backward, j, weight, x):
     """Add a weighted position to the sum of those for a joint."""
-    store_vector(
-        backward["position"], j, add(load_vector(backward["position"], j), scale(weight, x))
-    )
+    total = add(load_vector(backward["position"], j), scale(weight, x))
+    store_vector(backward["position"], j, total)
     backward["weight"][j] += weight
 
 
 def update_joint_pose(joints, data, backward, j):
-    """Put a joint where its parent and its coordinates have it now.
+    """Update a joint's pose in the world from its parent's and its coordinates.
 
     A ball with a backward position below keeps the rotation in the world that it had.
     """
-    x, R = joint_transform(joints, j, data.q)
-    parent = joints["parent"][j]
-    if parent >= 0:
-        R_parent = load_quaternion(data.rotations, parent)
-        x = add(load_vector(data.positions, parent), rotate(R_parent, x))
-        R = multiply(R_parent, R)
+    x, R = joint_in_world(joints, j, data.q, data.positions, data.rotations)
     store_vector(data.positions, j, x)
     if joints["kind"][j] != BALL or backward["weight"][j] == 0.0:
         store_quaternion(data.rotations, j, R)
@@ -185,27 +183,27 @@ def forward_joint(mechanism, target, data, work, j):
     store_vector(data.positions, j, x)
     if kind == HINGE and leads:
         axis = axis_of(joints, j, R)
-        angle = best_angle(attitude_profile(mechanism, target, data, work.backward, j), axis)
-        R = multiply(rotation_about(axis, move_by(joints, q, j, angle)), R)
+        M, _, _, _ = fit_arms(mechanism, target, data, work.backward, j)
+        R = multiply(rotation_about(axis, move_by(joints, q, j, best_angle(M, axis))), R)
     elif kind == BALL and work.backward["weight"][j] > 0.0:
-        R_wanted = multiply(forward_rotation(mechanism, target, data, work, j), R)
-        R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), R_wanted)
+        R_best = multiply(forward_rotation(mechanism, target, data, work, j), R)
+        R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), R_best)
     store_quaternion(data.rotations, j, normalised(R))
 
 
 def forward_free(mechanism, target, data, work, j):
-    """Move a free joint as one body to bring what is below nearest to where it should be.
+    """Move a free joint as one body to bring the joints below nearest to their backward positions.
 
     The centre of the arms goes to the centre of their backward positions, and the rotation is the
     best about it (Horn 1987): a joint that first went to its own backward position and then rotated
-    about that would overshoot and oscillate. Where all arms point along one line, or there is but
-    one, the least of the best rotations is taken.
+    about that would overshoot and oscillate. Where all arms are collinear, the smallest of the best
+    rotations is taken.
     """
     joints, x = mechanism.joints, load_vector(data.positions, j)
-    total, arm, to = mean_arms(mechanism, target, data, work.backward, j)
-    M = attitude_profile(mechanism, target, data, work.backward, j)
+    M, total, arms, ends = fit_arms(mechanism, target, data, work.backward, j)
+    arm, to = scale(1.0 / total, arms), scale(1.0 / total, ends)
     M = add_outer(M, -total, to, arm)
-    stay = LEAST_ROTATION * total * mechanism.reach * mechanism.reach
+    stay = IDENTITY_WEIGHT * total * mechanism.reach * mechanism.reach
     M = add_rotation(M, stay, IDENTITY)
     Q = best_rotation(M, work.eigen[0], work.eigen[1])
     v, frame = subtract(to, rotate(Q, arm)), frame_of(joints, j, data.rotations)
@@ -215,67 +213,55 @@ def forward_free(mechanism, target, data, work, j):
     store_quaternion(data.rotations, j, normalised(R))
 
 
-def mean_arms(mechanism, target, data, backward, j):
-    """Return the weight of what `attitude_profile` counts, and the means of its arms [m]."""
-    total, arms, ends = 0.0, ZERO, ZERO
-    for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
-            arm, to = effector_arms(mechanism, target, data, e, j)
-            weight = target["weight"][e]
-            arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
-            total += weight
-    for c in range(j + 1, len(backward)):
-        if mechanism.adjacent[j, c]:
-            arm, to = joint_arms(mechanism, data, backward, c, j)
-            weight = backward["weight"][c]
-            arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
-            total += weight
-    return total, scale(1.0 / total, arms), scale(1.0 / total, ends)
-
-
 def forward_rotation(mechanism, target, data, work, j):
-    """Return the rotation of joint j that brings what is adjacent nearest, of one the shortest."""
-    backward, count = work.backward, len(mechanism.joints)
-    found, arm, to = 0, ZERO, ZERO
+    """Return the rotation of joint j that brings adjacent points nearest, of one the shortest."""
+    backward, joints = work.backward, len(mechanism.joints)
+    count, arm, to = 0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):
-        if mechanism.adjacent[j, count + e]:
-            found += 2 if mechanism.effectors["oriented"][e] else 1
+        if mechanism.adjacent[j, joints + e]:
+            count += 2 if mechanism.effectors["oriented"][e] else 1
             arm, to = effector_arms(mechanism, target, data, e, j)
-    for c in range(j + 1, count):
+    for c in range(j + 1, joints):
         if mechanism.adjacent[j, c] and backward["weight"][c] > 0.0:
-            found += 1
+            count += 1
             arm, to = joint_arms(mechanism, data, backward, c, j)
-    if found == 1:
+    if count == 1:
         return between(arm, to)
-    M = attitude_profile(mechanism, target, data, backward, j)
+    M, _, _, _ = fit_arms(mechanism, target, data, backward, j)
     return best_rotation(M, work.eigen[0], work.eigen[1])
 
 
-def attitude_profile(mechanism, target, data, backward, j):
+def fit_arms(mechanism, target, data, backward, j):
     """Return Wahba's M of the arms from joint j to adjacent joints and to all effectors below.
 
     Effectors further below count as well: a hinge often cannot bring its child to its backward
-    position, and would else never make up for what that leaves.
+    position, and would else never make up for the remaining distance.
+
+    Returns:
+        M; the sum of the weights; and the weighted sums of the arms and of their targets [m].
     """
-    M = ZERO_MATRIX
+    M, total, arms, ends = ZERO_MATRIX, 0.0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             weight = target["weight"][e]
             arm, to = effector_arms(mechanism, target, data, e, j)
-            M = add_outer(M, weight, to, arm)
+            M, total = add_outer(M, weight, to, arm), total + weight
+            arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
             if mechanism.effectors["oriented"][e]:
                 R = rotation_below(mechanism, data, j, e)
                 error = multiply(load_quaternion(target["rotation"], e), conjugate(R))
                 M = add_rotation(M, weight * rotation_weight(mechanism), error)
     for c in range(j + 1, len(backward)):
         if mechanism.adjacent[j, c]:
+            weight = backward["weight"][c]
             arm, to = joint_arms(mechanism, data, backward, c, j)
-            M = add_outer(M, backward["weight"][c], to, arm)
-    return M
+            M, total = add_outer(M, weight, to, arm), total + weight
+            arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
+    return M, total, arms, ends
 
 
 def mean_displacement(mechanism, target, data, backward, j):
-    """Return the weighted mean of the vectors from joint j's children to where they should be."""
+    """Return the weighted mean of the vectors from joint j's children to their goals [m]."""
     total, mean = 0.0, ZERO
     for e in range(len(mechanism.effectors)):
         if mechanism.effectors["joint"][e] == j:
@@ -307,7 +293,7 @@ def joint_arms(mechanism, data, backward, c, j):
 def arm_to(joints, data, j, k, x):
     """Return the vector from joint j, in the world, to a point x of the frame of k, at or below j.
 
-    The coordinates from j down count, since what lies below has not been put in place yet.
+    The coordinates from j down count, since the poses below are not updated yet.
     """
     while k != j:
         offset, R = joint_transform(joints, k, data.q)

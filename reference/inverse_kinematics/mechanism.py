@@ -1,4 +1,4 @@
-"""The joints that move some effector, and where they put it: what the general solvers work on.
+"""The joints that move some effector, and its position by them: for the general solvers.
 
 Chains of unlimited balls with one position to reach have `chain.py` to themselves. Everything else
 is a mechanism: joints of all kinds with limits, several effectors, positions and rotations. Fixed
@@ -11,18 +11,21 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import BoolArray, FloatArray, IndexArray, RecordArray
-from ..articulation import WIDTHS, articulated_pose
+from ..articulation import FREE, WIDTHS, articulated_pose, ball_coordinate, clamp_ball
 from ..quaternion import (
     add,
     conjugate,
     dot,
     load_quaternion,
+    load_quaternion_from,
     load_vector,
     logarithm,
     multiply,
     norm,
+    normalised,
     rotate,
     store_quaternion,
+    store_quaternion_to,
     store_vector,
     subtract,
 )
@@ -30,7 +33,7 @@ from .chain import POSITION_ROUNDING
 
 # An angle between rotations counts as much as a distance of the angle times this part of the reach.
 LEVER = 0.5
-# What the kernels read of each effector, a record an effector.
+# A record of an effector, for kernels.
 EFFECTOR = np.dtype(
     [
         ("joint", np.int64),  # the joint it is attached to, -1 if none moves it
@@ -44,7 +47,7 @@ EFFECTOR = np.dtype(
     ],
     align=True,
 )
-# What the kernels read of the target of an effector.
+# A record of an effector's target, for kernels.
 TARGET = np.dtype(
     [("position", np.float64, 3), ("rotation", np.float64, 4), ("weight", np.float64)], align=True
 )
@@ -55,7 +58,7 @@ class Mechanism(NamedTuple):
 
     # those that move, fixed ones merged; coordinates are the mechanism's own, (joint,)
     joints: RecordArray
-    sources: IndexArray  # where a joint's coordinates begin among the articulation's, (joint,)
+    sources: IndexArray  # index of a joint's first coordinate in the articulation's, (joint,)
     effectors: RecordArray  # (effector,)
     moves: BoolArray  # whether a joint moves an effector, (joint, effector)
     # whether a joint moves a joint below it, or an effector, and no joint between them does,
@@ -64,15 +67,16 @@ class Mechanism(NamedTuple):
     # the length of the longest path from the root to an effector, slides left out unless there is
     # nothing else [m]
     reach: float
-    coordinates: int  # how many
-    freedoms: int  # how many
-    equations: int  # how many in all
+    # the numbers of
+    coordinates: int
+    freedoms: int
+    equations: int
 
 
 class ConfigurationData(NamedTuple):
     """A mechanism's coordinates with their forward kinematics; effectors come behind the joints."""
 
-    state: FloatArray  # what an attempt continues from, `q` and then `far_step`, (coordinate + 2,)
+    state: FloatArray  # an attempt continues from it: `q` and then `far_step`, (coordinate + 2,)
     q: FloatArray  # (coordinate,)
     far_step: FloatArray  # see `box_step.far_damping`, (2,); zero before the first step
     positions: FloatArray  # in the world [m], (joint + effector, 3)
@@ -107,12 +111,12 @@ def scatter(mechanism, own, q):
 
 
 def width(joints, j):
-    """Return how many coordinates a joint has of its own."""
+    """Return the number of a joint's own coordinates."""
     return WIDTHS[joints["kind"][j]] if joints["leader"][j] == j else 0
 
 
 def update_forward_kinematics(mechanism, data):
-    """Compute where the coordinates put the joints and the effectors."""
+    """Compute the poses of joints and effectors from the coordinates."""
     articulated_pose(mechanism.joints, data.q, data.positions, data.rotations)
     effectors = mechanism.effectors
     for e in range(len(effectors)):
@@ -162,7 +166,7 @@ def rotation_weight(mechanism):
 
 
 def cost(mechanism, target, data):
-    """Return what CCD lowers [m²]: the weighted sum of |error|² and of lever² (3 - tr R)."""
+    """Return the cost of CCD [m²]: the weighted sum of |error|² and of lever² (3 - tr R)."""
     total = 0.0
     for e in range(len(mechanism.effectors)):
         error = position_error(mechanism, target, data, e)
@@ -188,37 +192,38 @@ def residuals(mechanism, target, data):
     effector while another, further from its target, stays. No effector is further above its own
     least distance than the bound [m] is above the largest of those.
     """
-    largest, largest_angle, total, least, excess = 0.0, 0.0, 0.0, 0.0, 0.0
+    largest, largest_angle, total, largest_bound, excess = 0.0, 0.0, 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
         distance, angle = errors(mechanism, target, data, e)
         largest, largest_angle = max(largest, distance), max(largest_angle, angle)
         total = total + distance + LEVER * mechanism.reach * angle
         lower_bound = least_distance(mechanism, target, e)
-        least, excess = max(least, lower_bound), max(excess, distance - lower_bound)
-    return largest, largest_angle, total, least + excess
+        largest_bound = max(largest_bound, lower_bound)
+        excess = max(excess, distance - lower_bound)
+    return largest, largest_angle, total, largest_bound + excess
 
 
 def merit_of(mechanism, target, data):
     """Return the root of the sum of weighted squares of distances and of lever times angles [m]."""
     total = 0.0
     for e in range(len(mechanism.effectors)):
-        apart, off = errors(mechanism, target, data, e)
-        total += weighted_square(mechanism, target["weight"][e], apart, off)
+        distance, angle = errors(mechanism, target, data, e)
+        total += weighted_square(mechanism, target["weight"][e], distance, angle)
     return math.sqrt(total)
 
 
 def weighted_square(mechanism, weight, distance, angle):
-    """Return what one effector adds to the square of the merit [m²]."""
+    """Return the share of one effector in the square of the merit [m²]."""
     lever = LEVER * mechanism.reach
     return weight * (distance * distance + lever * lever * angle * angle)
 
 
 def least_residual(mechanism, target):
     """Return a lower bound of the largest distance from effector to target over all poses [m]."""
-    least = 0.0
+    bound = 0.0
     for e in range(len(mechanism.effectors)):
-        least = max(least, least_distance(mechanism, target, e))
-    return least
+        bound = max(bound, least_distance(mechanism, target, e))
+    return bound
 
 
 def least_distance(mechanism, target, e):
@@ -237,3 +242,40 @@ def least_distance(mechanism, target, e):
         return 0.0
     rounding = POSITION_ROUNDING * (reach + norm(start) + norm(position))
     return max(0.0, norm(offset) - reach - rounding * (1 + len(mechanism.joints)))
+
+
+def move_by(joints, q, j, displacement):
+    """Move a hinge or slide as far as its limits allow; return the displacement made."""
+    at = joints["coordinate"][j]
+    before = q[at]
+    q[at] = min(max(before + displacement, joints["lower"][j]), joints["upper"][j])
+    return q[at] - before
+
+
+def load_ball(joints, q, j):
+    """Return the quaternion of a ball or free joint."""
+    return load_quaternion_from(q, ball_coordinate(joints, j))
+
+
+def store_ball(joints, q, j, Q):
+    """Write the quaternion of a ball or free joint."""
+    store_quaternion_to(q, ball_coordinate(joints, j), Q)
+
+
+def rotate_to(joints, q, j, frame, R):
+    """Rotate a ball or free joint to R in the world as far as its limits allow.
+
+    Returns the rotation it then has; `frame` is that where its coordinates are zero.
+    """
+    Q = normalised(multiply(conjugate(frame), R))
+    if joints["kind"][j] != FREE:
+        axis, cone = load_vector(joints["axis"], j), joints["cone"][j]
+        Q = clamp_ball(Q, axis, joints["lower"][j], joints["upper"][j], cone)
+    store_ball(joints, q, j, Q)
+    return multiply(frame, Q)
+
+
+def translate_free(joints, q, j, v):
+    """Translate a free joint by a vector in its own frame at zero."""
+    at = joints["coordinate"][j]
+    q[at], q[at + 1], q[at + 2] = q[at] + v[0], q[at + 1] + v[1], q[at + 2] + v[2]

@@ -1,4 +1,4 @@
-"""What is asked of a solver, and what it answers."""
+"""The targets of a solver and its solution."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeGuard
@@ -22,13 +22,13 @@ class _TargetFields(NamedTuple):
 
 
 class Target(_TargetFields):
-    """Where a joint is wanted; position and rotation are copied.
+    """The position, and perhaps the rotation, that a joint is to reach; both are copied.
 
     Attributes:
         position: global position [m], shape (3,), or (..., 3) for a batch.
-        rotation: global rotation, shape (4,) or (..., 4); None if any will do.
+        rotation: global rotation, shape (4,) or (..., 4); None if it is free.
         effector: the joint, by index or name; None for the default of `solve_ik`.
-        weight: how much its squared error counts beside those of other targets.
+        weight: of its squared error among those of other targets.
     """
 
     __slots__ = ()
@@ -47,27 +47,27 @@ class Target(_TargetFields):
 
 
 class IKSolution(NamedTuple):
-    """A solver's answer; a batch has leading axes everywhere.
+    """A solver's result; a batch has leading axes everywhere.
 
     Attributes:
-        local_rotations: the pose found, shape (..., joint, 4).
+        local_rotations: the pose, shape (..., joint, 4).
         positions: all joints' global positions in that pose [m], shape (..., joint, 3).
         residual: distance from effector to target [m], by forward kinematics of the pose; the
             largest of several.
-        iterations: how many were made.
+        iterations: the number of iterations made.
         outcome: how it ended; for a batch an integer array of Outcome values.
         history: residuals [m] before and after each iteration, shape (..., iterations + 1) if
             recorded, else empty. In a batch each row repeats its last residual to the longest.
-        residual_rotation: angle from effector to target [rad], the largest of several; 0 where no
-            rotation is asked for.
-        coordinates: the pose found as what was given for a start: the coordinates of an
-            Articulation, (..., coordinate), or the local rotations of a Skeleton.
-        merit: what says which of several attempts is best [m], the root of the sum over targets of
+        residual_rotation: angle from effector to target [rad], the largest of several; 0 where all
+            rotations are free.
+        coordinates: the pose in the form of the start: the coordinates of an Articulation, (...,
+            coordinate), or the local rotations of a Skeleton.
+        merit: the cost by which attempts are compared [m]: the root of the sum over targets of
             weight (distance² + (lever angle)²), the heaviest weight taken as 1, the angle only
-            where a rotation is asked for, the lever half the reach.
-        excess: how far `residual` is above the least that geometry proves possible [m]: the
-            distance beyond all links and slides, and on a Skeleton with one position also that to
-            the inner radius which the longest link leaves; above 0 where nothing is proven.
+            where the rotation is not free, the lever half the reach.
+        excess: `residual` less a lower bound by geometry [m]: the distance beyond all links and
+            slides, and on a Skeleton with one position also that to the inner radius which the
+            longest link leaves; else 0.
     """
 
     local_rotations: FloatArray
@@ -110,17 +110,17 @@ def checked_targets(
     if isinstance(target, np.ndarray) or not are_targets(target):
         joint, position = effector_of(model, effector), arguments.floats("target", target, "...", 3)
         return [CheckedTarget(joint, position, None, 1.0)]
-    targets = [_checked(model, one, effector) for one in target]
-    joints = [one.joint for one in targets]
+    targets = [_checked(model, element, effector) for element in target]
+    joints = [checked.joint for checked in targets]
     if len(set(joints)) < len(joints):
-        twice = next(joint for joint in joints if joints.count(joint) > 1)
-        raise ValueError(f"target: expected one an effector, got two for joint {twice}")
+        repeated = next(joint for joint in joints if joints.count(joint) > 1)
+        raise ValueError(f"target: expected one an effector, got two for joint {repeated}")
     return targets
 
 
 def are_targets(target: Any) -> TypeGuard[Sequence[Target]]:
-    """Return whether it is a sequence that holds a Target."""
-    return isinstance(target, list | tuple) and any(isinstance(one, Target) for one in target)
+    """Return whether an argument is a sequence that holds a Target."""
+    return isinstance(target, list | tuple) and any(isinstance(x, Target) for x in target)
 
 
 def _checked(
@@ -144,9 +144,9 @@ def _checked(
 def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:
     """Return the targets with unit rotations; a ValueError if a number is not valid."""
     checked = []
-    for one in targets:
-        arguments.coordinates("target", one.position, "...", 3)
-        if one.rotation is not None:
-            one = one._replace(rotation=rotation.unit("rotation", one.rotation))
-        checked.append(one)
+    for target in targets:
+        arguments.coordinates("target", target.position, "...", 3)
+        if target.rotation is not None:
+            target = target._replace(rotation=rotation.unit("rotation", target.rotation))
+        checked.append(target)
     return checked

@@ -25,14 +25,12 @@ BLOCK = 16
 
 
 class Prepared(NamedTuple):
-    """What is made once for some effectors and restarts."""
+    """A mechanism and random restarts, made once for some effectors."""
 
-    mechanism: Mechanism  # what moves the effectors
-    columns: (
-        IndexArray  # which of the articulation's coordinates are the mechanism's, (coordinate,)
-    )
+    mechanism: Mechanism  # the joints that move the effectors
+    columns: IndexArray  # of its coordinates among the articulation's, (coordinate,)
     restarts: FloatArray  # the mechanism's coordinates in random poses, (restart, coordinate)
-    # where these put the effectors, positions [m] and rotations, (restart, effector, 7)
+    # the effectors in these poses, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
     # joints of the articulation and mechanism, one array or number after the other, and the two
     # above
@@ -46,7 +44,7 @@ def prepare(
     restarts: int = 0,
     seed: int = 0,
 ) -> Prepared:
-    """Return what is to be made once, kept by the articulation."""
+    """Return the mechanism and its restarts, cached by the articulation."""
     key = effectors, oriented, restarts, seed
     if key not in articulation.mechanisms:
         mechanism, columns = _prepared(articulation, effectors, oriented)
@@ -82,11 +80,12 @@ def _prepared(
     lengths = _path_lengths(joints, moves, ends)
     travel = np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
     ends["reach"] = lengths + travel
-    most = ends["reach"].max(where=np.isfinite(ends["reach"]), initial=0.0)
-    reach = float(lengths.max() or most or 1.0)
+    furthest = ends["reach"].max(where=np.isfinite(ends["reach"]), initial=0.0)
+    reach = float(lengths.max() or furthest or 1.0)
+    freedoms = int(FREEDOMS[joints["kind"][joints["leader"] == np.arange(len(joints))]].sum())
     mechanism = Mechanism(
         joints, whole["coordinate"][active].copy(), ends, moves, _adjacent(joints, ends, reach),
-        reach, len(columns), _freedoms(joints), int(np.where(oriented, 6, 3).sum()),
+        reach, len(columns), freedoms, int(np.where(oriented, 6, 3).sum()),
     )  # fmt: skip
     return mechanism, columns
 
@@ -100,8 +99,8 @@ def _active(
     """
     path, kinds = articulation.skeleton.path_array, articulation.joints["kind"]
     needed: set[int] = set()
-    for joint, posed in zip(effectors, oriented, strict=True):
-        moving = posed or kinds[joint] in (SLIDE, FREE)
+    for joint, has_rotation in zip(effectors, oriented, strict=True):
+        moving = has_rotation or kinds[joint] in (SLIDE, FREE)
         needed.update(path(joint).tolist() if moving else path(joint).tolist()[:-1])
     needed.update(articulation.joints["leader"][sorted(needed)].tolist())
     return np.array([j for j in sorted(needed) if kinds[j] != FIXED], dtype=np.int64)
@@ -131,9 +130,10 @@ def _attached(
     sizes = np.where(oriented, 6, 3)
     ends["row"] = np.cumsum(sizes) - sizes
     for e, joint in enumerate(effectors):
-        own = (number.get(joint, -1), (0.0, 0.0, 0.0), IDENTITY)
-        found = own if joint in number else _merged(whole, joint, number)
-        ends["joint"][e], ends["position"][e], ends["rotation"][e] = found
+        attached = (number.get(joint, -1), (0.0, 0.0, 0.0), IDENTITY)
+        if joint not in number:
+            attached = _merged(whole, joint, number)
+        ends["joint"][e], ends["position"][e], ends["rotation"][e] = attached
     return ends
 
 
@@ -201,14 +201,9 @@ def _stays(joints: RecordArray, j: int, c: int, margin: float) -> bool:
 
 
 def _travel(joints: RecordArray) -> FloatArray:
-    """Return how far each joint can carry things by itself [m], (joint,)."""
+    """Return the largest translation by each joint [m], (joint,)."""
     kinds, leaders, factors = joints["kind"], joints["leader"], np.abs(joints["multiplier"])
     ends = np.maximum(np.abs(joints["lower"]), np.abs(joints["upper"]))[leaders]
     with np.errstate(invalid="ignore"):  # 0 times infinity: a follower that does not move
         travel = np.where(factors > 0.0, factors * ends, 0.0) + np.abs(joints["shift"])
     return np.where(kinds == SLIDE, travel, np.where(kinds == FREE, np.inf, 0.0))
-
-
-def _freedoms(joints: RecordArray) -> int:
-    own = joints["leader"] == np.arange(len(joints))
-    return int(FREEDOMS[joints["kind"][own]].sum())

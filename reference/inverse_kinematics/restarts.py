@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arguments import FloatArray
 from ..backend.digest import PythonKernel
+from ..outcome import Outcome
 
 # An attempt that others may follow is given up once PATIENCE iterations have not brought the error
 # to this share of what it was. If no other reaches the target it goes on, MORE_PATIENT times as
@@ -19,10 +20,14 @@ from ..backend.digest import PythonKernel
 PATIENCE, PROGRESS, MORE_PATIENT = 3, 0.5, 4
 # How an attempt ended: within the tolerances, or of the nearest point that geometry allows; with no
 # more progress; with its iterations used; given up early.
-REACHED, SETTLED, LIMITED, GIVEN_UP = range(4)
+REACHED, STALLED, LIMITED, GIVEN_UP = range(4)
 # Columns of progress: iterations made, how the attempt ended, its merit [m], and its patience.
-MADE, STATE, COST, WAIT = range(4)
+COUNT, STATE, COST, WAIT = range(4)
 INFINITY = math.inf
+# Columns of Result.figures: the largest distance from effector to target [m], the largest angle
+# between them [rad], the number of iterations, the value of the outcome, the merit [m], and the
+# distance above the least that geometry allows [m].
+RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = range(6)
 
 
 class Operations(NamedTuple):
@@ -33,8 +38,7 @@ class Operations(NamedTuple):
     # sum of all distances and levered angles [m], which shows progress, and the distance that has
     # to be small
     error: PythonKernel
-    # (state, target): return what says which attempt is better, the less the better [m]
-    merit: PythonKernel
+    merit: PythonKernel  # (state, target): return the cost by which attempts are compared [m]
     # (state, target, criteria, first): move the first attempt, whose row of progress is `first`, if
     # it is stuck, and return whether it was
     perturb: PythonKernel
@@ -60,7 +64,7 @@ class Criteria(NamedTuple):
     # the final pose
     distance: float
     angle: float  # the same for rotations [rad]
-    margin: float  # an error that changes by no more has settled [m]
+    margin: float  # an error that changes by no more has stalled [m]
     max_iterations: int  # of each attempt
 
 
@@ -69,6 +73,19 @@ class Attempts(NamedTuple):
 
     saved: FloatArray  # rows of the state, one an attempt and in the last row the best end of one
     progress: FloatArray  # see the columns above, (attempt + 1, 4); the last row is not used
+
+
+class Result(NamedTuple):
+    """The arrays that kernels fill, a row a target."""
+
+    local: FloatArray  # local rotations, (target, joint, 4)
+    positions: FloatArray  # global positions [m], (target, joint, 3)
+    figures: FloatArray  # (target, 6), see above
+    # distances before and after each iteration [m], (target, iteration); (1, 1) if they are not to
+    # be recorded. Entries after the last iteration are not filled
+    history: FloatArray
+    # of an articulation, (target, coordinate); of a skeleton its local rotations
+    coordinates: FloatArray
 
 
 def limits_of(numbers):
@@ -94,7 +111,7 @@ def solve_with_restarts(operations, state, attempts, target, limits, criteria, h
     Saves the best attempt in the last row of `attempts.saved`.
 
     Returns:
-        The iterations of all attempts, and whether the best one settled.
+        The iterations of all attempts, and whether the best of them stalled.
     """
     saved, progress = attempts
     random = len(progress) - 2
@@ -102,10 +119,10 @@ def solve_with_restarts(operations, state, attempts, target, limits, criteria, h
     distance, _, _, _ = operations.error(state, target)
     store_if_inside(history, 0, distance)
     perturbed = operations.perturb(state, target, criteria, progress[0])
-    best, ending, done, drawn, periods = INFINITY, LIMITED, 0, 0, 1
+    best, ending, count, drawn, periods = INFINITY, LIMITED, 0, 0, 1
     k, limit = 0, criteria.max_iterations
     while k >= 0:
-        done += solve_once(operations, state, target, criteria, progress[k], limit, history, done)
+        count += solve_once(operations, state, target, criteria, progress[k], limit, history, count)
         progress[k, COST] = operations.merit(state, target)
         copy_row(state.row, saved[k])
         if is_better(progress[k], best):
@@ -129,28 +146,28 @@ def solve_with_restarts(operations, state, attempts, target, limits, criteria, h
             limit = periods * criteria.max_iterations
             copy_row(saved[k], state.row)
             operations.place(state)
-    return done, ending <= SETTLED
+    return count, ending <= STALLED
 
 
 def reset(progress, patience):
-    """Note that no attempt has been made."""
+    """Set all attempts to the state before their first iteration."""
     for k in range(len(progress) - 1):
         row = progress[k]
-        row[MADE], row[STATE], row[COST], row[WAIT] = 0.0, LIMITED, INFINITY, patience
+        row[COUNT], row[STATE], row[COST], row[WAIT] = 0.0, LIMITED, INFINITY, patience
 
 
-def solve_once(operations, state, target, criteria, attempt, limit, history, done):
-    """Update until the target is reached, the error settles, or `limit` iterations are made.
+def solve_once(operations, state, target, criteria, attempt, limit, history, earlier):
+    """Update until the target is reached, the error stalls, or `limit` iterations are made.
 
-    `attempt` is the row of progress, where it is noted how the attempt ends; `done` iterations
-    have been made by all attempts.
+    `attempt` is the row of progress, where its end is noted; all attempts have made `earlier`
+    iterations so far.
 
     Returns:
         The iterations made.
     """
     _, angle, total, bound = operations.error(state, target)
     milestone, since = total, 0
-    first, ending = int(attempt[MADE]), LIMITED
+    first, ending = int(attempt[COUNT]), LIMITED
     count = first
     while ending == LIMITED:
         if bound <= criteria.distance and angle <= criteria.angle:
@@ -161,22 +178,25 @@ def solve_once(operations, state, target, criteria, attempt, limit, history, don
         operations.update(state, target)
         count += 1
         distance, angle, total, bound = operations.error(state, target)
-        store_if_inside(history, done + count - first, distance)
+        store_if_inside(history, earlier + count - first, distance)
         since += 1
         if total < PROGRESS * milestone:
             milestone, since = total, 0
         if abs(before - total) <= criteria.margin:
-            ending = SETTLED
+            ending = STALLED
         elif since >= attempt[WAIT]:
             ending = GIVEN_UP
     if ending != LIMITED and bound <= criteria.distance and angle <= criteria.angle:
         ending = REACHED
-    attempt[MADE], attempt[STATE] = count, ending
+    attempt[COUNT], attempt[STATE] = count, ending
     return count - first
 
 
 def is_better(attempt, best):
-    """Return whether an attempt is finished and better than the best [m]; else it waits longer."""
+    """Return whether an attempt is finished and better than the best [m].
+
+    One that was given up becomes more patient.
+    """
     if attempt[STATE] == GIVEN_UP:
         attempt[WAIT] *= MORE_PATIENT
         return False
@@ -205,3 +225,19 @@ def store_if_inside(row, i, value):
     """Write entry i of a row that has one."""
     if i < len(row):
         row[i] = value
+
+
+def fill_figures(figures, distance, angle, iterations, merit, lower_bound):
+    """Fill all figures but the outcome; no pose is nearer to the target than a bound [m]."""
+    figures[RESIDUAL], figures[RESIDUAL_ROTATION] = distance, angle
+    figures[ITERATIONS], figures[MERIT] = iterations, merit
+    figures[EXCESS] = max(0.0, distance - lower_bound)
+
+
+def outcome_of(reached, unreachable, stalled):
+    """Return how a solve ended; `unreachable` is whether geometry proves the target to be so."""
+    if reached:
+        return Outcome.CONVERGED
+    if unreachable:
+        return Outcome.UNREACHABLE if stalled else Outcome.UNREACHABLE_UNSETTLED
+    return Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT

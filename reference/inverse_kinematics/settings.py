@@ -21,7 +21,7 @@ class IKSolver(NamedTuple):
 
     name: str  # in IK_SOLVERS
     chain: Kernel  # for one position to reach by a chain of unlimited balls
-    mechanism: Kernel  # for all else
+    mechanism: Kernel  # for all other problems
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _solver, (self.name,)
@@ -57,36 +57,35 @@ class Settings:
 
 def default_solver(model: Any, target: Any) -> tuple[str, int]:
     """Return the solver and the restarts that suit a model and its target."""
-    one = target[0] if are_targets(target) and len(target) == 1 else target
-    several = are_targets(one)
-    posed = isinstance(one, Target) and one.rotation is not None
-    if isinstance(model, Skeleton) and not (several or posed):
+    target = target[0] if are_targets(target) and len(target) == 1 else target
+    oriented = isinstance(target, Target) and target.rotation is not None
+    if isinstance(model, Skeleton) and not (oriented or are_targets(target)):
         return "fabrik", 0
     return "levenberg_marquardt", RESTARTS
 
 
-def checked_settings(*given: Any) -> Settings:
-    """Return the settings, of which the same are often asked for again."""
+def checked_settings(*arguments: Any) -> Settings:
+    """Return the settings; recent ones are cached."""
     try:
-        return _known_settings(*given)
-    except TypeError:  # one has no hash, and so is no number or name
-        return _settings(*given)
+        return _cached_settings(*arguments)
+    except TypeError:  # some argument has no hash, and so is no number or name
+        return _settings(*arguments)
 
 
 def _settings(
     solver: Any, tolerance: Any, tolerance_rotation: Any, max_iterations: Any,
     restarts: Any, seed: Any, record: bool, chained: bool = False,
 ) -> Settings:  # fmt: skip
-    near, far = MAX_ITERATIONS, FAR_ITERATIONS
+    within_reach, out_of_reach = MAX_ITERATIONS, FAR_ITERATIONS
     if max_iterations is not None:
-        most = arguments.integer("max_iterations", max_iterations, least=0)
-        near = far = min(most, LARGEST_COUNT)
+        count = arguments.integer("max_iterations", max_iterations, least=0)
+        within_reach = out_of_reach = min(count, LARGEST_COUNT)
     kernels = IK_SOLVERS[arguments.choice("solver", solver, IK_SOLVERS)]
     limits = Limits(
         arguments.number("tolerance", tolerance, least=0.0),
         arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
-        near,
-        far,
+        within_reach,
+        out_of_reach,
         arguments.count("restarts", restarts, least=0),
         chained,
     )
@@ -94,4 +93,4 @@ def _settings(
     return Settings(kernels, limits, seed, arguments.boolean("record", record))
 
 
-_known_settings = functools.lru_cache(maxsize=64, typed=True)(_settings)
+_cached_settings = functools.lru_cache(maxsize=64, typed=True)(_settings)

@@ -1,8 +1,8 @@
-"""From arguments to the kernels of a solver, and from what they fill to a solution.
+"""From arguments to the kernels of a solver, and from their results to a solution.
 
-`solve_checked` accepts anything. It takes as long as the kernel where there is one start and one
-target, a third of a call on a chain of ten balls; `solve_plain` does the same in fewer steps for
-float64 arrays of the right shape, and leaves all else to it.
+`solve_checked` accepts anything. For one start and one target it takes as long as the kernel, a
+third of a call on a chain of ten balls; `solve_plain` does the same in fewer steps for float64
+arrays of the right shape, and leaves all else to it.
 """
 
 from typing import Any, NoReturn
@@ -30,17 +30,17 @@ from ..skeleton import Skeleton
 from .mechanism import TARGET
 from .problem import CheckedTarget, IKSolution, Target, check_numbers
 from .reduce import prepare
-from .result import EXCESS, FIGURES, ITERATIONS, MERIT, OUTCOME, RESIDUAL, RESIDUAL_ROTATION, Result
+from .restarts import FIGURES, ITERATIONS, MERIT, OUTCOME, Result
 from .settings import Settings
 
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
-LEAST_ON_CHAINS, LEAST = 128, 16
+SLICE_ON_CHAINS, SLICE_ON_MECHANISMS = 128, 16
 OUTCOMES = {outcome.value: outcome for outcome in Outcome}
 # Outcomes after which a chain is not restarted.
 FINAL_OUTCOMES = [outcome for outcome in Outcome if outcome.unreachable or outcome.solved]
 LARGEST_HISTORY = 10**9  # residuals; more fit no memory
 NO_HISTORY = frozen(np.empty(0))
-UNRECORDED = np.empty((1, 1))  # where kernels may write a history that nobody reads
+UNRECORDED = np.empty((1, 1))  # where kernels may write a history that is not read
 NAMES = (int, str, type(None))
 
 
@@ -106,7 +106,7 @@ def solve_checked(
     targets: list[CheckedTarget],
     settings: Settings,
 ) -> IKSolution:
-    """Return what `solve_ik` does for targets that are checked but for their numbers.
+    """Return the solution for targets that are checked but for their numbers.
 
     If the settings are chained, each solve starts from the one before.
 
@@ -116,9 +116,9 @@ def solve_checked(
     """
     is_skeleton, name = isinstance(model, Skeleton), coordinates_name(model)
     shape = (model.joint_count, 4) if isinstance(model, Skeleton) else (model.coordinate_count,)
-    given = arguments.floats(name, start, "...", *shape)
-    batch = batch_shape(given.shape[: -len(shape)], targets, name)
-    starts = _rows(given, batch, len(shape))
+    starts = arguments.floats(name, start, "...", *shape)
+    batch = batch_shape(starts.shape[: -len(shape)], targets, name)
+    starts = _rows(starts, batch, len(shape))
     on_chain = is_skeleton and len(targets) == 1 and targets[0].rotation is None
     rows: np.ndarray
     if on_chain:
@@ -141,7 +141,7 @@ def _run_checked(
     rows: np.ndarray,
     settings: Settings,
 ) -> Result | None:
-    """Return what a kernel fills in for rows of starts and targets; None if some is not valid."""
+    """Return the result of a kernel for rows of starts and targets; None if some is not valid."""
     count = model.joint_count
     if isinstance(model, Skeleton) and rows.dtype == FLOAT64:
         arrays = (*model.arrays, model.path_array(targets[0].joint))
@@ -175,8 +175,8 @@ def run(
 ) -> tuple[FloatArray, ...]:
     """Return the fields of Result as a kernel fills them; none if some number is not valid.
 
-    `arrays` are what the kernel reads of the model. The starts are rows, (target, ...), or one for
-    all targets; the targets are positions [m], (target, 3), or of a mechanism records TARGET,
+    `arrays` are those of the model that the kernel reads. The starts are rows, (target, ...), or
+    one for all targets; the targets are positions [m], (target, 3), of a mechanism records TARGET,
     (target, effector). `coordinates` is how many a solution on a mechanism has, None on a chain.
     """
     n, history = len(targets), UNRECORDED
@@ -186,36 +186,21 @@ def run(
         history = _new_history(n, 1 if coordinates is None else 2, settings)
     rows: tuple[np.ndarray, ...]
     if coordinates is None:
-        q, least = local, LEAST_ON_CHAINS
+        q, slice_length = local, SLICE_ON_CHAINS
         rows = starts, targets, local, positions, figures, history
     else:
-        q, least = np.empty((n, coordinates)), LEAST
+        q, slice_length = np.empty((n, coordinates)), SLICE_ON_MECHANISMS
         rows = starts, targets, local, positions, figures, history, q
-    if n < 2 * least or settings.limits.chained:
+    if n < 2 * slice_length or settings.limits.chained:
         valid = kernel(*arrays, settings.numbers, *rows)
     else:
-        valid = _run_in_slices(kernel, (*arrays, settings.numbers), rows, least)
+
+        def arguments_of(part: slice) -> tuple[Any, ...]:
+            parts = [values if len(values) == 1 else values[part] for values in rows]
+            return (*arrays, settings.numbers, *parts)
+
+        valid = all(in_slices(kernel, n, arguments_of, least=slice_length))
     return (local, positions, figures, history, q) if valid else ()
-
-
-def _run_in_slices(
-    kernel: Kernel, model: tuple[Any, ...], rows: tuple[np.ndarray, ...], least: int
-) -> bool:
-    """Run a kernel on slices of its rows, spread over the threads; return whether all are valid."""
-    count = len(rows[1])
-    return all(
-        in_slices(
-            kernel,
-            count,
-            lambda part: (*model, *[_part(values, part) for values in rows]),
-            least=least,
-        )
-    )
-
-
-def _part(rows: np.ndarray, part: slice) -> np.ndarray:
-    """Return a part of the rows, or the only one, which serves all targets."""
-    return rows if len(rows) == 1 else rows[part]
 
 
 def _raise_invalid(
@@ -270,7 +255,7 @@ def batch_shape(
 
 
 def _rows(starts: FloatArray, batch: tuple[int, ...], axes: int) -> FloatArray:
-    """Return the starts as rows, of which the targets of a batch use one after the other."""
+    """Return the starts as rows: one for each target of a batch, or one for all."""
     if starts.ndim == axes:
         return starts[None]
     return one_batch(arguments.spread(starts, (*batch, *starts.shape[-axes:])), axes)
@@ -296,63 +281,59 @@ def _restarted(
     first: Result,
     settings: Settings,
 ) -> Result:
-    """Return the better of what one start and restarts give, where a target in reach is missed.
+    """Return the better of first results and restarts, where a target in reach is not reached.
 
     One start on a chain of unlimited balls has already had the iterations of all attempts. Towards
     a target out of reach it has one nearest point to come to, and no start comes to another.
     """
-    missed = np.flatnonzero(~np.isin(first.figures[:, OUTCOME], FINAL_OUTCOMES))
-    if not len(missed):
+    unsolved = np.flatnonzero(~np.isin(first.figures[:, OUTCOME], FINAL_OUTCOMES))
+    if not len(unsolved):
         return first
-    starts = starts[missed] if len(starts) > 1 else starts
-    more = _run_checked(skeleton, starts, targets, rows[missed], settings)
+    starts = starts[unsolved] if len(starts) > 1 else starts
+    more = _run_checked(skeleton, starts, targets, rows[unsolved], settings)
     assert more is not None, "both kernels accept the same starts and targets"
-    history = first.history
-    if settings.record:
-        history = _joined_history(first, more, missed)
-    iterations = first.figures[missed, ITERATIONS] + more.figures[:, ITERATIONS]
+    history = _appended(first, more, unsolved) if settings.record else first.history
+    iterations = first.figures[unsolved, ITERATIONS] + more.figures[:, ITERATIONS]
     is_better = (more.figures[:, OUTCOME] == Outcome.CONVERGED) | (
-        more.figures[:, MERIT] < first.figures[missed, MERIT]
+        more.figures[:, MERIT] < first.figures[unsolved, MERIT]
     )
-    better = missed[is_better]
-    first.local[better] = more.local[is_better]
-    first.positions[better] = more.positions[is_better]
-    first.figures[better] = more.figures[is_better]
-    first.figures[missed, ITERATIONS] = iterations
+    better = unsolved[is_better]
+    for values, replacements in zip(first[:3], more[:3], strict=True):
+        values[better] = replacements[is_better]
+    first.figures[unsolved, ITERATIONS] = iterations
     return first._replace(history=history)
 
 
-def _joined_history(first: Result, more: Result, missed: IndexArray) -> FloatArray:
-    """Return the residuals of one start and then those of its restarts."""
+def _appended(first: Result, more: Result, unsolved: IndexArray) -> FloatArray:
+    """Return the residuals of first results and then those of their restarts."""
     columns = first.history.shape[1] + more.history.shape[1] - 1
     history = np.empty((len(first.history), columns))
     history[:, : first.history.shape[1]] = first.history
-    counts = first.figures[missed, ITERATIONS].astype(np.int64)
-    for row, count, residuals in zip(missed, counts, more.history, strict=True):
+    counts = first.figures[unsolved, ITERATIONS].astype(np.int64)
+    for row, count, residuals in zip(unsolved, counts, more.history, strict=True):
         history[row, count + 1 : count + len(residuals)] = residuals[1:]
     return history
 
 
 def _solution(result: Result, batch: tuple[int, ...], settings: Settings) -> IKSolution:
-    """Return what the kernel filled in as a solution, in the shape of the batch."""
+    """Return the results as a solution in the shape of the batch."""
     local, positions, figures, history, q = result
-    if settings.record:
-        history = _repeated(history, figures[:, ITERATIONS].astype(np.int64))
+    if settings.record:  # up to the longest, each continued by its last residual
+        iterations = figures[:, ITERATIONS].astype(np.int64)
+        count = np.arange(int(iterations.max(initial=0)) + 1)
+        history = np.take_along_axis(history, np.minimum(count, iterations[:, None]), axis=1)
     if not batch:
         return _single_solution(frozen(history[0]) if settings.record else NO_HISTORY, *result)
-    figures = figures.T.copy()
+
+    def shaped(values: Any) -> Any:
+        return frozen(values.reshape(batch + values.shape[1:]))
+
+    residual, angle, steps, outcome, merit, excess = figures.T.copy()
     return IKSolution(
-        _shaped(local, batch),
-        _shaped(positions, batch),
-        _shaped(figures[RESIDUAL], batch),
-        _shaped(figures[ITERATIONS].astype(np.int64), batch),
-        _shaped(figures[OUTCOME].astype(np.int64), batch),
-        _shaped(history, batch) if settings.record else NO_HISTORY,
-        _shaped(figures[RESIDUAL_ROTATION], batch),
-        _shaped(q, batch),
-        _shaped(figures[MERIT], batch),
-        _shaped(figures[EXCESS], batch),
-    )
+        shaped(local), shaped(positions), shaped(residual), shaped(steps.astype(np.int64)),
+        shaped(outcome.astype(np.int64)), shaped(history) if settings.record else NO_HISTORY,
+        shaped(angle), shaped(q), shaped(merit), shaped(excess),
+    )  # fmt: skip
 
 
 def _single_solution(
@@ -360,7 +341,7 @@ def _single_solution(
     local: FloatArray,
     positions: FloatArray,
     figures: FloatArray,
-    history: FloatArray,
+    _history: FloatArray,
     coordinates: FloatArray,
 ) -> IKSolution:
     """Return the solution of the only target, with the history that it is to show."""
@@ -376,13 +357,3 @@ def _single_solution(
         pose, x, residual, int(iterations), OUTCOMES[outcome], shown_history, angle, q, merit,
         excess,
     )  # fmt: skip
-
-
-def _repeated(history: FloatArray, iterations: IndexArray) -> FloatArray:
-    """Return the rows up to the longest, each continued by its last residual."""
-    count = np.arange(int(iterations.max(initial=0)) + 1)
-    return np.take_along_axis(history, np.minimum(count, iterations[:, None]), axis=1)
-
-
-def _shaped(values: Any, batch: tuple[int, ...]) -> Any:
-    return frozen(values.reshape(batch + values.shape[1:]))

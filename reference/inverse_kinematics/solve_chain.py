@@ -23,20 +23,24 @@ from .chain import (
     rounding,
     store_local,
 )
-from .damped_least_squares import damped_least_squares_sweep
 from .fabrik import fabrik_sweep
-from .jacobian_transpose import jacobian_transpose_sweep
-from .levenberg_marquardt import levenberg_marquardt_sweep
+from .jacobian_methods import (
+    damped_least_squares_sweep,
+    jacobian_transpose_sweep,
+    levenberg_marquardt_sweep,
+)
 from .restarts import (
-    MADE,
+    COUNT,
+    OUTCOME,
     Criteria,
     Operations,
     copy_row,
+    fill_figures,
     limits_of,
     new_attempts,
+    outcome_of,
     solve_with_restarts,
 )
-from .result import OUTCOME, fill_figures, outcome_of
 
 
 def solve_chains(
@@ -61,7 +65,7 @@ def solve_chains(
         pose_chain(chain, path, pose)
         d = root_distance(chain, target)
         criteria, past = chain_criteria(chain, d, limits), history[i % len(history)]
-        iterations, settled = solve_with_restarts(
+        iterations, stalled = solve_with_restarts(
             operations, chain, attempts, target, limits, criteria, past
         )
         if iterations > 0:
@@ -70,10 +74,10 @@ def solve_chains(
             store_local(chain, path, pose)
         forward_pose(parents, offsets, pose, positions[i], rotations)
         distance = norm(subtract(load_vector(positions[i], path[-1]), target))
-        least = least_distance(chain, d)
-        fill_figures(figures[i], distance, 0.0, iterations, distance, least)
-        unreachable = least > limits.tolerance + rounding(chain, d)
-        outcome = outcome_of(distance <= limits.tolerance, unreachable, settled)
+        bound = least_distance(chain, d)
+        fill_figures(figures[i], distance, 0.0, iterations, distance, bound)
+        unreachable = bound > limits.tolerance + rounding(chain, d)
+        outcome = outcome_of(distance <= limits.tolerance, unreachable, stalled)
         figures[i, OUTCOME] = outcome.value
     return True
 
@@ -85,23 +89,22 @@ def largest(v):
 
 
 def chain_criteria(chain, d, limits):
-    """Return when an attempt ends whose target is at distance d from the root [m]."""
-    least, margin = least_distance(chain, d), rounding(chain, d)
+    """Return the end criteria of attempts at a target at distance d from the root [m]."""
+    bound, margin = least_distance(chain, d), rounding(chain, d)
     slack = min(8.0 * margin, 0.5 * limits.tolerance)
-    far = least > limits.tolerance
-    count = limits.far_iterations if far else limits.max_iterations
-    return Criteria(least + limits.tolerance - slack, limits.tolerance_rotation, margin, count)
+    count = limits.far_iterations if bound > limits.tolerance else limits.max_iterations
+    return Criteria(bound + limits.tolerance - slack, limits.tolerance_rotation, margin, count)
 
 
 def chain_error(chain, target):
-    """Return the distance from effector to target [m] as the loops want it."""
+    """Return the distance from effector to target [m] in the form of `Operations.error`."""
     distance = effector_error(chain, target)
     return distance, 0.0, distance, distance
 
 
 def perturb_chain(chain, target, criteria, first):
     """Bend a chain that starts collinear with its target, which no solver would leave."""
-    if first[MADE] > 0 or effector_error(chain, target) <= criteria.distance:
+    if first[COUNT] > 0 or effector_error(chain, target) <= criteria.distance:
         return False
     if is_beyond_reach(chain, root_distance(chain, target)) or not is_collinear(chain, target):
         return False

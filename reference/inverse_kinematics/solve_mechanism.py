@@ -28,47 +28,52 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .box_step import TaskSystem, new_task_system
+from .box_step import TaskSystem, clear, new_task_system
 from .ccd import ccd_update
 from .chain import BEND, POSITION_ROUNDING
-from .damped_least_squares import damped_least_squares_update
 from .fabrik import BACKWARD, fabrik_update
-from .jacobian_transpose import jacobian_transpose_update
-from .joint_updates import load_ball, move_by, store_ball
-from .levenberg_marquardt import levenberg_marquardt_update
+from .jacobian_methods import (
+    damped_least_squares_update,
+    jacobian_transpose_update,
+    levenberg_marquardt_update,
+)
 from .mechanism import (
     LEVER,
     ConfigurationData,
     Mechanism,
     gather,
     least_residual,
+    load_ball,
     merit_of,
+    move_by,
     new_data,
     residuals,
     scatter,
+    store_ball,
     update_forward_kinematics,
     weighted_square,
 )
 from .restarts import (
     COST,
+    COUNT,
     INFINITY,
-    MADE,
-    SETTLED,
+    OUTCOME,
+    STALLED,
     STATE,
     Criteria,
     Operations,
     copy_row,
+    fill_figures,
     limits_of,
     new_attempts,
+    outcome_of,
     solve_with_restarts,
 )
-from .result import OUTCOME, fill_figures, outcome_of
-from .task_jacobian import clear
 
-# A start that settles within so few iterations away from its target is stuck, such as a straight
+# A start that stalls within so few iterations away from its target is stuck, such as a straight
 # chain, perhaps folded since, whose target lies on its own line.
 STUCK = 6
-# Out of reach an error that changes by no more than this share of the tolerance has settled.
+# Out of reach an error that changes by no more than this share of the tolerance has stalled.
 FAR_MARGIN = 1e-8
 # A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)
@@ -112,7 +117,11 @@ def solve_mechanisms(
     mechanism = Mechanism(
         own_joints, sources, effectors, moves, adjacent, reach, width, freedoms, equations
     )
-    state = new_state(mechanism, restarts, restart_frames)
+    data = new_data(mechanism)
+    state = MechanismState(
+        mechanism, data, data.state, new_workspace(mechanism), restarts, restart_frames,
+        np.empty(len(restarts)),
+    )  # fmt: skip
     attempts = new_attempts(len(restarts) + 1, state)
     rotations = np.empty((len(joints), 4))
     for i in range(len(targets)):
@@ -122,9 +131,9 @@ def solve_mechanisms(
         if not (normalise_start(joints, q) and normalise_target(target)):
             return False
         begin(state, q)
-        least = least_residual(mechanism, target)
-        criteria, past = mechanism_criteria(mechanism, least, limits), history[i % len(history)]
-        iterations, settled = solve_with_restarts(
+        bound = least_residual(mechanism, target)
+        criteria, past = mechanism_criteria(mechanism, bound, limits), history[i % len(history)]
+        iterations, stalled = solve_with_restarts(
             operations, state, attempts, target, limits, criteria, past
         )
         scatter(mechanism, attempts.saved[-1], q)
@@ -133,18 +142,10 @@ def solve_mechanisms(
             _, Q = joint_transform(joints, j, q)
             store_quaternion(local[i], j, Q)
         distance, angle, merit = errors_of_pose(mechanism, target, positions[i], rotations)
-        fill_figures(figures[i], distance, angle, iterations, merit, least)
+        fill_figures(figures[i], distance, angle, iterations, merit, bound)
         reached = distance <= limits.tolerance and angle <= limits.tolerance_rotation
-        figures[i, OUTCOME] = outcome_of(reached, least > limits.tolerance, settled).value
+        figures[i, OUTCOME] = outcome_of(reached, bound > limits.tolerance, stalled).value
     return True
-
-
-def new_state(mechanism, restarts, effector_frames):
-    """Return a state to begin from."""
-    data = new_data(mechanism)
-    workspace = new_workspace(mechanism)
-    ranks = np.empty(len(restarts))
-    return MechanismState(mechanism, data, data.state, workspace, restarts, effector_frames, ranks)
 
 
 def new_workspace(mechanism):
@@ -174,22 +175,20 @@ def begin(state, q):
     update_forward_kinematics(state.mechanism, state.data)
 
 
-def mechanism_criteria(mechanism, least, limits):
-    """Return when an attempt ends, where no pose has a lesser residual than `least` [m].
+def mechanism_criteria(mechanism, bound, limits):
+    """Return the end criteria of attempts, where no pose has a residual below `bound` [m].
 
     Targets out of reach count as reached within the tolerance of their least distances.
     """
     margin = POSITION_ROUNDING * mechanism.reach
-    slack, slack_rotation = (
-        min(margin, 0.5 * limits.tolerance),
-        min(POSITION_ROUNDING, 0.5 * limits.tolerance_rotation),
-    )
-    far = least > limits.tolerance
+    slack = min(margin, 0.5 * limits.tolerance)
+    slack_rotation = min(POSITION_ROUNDING, 0.5 * limits.tolerance_rotation)
+    unreachable = bound > limits.tolerance
     return Criteria(
-        least + limits.tolerance - slack,
+        bound + limits.tolerance - slack,
         limits.tolerance_rotation - slack_rotation,
-        max(margin, FAR_MARGIN * limits.tolerance) if far else margin,
-        limits.far_iterations if far else limits.max_iterations,
+        max(margin, FAR_MARGIN * limits.tolerance) if unreachable else margin,
+        limits.far_iterations if unreachable else limits.max_iterations,
     )
 
 
@@ -219,10 +218,10 @@ def mechanism_merit(state, target):
 
 
 def perturb_mechanism(state, _target, _criteria, first):
-    """Bend a mechanism that settled at once, away from its target: all joints share one angle."""
+    """Bend a mechanism that stalled at once, away from its target: all joints share one angle."""
     mechanism, q, count = state.mechanism, state.data.q, len(state.mechanism.joints)
-    away = first[COST] > POSITION_ROUNDING * mechanism.reach
-    if not (first[STATE] == SETTLED and first[MADE] < STUCK and away):
+    missed_target = first[COST] > POSITION_ROUNDING * mechanism.reach
+    if not (first[STATE] == STALLED and first[COUNT] < STUCK and missed_target):
         return False
     for j in range(count):
         if mechanism.joints["leader"][j] == j:
@@ -267,8 +266,8 @@ def rank_restarts(state, target):
             )
             distance = max(distance, norm(offset))
             if state.mechanism.effectors["oriented"][e]:
-                there = load_quaternion(state.effector_frames[r], e, 3)
-                angle = max(angle, rough_angle(there, load_quaternion(target["rotation"], e)))
+                R = load_quaternion(state.effector_frames[r], e, 3)
+                angle = max(angle, rough_angle(R, load_quaternion(target["rotation"], e)))
         state.ranks[r] = distance + lever * angle
 
 

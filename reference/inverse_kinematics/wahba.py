@@ -11,12 +11,10 @@ from ..quaternion import dot
 
 # Where all vectors are collinear many rotations are best: the identity, added by this share of
 # M's norm, makes the smallest of them the best. It brings no vector further from its own.
-LEAST_ROTATION = 1e-6
+IDENTITY_WEIGHT = 1e-6
 # Below this share of M's norm the angle that is best is known to no digit.
 ANGLE_ROUNDING = 1e-15
 SWEEPS = 12
-
-
 ZERO_MATRIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -86,7 +84,7 @@ def best_rotation(M, K, V):
 
     Jacobi's rotations diagonalise K; V collects them, and the column of the largest is q.
     """
-    extra = LEAST_ROTATION * magnitude(M)
+    extra = IDENTITY_WEIGHT * magnitude(M)
     trace = M[0] + M[4] + M[8] + 3.0 * extra
     K[0, 0], K[0, 1], K[0, 2], K[0, 3] = trace, M[7] - M[5], M[2] - M[6], M[3] - M[1]
     K[1, 1], K[1, 2], K[1, 3] = 2.0 * (M[0] + extra) - trace, M[1] + M[3], M[2] + M[6]
@@ -112,11 +110,11 @@ def diagonalise(K, V):
         for j in range(i):
             K[i, j] = K[j, i]
     for _ in range(SWEEPS):
-        off = 0.0
+        remainder = 0.0
         for i in range(4):
             for j in range(i + 1, 4):
-                off += abs(K[i, j])
-        if off == 0.0:
+                remainder += abs(K[i, j])
+        if remainder == 0.0:
             return
         for i in range(4):
             for j in range(i + 1, 4):

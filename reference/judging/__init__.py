@@ -1,4 +1,4 @@
-"""How good is anyone's answer: distances first, residuals last."""
+"""Errors of a pose or a step from any solver."""
 
 from .pose import PoseJudgement, judge_pose
 from .step import StepJudgement, judge_step

@@ -1,8 +1,7 @@
-"""Anyone's answer to an inverse-kinematics problem, checked by forward kinematics.
+"""A pose from any solver, checked by forward kinematics.
 
-Answers in single precision hold quaternions that are off unit length by 1e-5 after some hundred
-products. They are normalised, and how far they were off is reported beside the distances, not
-instead.
+In single precision quaternions deviate from unit length by 1e-5 after some hundred products. They
+are normalised, and the deviation is reported beside the distances.
 """
 
 from collections.abc import Sequence
@@ -22,22 +21,21 @@ from ..skeleton import Pose, Skeleton
 
 @dataclass(frozen=True, eq=False)
 class PoseJudgement:
-    """What is known of a pose that is said to bring effectors to targets.
+    """Errors of a pose that is said to bring effectors to targets.
 
     Attributes:
         distance: from effector to target [m], the largest of several.
         angle: from the effector's to the target's rotation [rad], the largest of several; 0 where
-            no rotation is asked for.
+            the rotation is free.
         distances: from each effector to its target [m], (target,).
         angles: likewise [rad], (target,).
-        norm_deviation: the largest difference of a quaternion's length from one, as given.
+        norm_deviation: the largest difference of a quaternion's length from 1, as passed.
         limit_excess: how far each joint is beyond its limits [rad, of slides m], (joint,).
-        position_errors: distance between each joint's position as given and where the rotations
-            put it [m], (joint,); None unless both were given.
-        length_errors: difference between each link's length by the positions given and as the
-            model has it [m], (joint,); 0 of the root and of links that slide; None if none were
-            given.
-        positions: of all joints by forward kinematics of the normalised pose, or as given [m],
+        position_errors: distance between each joint's position as passed and by forward kinematics
+            [m], (joint,); None unless both pose and positions were passed.
+        length_errors: difference between each link's length by the positions passed and in the
+            model [m], (joint,); 0 of the root and of links that slide; None without positions.
+        positions: of all joints by forward kinematics of the normalised pose, or as passed [m],
             (joint, 3).
         names: of the joints.
         tolerance: distance that counts as reached [m].
@@ -74,34 +72,26 @@ class PoseJudgement:
 
     @property
     def summary(self) -> str:
-        """What was found, in a few sentences."""
-        return " ".join([self._targets(), *self._limits(), *self._given(), self._norms()])
-
-    def _targets(self) -> str:
+        """The findings in a few sentences."""
         verb = "is" if self.reached else "is not"
         angle = f" and {self.angle:.2g} rad" if self.angle else ""
-        return f"The target {verb} reached: the effector is {self.distance:.2g} m{angle} off."
-
-    def _limits(self) -> list[str]:
-        beyond = np.flatnonzero(self.limit_excess > 0.0)
-        if not len(beyond):
-            return []
-        worst = int(self.limit_excess.argmax())
-        return [
-            f"{len(beyond)} joints are beyond their limits, {self.names[worst]} by "
-            f"{self.limit_excess[worst]:.2g}."
+        sentences = [
+            f"The target {verb} reached: the effector is {self.distance:.2g} m{angle} off."
         ]
-
-    def _given(self) -> list[str]:
-        if self.position_error is None:
-            return []
-        return [
-            f"The positions given are up to {self.position_error:.2g} m from where the rotations "
-            f"put the joints, and change a link's length by up to {self.length_error:.2g} m."
-        ]
-
-    def _norms(self) -> str:
-        return f"Quaternions are up to {self.norm_deviation:.2g} off unit length."
+        count, worst = int((self.limit_excess > 0.0).sum()), int(self.limit_excess.argmax())
+        if count:
+            sentences.append(
+                f"{count} joints are beyond their limits, {self.names[worst]} by "
+                f"{self.limit_excess[worst]:.2g}."
+            )
+        if self.position_error is not None:
+            sentences.append(
+                f"The positions given are up to {self.position_error:.2g} m from where the "
+                f"rotations put the joints, and change a link's length by up to "
+                f"{self.length_error:.2g} m."
+            )
+        deviation = f"Quaternions are up to {self.norm_deviation:.2g} off unit length."
+        return " ".join([*sentences, deviation])
 
 
 def judge_pose(
@@ -114,12 +104,11 @@ def judge_pose(
     tolerance: float = 1e-4,
     tolerance_rotation: float = 1e-4,
 ) -> PoseJudgement:
-    """Return how far a pose is from its targets, its limits, and the positions said to be its own.
+    """Return the errors of a pose: from its targets, of its limits, of positions passed with it.
 
     `pose` holds the local rotations of a Skeleton, (joint, 4), w first, or the coordinates q of an
     Articulation, (coordinate,), with quaternions of any length but zero; None judges `positions`
-    alone, the global ones of all joints that came with it [m], (joint, 3). The other arguments are
-    as for `solve_ik`.
+    alone, the global ones of all joints [m], (joint, 3). All other arguments are as for `solve_ik`.
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion has no length,
@@ -136,58 +125,58 @@ def judge_pose(
     else:
         unit, deviation = _normalised(model, pose)
         placed, excess = forward_kinematics(model, unit), _limit_excess(model, unit)
-    distances = [_distance(one, placed.positions[one.joint]) for one in targets]
-    angles = [_angle(one, placed.rotations[one.joint]) for one in targets]
-    moved = None if x is None or pose is None else np.linalg.norm(x - placed.positions, axis=-1)
+    distances = [_distance(goal, placed.positions[goal.joint]) for goal in targets]
+    angles = [_angle(goal, placed.rotations[goal.joint]) for goal in targets]
+    errors = lengths = None
+    if x is not None:
+        lengths = frozen(_length_errors(model, tree, x))
+        errors = None if pose is None else frozen(np.linalg.norm(x - placed.positions, axis=-1))
     return PoseJudgement(
         max(distances), max(angles), frozen(np.array(distances)), frozen(np.array(angles)),
-        deviation, frozen(excess), None if moved is None else frozen(moved),
-        None if x is None else frozen(_length_errors(model, tree, x)), placed.positions,
-        tree.names, arguments.number("tolerance", tolerance, least=0.0),
+        deviation, frozen(excess), errors, lengths, placed.positions, tree.names,
+        arguments.number("tolerance", tolerance, least=0.0),
         arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
     )  # fmt: skip
 
 
 def _unrotated(positions: FloatArray | None, targets: Sequence[CheckedTarget]) -> Pose:
-    """Return positions as a pose whose rotations are not known."""
-    if positions is None or any(one.rotation is not None for one in targets):
+    """Return positions as a pose with unknown rotations."""
+    if positions is None or any(target.rotation is not None for target in targets):
         raise ValueError("pose: expected rotations or coordinates, got None")
     return Pose(frozen(np.array(positions)), np.full((len(positions), 4), np.nan))
 
 
 def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatArray, float]:
-    """Return the pose with unit quaternions, and how far one was off at most."""
+    """Return the pose with unit quaternions, and the largest deviation of their lengths from 1."""
     name = coordinates_name(model)
     if isinstance(model, Skeleton):
-        given = arguments.array(name, pose, model.joint_count, 4)
-        unit, deviation = rotation.normalise(given, name)
-        return unit, float(deviation.max())
+        quaternions = arguments.array(name, pose, model.joint_count, 4)
+        unit, deviations = rotation.normalise(quaternions, name)
+        return unit, float(deviations.max())
     unit = arguments.coordinates(name, pose, model.coordinate_count).copy()
-    worst = 0.0
-    for joint, kind in enumerate(model.kinds):
-        if kind in ("ball", "free"):
-            end = model.coordinates_of(joint).stop
-            unit[end - 4 : end], deviation = rotation.normalise(unit[end - 4 : end], name)
-            worst = max(worst, float(deviation))
-    return unit, worst
+    deviation = 0.0
+    for part in model.quaternions:
+        unit[part], difference = rotation.normalise(unit[part], name)
+        deviation = max(deviation, float(difference))
+    return unit, deviation
 
 
 def _distance(target: CheckedTarget, position: FloatArray) -> float:
-    if target.position.ndim != 1:
-        raise ValueError(
-            f"target: expected shape (3,), got {arguments.shape(target.position.shape)}"
-        )
+    _check_single("target", target.position, 3)
     return float(np.linalg.norm(position - target.position))
 
 
 def _angle(target: CheckedTarget, Q: FloatArray) -> float:
     if target.rotation is None:
         return 0.0
-    if target.rotation.ndim != 1:
-        raise ValueError(
-            f"rotation: expected shape (4,), got {arguments.shape(target.rotation.shape)}"
-        )
+    _check_single("rotation", target.rotation, 4)
     return float(rotation.angle(Q, target.rotation))
+
+
+def _check_single(name: str, values: FloatArray, length: int) -> None:
+    if values.ndim != 1:
+        got = arguments.shape(values.shape)
+        raise ValueError(f"{name}: expected shape ({length},), got {got}")
 
 
 def _limit_excess(model: Skeleton | Articulation, q: FloatArray) -> FloatArray:

@@ -18,13 +18,12 @@ from numpy.typing import ArrayLike
 from ..arguments import SMALLEST_POSITIVE, FloatArray, array, coordinates, frozen
 from ..implicit_euler import ImplicitEuler
 from ..implicit_euler.certificate import Certificate
-from ..implicit_euler.objective import Objective
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
 
 # The smallest: only rounding stops Newton's method.
 TOLERANCE = SMALLEST_POSITIVE
-MOST_ITERATIONS = 500
+MAX_ITERATIONS = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +66,14 @@ class StepJudgement:
     @property
     def summary(self) -> str:
         """The findings in a few sentences, worst first."""
-        return " ".join([*self._pins(), self._distance(), self._proof(), *self._velocities()])
-
-    def _pins(self) -> list[str]:
-        if self.pin_displacement == 0.0:
-            return []
-        return [f"A pin is {self.pin_displacement:.2g} m from where the step takes it."]
+        sentences = [self._distance(), self._proof()]
+        if self.pin_displacement:
+            pin = f"A pin is {self.pin_displacement:.2g} m from where the step takes it."
+            sentences.insert(0, pin)
+        if self.velocity_error is not None:
+            error = f"{self.velocity_error:.2g} m/s"
+            sentences.append(f"Velocities differ from (x - x_n) / h by up to {error}.")
+        return " ".join(sentences)
 
     def _distance(self) -> str:
         if not self.outcome.solved:
@@ -86,18 +87,13 @@ class StepJudgement:
     def _proof(self) -> str:
         if not self.certificate.covered:
             return self.certificate.coverage.sentence
-        which = {
+        minimiser = {
             True: "the minimiser near x* lies",
             False: "another minimiser, as right as that one, lies",
             None: "a minimiser lies",
         }[self.same_minimiser]
         pins = " of them with the pins in place" if self.pin_displacement else ""
-        return f"Proven: {which} within {self.certificate.distance:.2g} m{pins}."
-
-    def _velocities(self) -> list[str]:
-        if self.velocity_error is None:
-            return []
-        return [f"Velocities differ from (x - x_n) / h by up to {self.velocity_error:.2g} m/s."]
+        return f"Proven: {minimiser} within {self.certificate.distance:.2g} m{pins}."
 
 
 def judge_step(
@@ -115,7 +111,7 @@ def judge_step(
     without velocities only the positions are. The other arguments and the errors are those of
     `ImplicitEuler.step`.
     """
-    integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MOST_ITERATIONS)
+    integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MAX_ITERATIONS)
     loads = external_forces, pin_positions
     objective = integrator.objective(state, *loads)
     x = coordinates("positions", positions, system.particle_count, 3)
@@ -124,41 +120,31 @@ def judge_step(
     certificate, reference = (
         integrator.certify(state, points, *loads) for points in (with_pins, best)
     )
-    apart = float(np.linalg.norm(with_pins - best))
+    between = float(np.linalg.norm(with_pins - best))
+    distance = displacement = error = math.inf
+    if solution.outcome.solved:
+        distance = float(np.linalg.norm(x - best))
+        displacement = float(np.linalg.norm(objective.y - best))
+        if displacement > 0.0 or distance == 0.0:
+            error = distance / displacement if distance > 0.0 else 0.0
+    velocity_error = None
+    if velocities is not None:
+        v = array("velocities", velocities, len(x), 3)
+        velocity_error = _largest(v - (x - objective.x_n) / objective.h)
     return StepJudgement(
-        **_distances(x, best, objective.y, solution.outcome.solved),
+        error=error,
+        distance=distance,
+        displacement=displacement,
         pin_displacement=_largest((x - objective.y)[system.pinned]),
-        velocity_error=_velocity_error(x, velocities, objective),
+        velocity_error=velocity_error,
         residual=integrator.certify(state, x, *loads).residual,
         certificate=certificate,
         reference_certificate=reference,
-        same_minimiser=certificate.shares_minimiser_within(reference, apart),
+        same_minimiser=certificate.shares_minimiser_within(reference, between),
         minimiser=frozen(best),
         iterations=solution.iterations,
         outcome=solution.outcome,
     )
-
-
-def _distances(x: FloatArray, best: FloatArray, y: FloatArray, solved: bool) -> dict[str, float]:
-    """Return the error, the distance |x - x*| and the displacement |y - x*|."""
-    if not solved:
-        return dict.fromkeys(("error", "distance", "displacement"), math.inf)
-    distance, displacement = float(np.linalg.norm(x - best)), float(np.linalg.norm(y - best))
-    ratio = distance / displacement if displacement > 0.0 else math.inf
-    return {
-        "error": ratio if distance > 0.0 else 0.0,
-        "distance": distance,
-        "displacement": displacement,
-    }
-
-
-def _velocity_error(
-    x: FloatArray, velocities: ArrayLike | None, objective: Objective
-) -> float | None:
-    if velocities is None:
-        return None
-    v = array("velocities", velocities, len(x), 3)
-    return _largest(v - (x - objective.x_n) / objective.h)
 
 
 def _largest(vectors: FloatArray) -> float:

@@ -1,8 +1,8 @@
 """Sparse Cholesky factorisation, P A P' = L L', made for the matrices of cloths and networks.
 
-`dissection` and `minimum_degree` find the order P, `elimination_tree` and `supernodes` the pattern
-of L, `multifrontal` with `dense` its values; `triangular` solves, with the right-hand
-sides in vector registers. `factor` holds them together; `linear_solver` chooses among libraries.
+`dissection` finds the order P, `symbolic` the pattern of L and `multifrontal` its entries;
+`triangular` solves, with the right-hand sides in vector registers. `factor` is the interface to
+them; `linear_solver` chooses among libraries.
 """
 
 from .factor import CholeskyFactor, NotPositiveDefiniteError

@@ -25,7 +25,7 @@ class BlockSum:
         spring = np.repeat(np.arange(s), np.diff(columns.indptr))
         self._ends = np.full((s, 2), -1, dtype=np.int32)
         self._ends[spring, np.arange(columns.nnz) - columns.indptr[spring]] = columns.indices
-        self._starts, self._rows = _joined(self._ends, n)
+        self._starts, self._rows = _pattern_of_pairs(self._ends, n)
         self._places = _block_places(self._ends, self._starts, self._rows)
         self._scalar = _pattern(self._starts, self._rows)
 
@@ -36,7 +36,7 @@ class BlockSum:
 
     @property
     def diagonal(self) -> IndexArray:
-        """Where the diagonal of `matrix` is in its data, shape (3 particle,)."""
+        """The places of the diagonal of `matrix` in its data, shape (3 particle,)."""
         return self._wide[1]
 
     def matrix(self, blocks: FloatArray) -> Any:
@@ -51,7 +51,7 @@ class BlockSum:
 
 
 def _pattern(starts: IndexArray, rows: IndexArray) -> Any:
-    """Return a sparse CSC matrix of zeros, which take no memory; its pattern is read-only."""
+    """Return a sparse CSC matrix of zeros without memory; its pattern is read-only."""
     size, zeros = len(starts) - 1, np.broadcast_to(0.0, len(rows))
     matrix = scipy.sparse.csc_array((zeros, frozen(rows), frozen(starts)), (size, size))
     matrix.has_canonical_format = True
@@ -59,7 +59,7 @@ def _pattern(starts: IndexArray, rows: IndexArray) -> Any:
 
 
 def _filled(pattern: Any, data: FloatArray) -> Any:
-    """Return a matrix that shares a pattern, ten times quicker than by its constructor."""
+    """Return a matrix that shares a pattern, ten times faster than the constructor."""
     matrix = copy.copy(pattern)
     matrix.data = data
     return matrix
@@ -102,20 +102,20 @@ def sorted_columns(starts, ends, rows):
 
 def without_repeats(starts, rows):
     """Return starts and rows of sorted columns, each row once."""
-    kept, p = np.zeros(len(starts) - 1, np.int32), 0
+    ends, p = np.zeros(len(starts) - 1, np.int32), 0
     for c in range(len(starts) - 2):
         for e in range(starts[c], starts[c + 1]):
             if e == starts[c] or rows[e] != rows[p - 1]:
                 rows[p] = rows[e]
                 p += 1
-        kept[c + 1] = p
-    return kept, rows[:p].copy()
+        ends[c + 1] = p
+    return ends, rows[:p].copy()
 
 
 def block_places(ends, starts, rows):
-    """Return where the blocks ii, ji, ij, jj of every spring are in a pattern, -1 if nowhere.
+    """Return the places of the blocks ii, ji, ij, jj of every spring in sorted columns.
 
-    The pattern is that of sorted columns; an end of -1 has no place.
+    The place of a block with an end of -1 is -1.
     """
     places = np.full((len(ends), 4), -1, np.int32)
     for s in range(len(ends)):
@@ -127,7 +127,7 @@ def block_places(ends, starts, rows):
 
 
 def find(rows, first, last, row):
-    """Return where a row is among the sorted ones from `first` to `last`."""
+    """Return the place of a row among the sorted ones from `first` to `last`."""
     while last - first > 1:
         middle = (first + last) // 2
         if rows[middle] <= row:
@@ -138,7 +138,7 @@ def find(rows, first, last, row):
 
 
 def widen_pattern(starts, rows):
-    """Return the pattern with 3 x 3 entries for each one, and where its diagonal is."""
+    """Return the pattern with 3 x 3 entries for each entry, and the places of its diagonal."""
     wide_starts = np.zeros(3 * len(starts) - 2, np.int32)
     wide_rows = np.empty(9 * len(rows), np.int32)
     diagonal, p = np.empty(3 * len(starts) - 3, np.int64), 0
@@ -181,7 +181,7 @@ def sum_weights(weights, diagonal, places, starts, rows):
     return data
 
 
-_joined = Kernel(join_ends)
+_pattern_of_pairs = Kernel(join_ends)
 _block_places = Kernel(block_places)
 _widened = Kernel(widen_pattern)
 _summed_blocks = Kernel(sum_blocks)

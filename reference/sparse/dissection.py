@@ -6,6 +6,13 @@ few coordinates, which breadth-first searches find: with a and b far apart, dist
 grows evenly from a to b, and its level sets run straight across, where those of one distance bend.
 Whatever the threshold t of a coordinate f, the vertices with f >= t that have a neighbour with
 f < t are a separator, and one sweep over the edges counts them for every t.
+
+Small pieces are ordered by minimum degree: eliminating a vertex joins all its neighbours, and the
+vertex with the fewest goes first (Tinney and Walker 1967, "Direct Solutions of Sparse Network
+Equations by Optimally Ordered Triangular Factorization"). Neighbours outside of the piece count
+although they are eliminated later: without this halo (Pellegrini, Roman, Amestoy 2000, "Hybridizing
+Nested Dissection and Halo Approximate Minimum Degree") the vertices on a piece's rim would always
+seem to have the least degree.
 """
 
 import math
@@ -13,14 +20,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .minimum_degree import minimum_degree
-
 LEAF = 20  # pieces of at most so many vertices are ordered by minimum degree
 HARD = 2000  # so are pieces of at most so many vertices that have no good separator
 LEAST_SHARE = 0.2  # of a piece: what the smaller half must have
 LARGEST_SHARE = 0.3  # of a piece: what a good separator may have
 AXES = 4  # coordinates of a vertex
-GONE = 2**30  # the coordinates of a vertex in a separator
+REMOVED = 2**30  # the coordinates of a vertex in a separator
 
 
 class Graph(NamedTuple):
@@ -93,26 +98,26 @@ def push(pieces, waiting, first, last, measured):
 
 
 def postpone_hubs(graph, search, order):
-    """Put vertices with very many neighbours last; return how many others there are."""
+    """Put vertices with very many neighbours last; return the number of the others."""
     n = len(order)
-    most = max(16.0, 10.0 * math.sqrt(n))
-    others, hubs = 0, n
+    degree_limit = max(16.0, 10.0 * math.sqrt(n))
+    count, hubs = 0, n
     for v in order.copy():
-        if graph.indptr[v + 1] - graph.indptr[v] > most:
+        if graph.indptr[v + 1] - graph.indptr[v] > degree_limit:
             hubs -= 1
             order[hubs] = v
             leave(search, v)
         else:
-            order[others] = v
-            others += 1
-    return others
+            order[count] = v
+            count += 1
+    return count
 
 
 def leave(search, v):
     """Take a vertex out of every piece."""
     search.region[v] = -1
     for axis in range(AXES):
-        search.axes[axis, v] = GONE
+        search.axes[axis, v] = REMOVED
 
 
 def enter(search, piece, region):
@@ -168,7 +173,7 @@ def measure(graph, search, region, piece):
     for axis in range(AXES):
         start = farthest(graph, axes, piece, axis)
         breadth_first(graph, search, region + axis, start, axis, 0)
-    ends = np.full(AXES, GONE)
+    ends = np.full(AXES, REMOVED)
     for v in piece:
         f = axes[0, v] - axes[1, v]
         g = axes[2, v] - axes[3, v]
@@ -181,21 +186,21 @@ def measure(graph, search, region, piece):
     return region + AXES
 
 
-def farthest(graph, axes, piece, known):
+def farthest(graph, axes, piece, axis):
     """Return a vertex far from where earlier searches started, of the least degree among such.
 
     Gibbs, Poole, Stockmeyer 1976, "An Algorithm for Reducing the Bandwidth and Profile of a Sparse
     Matrix". Axis 0 holds the distances from any vertex at first. The second pair is far from both
     of the first, then from each other.
     """
-    best, most, least = piece[0], -1, 0
+    best, largest, lowest_degree = piece[0], -1, 0
     for v in piece:
-        far = axes[2, v] if known == 3 else axes[0, v]
-        if known == 2:
-            far = min(far, axes[1, v])
+        distance = axes[2, v] if axis == 3 else axes[0, v]
+        if axis == 2:
+            distance = min(distance, axes[1, v])
         degree = graph.indptr[v + 1] - graph.indptr[v]
-        if far > most or (far == most and degree < least):
-            best, most, least = v, far, degree
+        if distance > largest or (distance == largest and degree < lowest_degree):
+            best, largest, lowest_degree = v, distance, degree
     return best
 
 
@@ -204,13 +209,13 @@ def split(graph, search, piece):
 
     They are zero, and the piece as it was, if it has no good separator.
     """
-    best_axis, best, least = 0, -1, np.inf
+    best_axis, best, lowest_cost = 0, -1, np.inf
     for axis in range(AXES):
         f = search.axes[axis]
         low, high = sweep(graph, f, search.lowest, piece)
         t, cost = threshold(f, search.lowest, piece, low, high)
-        if cost < least:
-            best_axis, best, least = axis, t, cost
+        if cost < lowest_cost:
+            best_axis, best, lowest_cost = axis, t, cost
     if best < 0:
         return 0, 0
     sweep(graph, search.axes[best_axis], search.lowest, piece)
@@ -219,14 +224,14 @@ def split(graph, search, piece):
 
 def sweep(graph, f, lowest, piece):
     """Set the least coordinate next to each vertex; return the least and largest of all."""
-    least, most = GONE, 0
+    first, last = REMOVED, 0
     for v in piece:
         low = f[v]
-        least, most = min(least, low), max(most, low)
+        first, last = min(first, low), max(last, low)
         for e in range(graph.indptr[v], graph.indptr[v + 1]):
             low = min(low, f[graph.indices[e]])
         lowest[v] = low
-    return least, most
+    return first, last
 
 
 def threshold(f, lowest, piece, first, last):
@@ -241,16 +246,16 @@ def threshold(f, lowest, piece, first, last):
         below[f[v] + 1 - first] += 1
         separator[lowest[v] + 1 - first] += 1  # v separates for lowest < t <= f
         separator[f[v] + 1 - first] -= 1
-    best, least = -1, np.inf
-    left, cut = 0, 0
+    best, lowest_cost = -1, np.inf
+    left, size = 0, 0
     for t in range(1, last - first + 1):
         left += below[t]
-        cut += separator[t]
-        right = len(piece) - left - cut
+        size += separator[t]
+        right = len(piece) - left - size
         even = min(left, right) >= LEAST_SHARE * len(piece)
-        if even and cut <= LARGEST_SHARE * len(piece) and cut < least * left * right:
-            best, least = t + first, cut / (left * right)
-    return best, least
+        if even and size <= LARGEST_SHARE * len(piece) and size < lowest_cost * left * right:
+            best, lowest_cost = t + first, size / (left * right)
+    return best, lowest_cost
 
 
 def divide(search, axis, t, piece):
@@ -273,3 +278,65 @@ def divide(search, axis, t, piece):
         piece[left + right + i - separator] = search.queue[i]
         leave(search, search.queue[i])
     return left, right
+
+
+def minimum_degree(graph, piece, local):
+    """Reorder the vertices of a piece in place; `local` is -1 everywhere, before and after.
+
+    Of several vertices of least degree, the one goes first that has not changed for longest: so
+    elimination moves about, as it does where many are eliminated at once (Liu 1985, "Modification
+    of the Minimum-Degree Algorithm by Multiple Elimination").
+    """
+    adjacent = adjacency(graph, piece, local)
+    count, width = adjacent.shape
+    vertices, ranks = np.empty(count, np.int32), np.zeros(count, np.int64)
+    for v in range(count):
+        vertices[v] = piece[v]
+        for u in range(width):
+            ranks[v] += int(adjacent[v, u])
+        ranks[v] *= count + 1
+    for position in range(count):
+        lowest = 0
+        for v in range(count):
+            if ranks[v] < ranks[lowest]:
+                lowest = v
+        piece[position] = vertices[lowest]
+        eliminate(adjacent, ranks, lowest, position + 1)
+        ranks[lowest] = (width + 1) * (count + 1)  # never the lowest again
+
+
+def adjacency(graph, piece, local):
+    """Return which vertex of the piece neighbours which of piece and halo, as zeros and ones."""
+    count, entries = len(piece), 0
+    for i in range(count):
+        local[piece[i]] = i
+        entries += graph.indptr[piece[i] + 1] - graph.indptr[piece[i]]
+    halo, width = np.empty(entries, np.int32), count
+    for v in piece:
+        for u in graph.indices[graph.indptr[v] : graph.indptr[v + 1]]:
+            if local[u] < 0:
+                local[u], halo[width - count] = width, u
+                width += 1
+    adjacent = np.zeros((count, width), np.uint8)
+    for i in range(count):
+        for u in graph.indices[graph.indptr[piece[i]] : graph.indptr[piece[i] + 1]]:
+            adjacent[i, local[u]] = 1
+        adjacent[i, i] = 0
+    for v in piece:
+        local[v] = -1
+    for v in halo[: width - count]:
+        local[v] = -1
+    return adjacent
+
+
+def eliminate(adjacent, ranks, v, now):
+    """Join all neighbours of v and take it out; their ranks are degree, then time of change."""
+    count, width = adjacent.shape
+    for u in range(count):
+        if adjacent[v, u]:
+            degree = 0
+            for w in range(width):
+                adjacent[u, w] |= adjacent[v, w]
+                degree += int(adjacent[u, w])
+            adjacent[u, u] = adjacent[u, v] = 0
+            ranks[u] = (degree - 2) * (count + 1) + now

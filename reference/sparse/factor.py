@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from ..arguments import FLOAT64, FloatArray, floats, instance, shape, shown
 from ..backend.compiled import Kernel
-from .analysis import analyse
 from .dissection import Graph
 from .multifrontal import factorize
+from .symbolic import analyse
 from .triangular import REGISTER, RIGHT_HAND_SIDES, solve
 
 
@@ -18,7 +18,7 @@ class NotPositiveDefiniteError(ValueError):
     """The matrix has no Cholesky factor: it is indefinite, singular or not finite."""
 
 
-class Pattern:
+class SymbolicFactor:
     """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
 
     def __init__(self, indptr: Any, indices: Any) -> None:
@@ -28,8 +28,8 @@ class Pattern:
             ValueError: if the pattern is not symmetric.
         """
         n = len(indptr) - 1
-        ones = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
-        if (ones != ones.T).nnz:
+        pattern = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
+        if (pattern != pattern.T).nnz:
             raise ValueError("matrix: expected both triangles with the same pattern")
         self.graph = Graph(indptr, indices)
         self.order, self.place, self.blocks, self.family = _analyse(
@@ -38,15 +38,13 @@ class Pattern:
 
     def fits(self, indptr: Any, indices: Any) -> bool:
         """Return whether the pattern is the same."""
-        return np.array_equal(indptr, self.graph.indptr) and np.array_equal(
-            indices, self.graph.indices
-        )
+        return all(map(np.array_equal, self.graph, (indptr, indices)))
 
 
 class CholeskyFactor:
     """P A P' = L L', L in supernodes."""
 
-    def __init__(self, matrix: Any, pattern: Pattern | None = None) -> None:
+    def __init__(self, matrix: Any, pattern: SymbolicFactor | None = None) -> None:
         """Factorise a sparse symmetric matrix, both triangles given.
 
         `pattern` is the analysis of an earlier matrix; it is used if the matrix has that pattern.
@@ -60,8 +58,10 @@ class CholeskyFactor:
             columns = columns.copy()
             columns.sum_duplicates()
         indptr, indices = columns.indptr.astype(np.int32), columns.indices.astype(np.int32)
-        if pattern is None or not instance("pattern", pattern, Pattern).fits(indptr, indices):
-            pattern = Pattern(indptr, indices)
+        if pattern is None or not instance("pattern", pattern, SymbolicFactor).fits(
+            indptr, indices
+        ):
+            pattern = SymbolicFactor(indptr, indices)
         self.pattern = pattern
         self._values = np.empty(pattern.family.entries)
         self._spare: list[FloatArray] = []  # workspaces for the unknowns, one a thread
@@ -78,7 +78,7 @@ class CholeskyFactor:
 
     @property
     def entries(self) -> int:
-        """How many entries of L are stored."""
+        """The number of stored entries of L."""
         return len(self._values)
 
     def refactorize(self, matrix: Any) -> "CholeskyFactor":
@@ -142,16 +142,16 @@ def square(matrix: Any) -> Any:
 
 
 def right_sides(b: ArrayLike, n: int) -> FloatArray:
-    """Return right-hand sides, (n,) or (n, right-hand side), whatever numbers they hold.
+    """Return right-hand sides, (n,) or (n, right-hand side), as floats.
 
     Raises:
         ValueError: if they are no numbers or have another shape.
     """
-    given = floats("b", b, "...")
-    if given.ndim not in (1, 2) or len(given) != n:
-        got = shape(given.shape)
+    columns = floats("b", b, "...")
+    if columns.ndim not in (1, 2) or len(columns) != n:
+        got = shape(columns.shape)
         raise ValueError(f"b: expected shape ({n},) or ({n}, right-hand side), got {got}")
-    return given
+    return columns
 
 
 _analyse = Kernel(analyse, label="the analysis of sparse matrices")

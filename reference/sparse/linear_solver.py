@@ -1,7 +1,7 @@
 """Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
 
-Three solvers stand behind one interface: our own `cholesky`, the default, CHOLMOD through cholespy
-where that is installed, and SciPy's SuperLU. cholespy prints a warning at an indefinite matrix.
+Three solvers have the same interface: our own `CholeskyFactor`, the default, CHOLMOD through
+cholespy where that is installed, and SciPy's SuperLU. cholespy warns of an indefinite matrix.
 """
 
 from collections.abc import Callable
@@ -63,7 +63,7 @@ class SuperLUFactor:
 
     @property
     def entries(self) -> int:
-        """How many entries of L are stored."""
+        """The number of stored entries of L."""
         return self._lu.L.nnz
 
     def solve(self, b: FloatArray) -> FloatArray:

@@ -4,13 +4,19 @@ A supernode's columns of A and the updates that its children left are added into
 its columns are eliminated there and what remains is the update for its parent (Duff and Reid 1983,
 "The Multifrontal Solution of Indefinite Sparse Symmetric Linear Systems"; Liu 1992, "The
 Multifrontal Method for Sparse Matrix Solution: Theory and Practice"). Children come right before
-their parents, so that the updates waiting form a stack.
+their parents, so that the pending updates form a stack.
+
+Row j of a front holds column j of the lower triangle, from the diagonal on: elimination runs along
+rows. Indices are made unsigned (`at`) for the reason given in `triangular`.
 """
+
+import math
 
 import numpy as np
 from numpy import uint64 as at
 
-from .dense import eliminate
+PANEL = 64  # rows eliminated one by one before the rest is updated
+STRIP = 256  # columns updated together, so that those of a panel stay in a near cache
 
 
 def factorize(matrix, data, order, place, blocks, family, values):
@@ -75,3 +81,87 @@ def store(front, first, last, target, position):
             target[at(position + i)] = front[at(j), at(j + i)]
         position += size - j
     return position
+
+
+def eliminate(front, width):
+    """Eliminate the first rows of a front; return the first whose pivot is not > 0, or -1."""
+    size = len(front)
+    for first in range(0, width, PANEL):
+        last = min(first + PANEL, width)
+        failed = eliminate_panel(front, first, last)
+        if failed >= 0:
+            return failed
+        for begin in range(last, size, STRIP):
+            end = min(begin + STRIP, size)
+            k = last
+            while k + 4 <= end:
+                subtract_from_four(front, first, last, k, max(begin, k), end)
+                k += 4
+            while k < end:
+                subtract_from_one(front, first, last, k, max(begin, k), end)
+                k += 1
+    return -1
+
+
+def eliminate_panel(front, first, last):
+    """Eliminate rows from each other; return the first whose pivot is not positive, or -1."""
+    size = len(front)
+    for j in range(first, last):
+        subtract_from_one(front, first, j, j, j, size)
+        pivot = front[at(j), at(j)]
+        if not (pivot > 0.0 and pivot < math.inf):
+            return j
+        pivot = math.sqrt(pivot)
+        front[at(j), at(j)] = pivot
+        inverse = 1.0 / pivot
+        for i in range(j + 1, size):
+            front[at(j), at(i)] *= inverse
+    return -1
+
+
+def subtract_from_one(front, first, last, k, begin, end):
+    """Subtract the products with rows `first` to `last` from row k, columns `begin` to `end`."""
+    row, j = at(k), first
+    while j + 4 <= last:
+        A, B, C, D = at(j), at(j + 1), at(j + 2), at(j + 3)
+        a, b, c, d = front[A, row], front[B, row], front[C, row], front[D, row]
+        for column in range(begin, end):
+            i = at(column)
+            front[row, i] -= a * front[A, i] + b * front[B, i] + c * front[C, i] + d * front[D, i]
+        j += 4
+    while j < last:
+        A = at(j)
+        a = front[A, row]
+        for column in range(begin, end):
+            front[row, at(column)] -= a * front[A, at(column)]
+        j += 1
+
+
+def subtract_from_four(front, first, last, k, begin, end):
+    """Do what `subtract_from_one` does for rows k to k + 3, with a quarter of the loads."""
+    k0, k1, k2, k3, j = at(k), at(k + 1), at(k + 2), at(k + 3), first
+    while j + 4 <= last:
+        A, B, C, D = at(j), at(j + 1), at(j + 2), at(j + 3)
+        a0, a1, a2, a3 = front[A, k0], front[A, k1], front[A, k2], front[A, k3]
+        b0, b1, b2, b3 = front[B, k0], front[B, k1], front[B, k2], front[B, k3]
+        c0, c1, c2, c3 = front[C, k0], front[C, k1], front[C, k2], front[C, k3]
+        d0, d1, d2, d3 = front[D, k0], front[D, k1], front[D, k2], front[D, k3]
+        for column in range(begin, end):
+            i = at(column)
+            a, b, c, d = front[A, i], front[B, i], front[C, i], front[D, i]
+            front[k0, i] -= a0 * a + b0 * b + c0 * c + d0 * d
+            front[k1, i] -= a1 * a + b1 * b + c1 * c + d1 * d
+            front[k2, i] -= a2 * a + b2 * b + c2 * c + d2 * d
+            front[k3, i] -= a3 * a + b3 * b + c3 * c + d3 * d
+        j += 4
+    while j < last:
+        A = at(j)
+        a0, a1, a2, a3 = front[A, k0], front[A, k1], front[A, k2], front[A, k3]
+        for column in range(begin, end):
+            i = at(column)
+            a = front[A, i]
+            front[k0, i] -= a0 * a
+            front[k1, i] -= a1 * a
+            front[k2, i] -= a2 * a
+            front[k3, i] -= a3 * a
+        j += 1

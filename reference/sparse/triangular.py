@@ -123,87 +123,67 @@ def four_columns(p, size):
     return p, p + size, p + 2 * size - 1, p + 3 * size - 3
 
 
+def subtract_four(z, values, p, q, r, s, rows):
+    """Return a row minus four scaled rows, scaled by the values at p, q, r and s."""
+    a, b, c, d = rows
+    z = subtract_scaled(subtract_scaled(z, values[at(p)], a), values[at(q)], b)
+    return subtract_scaled(subtract_scaled(z, values[at(r)], c), values[at(s)], d)
+
+
 def eliminate_four(values, p, size, j, last, below, y):
     """Do what `eliminate` does for columns j to j + 3; return where they end."""
     p, q, r, s = four_columns(p, size)
-    a = load_row(y, at(j))
-    a = scale_row(1.0 / values[at(p)], a)
+    a = scale_row(1.0 / values[at(p)], load_row(y, at(j)))
     b = subtract_scaled(load_row(y, at(j + 1)), values[at(p + 1)], a)
     b = scale_row(1.0 / values[at(q)], b)
-    c = subtract_scaled(
-        subtract_scaled(load_row(y, at(j + 2)), values[at(p + 2)], a), values[at(q + 1)], b
-    )
-    c = scale_row(1.0 / values[at(r)], c)
-    d = subtract_scaled(
-        subtract_scaled(load_row(y, at(j + 3)), values[at(p + 3)], a), values[at(q + 2)], b
-    )
+    c = subtract_scaled(load_row(y, at(j + 2)), values[at(p + 2)], a)
+    c = scale_row(1.0 / values[at(r)], subtract_scaled(c, values[at(q + 1)], b))
+    d = subtract_scaled(load_row(y, at(j + 3)), values[at(p + 3)], a)
+    d = subtract_scaled(d, values[at(q + 2)], b)
     d = scale_row(1.0 / values[at(s)], subtract_scaled(d, values[at(r + 1)], c))
     store_row(y, at(j), a)
     store_row(y, at(j + 1), b)
     store_row(y, at(j + 2), c)
     store_row(y, at(j + 3), d)
-    p, q, r, s = p + 4, q + 3, r + 2, s + 1
+    p, q, r, s, rows = p + 4, q + 3, r + 2, s + 1, (a, b, c, d)
     for i in range(last - j - 4):
         row = at(j + 4 + i)
-        z = subtract_scaled(
-            subtract_scaled(load_row(y, row), values[at(p + i)], a), values[at(q + i)], b
-        )
-        store_row(
-            y, row, subtract_scaled(subtract_scaled(z, values[at(r + i)], c), values[at(s + i)], d)
-        )
+        z = load_row(y, row)
+        store_row(y, row, subtract_four(z, values, p + i, q + i, r + i, s + i, rows))
     k = last - j - 4
     p, q, r, s = p + k, q + k, r + k, s + k
     for i in range(below.length):
         row = row_below(below, i)
-        z = subtract_scaled(
-            subtract_scaled(load_row(y, row), values[at(p + i)], a), values[at(q + i)], b
-        )
-        store_row(
-            y, row, subtract_scaled(subtract_scaled(z, values[at(r + i)], c), values[at(s + i)], d)
-        )
+        z = load_row(y, row)
+        store_row(y, row, subtract_four(z, values, p + i, q + i, r + i, s + i, rows))
     return s + below.length
 
 
 def substitute_four(values, p, size, j, last, below, y):
     """Do what `substitute` does for columns j to j + 3."""
     p, q, r, s = four_columns(p, size)
-    a, b, c, d = (
-        load_row(y, at(j)),
-        load_row(y, at(j + 1)),
-        load_row(y, at(j + 2)),
-        load_row(y, at(j + 3)),
-    )
-    for i in range(last - j - 4):
-        z = load_row(y, at(j + 4 + i))
-        a, b = (
-            subtract_scaled(a, values[at(p + 4 + i)], z),
-            subtract_scaled(b, values[at(q + 3 + i)], z),
-        )
-        c, d = (
-            subtract_scaled(c, values[at(r + 2 + i)], z),
-            subtract_scaled(d, values[at(s + 1 + i)], z),
-        )
+    a, b = load_row(y, at(j)), load_row(y, at(j + 1))
+    c, d = load_row(y, at(j + 2)), load_row(y, at(j + 3))
+    for i in range(4, last - j):
+        z = load_row(y, at(j + i))
+        a = subtract_scaled(a, values[at(p + i)], z)
+        b = subtract_scaled(b, values[at(q + i - 1)], z)
+        c = subtract_scaled(c, values[at(r + i - 2)], z)
+        d = subtract_scaled(d, values[at(s + i - 3)], z)
     k = last - j
     for i in range(below.length):
         z = load_row(y, row_below(below, i))
-        a, b = (
-            subtract_scaled(a, values[at(p + k + i)], z),
-            subtract_scaled(b, values[at(q + k - 1 + i)], z),
-        )
-        c, d = (
-            subtract_scaled(c, values[at(r + k - 2 + i)], z),
-            subtract_scaled(d, values[at(s + k - 3 + i)], z),
-        )
+        a = subtract_scaled(a, values[at(p + k + i)], z)
+        b = subtract_scaled(b, values[at(q + k - 1 + i)], z)
+        c = subtract_scaled(c, values[at(r + k - 2 + i)], z)
+        d = subtract_scaled(d, values[at(s + k - 3 + i)], z)
     d = scale_row(1.0 / values[at(s)], d)
     c = scale_row(1.0 / values[at(r)], subtract_scaled(c, values[at(r + 1)], d))
     b = subtract_scaled(subtract_scaled(b, values[at(q + 1)], c), values[at(q + 2)], d)
     b = scale_row(1.0 / values[at(q)], b)
-    a = subtract_scaled(
-        subtract_scaled(subtract_scaled(a, values[at(p + 1)], b), values[at(p + 2)], c),
-        values[at(p + 3)],
-        d,
-    )
-    store_row(y, at(j), scale_row(1.0 / values[at(p)], a))
+    a = subtract_scaled(subtract_scaled(a, values[at(p + 1)], b), values[at(p + 2)], c)
+    a = scale_row(1.0 / values[at(p)], subtract_scaled(a, values[at(p + 3)], d))
+    store_row(y, at(j), a)
     store_row(y, at(j + 1), b)
     store_row(y, at(j + 2), c)
     store_row(y, at(j + 3), d)

@@ -1,4 +1,4 @@
-"""Smooth trajectories: of all motions that follow a curve, one that changes least between frames.
+"""Smooth trajectories: motions along a curve with the smallest displacements between frames.
 
 Minimise 1/2 sum_f |d_f|^2 over the poses q_f of all frames together, d_f the displacement from
 frame f to the next, subject to every effector being on its target and every joint within its
@@ -37,9 +37,9 @@ def smooth(
     """Return a smooth trajectory near one that follows the targets, and the Newton steps taken.
 
     The targets of each frame are records TARGET, (frame, effector); q holds the mechanism's
-    coordinates to start from, (frame, coordinate). Frames that have `reached` their targets keep to
-    them, the others only approach theirs as far as a penalty draws them. The last frame leads back
-    to the first if closed. Limits are kept to about 1e-10 rad.
+    coordinates to start from, (frame, coordinate). Frames that have `reached` their targets stay
+    on them; a penalty draws all other frames towards theirs. The last frame leads back to the first
+    if closed. Limits are kept to about 1e-10 rad.
     """
     problem = new_problem(mechanism, targets, reached, closed and len(q) > 2)
     projected, valid = project(problem, q)

@@ -28,7 +28,7 @@ DEGENERATE = 1e-9
 
 def joint_limits(joints: RecordArray) -> IndexArray:
     """Return the joint and the bound, LOWER, UPPER or CONE, of every finite limit, (limit, 2)."""
-    found = [
+    limits = [
         (j, bound)
         for j, joint in enumerate(joints)
         for bound in ((LOWER, UPPER, CONE) if joint["kind"] == BALL else (LOWER, UPPER))
@@ -36,7 +36,7 @@ def joint_limits(joints: RecordArray) -> IndexArray:
         and joint["kind"] in (HINGE, SLIDE, BALL)
         and np.isfinite(bound_of(joints, j, bound))
     ]
-    return np.array(found, dtype=np.int64).reshape(-1, 2)
+    return np.array(limits, dtype=np.int64).reshape(-1, 2)
 
 
 def bound_of(joints, j, bound):
@@ -108,33 +108,22 @@ def add_active_limits(problem, q, z, step, gradient, diagonal, active):
     for f in range(len(q)):
         for i in range(len(problem.limits)):
             j = problem.limits[i, 0]
+            k, n = joints["freedom"][j], FREEDOMS[joints["kind"][j]]
             h, normal = excess(problem, q[f], i)
-            force = z[f, i] + PENALTY * h
-            at_end = force + PENALTY * directional_derivative(joints, j, normal, step[f])
+            force, slope = z[f, i] + PENALTY * h, 0.0
+            for a in range(n):
+                slope += normal[a] * step[f, k + a]
+            at_end = force + PENALTY * slope
             if at_end > 0.0:
-                add_parabola(joints, j, force, normal, gradient[f], diagonal[f])
                 if force < 0.0:
                     surplus += 0.5 * force * force / PENALTY
+                for a in range(n):
+                    gradient[f, k + a] += force * normal[a]
+                    for b in range(n):
+                        diagonal[f, k + a, k + b] += PENALTY * normal[a] * normal[b]
             changed |= active[f, i] != (at_end > 0.0)
             active[f, i] = at_end > 0.0
     return surplus, changed
-
-
-def directional_derivative(joints, j, normal, step):
-    """Return the change of h along a step, to first order."""
-    k, total = joints["freedom"][j], 0.0
-    for a in range(FREEDOMS[joints["kind"][j]]):
-        total += normal[a] * step[k + a]
-    return total
-
-
-def add_parabola(joints, j, force, normal, gradient, diagonal):
-    """Add the derivatives of one active limit."""
-    k, n = joints["freedom"][j], FREEDOMS[joints["kind"][j]]
-    for a in range(n):
-        gradient[k + a] += force * normal[a]
-        for b in range(n):
-            diagonal[k + a, k + b] += PENALTY * normal[a] * normal[b]
 
 
 def update_multipliers(problem, q, z):

@@ -52,13 +52,13 @@ def fill_band(diagonal, coupling, number, band):
             for a in range(b, n):
                 band[first + b, a - b] = diagonal[f, a, b]
     for f in range(len(coupling)):
-        here, there = number[f], number[(f + 1) % frames]
+        row, successor = number[f], number[(f + 1) % frames]
         for a in range(n):
             for b in range(n):
-                if there > here:
-                    band[here * n + b, (there - here) * n + a - b] = coupling[f, a, b]
+                if successor > row:
+                    band[row * n + b, (successor - row) * n + a - b] = coupling[f, a, b]
                 else:
-                    band[there * n + a, (here - there) * n + b - a] = coupling[f, a, b]
+                    band[successor * n + a, (row - successor) * n + b - a] = coupling[f, a, b]
 
 
 _fill = Kernel(fill_band)

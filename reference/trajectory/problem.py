@@ -1,4 +1,4 @@
-"""The problem that a smooth trajectory solves: its displacements, its constraints, its retraction.
+"""The problem of a smooth trajectory: its displacements, its constraints, its retraction.
 
 The poses that meet their targets form a manifold. A step along it is integrated joint by joint and
 then projected back onto it by Gauss-Newton steps of least norm; the two together are the retraction
@@ -34,7 +34,7 @@ _errors_and_jacobians = Kernel(fill_errors_and_jacobians)
 
 
 class TrajectoryProblem(NamedTuple):
-    """What a trajectory has to keep."""
+    """The constraints and units of a trajectory."""
 
     mechanism: Mechanism  # the joints
     units: FloatArray  # the displacement that counts as 1: 1 rad, or the reach [m], (freedom,)
@@ -54,22 +54,16 @@ def new_problem(
     mechanism: Mechanism, targets: RecordArray, constrained: np.ndarray, closed: bool
 ) -> TrajectoryProblem:
     """Return the problem of a mechanism whose limits are those of its joints."""
-    units, limits = displacement_units(mechanism), joint_limits(mechanism.joints)
-    return TrajectoryProblem(mechanism, units, limits, targets, constrained, closed)
-
-
-def displacement_units(mechanism: Mechanism) -> FloatArray:
-    """Return the displacement of each freedom that counts as 1: 1 rad, or the reach [m]."""
-    units = np.ones(mechanism.freedoms)
+    units, limits = np.ones(mechanism.freedoms), joint_limits(mechanism.joints)
     for j, joint in enumerate(mechanism.joints):
         if joint["leader"] == j and joint["kind"] in (SLIDE, FREE):
             first, count = joint["freedom"], 1 if joint["kind"] == SLIDE else 3
             units[first : first + count] = mechanism.reach
-    return units
+    return TrajectoryProblem(mechanism, units, limits, targets, constrained, closed)
 
 
 def displacements(problem: TrajectoryProblem, q: FloatArray) -> FloatArray:
-    """Return those from each frame to the next: as many as frames if closed, else one less."""
+    """Return the displacements between neighbouring frames, (displacement, freedom)."""
     d = np.empty((len(q) - (not problem.closed), problem.mechanism.freedoms))
     _displacements(problem, q, d)
     return d
@@ -103,14 +97,14 @@ def project(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, np.n
     """Return the constrained frames brought onto their targets, and which frames meet theirs."""
     for _ in range(MAX_PROJECTIONS):
         e, J = errors_and_jacobians(problem, q)
-        off = np.abs(e).max(axis=-1) > CONSTRAINT_TOLERANCE
-        if not (off & problem.constrained).any():
+        missed_target = np.abs(e).max(axis=-1) > CONSTRAINT_TOLERANCE
+        if not (missed_target & problem.constrained).any():
             break
         step = np.einsum("fe,fek->fk", e, transposed_pseudoinverse(J))
         step[~problem.constrained] = 0.0
         step[np.abs(step).max(axis=-1) > LONGEST_PROJECTION] = 0.0
         q = integrate(problem, q, step)
-    return q, ~off
+    return q, ~missed_target
 
 
 def near_singular(problem: TrajectoryProblem, q: FloatArray) -> np.ndarray:
@@ -120,9 +114,9 @@ def near_singular(problem: TrajectoryProblem, q: FloatArray) -> np.ndarray:
     """
     frames, n = len(q), problem.mechanism.freedoms
     nearby = integrate(problem, q, PROBE * np.cos(np.arange(frames * n)).reshape(frames, n))
-    here, there = (
-        np.linalg.svd(errors_and_jacobians(problem, some)[1], compute_uv=False)
-        for some in (q, nearby)
+    values, nearby_values = (
+        np.linalg.svd(errors_and_jacobians(problem, poses)[1], compute_uv=False)
+        for poses in (q, nearby)
     )
-    usual = there.max(axis=0)
-    return ((here < SINGULAR_RATIO * usual) & (usual > ALWAYS_ZERO)).any(axis=-1)
+    usual = nearby_values.max(axis=0)
+    return ((values < SINGULAR_RATIO * usual) & (usual > ALWAYS_ZERO)).any(axis=-1)

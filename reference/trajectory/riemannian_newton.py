@@ -26,7 +26,7 @@ from .problem import (
 from .smoothness import add_smoothness
 from .task_derivatives import subtract_second_derivatives
 
-# The weight of half the squared errors, over the reach, of a frame that need not meet its targets.
+# The weight of half the squared errors, over the reach, of a frame that is not constrained.
 TARGET_PENALTY = 100.0
 # Converged when a step predicts a decrease below this ratio to the cost, or below this cost.
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-14, 1e-20
@@ -52,6 +52,9 @@ _subtract_second_derivatives = Kernel(subtract_second_derivatives)
 class QuadraticModel(NamedTuple):
     """The cost about a trajectory to second order; the terms of the limits are in `cost` only."""
 
+    problem: TrajectoryProblem
+    q: FloatArray  # the trajectory, (frame, coordinate)
+    z: FloatArray  # the multipliers of the limits, (frame, limit)
     cost: float  # of the trajectory, limits included
     gradient: FloatArray  # (frame, freedom)
     diagonal: FloatArray  # the Hessian's block of each frame, (frame, freedom, freedom)
@@ -59,15 +62,6 @@ class QuadraticModel(NamedTuple):
     # within the null spaces, (displacement, freedom, freedom)
     coupling: FloatArray
     P: FloatArray  # projections onto the null spaces, (frame, freedom, freedom)
-
-
-class AcceptedStep(NamedTuple):
-    """The trajectory after a step, its largest entry [rad], its predicted decrease, the shift."""
-
-    q: FloatArray
-    length: float
-    predicted: float
-    shift: float
 
 
 def minimise(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, int]:
@@ -78,13 +72,14 @@ def minimise(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, int
     while steps < MAX_STEPS and not converged:
         steps += 1
         model = quadratic_model(problem, q, z)
-        accepted = accepted_step(problem, q, z, model, system, shift)
+        accepted = accepted_step(model, system, shift)
         if accepted is None:
             break
-        q, shift, change = accepted.q, accepted.shift, np.inf
-        if accepted.length <= LONGEST_STEP_TO_UPDATE:
+        q, length, predicted, shift = accepted
+        change = np.inf
+        if length <= LONGEST_STEP_TO_UPDATE:
             change = _update_multipliers(problem, q, z)
-        converged = is_negligible(accepted.predicted, model) and change <= MULTIPLIER_TOLERANCE
+        converged = is_negligible(predicted, model) and change <= MULTIPLIER_TOLERANCE
     return q, steps
 
 
@@ -105,7 +100,7 @@ def cost(problem: TrajectoryProblem, q: FloatArray, z: FloatArray) -> float:
 
 
 def sum_of_costs(problem: TrajectoryProblem, d: FloatArray, e: FloatArray) -> float:
-    """Return half the squared displacements, plus the penalties of errors where these may stay."""
+    """Return half the squared displacements, plus the penalties of frames off their targets."""
     errors = e[~problem.constrained]
     return 0.5 * float((d * d).sum() + TARGET_PENALTY * (errors**2).sum())
 
@@ -117,51 +112,45 @@ def quadratic_model(problem: TrajectoryProblem, q: FloatArray, z: FloatArray) ->
     gradient, diagonal = np.zeros((frames, n)), np.zeros((frames, n, n))
     coupling = np.zeros((len(d), n, n))
     _add_smoothness(mechanism.joints, d, gradient, diagonal, coupling)
-    K, drawn = transposed_pseudoinverse(J), ~problem.constrained
+    K, penalised = transposed_pseudoinverse(J), ~problem.constrained
     with_limits, _, _, _ = add_limits(problem, q, z, gradient, diagonal, np.zeros_like(gradient))
     m = np.einsum("fek,fk->fe", K, with_limits)
     P = np.eye(n) - J.swapaxes(-1, -2) @ K
-    P[drawn], m[drawn] = np.eye(n), TARGET_PENALTY * e[drawn]
-    gradient[drawn] -= np.einsum("fek,fe->fk", J[drawn], m[drawn])
-    diagonal[drawn] += TARGET_PENALTY * J[drawn].swapaxes(-1, -2) @ J[drawn]
+    P[penalised], m[penalised] = np.eye(n), TARGET_PENALTY * e[penalised]
+    gradient[penalised] -= np.einsum("fek,fe->fk", J[penalised], m[penalised])
+    diagonal[penalised] += TARGET_PENALTY * J[penalised].swapaxes(-1, -2) @ J[penalised]
     _subtract_second_derivatives(problem, q, m / mechanism.reach, diagonal)
-    after = np.roll(P, -1, axis=0)[: len(d)]
-    projected = after @ coupling @ P[: len(d)]
+    projected = np.roll(P, -1, axis=0)[: len(d)] @ coupling @ P[: len(d)]
     total = sum_of_costs(problem, d, e) + _limit_cost(problem, q, z)
-    return QuadraticModel(total, gradient, diagonal, projected, P)
+    return QuadraticModel(problem, q, z, total, gradient, diagonal, projected, P)
 
 
 def accepted_step(
-    problem: TrajectoryProblem,
-    q: FloatArray,
-    z: FloatArray,
-    model: QuadraticModel,
-    system: CyclicBandedSystem,
-    shift: float,
-) -> AcceptedStep | None:
-    """Return the first step that lowers the cost enough as the shift is raised, or None."""
+    model: QuadraticModel, system: CyclicBandedSystem, shift: float
+) -> tuple[FloatArray, float, float, float] | None:
+    """Return the first step that lowers the cost enough as the shift is raised, or None.
+
+    Returns:
+        The trajectory after it, its largest entry [rad], its predicted decrease, the next shift.
+    """
+    problem = model.problem
     while shift <= MAX_SHIFT:
-        step, predicted = newton_step(problem, q, z, model, system, shift)
+        step, predicted = newton_step(model, system, shift)
         if step is not None:
-            trial, valid = project(problem, integrate(problem, q, step))
+            trial, valid = project(problem, integrate(problem, model.q, step))
             if valid[problem.constrained].all():
-                decrease = model.cost - cost(problem, trial, z)
+                decrease = model.cost - cost(problem, trial, model.z)
                 negligible = is_negligible(predicted, model)
                 if negligible or decrease >= ACCEPTED * abs(predicted):
                     trusted = negligible or decrease >= TRUSTED * predicted
                     after = max(shift / 16.0, LEAST_SHIFT) if trusted else shift
-                    return AcceptedStep(trial, float(np.abs(step).max()), predicted, after)
+                    return trial, float(np.abs(step).max()), predicted, after
         shift = max(4.0 * shift, LEAST_RAISED_SHIFT)
     return None
 
 
 def newton_step(
-    problem: TrajectoryProblem,
-    q: FloatArray,
-    z: FloatArray,
-    model: QuadraticModel,
-    system: CyclicBandedSystem,
-    shift: float,
+    model: QuadraticModel, system: CyclicBandedSystem, shift: float
 ) -> tuple[FloatArray | None, float]:
     """Return the minimiser of the shifted model, and the decrease that it predicts.
 
@@ -169,19 +158,19 @@ def newton_step(
     Returns None if the shifted Hessian is not positive definite.
     """
     step, predicted = np.zeros_like(model.gradient), 0.0
-    active = np.zeros(z.shape, dtype=bool)
+    active = np.zeros(model.z.shape, dtype=bool)
     for i in range(MAX_ACTIVE_SETS):
         gradient, diagonal, surplus, changed = add_limits(
-            problem, q, z, model.gradient, model.diagonal, step, active
+            model.problem, model.q, model.z, model.gradient, model.diagonal, step, active
         )
         if i > 0 and not changed:
             break
         gradient, diagonal = project_derivatives(model.P, gradient, diagonal)
         system.fill(diagonal, model.coupling)
-        solved = system.solve(-gradient, shift)
-        if solved is None:
+        solution = system.solve(-gradient, shift)
+        if solution is None:
             return None, 0.0
-        step = solved
+        step = solution
         predicted = 0.5 * float((step * (shift * step - gradient)).sum()) - surplus
     return step, predicted
 

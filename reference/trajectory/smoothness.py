@@ -55,16 +55,7 @@ def integrate_frames(problem, step, q):
 
 
 def add_smoothness(joints, d, gradient, diagonal, coupling):
-    """Add the derivatives of half the squared displacements.
-
-    Args:
-        joints: the joints of the mechanism.
-        d: the displacements, (displacement, freedom).
-        gradient: (frame, freedom).
-        diagonal: the Hessian's block of each frame, (frame, freedom, freedom).
-        coupling: its blocks with the frame after a displacement as rows and the one before it as
-            columns, (displacement, freedom, freedom).
-    """
+    """Add the derivatives of half the squared displacements, see `QuadraticModel`."""
     for f in range(len(d)):
         g = (f + 1) % len(gradient)
         for k in range(d.shape[1]):
@@ -74,15 +65,13 @@ def add_smoothness(joints, d, gradient, diagonal, coupling):
             diagonal[g, k, k] += 1.0
             coupling[f, k, k] -= 1.0
         for j in range(len(joints)):
-            k, kind = joints["freedom"][j], joints["kind"][j]
-            if kind == BALL:
+            if joints["kind"][j] in (BALL, FREE):
+                k = joints["freedom"][j] + (3 if joints["kind"][j] == FREE else 0)
                 add_curvature(d[f], k, diagonal[f], diagonal[g], coupling[f])
-            elif kind == FREE:
-                add_curvature(d[f], k + 3, diagonal[f], diagonal[g], coupling[f])
 
 
 def add_curvature(d, k, before, after, coupling):
-    """Add what the rotation vector from freedom k on has beyond the second derivatives +-1."""
+    """Add the second derivatives of the rotation vector from freedom k on, less +-1."""
     v = d[k], d[k + 1], d[k + 2]
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     if square < SMALL_ANGLE * SMALL_ANGLE:

@@ -14,14 +14,14 @@ import numpy as np
 
 from ..arguments import FloatArray, IndexArray
 from ..articulation import FREEDOMS
+from ..inverse_kinematics.box_step import fill_errors, fill_jacobian
 from ..inverse_kinematics.mechanism import (
     LEVER,
     effector_position,
     new_data,
     update_forward_kinematics,
 )
-from ..inverse_kinematics.task_jacobian import fill_errors, fill_jacobian
-from ..motion_subspace import motion, velocity_at
+from ..jacobians import motion, velocity_at
 from ..quaternion import add, cross, dot, load_vector, scale, store_vector, subtract
 
 
@@ -34,15 +34,6 @@ class Motions(NamedTuple):
     # vectors whose product with the angular velocity of a motion above is m times the effector's
     # second derivative by both, (motion, 3)
     moments: FloatArray
-
-
-def new_motions(joints):
-    """Return motions to be filled."""
-    count = 0
-    for j in range(len(joints)):
-        count += FREEDOMS[joints["kind"][j]]
-    owners = np.empty((count, 2), dtype=np.int64)
-    return Motions(owners, np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)))
 
 
 def fill_errors_and_jacobians(problem, q, e, J):
@@ -58,7 +49,9 @@ def fill_errors_and_jacobians(problem, q, e, J):
 def subtract_second_derivatives(problem, q, m, diagonal):
     """Subtract m, (frame, equation), times the second derivatives of the effectors."""
     mechanism = problem.mechanism
-    data, motions = new_data(mechanism), new_motions(mechanism.joints)
+    data, count = new_data(mechanism), FREEDOMS[mechanism.joints["kind"]].sum()
+    angular, linear, moments = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    motions = Motions(np.empty((count, 2), dtype=np.int64), angular, linear, moments)
     for f in range(len(q)):
         set_frame(mechanism, q[f], data)
         fill_motions(mechanism, data, motions)
@@ -117,14 +110,9 @@ def subtract_effector(mechanism, motions, e, diagonal):
             above, i = owners[a]
             if mechanism.moves[above, e]:
                 second = dot(load_vector(angular, a), load_vector(moments, b))
-                if above == j and is_rotation(motions, a):
+                rotates = dot(load_vector(angular, a), load_vector(angular, a)) > 0.0
+                if above == j and rotates:
                     second = 0.5 * (second + dot(load_vector(angular, b), load_vector(moments, a)))
                 diagonal[i, k] -= second
                 if a != b:
                     diagonal[k, i] -= second
-
-
-def is_rotation(motions, a):
-    """Return whether a motion is a rotation."""
-    x, y, z = load_vector(motions.angular, a)
-    return x != 0.0 or y != 0.0 or z != 0.0

@@ -9,9 +9,9 @@ import pytest
 
 from plumbob import cli
 from plumbob.bench.comparison import compare as comparing
-from plumbob.bench.comparison import output, times
-from plumbob.bench.comparison.compare import Limits, compare, limits, stops_at
-from plumbob.bench.comparison.rows import ORDER, Ratio, Verdict, by_row
+from plumbob.bench.comparison import times
+from plumbob.bench.comparison.compare import compare, failing, gate_limits
+from plumbob.bench.comparison.rows import ORDER, ChangeVerdict, Pair, TimeRatio, by_row
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import RecordFile
 
@@ -29,23 +29,23 @@ def verdicts(old, new):
 
 def test_a_run_beside_itself_differs_in_nothing(records):
     made = compare(records, records)
-    assert {row.verdict for row in made.rows} == {Verdict.SAME}
+    assert {row.verdict for row in made.rows} == {ChangeVerdict.SAME}
     assert len(made.rows) > 30
-    assert stops_at(made.rows, Limits(accuracy=0.0, time=0.0, gone=True)) == []
+    assert failing(made.rows, gate_limits("accuracy,time,gone")) == []
 
 
 def test_times_of_too_few_rounds_are_counted(make):
     old = changed(make.timed("mine", 1.0), seconds=[1.0] * 4)
     made = compare([old], [changed(old, seconds=[2.0] * 4)])
-    assert (made.short, [row.verdict for row in made.rows]) == (1, [Verdict.SAME])
-    (*_, drift) = output.summary(made, [], 200)
-    assert "1 time of fewer than 5 rounds not compared" in drift
+    assert (made.short, [row.verdict for row in made.rows]) == (1, [ChangeVerdict.SAME])
+    (*_, last) = comparing.summary(made, [], 200)
+    assert "1 time with fewer than 5 rounds" in last
 
 
 @pytest.mark.parametrize(
     ("name", "step", "verdict"),
-    [("residual", 1, Verdict.LESS_RIGHT), ("residual", -1, Verdict.MORE_RIGHT),
-     ("largest_angle", 1, Verdict.CHANGED)],
+    [("residual", 1, ChangeVerdict.LESS_RIGHT), ("residual", -1, ChangeVerdict.MORE_RIGHT),
+     ("largest_angle", 1, ChangeVerdict.CHANGED)],
 )  # fmt: skip
 def test_the_last_digit_of_one_number_is_seen_whatever_else_changed(
     records, make, name, step, verdict
@@ -60,10 +60,10 @@ def test_the_last_digit_of_one_number_is_seen_whatever_else_changed(
     found = next(row for row in rows if row.quantity == name)
     assert found.verdict == verdict
     assert found.key[1:3] == ("arm/circle", "ccd")
-    assert Verdict.SLOWER in {row.verdict for row in rows}
+    assert ChangeVerdict.SLOWER in {row.verdict for row in rows}
     if step > 0:
         assert rows[0] == found
-        assert stops_at(rows, Limits(accuracy=0.0)) == [found]
+        assert failing(rows, {"accuracy": 0.0}) == [found]
 
 
 WORSE = {
@@ -78,41 +78,41 @@ def test_what_is_worse_is_less_right_and_the_reverse_more(make, arrays):
     old = make.raced("lm", "one start")
     new = changed(old, **arrays)
     (name,) = arrays
-    assert verdicts([old], [new])[0] == (Verdict.LESS_RIGHT, name)
-    assert verdicts([new], [old])[0] == (Verdict.MORE_RIGHT, name)
+    assert verdicts([old], [new])[0] == (ChangeVerdict.LESS_RIGHT, name)
+    assert verdicts([new], [old])[0] == (ChangeVerdict.MORE_RIGHT, name)
 
 
 def test_rows_come_go_and_fail(make):
     a, b = make.drawn("a", False, 1.0), make.drawn("b", False, 1.0)
     failed = replace(b, arrays={}, notes={"failed": "no engine"})
-    assert verdicts([a], [b]) == [(Verdict.GONE, ""), (Verdict.NEW, "")]
-    assert verdicts([b], [failed])[0] == (Verdict.LESS_RIGHT, "")
-    assert verdicts([failed], [b])[0] == (Verdict.NEW, "")
+    assert verdicts([a], [b]) == [(ChangeVerdict.GONE, ""), (ChangeVerdict.NEW, "")]
+    assert verdicts([b], [failed])[0] == (ChangeVerdict.LESS_RIGHT, "")
+    assert verdicts([failed], [b])[0] == (ChangeVerdict.NEW, "")
     rows = compare([a], [b]).rows
-    assert [row.verdict for row in stops_at(rows, Limits(gone=True))] == [Verdict.GONE]
+    assert [row.verdict for row in failing(rows, {"gone": 0.0})] == [ChangeVerdict.GONE]
 
 
 def test_versions_do_not_part_what_is_one_row(make):
     old = make.raced("peer", "one start")
     new = replace(old, settings={**old.settings, "version": "2"})
-    assert {verdict for verdict, _ in verdicts([old], [new])} == {Verdict.SAME}
+    assert {verdict for verdict, _ in verdicts([old], [new])} == {ChangeVerdict.SAME}
 
 
 def test_a_run_cut_sooner_is_compared_over_what_both_came_to(make):
     old = make.raced("peer", "one start")
     new = replace(old, arrays={k: v[:2] if v.ndim else v for k, v in old.arrays.items()})
-    assert {verdict for verdict, _ in verdicts([old], [new])} == {Verdict.SAME}
+    assert {verdict for verdict, _ in verdicts([old], [new])} == {ChangeVerdict.SAME}
     new = changed(new, solved=[True, True])
-    assert verdicts([old], [new])[0] == (Verdict.MORE_RIGHT, "solved")
+    assert verdicts([old], [new])[0] == (ChangeVerdict.MORE_RIGHT, "solved")
 
 
 @pytest.mark.parametrize(
     ("frames", "true", "remarks", "expected"),
     [
-        ([3, 2], [1.0, 9.0], [], (Verdict.SAME, "")),
-        ([3, 2], [1.1, 9.0], [], (Verdict.LESS_RIGHT, "true")),
-        ([3, 2], [1.0, 2.0], [20], (Verdict.CHANGED, "frames")),
-        ([3, 3], [1.0, 2.5], [], (Verdict.LESS_RIGHT, "true")),
+        ([3, 2], [1.0, 9.0], [], (ChangeVerdict.SAME, "")),
+        ([3, 2], [1.1, 9.0], [], (ChangeVerdict.LESS_RIGHT, "true")),
+        ([3, 2], [1.0, 2.0], [20], (ChangeVerdict.CHANGED, "frames")),
+        ([3, 3], [1.0, 2.5], [], (ChangeVerdict.LESS_RIGHT, "true")),
     ],
 )
 def test_motions_that_a_clock_ended_are_left_out_and_those_that_failed_are_not(
@@ -128,12 +128,12 @@ def test_motions_that_a_clock_ended_are_left_out_and_those_that_failed_are_not(
 
 def test_runs_of_other_sizes_are_not_compared(make):
     old = make.drawn("ccd", False, 1.0)
-    assert verdicts([old], [replace(old, size=20)]) == [(Verdict.UNDECIDED, "")]
+    assert verdicts([old], [replace(old, size=20)]) == [(ChangeVerdict.UNDECIDED, "")]
 
 
 @pytest.mark.parametrize(
     ("lost", "verdict"),
-    [(0, Verdict.SAME), (3, Verdict.UNDECIDED), (30, Verdict.LESS_RIGHT)],
+    [(0, ChangeVerdict.SAME), (3, ChangeVerdict.UNDECIDED), (30, ChangeVerdict.LESS_RIGHT)],
 )
 def test_answers_cut_by_a_clock_are_decided_by_chance(make, lost, verdict):
     solved = np.ones(200, dtype=bool)
@@ -174,7 +174,7 @@ def false_calls(make, repetitions, rate=lambda chances: metrics.adjusted(chances
     rng, count = np.random.default_rng(5), 0
     for _ in range(repetitions):
         rows = compare(*two_runs(make, rng)).rows
-        count += any(row.verdict in (Verdict.FASTER, Verdict.SLOWER) for row in rows)
+        count += any(row.verdict in (ChangeVerdict.FASTER, ChangeVerdict.SLOWER) for row in rows)
     return count
 
 
@@ -185,7 +185,7 @@ def test_of_twenty_runs_beside_their_like_at_most_one_calls_anything(make):
 def test_without_one_rate_over_all_rows_and_the_drift_far_more_would_be_called(make, monkeypatch):
     """The law above can fail: by no adjustment and no drift it does."""
     monkeypatch.setattr(comparing, "adjusted", np.asarray)
-    monkeypatch.setattr(comparing, "drift", lambda rows: times.known_drift(1e-9, ""))
+    monkeypatch.setattr(comparing, "machine_drift", lambda rows: times.assumed_drift(1e-9, ""))
     assert false_calls(make, 20) > 10
 
 
@@ -193,25 +193,25 @@ def test_a_slowdown_beyond_the_drift_is_called_and_one_within_is_undecided(make)
     rng = np.random.default_rng(1)
     old, new = two_runs(make, rng, drift=0.01, factor=1.2)
     made = compare(old, new)
-    assert made.rows[0].verdict == Verdict.SLOWER
+    assert made.rows[0].verdict == ChangeVerdict.SLOWER
     assert made.rows[0].key[2] == "s0"
     assert made.rows[0].ratio.low < 1.2 < made.rows[0].ratio.high
-    assert stops_at(made.rows, Limits(time=0.1)) == made.rows[:1]
-    assert stops_at(made.rows, Limits(time=0.5)) == []
+    assert failing(made.rows, {"time": 0.1}) == made.rows[:1]
+    assert failing(made.rows, {"time": 0.5}) == []
     back = compare(new, old).rows
-    assert [row.key[2] for row in back if row.verdict == Verdict.FASTER] == ["s0"]
+    assert [row.key[2] for row in back if row.verdict == ChangeVerdict.FASTER] == ["s0"]
     old, new = two_runs(make, rng, drift=0.3, factor=1.2)
     made = compare(old, new)
-    assert made.drift.value > 0.2
-    assert not {Verdict.SLOWER, Verdict.FASTER} & {row.verdict for row in made.rows}
+    assert made.drift.half_width > 0.2
+    assert not {ChangeVerdict.SLOWER, ChangeVerdict.FASTER} & {row.verdict for row in made.rows}
 
 
 def test_the_pace_beside_records_tells_the_drift_where_no_engine_does(make):
     record = changed(make.timed("mine", 1.0), seconds=[1.0, 1.01] * 10)
     calm = [replace(record, conditions={"pace": p}) for p in (1.0, 1.001)]
     wild = [replace(record, conditions={"pace": p}) for p in (1.0, 1.5)]
-    assert compare(*([r] for r in calm)).drift.value < 0.02
-    assert compare(*([r] for r in wild)).drift.value > np.log(1.5)
+    assert compare(*([r] for r in calm)).drift.half_width < 0.02
+    assert compare(*([r] for r in wild)).drift.half_width > np.log(1.5)
     assert "assumed" in compare([record], [record]).drift.source
 
 
@@ -219,7 +219,7 @@ def test_times_of_two_machines_are_not_compared(make):
     old = changed(make.timed("mine", 1.0), seconds=[1.0] * 10)
     stamp = {**old.stamp, "machine": {**old.stamp["machine"], "processor": "abacus"}}
     new = replace(changed(old, seconds=[9.0] * 10), stamp=stamp)
-    assert verdicts([old], [new])[0] == (Verdict.UNDECIDED, "seconds")
+    assert verdicts([old], [new])[0] == (ChangeVerdict.UNDECIDED, "seconds")
 
 
 def test_pairs_by_lot_call_nothing_by_chance_and_find_a_fifth():
@@ -260,23 +260,23 @@ def test_chances_over_all_rows_are_those_of_holm():
 
 
 LIMITS = {
-    "accuracy": Limits(accuracy=0.0),
-    "accuracy,time:10%": Limits(accuracy=0.0, time=0.1),
-    "time:0.25, gone": Limits(time=0.25, gone=True),
-    "accuracy:1e-9": Limits(accuracy=1e-9),
-    "time:": Limits(time=0.0),
-    "": Limits(),
+    "accuracy": {"accuracy": 0.0},
+    "accuracy,time:10%": {"accuracy": 0.0, "time": 0.1},
+    "time:0.25, gone": {"time": 0.25, "gone": 0.0},
+    "accuracy:1e-9": {"accuracy": 1e-9},
+    "time:": {"time": 0.0},
+    "": {},
     **dict.fromkeys(["speed", "time:fast", "time:-1", "gone:1", "time:nan"]),
 }
 
 
 @pytest.mark.parametrize(("text", "expected"), LIMITS.items())
 def test_limits_are_read_and_what_is_none_is_refused(text, expected):
-    if expected:
-        assert limits(text) == expected
+    if expected is not None:
+        assert gate_limits(text) == expected
     else:
         with pytest.raises(ValueError, match="--fail: expected"):
-            limits(text)
+            gate_limits(text)
 
 
 def test_numbers_of_any_kind_are_compared(make):
@@ -284,7 +284,10 @@ def test_numbers_of_any_kind_are_compared(make):
     old = make.record("x", "p", "a", arrays={"i": [2**62], "seconds": [1.0] * 9, "b": [True]},
                       conditions={"pace": "slow"})  # fmt: skip
     new = changed(old, i=[2**62 + 1], seconds=[np.inf] * 9, b=[False])
-    assert verdicts([old], [new]) == [(Verdict.CHANGED, "i"), (Verdict.UNDECIDED, "seconds")]
+    assert verdicts([old], [new]) == [
+        (ChangeVerdict.CHANGED, "i"),
+        (ChangeVerdict.UNDECIDED, "seconds"),
+    ]
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
@@ -293,17 +296,17 @@ def test_a_change_is_a_share_of_the_larger_number_and_a_gate_stops_from_there_on
     new = changed(old, largest_angle=factor * old.arrays["largest_angle"])
     rows = compare([old], [new]).rows
     (row,) = (row for row in rows if row.quantity == "largest_angle")
-    assert (row.verdict, row.change) == (Verdict.CHANGED, 0.5)
-    assert stops_at(rows, Limits(accuracy=0.5)) == [row]
-    assert stops_at(rows, Limits(accuracy=0.51)) == []
+    assert (row.verdict, row.change) == (ChangeVerdict.CHANGED, 0.5)
+    assert failing(rows, {"accuracy": 0.5}) == [row]
+    assert failing(rows, {"accuracy": 0.51}) == []
 
 
 @pytest.mark.parametrize(
     ("position", "verdict"),
     [
-        ([1e-8, 0.4, 0.1, 1e-7], Verdict.LESS_RIGHT),  # as many are worse as better
-        ([1e-8, 0.4, 0.09, 1e-7], Verdict.MORE_RIGHT),  # one of three is worse
-        ([1e-8, 0.6, 0.09, 1e-7], Verdict.LESS_RIGHT),
+        ([1e-8, 0.4, 0.1, 1e-7], ChangeVerdict.LESS_RIGHT),  # as many are worse as better
+        ([1e-8, 0.4, 0.09, 1e-7], ChangeVerdict.MORE_RIGHT),  # one of three is worse
+        ([1e-8, 0.6, 0.09, 1e-7], ChangeVerdict.LESS_RIGHT),
     ],
 )
 def test_answers_are_less_right_where_half_of_those_that_differ_are_worse(make, position, verdict):
@@ -315,21 +318,21 @@ def test_answers_are_less_right_where_half_of_those_that_differ_are_worse(make, 
 @pytest.mark.parametrize(
     ("low", "high", "chance", "verdict"),
     [
-        (0.92, 1.09, 1.0, Verdict.SAME),
-        (0.90, 1.09, 1.0, Verdict.UNDECIDED),  # it may be 1.1 times as fast
-        (0.92, 1.11, 1.0, Verdict.UNDECIDED),
-        (1.01, 1.05, times.ERROR_RATE, Verdict.SLOWER),
-        (1.01, 1.05, 1.01 * times.ERROR_RATE, Verdict.SAME),
+        (0.92, 1.09, 1.0, ChangeVerdict.SAME),
+        (0.90, 1.09, 1.0, ChangeVerdict.UNDECIDED),  # it may be 1.1 times as fast
+        (0.92, 1.11, 1.0, ChangeVerdict.UNDECIDED),
+        (1.01, 1.05, times.ERROR_RATE, ChangeVerdict.SLOWER),
+        (1.01, 1.05, 1.01 * times.ERROR_RATE, ChangeVerdict.SAME),
     ],
 )
 def test_times_are_the_same_where_both_ends_of_the_interval_are_within_a_tenth(
     low, high, chance, verdict
 ):
-    ratio = Ratio(math.sqrt(low * high), low, high, chance)
-    assert times.judged(KEY, "seconds", ratio, chance).verdict is verdict
-    inverse = Ratio(1.0 / ratio.value, 1.0 / high, 1.0 / low, chance)
-    mirrored = Verdict.FASTER if verdict is Verdict.SLOWER else verdict
-    assert times.judged(KEY, "seconds", inverse, chance).verdict is mirrored
+    ratio = TimeRatio(math.sqrt(low * high), low, high, chance)
+    assert times.time_change(KEY, "seconds", ratio, chance).verdict is verdict
+    inverse = TimeRatio(1.0 / ratio.ratio, 1.0 / high, 1.0 / low, chance)
+    mirrored = ChangeVerdict.FASTER if verdict is ChangeVerdict.SLOWER else verdict
+    assert times.time_change(KEY, "seconds", inverse, chance).verdict is mirrored
 
 
 def test_a_drift_by_the_pace_is_that_between_two_moments(make):
@@ -337,10 +340,10 @@ def test_a_drift_by_the_pace_is_that_between_two_moments(make):
     record = make.timed("mine", 1.0)
     logs = np.array([0.0, 0.05, 0.1, 0.3])
     paced = [replace(record, conditions={"pace": float(np.exp(pace))}) for pace in logs]
-    rows = {(*KEY[:3], str(k)): times.Pair(*paced[k : k + 2]) for k in (0, 2)}
-    deviation = times.drift(rows).deviation
-    assert deviation.value == pytest.approx(math.sqrt(2.0) * np.std(logs, ddof=1))
-    assert deviation.freedom == 3
+    rows = {(*KEY[:3], str(k)): Pair(*paced[k : k + 2]) for k in (0, 2)}
+    drift = times.machine_drift(rows)
+    assert drift.sigma == pytest.approx(math.sqrt(2.0) * np.std(logs, ddof=1))
+    assert drift.freedom == 3
 
 
 def test_of_several_records_of_a_row_the_latest_counts(make):
@@ -387,7 +390,7 @@ def test_markdown_and_json_hold_what_was_found(capsys, folders):
     assert content["stop"] == 1
     assert [row["verdict"] for row in content["rows"] if row["stops"]] == ["LESS RIGHT"]
     assert sum(content["counts"].values()) == len(content["rows"])
-    ranks = [ORDER.index(Verdict(row["verdict"])) for row in content["rows"]]
+    ranks = [ORDER.index(ChangeVerdict(row["verdict"])) for row in content["rows"]]
     assert ranks == sorted(ranks)
 
 

@@ -5,6 +5,7 @@ import csv
 import io
 import math
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -68,12 +69,19 @@ FACTS = re.compile(
 SOURCES = sorted(
     path
     for name in ("tables", "figures", "readings", "headlines", "sections")
-    for path in Path(bench.__file__).parent.rglob(f"{name}.py")
+    for path in Path(bench.__file__).parent.rglob(f"{name}.*")
+    if path.suffix in {".py", ".toml"}
 )
 
 
 def phrases(path):
-    """The string literals of a module that have several words, docstrings left out."""
+    """The strings of a file that have several words, docstrings and columns left out."""
+    if path.suffix == ".toml":
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        tables.pop("columns", None)
+        for texts in tables.values():
+            yield from texts.values()
+        return
     tree = ast.parse(path.read_text(encoding="utf-8"))
     bodies = [node.body for node in ast.walk(tree) if isinstance(getattr(node, "body", 0), list)]
     docs = {id(body[0].value) for body in bodies if body and isinstance(body[0], ast.Expr)}
@@ -82,7 +90,7 @@ def phrases(path):
             yield node.value if " " in node.value else ""
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: f"{path.parent.name}-{path.stem}")
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: f"{path.parent.name}-{path.name}")
 def test_no_setting_is_typed_into_a_sentence(path):
     """A number in a text comes from the constant that the measurement uses, or is a fact."""
     assert [text for text in phrases(path) if re.search(r"\d", FACTS.sub("", text))] == []

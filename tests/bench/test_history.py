@@ -37,10 +37,10 @@ def test_runs_come_in_the_order_of_time_and_the_greatest_change_first(runs):
     assert [run.name for run in read] == [f"run{i} {str(i) * 7}" for i in range(4)]
     made = courses(read, "seconds")
     assert len(made) == 9
-    assert made[0].title.endswith("s3")
+    assert made[0].solver == "s3"
     assert np.exp(made[0].change) == pytest.approx(2.0)
-    late = next(course for course in made if course.title.endswith("late"))
-    assert np.isnan(late.values).tolist() == [True, True, False, False]
+    late = next(course for course in made if course.solver == "late")
+    assert np.isnan(late.medians).tolist() == [True, True, False, False]
 
 
 def test_the_command_prints_sparklines_and_draws(capsys, runs, tmp_path):

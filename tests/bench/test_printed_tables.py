@@ -15,7 +15,7 @@ from plumbob.bench.report import sections
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import is_blank, without_empty, words
 from plumbob.crosscheck.claims import CLAIMS
-from plumbob.crosscheck.verdict import Verdict
+from plumbob.crosscheck.verdict import ClaimVerdict
 from plumbob.crosscheck.verify.judgement import Verdict as TaskVerdict
 from plumbob.crosscheck.verify.output import terminal as verify_terminal
 
@@ -75,7 +75,7 @@ def verdicts(monkeypatch):
     """Verdicts of all claims, no two numbers of a row alike; two are missed."""
     failures = {3: "nothing moved", 8: "not a number"}
     made = [
-        Verdict(claim, 3 + i, claim.tolerance.value / (2 + 3 * i), 1.0, failures.get(i, ""))
+        ClaimVerdict(claim, 3 + i, claim.tolerance.value / (2 + 3 * i), 1.0, failures.get(i, ""))
         for i, claim in enumerate(CLAIMS.values())
     ]
     made[8] = replace(made[8], difference=float("nan"))
@@ -152,8 +152,8 @@ def test_files_are_listed_with_what_each_engine_reads(capsys, tmp_path, monkeypa
     from plumbob.crosscheck.robots import files
 
     def checked(name, kind, *readings):
-        file = files.File(tmp_path / "robots" / name, kind, tmp_path / "robots")
-        return files.Checked(file, tuple(files.Reading(*reading) for reading in readings))
+        file = files.ModelFile(tmp_path / "robots" / name, kind, tmp_path / "robots")
+        return files.CheckedFile(file, tuple(files.FileReading(*reading) for reading in readings))
 
     every = [
         checked("my_arm.urdf", URDF, ("MuJoCo", files.AGREES, 2e-16), ("Pinocchio", files.UNREAD)),
@@ -161,7 +161,7 @@ def test_files_are_listed_with_what_each_engine_reads(capsys, tmp_path, monkeypa
         checked("walk.bvh", BVH, ("second reader", files.AGREES, 4e-14)),
         checked("part.xml", FRAGMENT),
     ]
-    found = files.Found(tuple(one.file for one in every), 1)
+    found = files.FileSelection(tuple(one.file for one in every), 1)
     monkeypatch.setattr(files, "find", lambda paths: found)
     monkeypatch.setattr(files, "check", lambda given: every)
     code, out = plumbob(capsys, "check", "--files", "robots")

@@ -13,7 +13,7 @@ import pytest
 
 from plumbob import cli
 from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
-from plumbob.bench.comparison.rows import Verdict
+from plumbob.bench.comparison.rows import ChangeVerdict
 from plumbob.bench.harness import machine
 
 LOOPS = 20_000
@@ -99,7 +99,7 @@ def side_by_side(folder, seed=1, **plan):
 def called(made):
     return {
         (row.key[2], row.quantity): row.verdict
-        for row in made.rows if row.verdict in (Verdict.FASTER, Verdict.SLOWER)
+        for row in made.rows if row.verdict in (ChangeVerdict.FASTER, ChangeVerdict.SLOWER)
     }  # fmt: skip
 
 
@@ -169,8 +169,8 @@ def measure_endlessly(repository):
 def test_a_revision_beside_itself_answers_alike_and_one_pair_tells_no_drift(repository):
     made = side_by_side(repository, words=("stead",), pairs=1)
     assert {row.key[2] for row in made.rows} == {"steady"}
-    assert [row.verdict for row in made.rows if row.quantity != "seconds"] == [Verdict.SAME]
-    assert made.drift.sentence == "10.5 % (assumed, for one pair does not tell)"
+    assert [row.verdict for row in made.rows if row.quantity != "seconds"] == [ChangeVerdict.SAME]
+    assert made.drift.sentence == "10.5 % (assumed: one pair does not measure it)"
     assert worktrees(repository) == 1
 
 
@@ -183,16 +183,16 @@ def test_a_revision_beside_itself_is_neither_faster_nor_slower(repository):
 def test_a_planted_digit_is_first_of_all(repository):
     write(repository, loops=2 * LOOPS, digit=np.nextafter(0.5, 1.0))
     made = side_by_side(repository, pairs=2)
-    assert [row.verdict for row in made.rows[:2]] == [Verdict.LESS_RIGHT] * 2
+    assert [row.verdict for row in made.rows[:2]] == [ChangeVerdict.LESS_RIGHT] * 2
     assert made.rows[0].quantity == "residual"
-    assert "2 times each" in made.how
+    assert "2 times each" in made.method
 
 
 @pytest.mark.slow
 def test_a_planted_fifth_is_found(repository):
     write(repository, loops=LOOPS * 6 // 5)
     made = side_by_side(repository, pairs=14)
-    assert called(made) == {("ours", "seconds"): Verdict.SLOWER}
+    assert called(made) == {("ours", "seconds"): ChangeVerdict.SLOWER}
     ratio = next(row.ratio for row in made.rows if row.key[2] == "ours" and row.ratio)
     assert ratio.low < 1.2 < 1.1 * ratio.high
 

@@ -9,7 +9,7 @@ from plumbob.bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
 from plumbob.bench.problems.robots import ALL, CHARACTER, is_installed
 from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import ROBOT_ENGINES
-from plumbob.crosscheck.robots.models import Model
+from plumbob.crosscheck.robots.models import RobotFile
 
 URDF = """<robot name="arm"><link name="base"/><link name="arm"/><link name="tip"/>
   <joint name="shoulder" type="continuous">
@@ -34,7 +34,7 @@ def compared(make, tmp_path):
                 measured.arrays, notes=dict(measured.notes), facts={"title": name},
             )
             for engine in ROBOT_ENGINES
-            for measured in [compare(engine, Model(name, path))]
+            for measured in [compare(engine, RobotFile(name, path))]
         ]  # fmt: skip
 
     return records

@@ -16,7 +16,7 @@ from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skeleton_claims
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS
-from plumbob.crosscheck.tolerances import ORDER, STIFFNESS, Tolerance
+from plumbob.crosscheck.tolerances import TOLERANCES, Tolerance
 from plumbob.crosscheck.verdict import Claim, Comparison, check_claim
 from plumbob.reference.backend.compiled import set_backend
 
@@ -25,7 +25,7 @@ FEW = 2
 
 
 # What is not only rounding: the next term of an error, and of a difference.
-LARGEST = {ORDER: 0.1, STIFFNESS: 5e-11}
+LARGEST = {TOLERANCES["order"]: 0.1, TOLERANCES["stiffness"]: 5e-11}
 
 # What follows many steps; in the interpreter that takes minutes.
 LONG = [name for name, claim in CLAIMS.items() if claim.cases < 10]
@@ -57,11 +57,11 @@ def disturbed(claim, size):
 
     def compare(cases):
         *others, last = claim.compare(cases)
-        ours = np.array(last.ours)
-        ours[np.unravel_index(np.abs(ours).argmax(), ours.shape)] += (
+        actual = np.array(last.actual)
+        actual[np.unravel_index(np.abs(actual).argmax(), actual.shape)] += (
             size * claim.tolerance.value * last.scale
         )
-        return [*others, last._replace(ours=ours)]
+        return [*others, last._replace(actual=actual)]
 
     return dataclasses.replace(claim, compare=compare)
 
@@ -125,8 +125,8 @@ def test_no_claim_hides_another_of_its_name():
 TOLERANCE = Tolerance(1e-12, "made up")
 
 
-def comparison(ours=(1.0, 2.0), theirs=(1.0, 2.0), baseline=(0.0, 0.0), scale=2.0):
-    return Comparison(np.array(ours), np.array(theirs), np.array(baseline), scale)
+def comparison(actual=(1.0, 2.0), expected=(1.0, 2.0), baseline=(0.0, 0.0), scale=2.0):
+    return Comparison(np.array(actual), np.array(expected), np.array(baseline), scale)
 
 
 def verdict_of(*comparisons):
@@ -135,7 +135,7 @@ def verdict_of(*comparisons):
 
 
 def test_equal_values_away_from_the_baseline_hold():
-    verdict = verdict_of(comparison(), comparison(theirs=(1.0, 2.0 + 1e-12)))
+    verdict = verdict_of(comparison(), comparison(expected=(1.0, 2.0 + 1e-12)))
     assert verdict.holds
     assert verdict.cases == 2
     assert verdict.difference == pytest.approx(5e-13, rel=1e-3)
@@ -145,17 +145,17 @@ def test_equal_values_away_from_the_baseline_hold():
 FAILURES = {
     "no cases": ([], "no cases", 0.0),
     "one bad case among many": (
-        [comparison(), comparison(theirs=(1.0, 2.1)), comparison()], "they differ", 0.05
+        [comparison(), comparison(expected=(1.0, 2.1)), comparison()], "they differ", 0.05
     ),
     "one case at its baseline among many": (
         [comparison(), comparison(baseline=(1.0, 2.0 + 1e-5))], "nothing moved", 0.0
     ),
     "the same infinity": (
-        [comparison(ours=(1.0, np.inf), theirs=(1.0, np.inf))], "not a number", np.nan
+        [comparison(actual=(1.0, np.inf), expected=(1.0, np.inf))], "not a number", np.nan
     ),
     **{
         f"{bad} in {field}": ([comparison(**{field: (1.0, bad)})], "not a number", np.nan)
-        for field in ("ours", "theirs", "baseline")
+        for field in ("actual", "expected", "baseline")
         for bad in (np.nan, np.inf)
     },
     **{
@@ -176,10 +176,10 @@ def test_a_claim_is_missed(name):
         assert verdict.displacement == pytest.approx(5e-6)
 
 
-@pytest.mark.parametrize(("ours", "theirs"), [((1.0, 2.0), (1.0,)), ((), ())])
-def test_shapes_must_be_equal_and_not_empty(ours, theirs):
+@pytest.mark.parametrize(("actual", "expected"), [((1.0, 2.0), (1.0,)), ((), ())])
+def test_shapes_must_be_equal_and_not_empty(actual, expected):
     with pytest.raises(ValueError, match="comparison: expected"):
-        verdict_of(comparison(ours=ours, theirs=theirs))
+        verdict_of(comparison(actual=actual, expected=expected))
 
 
 # Prints which claims are checked where neither engine makes a model; nothing is cached there.
@@ -216,7 +216,8 @@ def test_what_is_counted_as_resting_on_an_engine_cannot_be_checked_without_it():
     assert 0 < count < len(claims)
     arrays = {"cases": 1, "difference": 0.0, "tolerance": 1.0, "moved": 1.0, "held": True}
     records = [
-        Record("check", c.name, c.theirs, arrays=arrays, notes={"ours": c.ours}) for c in claims
+        Record("check", c.name, c.counterpart, arrays=arrays, notes={"ours": c.quantity})
+        for c in claims
     ]
     assert verdicts(Results(records)).summary.sentence.startswith(
         f"{len(claims)} of {len(claims)} claims held ({count} against Pinocchio or MuJoCo, "

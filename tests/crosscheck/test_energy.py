@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck import samples
-from plumbob.crosscheck.mass_spring.energy import energy_series, mechanical_energy
-from plumbob.crosscheck.mass_spring.integrators import SIMULATORS
+from plumbob.crosscheck.mass_spring.integrators import SIMULATORS, energy_series, mechanical_energy
 
 # Steps of an undamped spring, twelve to a radian.
 STEPS, SHARE = 600, 1 / 12

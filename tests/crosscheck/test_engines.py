@@ -14,7 +14,7 @@ from plumbob.crosscheck.engines import (
 )
 from plumbob.crosscheck.engines.mujoco_mass_spring import add_point_mass
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
-from plumbob.crosscheck.tolerances import STEP
+from plumbob.crosscheck.tolerances import TOLERANCES
 from plumbob.reference import rotation
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.mass_spring import MassSpring, State
@@ -165,7 +165,7 @@ def test_discrete_solves_a_stiff_cloth_to_the_end(rng):
     )
     theirs = MujocoMassSpring(system, h=1 / 60, integrator="discrete").step(state).velocities
     ours = ImplicitEuler(system, h=1 / 60, solver="gauss_newton").step(state).state.velocities
-    assert np.abs(ours - theirs).max() < STEP.value * np.abs(theirs).max()
+    assert np.abs(ours - theirs).max() < TOLERANCES["step"].value * np.abs(theirs).max()
 
 
 @pytest.mark.parametrize(("shift", "stiff"), [(0.0, False), (1e-12, True)])

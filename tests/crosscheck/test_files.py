@@ -17,18 +17,19 @@ from plumbob.crosscheck.robots.comparisons import sweep_in_parts
 from plumbob.crosscheck.robots.deviations import FRAME, INCLUDE
 from plumbob.crosscheck.robots.files import (
     AGREES,
+    CRASHED,
     DEVIATES,
     DIFFERS,
-    LOST,
     NEITHER,
     REFUSED,
     SECOND_READER,
     UNREAD,
-    File,
+    ModelFile,
     check,
     compare,
     find,
 )
+from plumbob.crosscheck.robots.models import RobotFile
 from plumbob.crosscheck.tolerances import POSITION
 from plumbob.reference import Skeleton, rotation
 from plumbob.reference.formats import bvh, mjcf
@@ -130,9 +131,9 @@ def test_files_are_found_below_folders_in_order_and_once(folder):
     assert [(file.path.relative_to(root).as_posix(), file.kind) for file in found.files] == [
         ("a.xml", MJCF), ("b/a.bvh", BVH), ("b/b.urdf", URDF), ("b/part.xml", FRAGMENT)
     ]  # fmt: skip
-    assert found.others == 1
+    assert found.ignored == 1
     assert {file.root for file in found.files} == {root}
-    assert find([root / "a.xml"]).files == (File(root / "a.xml", MJCF, root),)
+    assert find([root / "a.xml"]).files == (ModelFile(root / "a.xml", MJCF, root),)
 
 
 def test_folders_without_files_are_an_error(folder):
@@ -219,7 +220,7 @@ def test_a_difference_is_excused_only_by_a_known_cause_where_mujoco_agrees(
     monkeypatch.setattr(files, "known_deviations", lambda path: [])
     assert outcomes(root)["a.xml"]["Pinocchio"].outcome == DIFFERS
     file = find([root]).files[0]
-    theirs = files.Reading("Pinocchio", DIFFERS, 0.5), files.Reading("MuJoCo", LOST)
+    theirs = files.FileReading("Pinocchio", DIFFERS, 0.5), files.FileReading("MuJoCo", CRASHED)
     monkeypatch.undo()
     assert files._with_causes(Here(None, 60.0), file, list(theirs)) == theirs
 
@@ -290,7 +291,7 @@ def test_a_model_of_many_freedoms_is_compared_in_little_memory(folder):
 def test_the_parts_of_a_model_differ_by_as_much_as_the_whole(engine, folder, monkeypatch):
     """To the bit; and a fault in the last link alone is seen from every size of the parts."""
     file = find([folder(a_urdf=tree_of_hinges(40))]).files[0]
-    model = files.Model("a.urdf", file.path)
+    model = RobotFile("a.urdf", file.path)
     numbers = 41 * 5 * 6 * 40
 
     def compared(part):
@@ -336,12 +337,12 @@ def test_a_changed_file_differs(name, tmp_path, monkeypatch):
     file = find([tmp_path / path]).files[0]
     for engine in files.ENGINES[file.kind]:
         assert compare(engine, file).outcome == AGREES
-    for reader in (bvh, mjcf, files.Model):
+    for reader in (bvh, mjcf, RobotFile):
         read = reader.read
         monkeypatch.setattr(
             reader, "read",
-            (lambda self, read=read, **options: read(files.Model("", other), **options))
-            if reader is files.Model
+            (lambda self, read=read, **options: read(RobotFile("", other), **options))
+            if reader is RobotFile
             else (lambda _, read=read, **options: read(other)),
         )  # fmt: skip
     for engine in files.ENGINES[file.kind]:
@@ -365,7 +366,7 @@ def raising(*_):
     ("largest", "outcome", "why"),
     [
         *((lambda *_, x=x: x, DIFFERS, "") for x in (np.nan, np.inf, 2 * POSITION.value)),
-        (raising, LOST, "it ends in KeyError: 'a'"),
+        (raising, CRASHED, "it ends in KeyError: 'a'"),
     ],
 )
 def test_a_difference_above_the_tolerance_differs_and_an_exception_is_lost(
@@ -389,7 +390,7 @@ def test_a_file_that_crashes_an_engine_loses_only_that_reading(folder):
     deep = '<body name="a">' * 60_000 + "</body>" * 60_000
     root = folder(a_urdf=ARM(-1), c_urdf=ARM(-2), b_xml=character(deep))
     said = outcomes(root)
-    assert said["b.xml"]["Pinocchio"].outcome == LOST
+    assert said["b.xml"]["Pinocchio"].outcome == CRASHED
     assert said["b.xml"]["Pinocchio"].why == "the process ends by SIGSEGV"
     assert said["b.xml"]["MuJoCo"].outcome == NEITHER
     assert "at most 500 elements in each other" in said["b.xml"]["MuJoCo"].why

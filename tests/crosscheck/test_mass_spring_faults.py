@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.claims import CLAIMS
-from plumbob.crosscheck.mass_spring import balances, equilibria, integrators, steps
+from plumbob.crosscheck.mass_spring import equilibria, integrators, steps
 from plumbob.crosscheck.mass_spring import forces as force_claims
 from plumbob.crosscheck.mass_spring.claims import MASS_SPRING_CLAIMS
 from plumbob.crosscheck.mass_spring.steps import damper_blocks, semi_implicit
@@ -306,9 +306,9 @@ FAULTS = {
     "implicit Euler on a line": ((integrators, "ImplicitEuler", faulty_euler),
         ["gravity times mass twice", "external forces left out", "dampers left out",
          "dampers twice", "velocities not recomputed"]),
-    "implicit Euler balance": ((balances, "ImplicitEuler", faulty_euler),
+    "implicit Euler balance": ((steps, "ImplicitEuler", faulty_euler),
         [*IMPLICIT_FAULTS, LOOSE, "one iteration"]),
-    "implicit Euler balance, damped": ((balances, "ImplicitEuler", faulty_euler), DAMPER_FAULTS),
+    "implicit Euler balance, damped": ((steps, "ImplicitEuler", faulty_euler), DAMPER_FAULTS),
     "rope at rest, closed form": ((equilibria, "ImplicitEuler", faulty_euler), REST_FAULTS),
     "rope at rest": ((equilibria, "ImplicitEuler", faulty_euler), [*REST_FAULTS, "one iteration"]),
     "cloth at rest": ((equilibria, "ImplicitEuler", faulty_euler), ["gravity left out"]),

@@ -25,7 +25,6 @@ from plumbob.crosscheck.robots.comparisons import (
 )
 from plumbob.crosscheck.robots.deviations import (
     CLASS_ANCHOR,
-    DEVIATIONS,
     FRAME,
     INCLUDE,
     NAMELESS,
@@ -34,7 +33,7 @@ from plumbob.crosscheck.robots.deviations import (
     SHARED_REF,
     known_deviations,
 )
-from plumbob.crosscheck.robots.models import CAUSES, CHARACTERS, IMMOBILE, ROBOTS, UNREAD, Model
+from plumbob.crosscheck.robots.models import CAUSES, CHARACTERS, IMMOBILE, ROBOTS, UNREAD, RobotFile
 from plumbob.crosscheck.verdict import check_claim
 from plumbob.reference import Articulation
 from plumbob.reference.formats import FormatWarning, mjcf, urdf
@@ -210,7 +209,7 @@ def small(tmp_path, monkeypatch):
     for family, (name, text) in TEXTS.items():
         path = tmp_path / name
         path.write_text(text)
-        made[family] = Model(name, path)
+        made[family] = RobotFile(name, path)
     monkeypatch.setattr(models, "models", lambda family: (made[family],))
     sweep.cache_clear()
     return made
@@ -307,7 +306,7 @@ def test_lengths_are_over_the_extent_of_all_links_and_angles_over_a_radian(
 def written(folder, text, name="a.xml"):
     sweep.cache_clear()
     (folder / name).write_text(text)
-    return Model(name, folder / name)
+    return RobotFile(name, folder / name)
 
 
 # Minimal files in which Pinocchio departs from MuJoCo, by the cause that the check names.
@@ -332,7 +331,7 @@ DEVIATES = {
 }
 
 
-@pytest.mark.parametrize("cause", DEVIATIONS)
+@pytest.mark.parametrize("cause", DEVIATES)
 def test_pinocchio_departs_from_mujoco_and_us_by_a_cause_that_is_named(cause, tmp_path):
     """If this fails, Pinocchio has learnt something: the cause and its entries in CAUSES can go."""
     (tmp_path / "j.xml").write_text('<x><joint name="k"/></x>')
@@ -355,7 +354,7 @@ def test_refused_mimics_move_independently_for_both_with_a_reason(engine, small)
     """A leader that does not exist; one that Pinocchio, which goes by the alphabet, meets late."""
     unknown = small[ROBOTS].path.with_name("unknown.urdf")
     unknown.write_text(URDF.replace('mimic joint="shoulder"', 'mimic joint="elbow"'))
-    swept = sweep(engine, Model("unknown.urdf", unknown))
+    swept = sweep(engine, RobotFile("unknown.urdf", unknown))
     assert swept.free_mimics
     assert swept.robot.articulation.freedom_count == 5
     assert max(differences([swept])) < 1e-14
@@ -364,7 +363,7 @@ def test_refused_mimics_move_independently_for_both_with_a_reason(engine, small)
     late.write_text(
         URDF.replace('"shoulder"', '"zz"').replace('<limit lower="-0.2" upper="0.6"', follows)
     )
-    swept = sweep(engine, Model("late.urdf", late))
+    swept = sweep(engine, RobotFile("late.urdf", late))
     assert bool(swept.free_mimics) == (engine == "Pinocchio")
     assert max(differences([swept])) < 1e-14
 
@@ -422,7 +421,7 @@ UNNAMED = {
 def test_joints_without_names_are_found(joints, engine, tmp_path):
     swept = sweep(engine, written(tmp_path, NESTED.format(joints)))
     assert len(swept.links) == 2 + (engine == "MuJoCo")  # which also knows the world
-    assert np.ptp(swept.theirs.matrices[:, -1], axis=0).max() > 0.1  # not constant
+    assert np.ptp(swept.expected.matrices[:, -1], axis=0).max() > 0.1  # not constant
     assert max(differences([swept])) < 1e-14
 
 
@@ -430,7 +429,7 @@ def test_joints_of_bodies_without_names_are_found(tmp_path):
     text = NESTED.format("<freejoint/>").replace(' name="a"', "").replace(' name="j"', "")
     swept = sweep("MuJoCo", written(tmp_path, text))
     assert len(swept.links) == 3
-    assert np.ptp(swept.theirs.positions[:, -1], axis=0).max() > 0.1
+    assert np.ptp(swept.expected.positions[:, -1], axis=0).max() > 0.1
     assert max(differences([swept])) < 1e-14
 
 
@@ -465,7 +464,7 @@ def test_a_mimic_of_a_mimic_moves_and_is_in_the_jacobian(order, engine, tmp_path
     )
     # Off by 1e-16/h, and by h²/6 times the third derivative, 4³ m where four coordinates change.
     rates = (ahead - behind) / 2e-5
-    theirs = swept.theirs.jacobians[..., :3, :].sum(axis=-1)  # all coordinates change
+    theirs = swept.expected.jacobians[..., :3, :].sum(axis=-1)  # all coordinates change
     np.testing.assert_allclose(theirs, rates, atol=1e-8)
 
 
@@ -492,7 +491,7 @@ def indices_reversed(model, root):
     return zip(names, places[::-1], strict=True)
 
 
-found_followers, found_indices = mujoco_robot._followers, pinocchio_robot._indices_by_body
+found_followers, found_indices = mujoco_robot._followers, pinocchio_robot._joints_by_body
 UNNAMED_TWO = ("a.xml", NESTED.format(JOINTS))
 CHAIN = ("a.urdf", chain_of_mimics(4, (0, 1, 2, 3)))
 # What an adapter may get wrong: (engine, what of it, what in its place, a file that shows it).
@@ -510,7 +509,7 @@ ADAPTERS = {
         "Pinocchio", "pinocchio_robot._kind", lambda joint: "Joint_", UNNAMED_TWO
     ),
     "joints of bodies in another order": (
-        "Pinocchio", "pinocchio_robot._indices_by_body", indices_reversed, UNNAMED_TWO
+        "Pinocchio", "pinocchio_robot._joints_by_body", indices_reversed, UNNAMED_TWO
     ),
 }  # fmt: skip
 

@@ -28,7 +28,7 @@ from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.restarts import (
     COST,
     GIVEN_UP,
-    SETTLED,
+    STALLED,
     STATE,
     WAIT,
     Limits,
@@ -62,13 +62,13 @@ def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_ci
 
 def test_of_attempts_given_up_the_least_patient_goes_on_and_then_the_nearest():
     progress = np.empty((6, WAIT + 1))
-    progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, SETTLED, GIVEN_UP, GIVEN_UP
+    progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, STALLED, GIVEN_UP, GIVEN_UP
     progress[:, WAIT] = 12.0, 3.0, 3.0, 3.0, 3.0, 0.0
     progress[:, COST] = 0.1, 0.5, 0.3, 0.2, 0.4, 0.0
     order = []
     while (k := most_promising(progress)) >= 0:
         order.append(k)
-        progress[k, STATE] = SETTLED
+        progress[k, STATE] = STALLED
     assert order == [2, 4, 1, 0]
 
 

@@ -1,4 +1,4 @@
-"""What comes of files of anyone beside the engines, as tables and sentences."""
+"""Tables and sentences on how engines and the reference read a user's files."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -7,22 +7,28 @@ from typing import NamedTuple
 
 from plumbob.crosscheck.engines.file_kind import FRAGMENT
 from plumbob.crosscheck.robots import files
-from plumbob.crosscheck.robots.files import AGREES, DIFFERS, ENGINES, Checked, Found, Reading
+from plumbob.crosscheck.robots.files import (
+    AGREES,
+    DIFFERS,
+    ENGINES,
+    CheckedFile,
+    FileReading,
+    FileSelection,
+)
 
 from ...tables.columns import text
 from ...tables.table import Column, Summary, Table, cells, words
 
-# Outcomes by which a file is counted; the first two are shown whether there are any or not.
-OUTCOMES = (AGREES, DIFFERS, files.DEVIATES, files.UNREAD, files.REFUSED, files.NEITHER, files.LOST)
+# Outcomes by which files are counted; the first two are shown even where there are none.
+READ = (AGREES, DIFFERS, files.DEVIATES)
+OUTCOMES = (*READ, files.UNREAD, files.REFUSED, files.NEITHER, files.CRASHED)
 SHOWS = (
     "Differences are the largest in random configurations, or frames: of positions and linear "
     "velocities over the extent of the links, of rotation matrices and angular velocities."
 )
-# A kind of files and an engine, with all readings of such files by it.
-Group = tuple[tuple[str, str], list[Reading]]
 
 
-class Report(NamedTuple):
+class FileReport(NamedTuple):
     """A row for each file, a row for each kind and engine, and how many readings disagree."""
 
     files: Table
@@ -30,89 +36,95 @@ class Report(NamedTuple):
     disagreements: int
 
 
-def report(found: Found, checked: Sequence[Checked]) -> Report:
+class FileGroup(NamedTuple):
+    """The readings of all files of a kind by one engine."""
+
+    kind: str
+    engine: str
+    readings: list[FileReading]
+
+
+def report(scan: FileSelection, checked: Sequence[CheckedFile]) -> FileReport:
     """Return the tables of files that were checked."""
-    readings = [reading for file in checked for reading in file.readings]
-    engines = dict.fromkeys(engine for engines in ENGINES.values() for engine in engines)
-    asked = [engine for engine in engines if engine in {reading.engine for reading in readings}]
+    groups = [
+        FileGroup(kind, engine, readings)
+        for kind, engines in ENGINES.items()
+        for engine in engines
+        if (readings := _readings(kind, engine, checked))
+    ]
     columns = (
         text("file", _name),
         text("format", lambda checked: checked.file.kind),
-        *(text(engine, partial(_outcome, engine)) for engine in asked),
+        *(text(e, partial(_outcome, e)) for e in dict.fromkeys(group.engine for group in groups)),
     )
     whole = [file for file in checked if file.file.kind != FRAGMENT]
     points = tuple(point for file in checked for point in _points(file))
     table = Table("files", "Files", columns, cells(columns, whole), summary=Summary(SHOWS, points))
-    disagreements = sum(reading.outcome == DIFFERS for reading in readings)
-    summary = Summary(_sentence(found, checked, disagreements))
-    return Report(table, _summary(list(_groups(checked)), summary), disagreements)
+    outcomes = [reading.outcome for group in groups for reading in group.readings]
+    disagreements = outcomes.count(DIFFERS)
+    summary = Summary(_sentence(scan, checked, disagreements))
+    return FileReport(table, _summary(groups, {*outcomes}, summary), disagreements)
 
 
-def _groups(checked: Sequence[Checked]) -> Iterator[Group]:
-    """Yield the readings of each kind of files by each engine, if there are any."""
-    for kind, engines in ENGINES.items():
-        of_kind = [r for file in checked if file.file.kind == kind for r in file.readings]
-        for engine in engines:
-            if readings := [reading for reading in of_kind if reading.engine == engine]:
-                yield (kind, engine), readings
+def _readings(kind: str, engine: str, checked: Sequence[CheckedFile]) -> list[FileReading]:
+    of_kind = [r for file in checked if file.file.kind == kind for r in file.readings]
+    return [reading for reading in of_kind if reading.engine == engine]
 
 
-def _summary(groups: Sequence[Group], summary: Summary) -> Table:
+def _summary(groups: Sequence[FileGroup], outcomes: set[str], summary: Summary) -> Table:
     """Return a row for each kind and engine, with the outcomes that there are."""
-    present = {AGREES, DIFFERS, *(r.outcome for _, readings in groups for r in readings)}
+
+    def count(outcome: str, group: FileGroup) -> int:
+        return sum(reading.outcome == outcome for reading in group.readings)
+
     columns = (
-        text("format", lambda group: group[0][0]),
-        text("beside", lambda group: group[0][1]),
-        Column("files", read=lambda group: len(group[1])),
-        *(Column(o, read=partial(_count, o)) for o in OUTCOMES if o in present),
+        text("format", lambda group: group.kind),
+        text("compared with", lambda group: group.engine),
+        Column("files", read=lambda group: len(group.readings)),
+        *(Column(o, read=partial(count, o)) for o in OUTCOMES if o in {AGREES, DIFFERS, *outcomes}),
         Column("agrees within", read=_largest_difference),
     )
     title = "Who reads and who agrees"
     return Table("summary", title, columns, cells(columns, groups), summary=summary)
 
 
-def _outcome(engine: str, checked: Checked) -> str | None:
-    """Return what came of an engine's reading, with the difference; None if it was not asked."""
+def _outcome(engine: str, checked: CheckedFile) -> str | None:
+    """Return the outcome of an engine's reading, with the difference; None without a reading."""
     reading = next((r for r in checked.readings if r.engine == engine), None)
     if reading is None or reading.difference is None:
         return reading and reading.outcome
     return f"{reading.outcome} ({words(reading.difference)})"
 
 
-def _count(outcome: str, group: Group) -> int:
-    return sum(reading.outcome == outcome for reading in group[1])
-
-
-def _largest_difference(group: Group) -> float | None:
+def _largest_difference(group: FileGroup) -> float | None:
     """Return the largest difference of the readings that agree, None where none does."""
-    return max((r.difference or 0.0 for r in group[1] if r.outcome == AGREES), default=None)
+    return max((r.difference or 0.0 for r in group.readings if r.outcome == AGREES), default=None)
 
 
-def _name(checked: Checked) -> str:
+def _name(checked: CheckedFile) -> str:
     root = checked.file.root
     return (Path(root.resolve().name) / checked.file.path.relative_to(root)).as_posix()
 
 
-def _points(checked: Checked) -> Iterator[str]:
-    """Return what is to be said of a file beyond its row."""
+def _points(checked: CheckedFile) -> Iterator[str]:
+    """Return the reasons and notes that a file's row has no space for."""
     reasons = [f"{r.engine}: {r.outcome}: {r.why}" for r in checked.readings if r.why]
     notes = dict.fromkeys(note for reading in checked.readings for note in reading.notes)
     return (f"{_name(checked)}: {sentence}" for sentence in (*reasons, *notes))
 
 
-def _sentence(found: Found, checked: Sequence[Checked], disagreements: int) -> str:
+def _sentence(scan: FileSelection, checked: Sequence[CheckedFile], disagreements: int) -> str:
+    def counted(count: int, singular: str, plural: str) -> str:
+        return f"{count:,} {singular if count == 1 else plural}"
+
     fragments = sum(file.file.kind == FRAGMENT for file in checked)
     outcomes = ({reading.outcome for reading in file.readings} for file in checked)
     unread = sum(outcome == {files.NEITHER} for outcome in outcomes)
-    silent = f", {_counted(unread, 'is', 'are')} read by none" if unread else ""
-    differ = _counted(disagreements, "reading disagrees", "readings disagree")
-    parts = _counted(fragments, "is a part", "are parts")
-    others = _counted(found.others, "XML file is", "XML files are")
+    silent = f", {counted(unread, 'is', 'are')} read by none" if unread else ""
+    differ = counted(disagreements, "reading disagrees", "readings disagree")
+    parts = counted(fragments, "is a part", "are parts")
+    ignored = counted(scan.ignored, "XML file is", "XML files are")
     return (
         f"Of {len(checked) - fragments:,} files {differ if disagreements else 'nothing disagrees'}"
-        f"{silent}; {parts} that others include, {others} of other kinds"
+        f"{silent}; {parts} that others include, {ignored} of other kinds"
     )
-
-
-def _counted(count: int, one: str, many: str) -> str:
-    return f"{count:,} {one if count == 1 else many}"

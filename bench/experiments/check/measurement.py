@@ -10,15 +10,15 @@ from .values import ClaimValues
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield every claim; its number of cases is its own at every scale."""
+    """Yield every claim, whose number of cases is the same at every scale."""
     for claim in CLAIMS.values():
-        yield Block("check", claim.name, claim.theirs, partial(verdict, claim.name))
+        yield Block("check", claim.name, claim.counterpart, partial(evaluate, claim.name))
 
 
-def verdict(name: str) -> Measured:
-    """Evaluate a claim; keep its numbers and its words."""
+def evaluate(name: str) -> Measured:
+    """Evaluate a claim; return its numbers and its sentences."""
     (verdict,) = run_claims([name])
     claim = verdict.claim
     numbers = (verdict.cases, verdict.difference, claim.tolerance.value, verdict.displacement)
-    notes = {"ours": claim.ours, "reason": claim.tolerance.reason, "missed": verdict.failure}
+    notes = {"ours": claim.quantity, "reason": claim.tolerance.reason, "missed": verdict.failure}
     return Measured(ClaimValues(*numbers, verdict.holds), notes)

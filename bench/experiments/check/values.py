@@ -1,10 +1,12 @@
 """The records of the cross-check's claims."""
 
+import msgspec
+
 from ...harness.values import Details, Kind, Values
 
 
 class ClaimValues(Values, frozen=True):
-    """The largest relative difference over cases, what it may be, and what moved in each case."""
+    """The largest relative difference over the cases, its tolerance, and the displacement."""
 
     cases: int
     difference: float
@@ -14,11 +16,11 @@ class ClaimValues(Values, frozen=True):
 
 
 class ClaimDetails(Details, frozen=True):
-    """What a claim compares, the reason for its tolerance, and why it was missed."""
+    """The quantity that we compute, the reason for the tolerance, and why the claim failed."""
 
-    ours: str = ""
+    quantity: str = msgspec.field(default="", name="ours")
     reason: str = ""
-    missed: str = ""
+    failure: str = msgspec.field(default="", name="missed")
 
 
 KINDS = {"": Kind(ClaimValues, ClaimDetails)}

@@ -4,9 +4,14 @@ import functools
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from plumbob.crosscheck.mass_spring.energy import energy_series, mechanical_energy
 from plumbob.crosscheck.mass_spring.equilibria import equilibrium
-from plumbob.crosscheck.mass_spring.integrators import SIMULATORS, Simulation, implicit
+from plumbob.crosscheck.mass_spring.integrators import (
+    SIMULATORS,
+    Simulation,
+    energy_series,
+    implicit,
+    mechanical_energy,
+)
 from plumbob.reference import MassSpring, State, scenes, symplectic_euler
 
 from ...harness.block import Block, Measured, Scale

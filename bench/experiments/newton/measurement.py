@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.mass_spring import balance_residual
 from plumbob.crosscheck.mass_spring.exact_step import ExactStep, exact_step
+from plumbob.crosscheck.mass_spring.steps import balance_residual
 from plumbob.reference import STEP_SOLVERS
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.implicit_euler.certificate import Certificate, certify

@@ -6,7 +6,7 @@ from functools import partial
 from plumbob.crosscheck.engines import ROBOT_ENGINES
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
 from plumbob.crosscheck.robots.comparisons import CONFIGURATIONS, differences, sweep
-from plumbob.crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
+from plumbob.crosscheck.robots.models import CAUSES, PACKAGES, RobotFile, models, moving_joints
 
 from ...harness.block import Block, Measured, Scale
 from . import peers
@@ -27,7 +27,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
     yield from peers.blocks(SUITE)
 
 
-def compare(engine: str, model: Model) -> Measured:
+def compare(engine: str, model: RobotFile) -> Measured:
     """Compare one file in random configurations; keep why the engine does not read it."""
     try:
         swept = sweep(engine, model)
@@ -36,7 +36,7 @@ def compare(engine: str, model: Model) -> Measured:
     except ValueError as error:
         return _unread(f"{engine} reads it, the reference does not: {error}", model)
     articulation = swept.robot.articulation
-    joints = len(slots(swept.robot)) + len(articulation.mimics)
+    joints = len(moving_joints(swept.robot)) + len(articulation.mimics)
     sizes = (len(swept.links), joints, articulation.freedom_count)
     return Measured(
         FileValues(*sizes, **differences([swept])._asdict()),
@@ -44,5 +44,5 @@ def compare(engine: str, model: Model) -> Measured:
     )
 
 
-def _unread(why: str, model: Model) -> Measured:
+def _unread(why: str, model: RobotFile) -> Measured:
     return Measured(None, {"unread": why.replace(str(model.path), model.path.name)})

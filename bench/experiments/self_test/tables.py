@@ -1,17 +1,13 @@
-"""Which known faults the judge catches and names, by which laws, and whom it accuses."""
+"""Which planted faults `plumbob verify` catches and names, and which honest solvers it accuses."""
 
 from collections.abc import Sequence
 
 from ...harness.record import Record
+from ...tables.captions import Captions
 from ...tables.columns import text, titled
 from ...tables.layout import Layout
-from ...tables.results import listed
-from ...tables.table import Cell, Column, Summary
-
-
-def _of_fault(name: str, record: Record) -> Cell:
-    """Return whether a fault is caught, or named; None of an honest solver."""
-    return getattr(record.values, name) if record.details.faulty else None
+from ...tables.results import grouped, listed
+from ...tables.table import Column, Summary
 
 
 def _is_accused(record: Record) -> bool | None:
@@ -20,42 +16,33 @@ def _is_accused(record: Record) -> bool | None:
 
 
 def _summary(records: Sequence[Record]) -> Summary:
-    families = dict.fromkeys(record.details.family for record in records)
+    families = grouped(records, lambda record: record.details.family)
     failures = [f"{r.details.family}: {r.title}" for r in records if not r.values.passed]
-    points = (f"{f}: {_count([r for r in records if r.details.family == f])}" for f in families)
-    return Summary(f"{_count(records)}:", (*failures, *points))
+    points = (f"{family}: {_counts(members)}" for family, members in families.items())
+    return Summary(f"{_counts(records)}:", (*failures, *points))
 
 
-def _count(records: Sequence[Record]) -> str:
-    """Say how many faults are caught and named, and how many honest solvers are accused."""
-    faulty = [record for record in records if record.details.faulty]
-    caught, named = (
-        sum(bool(getattr(r.values, name)) for r in faulty) for name in ("caught", "named")
-    )
+def _counts(records: Sequence[Record]) -> str:
+    """Return how many faults are caught and named, and how many honest solvers are accused."""
+    faults = [record.values for record in records if record.details.faulty]
+    caught, named = sum(f.caught for f in faults), sum(f.named for f in faults)
     accused = sum(bool(_is_accused(record)) for record in records)
-    faults = f"{caught} of {len(faulty)} planted faults caught, {named} named"
-    honest = f"{accused} of {len(records) - len(faulty)} honest solvers accused"
-    return "; ".join([faults] * bool(faulty) + [honest] * (len(faulty) < len(records)))
+    planted = f"{caught} of {len(faults)} planted faults caught, {named} named"
+    honest = f"{accused} of {len(records) - len(faults)} honest solvers accused"
+    return "; ".join([planted] * bool(faults) + [honest] * (len(faults) < len(records)))
 
 
 self_test = Layout(
-    "Does the judge of solvers find what is wrong, and only that?",
-    "self_test",
-    "Planted faults and honest solvers, judged by plumbob verify",
+    **Captions(__file__).of("self_test"),
     subjects=lambda results: results.all("self_test"),
     columns=(
         text("solvers", lambda record: record.details.family),
         titled("fault or honest solver"),
-        Column("caught", read=lambda record: _of_fault("caught", record)),
-        Column("named", read=lambda record: _of_fault("named", record)),
+        Column("caught", read=lambda r: r.values.caught if r.details.faulty else None),
+        Column("named", read=lambda r: r.values.named if r.details.faulty else None),
         Column("accused", read=_is_accused),
-        text("broken laws", lambda record: listed(record.details.laws)),
+        text("violated laws", lambda record: listed(record.details.laws)),
     ),
-    shows="Caught: a law is broken that knows nothing of faults. Named: the fault, or a class "
-    "with it that no answer tells apart, is the first explanation. Accused: an honest solver is "
-    "called wrong, or a fault is named.",
-    measured="Each fault planted in the textbook’s method or the dense step, and judged as any "
-    "solver is; honest are the reference, engines, single precision and other models of the step.",
     summary=_summary,
 )
 

@@ -1,4 +1,4 @@
-"""The records of the judge's self-test."""
+"""The records of the self-test of `plumbob verify`."""
 
 import msgspec
 
@@ -6,7 +6,7 @@ from ...harness.values import Details, Kind, Values
 
 
 class TrialValues(Values, frozen=True):
-    """Whether a law is broken, the fault named (or none, of an honest solver), all is right."""
+    """Whether a law is violated, the fault (or none) named, and the verdict right."""
 
     caught: bool
     named: bool
@@ -14,7 +14,7 @@ class TrialValues(Values, frozen=True):
 
 
 class TrialDetails(Details, frozen=True):
-    """The solver's family, whether it is faulty, and the laws that it breaks."""
+    """The solver's family, whether it is faulty, and the laws that it violates."""
 
     family: str
     faulty: bool

@@ -24,7 +24,7 @@ MOTION_STEPS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class SpringScene:
     """A system, its state and a step."""
 
     name: str
@@ -67,7 +67,7 @@ def _has(system: System, need: str) -> bool:
     return system.gravity == "vector" if need == "gravity" else bool(getattr(system, need))
 
 
-def _case(task: str, scene: Scene, system: System) -> Case:
+def _case(task: str, scene: SpringScene, system: System) -> Case:
     """Return the scene as a request, with one value for all where the solver has but one."""
     springs = np.asarray(scene.springs, dtype=np.int64).reshape(-1, 2)
     x, v, g = scene.positions, scene.velocities, scene.gravity
@@ -106,7 +106,7 @@ def _lengths(x: FloatArray, springs: Any) -> FloatArray:
     return np.linalg.norm(x[springs[:, 0]] - x[springs[:, 1]], axis=1)
 
 
-def scenes(seed: int, thorough: bool) -> list[Scene]:
+def scenes(seed: int, thorough: bool) -> list[SpringScene]:
     """Return all scenes in their order; the long list has more random cloths."""
     found = [*_particles(), *_small(seed), *_changes(seed), *_cloths(seed)]
     if thorough:
@@ -124,16 +124,16 @@ HEIGHT = np.array([0.0, 1.6, 0.0])
 STEPS = ("mass_spring_step", "mass_spring_motion")
 
 
-def _pair(name: str, family: str, about: Sentence, **changes: Any) -> Scene:
+def _pair(name: str, family: str, about: Sentence, **changes: Any) -> SpringScene:
     """Return two particles with one spring, moving and stretched."""
-    scene = Scene(
+    scene = SpringScene(
         name, family, about, PAIR_AT_REST, [(0, 1)], PAIR, PAIR_VELOCITIES, PAIR_MASSES,
         np.array([60.0]), np.array([0.0]), G, 0.05, probe=True,
     )  # fmt: skip
     return replace(scene, **changes)
 
 
-def _particles() -> list[Scene]:
+def _particles() -> list[SpringScene]:
     """Return the scenes of one spring."""
     hanging = {"velocities": PAIR_VELOCITIES * [[0.0], [1.0]], "pinned": (0,), "needs": ("pinned",)}
     damped = {"dampings": np.array([1.5])}
@@ -156,13 +156,15 @@ def _particles() -> list[Scene]:
     ]  # fmt: skip
 
 
-def _random(name: str, family: str, about: Sentence, seed: int, n: int, **changes: Any) -> Scene:
+def _random(
+    name: str, family: str, about: Sentence, seed: int, n: int, **changes: Any
+) -> SpringScene:
     """Return a triangle or a chain of triangles with values of its own for each spring."""
     rng = np.random.default_rng([11, seed, n])
     springs = [(i, j) for i in range(n) for j in range(i + 1, min(i + 3, n))]
     rest = np.cumsum(rng.uniform(0.2, 0.4, (n, 3)) * [1.0, -0.6, 0.5], axis=0) + HEIGHT
     s = len(springs)
-    scene = Scene(
+    scene = SpringScene(
         name, family, about, rest, springs,
         rest + 0.05 * rng.standard_normal((n, 3)), rng.standard_normal((n, 3)),
         rng.uniform(0.4, 2.5, n), rng.uniform(30.0, 120.0, s), rng.uniform(0.3, 2.0, s), G, 0.04,
@@ -171,13 +173,13 @@ def _random(name: str, family: str, about: Sentence, seed: int, n: int, **change
     return _pins_still(replace(scene, **changes))
 
 
-def _pins_still(scene: Scene) -> Scene:
+def _pins_still(scene: SpringScene) -> SpringScene:
     v = scene.velocities.copy()
     v[list(scene.pinned)] = 0.0
     return replace(scene, velocities=v)
 
 
-def _small(seed: int) -> list[Scene]:
+def _small(seed: int) -> list[SpringScene]:
     slack = np.array([[0, 1, 0], [0.2, 0.9, 0.1], [0.7, 0.7, 0.2], [0.8, 0.6, 0.5]])
     loads = np.array([[1.0, 2.0, -3.0], [-4.0, 1.0, 2.0], [3.0, -1.0, 1.0]])
     return [
@@ -202,7 +204,7 @@ def _small(seed: int) -> list[Scene]:
     ]  # fmt: skip
 
 
-def _changes(seed: int) -> list[Scene]:
+def _changes(seed: int) -> list[SpringScene]:
     """Return scenes that are asked one after another, and those for small h."""
     before = _random(
         "before h changes", "h changes", sentence("Three particles, the step before h changes."),
@@ -228,12 +230,12 @@ def _changes(seed: int) -> list[Scene]:
 
 def _cloth_scene(
     name: str, seed: int, n: int, stiffness: float = 100.0, damping: float = 0.2, **changes: Any
-) -> Scene:
+) -> SpringScene:
     """Return a moved cloth of n x n particles."""
     rng = np.random.default_rng([12, seed, n])
     system, state = grid_cloth(n, n)
     s = len(system.springs)
-    scene = Scene(
+    scene = SpringScene(
         name, "cloth", sentence("A moving cloth of {n} x {n} particles.", n=n),
         state.positions, system.springs,
         state.positions + 0.02 * rng.standard_normal((n * n, 3)),
@@ -244,7 +246,7 @@ def _cloth_scene(
     return _pins_still(replace(scene, **changes))
 
 
-def _cloths(seed: int) -> list[Scene]:
+def _cloths(seed: int) -> list[SpringScene]:
     base, crumpled = (_cloth_scene(name, seed, 3) for name in ("cloth 3 x 3", "crumpled cloth"))
     middle = crumpled.rest.mean(0)
     return [
@@ -262,7 +264,7 @@ def _cloths(seed: int) -> list[Scene]:
     ]  # fmt: skip
 
 
-def _symmetries(base: Scene) -> list[Scene]:
+def _symmetries(base: SpringScene) -> list[SpringScene]:
     """Return the scene moved, mirrored, rotated about the vertical, and with other numbers."""
     c, s = 0.6, 0.8
     mirror = np.diag([1.0, 1.0, -1.0])
@@ -279,7 +281,7 @@ def _symmetries(base: Scene) -> list[Scene]:
     ]  # fmt: skip
 
 
-def _transformed(base: Scene, name: str, about: Sentence, **changes: Any) -> Scene:
+def _transformed(base: SpringScene, name: str, about: Sentence, **changes: Any) -> SpringScene:
     """Return the scene with x -> matrix x + shift; particle i becomes number order[i]."""
     unchanged = {"matrix": np.eye(3), "shift": np.zeros(3), "order": np.arange(len(base.masses))}
     facts = {"of": base.name, **unchanged, **changes}

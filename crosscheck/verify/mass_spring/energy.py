@@ -24,7 +24,7 @@ from . import laws
 from .cases import task_cases
 from .faults import GRAVITY, SPRINGS, Option, combined, faults_of
 from .problem import (
-    Problem,
+    SpringProblem,
     all_forces,
     elastic_energy,
     problem_of,
@@ -71,7 +71,7 @@ def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskRep
     return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
 
 
-def right(p: Problem) -> dict[str, float]:
+def right(p: SpringProblem) -> dict[str, float]:
     """Return all energies by the formulas [J]."""
     kinetic = 0.5 * float((p.masses[:, None] * p.velocities**2).sum())
     return _sums(kinetic, elastic_energy(p), -float((p.constant * p.positions).sum()))
@@ -83,7 +83,7 @@ def _sums(kinetic: float, elastic: float, gravitational: float) -> dict[str, flo
     return dict(zip(PARTS, values, strict=True))
 
 
-def tolerance(p: Problem, epsilon: float) -> float:
+def tolerance(p: SpringProblem, epsilon: float) -> float:
     """Return how far rounding may take an energy [J]."""
     x, v = np.abs(p.positions), np.abs(p.velocities)
     size = float(x.max() + p.rest_lengths.max(initial=0.0))
@@ -112,7 +112,7 @@ def _judge_case(one: Exchange, asked: Sequence[Exchange], greeting: Greeting) ->
 
 
 def _findings(
-    one: Exchange, answer: Answer, asked: Sequence[Exchange], p: Problem, allowed: float
+    one: Exchange, answer: Answer, asked: Sequence[Exchange], p: SpringProblem, allowed: float
 ) -> list[Finding]:
     given, expected = answer.values, right(p)
     if not np.isfinite(list(given.values())).all():
@@ -147,7 +147,9 @@ def _sum_laws(given: Values, allowed: float) -> list[Finding]:
     return found
 
 
-def _work(p: Problem, q: Problem, before: Values, after: Values, allowed: float) -> list[Finding]:
+def _work(
+    p: SpringProblem, q: SpringProblem, before: Values, after: Values, allowed: float
+) -> list[Finding]:
     """Return whether energies change by the work of forces between the two states."""
     found = []
     for name, work in works(p, q).items():
@@ -164,7 +166,7 @@ def _work(p: Problem, q: Problem, before: Values, after: Values, allowed: float)
     return found
 
 
-def works(p: Problem, q: Problem) -> dict[str, float]:
+def works(p: SpringProblem, q: SpringProblem) -> dict[str, float]:
     """Return the work of forces along the line from one state to the other, by energy [J]."""
     d = q.positions - p.positions
     still = p.changed(velocities=0.0 * p.velocities)
@@ -210,7 +212,7 @@ FAULTS = (
 )  # fmt: skip
 
 
-def predict(faults: Sequence[Option], p: Problem) -> dict[str, float]:
+def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
     """Return the energies that a solver with these faults answers."""
     factors = np.ones(3)
     for fault in faults:
@@ -245,7 +247,7 @@ def _diagnose(
     return Diagnosis(first_broken=first_broken(judgements), variant_count=tried)
 
 
-def _matches(faults: Sequence[Option], p: Problem, given: Values, epsilon: float) -> bool:
+def _matches(faults: Sequence[Option], p: SpringProblem, given: Values, epsilon: float) -> bool:
     expected = predict(faults, p)
     limit = 8.0 * tolerance(p, epsilon)
     return all(abs(given[name] - expected[name]) <= limit for name in PARTS if name in given)

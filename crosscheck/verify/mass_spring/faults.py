@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..sentence import Sentence, sentence
-from .model import Integrator, Model
-from .problem import Problem, frames
+from .model import Integrator, StepModel
+from .problem import SpringProblem, frames
 
-Change = Callable[[Problem], Problem]
+Change = Callable[[SpringProblem], SpringProblem]
 
 
 class Option(NamedTuple):
@@ -62,7 +62,7 @@ def _scaled(**factors: float) -> Change:
     return lambda p: p.changed(**{name: f * getattr(p, name) for name, f in factors.items()})
 
 
-def _weights(weigh: Callable[[Problem], Any]) -> Change:
+def _weights(weigh: Callable[[SpringProblem], Any]) -> Change:
     """Return the change that puts other weights in place of m gravity."""
     return lambda p: p.changed(weights=weigh(p) * np.ones((p.count, 3)))
 
@@ -80,7 +80,7 @@ def _all_as_first(name: str) -> Change:
 
 
 def _without_spring(which: int) -> Change:
-    def change(p: Problem) -> Problem:
+    def change(p: SpringProblem) -> SpringProblem:
         kept = np.ones(len(p.springs))
         kept[which] = 0.0
         return p.changed(stiffnesses=kept * p.stiffnesses, dampings=kept * p.dampings)
@@ -92,11 +92,11 @@ def _tension_only(flag: bool) -> Change:
     return lambda p: p.changed(tension_only=np.full(len(p.springs), flag))
 
 
-def _rest_now(p: Problem) -> Problem:
+def _rest_now(p: SpringProblem) -> SpringProblem:
     return p.changed(rest_lengths=frames(p, p.positions)[0])
 
 
-def _of_strain(p: Problem) -> Problem:
+def _of_strain(p: SpringProblem) -> SpringProblem:
     r = np.where(p.rest_lengths > 0, p.rest_lengths, 1.0)
     return p.changed(stiffnesses=p.stiffnesses / r)
 
@@ -346,7 +346,9 @@ STEP_FAULTS = (
 )  # fmt: skip
 
 
-def apply(options: tuple[Option, ...], p: Problem, model: Model) -> tuple[Problem, Model]:
+def apply(
+    options: tuple[Option, ...], p: SpringProblem, model: StepModel
+) -> tuple[SpringProblem, StepModel]:
     """Return the problem and the model as a solver with these options has them."""
     for option in options:
         if option.change is not None:

@@ -18,9 +18,9 @@ from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
-from .model import Model
+from .model import StepModel
 from .problem import (
-    Problem,
+    SpringProblem,
     all_forces,
     damper_forces,
     problem_of,
@@ -46,7 +46,7 @@ def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskRep
     return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
 
 
-def tolerance(p: Problem, epsilon: float) -> float:
+def tolerance(p: SpringProblem, epsilon: float) -> float:
     """Return how far rounding may take a force [N]."""
     size = float(np.abs(p.positions).max() + p.rest_lengths.max(initial=0.0))
     speed = float(np.abs(p.velocities).max())
@@ -73,7 +73,7 @@ def _findings(
     one: Exchange,
     answer: Answer,
     asked: Sequence[Exchange],
-    p: Problem,
+    p: SpringProblem,
     expected: Any,
     allowed: float,
 ) -> list[Finding]:
@@ -91,7 +91,7 @@ def _findings(
     ]
 
 
-def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:
+def _formula(p: SpringProblem, given: Any, expected: Any, allowed: float) -> Finding:
     gap = np.abs(given - expected).max(axis=1)
     where, worst = int(gap.argmax()), float(gap.max())
     said = sentence(
@@ -103,7 +103,7 @@ def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:
     return laws.bounded("force formula", worst, allowed, "N", said, where)
 
 
-def _term(p: Problem, error: Any) -> Sentence:
+def _term(p: SpringProblem, error: Any) -> Sentence:
     """Return which term's force looks most like the error."""
     x, v = p.positions, p.velocities
     terms = (
@@ -120,7 +120,7 @@ def _term(p: Problem, error: Any) -> Sentence:
     return terms[best][1] if likeness[best] > 0.7 else sentence("(an error like no single term)")
 
 
-def _balance(p: Problem, given: Any, allowed: float) -> Finding:
+def _balance(p: SpringProblem, given: Any, allowed: float) -> Finding:
     """Springs and dampers pull both ends alike: the sum of forces is the weight."""
     gap = float(np.abs(given.sum(0) - p.constant.sum(0)).max())
     said = sentence("The sum of all forces is {gap:.2g} N off the weight.", gap=gap)
@@ -128,7 +128,7 @@ def _balance(p: Problem, given: Any, allowed: float) -> Finding:
 
 
 def _predict(faults: tuple[Option, ...], case: Case) -> Mapping[str, Any]:
-    return {"forces": all_forces(apply(faults, problem_of(case.inputs), Model())[0])}
+    return {"forces": all_forces(apply(faults, problem_of(case.inputs), StepModel())[0])}
 
 
 def variants() -> Iterator[Variant]:

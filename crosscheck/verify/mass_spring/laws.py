@@ -14,8 +14,8 @@ from ..contestant import Answer, Exchange
 from ..explain import largest_gap
 from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
-from .model import Model
-from .problem import Problem, accelerations, damper_forces, frames, state_of, system_of
+from .model import StepModel
+from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of
 from .rounding import SOLVED, Rounding, apart, difference
 
 # Up to this share of what a step changes, an answer is called imprecise; beyond it is another step.
@@ -30,10 +30,10 @@ CONSISTENT = 0.1
 class Context:
     """What the laws of one answer need."""
 
-    problem: Problem
+    problem: SpringProblem
     answered: Mapping[str, Any]  # by the names of the outputs
     allowed: Rounding
-    model: Model  # the step that is declared, completed by what was inferred
+    model: StepModel  # the step that is declared, completed by what was inferred
     known: bool  # whether that model is declared or was recognised
     says: Sentence  # the model in words
     expected: Mapping[str, Any]  # its prediction, or {} if it has none

@@ -14,7 +14,7 @@ import numpy as np
 from plumbob.reference.arguments import BoolArray, FloatArray
 
 from .problem import (
-    Problem,
+    SpringProblem,
     accelerations,
     damper_forces,
     frames,
@@ -56,7 +56,7 @@ class Integrator(NamedTuple):
         return self.method in EXPLICIT
 
 
-class Model(NamedTuple):
+class StepModel(NamedTuple):
     """A complete description of a step, honest or not."""
 
     integrator: Integrator = Integrator("converged", "y")  # of the positions
@@ -108,8 +108,8 @@ MATRICES: Mapping[str, Matrix] = {
 class Start(NamedTuple):
     """What a substep starts from."""
 
-    p: Problem
-    model: Model
+    p: SpringProblem
+    model: StepModel
     x: FloatArray
     v: FloatArray
     h: float
@@ -123,7 +123,7 @@ class Start(NamedTuple):
         return free
 
 
-def simulate(p: Problem, model: Model) -> dict[str, FloatArray]:
+def simulate(p: SpringProblem, model: StepModel) -> dict[str, FloatArray]:
     """Return positions and velocities after the step, or after each of several."""
     p = _with_pins(p, model)
     if model.integrator.explicit and model.damper == "none":
@@ -138,7 +138,7 @@ def simulate(p: Problem, model: Model) -> dict[str, FloatArray]:
     return {"positions": positions, "velocities": velocities}
 
 
-def predicted(p: Problem, model: Model) -> dict[str, FloatArray]:
+def predicted(p: SpringProblem, model: StepModel) -> dict[str, FloatArray]:
     """Return the model's result, {} if its matrix is singular."""
     with np.errstate(all="ignore"):
         try:
@@ -147,7 +147,7 @@ def predicted(p: Problem, model: Model) -> dict[str, FloatArray]:
             return {}
 
 
-def _with_pins(p: Problem, model: Model) -> Problem:
+def _with_pins(p: SpringProblem, model: StepModel) -> SpringProblem:
     """Return the problem with the pins' masses, springs or number as the model has them."""
     kind, pinned = model.pins.split()[0], p.pinned
     if kind in ("heavy", "falling", "one"):
@@ -160,7 +160,9 @@ def _with_pins(p: Problem, model: Model) -> Problem:
     return p.changed(pinned=pinned[: {"first": 1, "free": 0}.get(kind)])
 
 
-def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _step(
+    p: SpringProblem, model: StepModel, x: FloatArray, v: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     whole = p.h if isinstance(model.time, str) else model.time
     h = whole if model.time == "undivided" else whole / model.substeps
     pins = x[p.pinned]
@@ -424,7 +426,7 @@ def _isotropic(scale: FloatArray) -> FloatArray:
     return scale[:, None, None] * np.eye(3)
 
 
-def _assemble(p: Problem, blocks: FloatArray) -> FloatArray:
+def _assemble(p: SpringProblem, blocks: FloatArray) -> FloatArray:
     """Return the sum over springs of (A_i A_i') x block, (3 particle, 3 particle)."""
     n = p.count
     right = (p.incidence[:, :, None, None] * blocks[:, None]).reshape(len(blocks), -1)

@@ -21,7 +21,7 @@ COINCIDENT = 1e-150
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class SpringProblem:
     """What a request of a force, an energy or a step says, and how a faulty solver reads it."""
 
     masses: FloatArray
@@ -96,12 +96,12 @@ class Problem:
         weights = self.weighed[:, None] * self.gravity if self.weights is None else self.weights
         return weights + self.external
 
-    def changed(self, **fields: Any) -> "Problem":
+    def changed(self, **fields: Any) -> "SpringProblem":
         """Return the problem with other fields."""
         return dataclasses.replace(self, **fields)
 
 
-def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> Problem:
+def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> SpringProblem:
     """Return the problem that a request states; the velocities of pins count as zero."""
     velocities = np.array(inputs["velocities"], dtype=float)
     pinned = np.asarray(inputs.get("pinned", ()), dtype=int)
@@ -110,7 +110,7 @@ def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> Prob
     h = float(inputs.get("h", 0.0))
     loads, slack = np.zeros_like(velocities), np.zeros(len(springs))
     numbers: dict[str, Any] = {name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS}
-    return Problem(
+    return SpringProblem(
         **numbers,
         springs=springs,
         velocities=velocities,
@@ -126,7 +126,7 @@ def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> Prob
 _NUMBERS = ("masses", "rest_lengths", "stiffnesses", "dampings", "gravity", "positions")
 
 
-def system_of(p: Problem) -> MassSpring:
+def system_of(p: SpringProblem) -> MassSpring:
     """Return the same system for `reference`."""
     return MassSpring(
         p.masses, p.springs, p.rest_lengths, p.stiffnesses, p.dampings, p.pinned, p.gravity,
@@ -134,12 +134,12 @@ def system_of(p: Problem) -> MassSpring:
     )  # fmt: skip
 
 
-def state_of(p: Problem) -> State:
+def state_of(p: SpringProblem) -> State:
     """Return the same state for `reference`."""
     return State(p.positions, p.velocities)
 
 
-def frames(p: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+def frames(p: SpringProblem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the length of each spring and its direction from the second end to the first."""
     d = x[p.springs[:, 0]] - x[p.springs[:, 1]]
     length = np.sqrt((d * d).sum(axis=1))
@@ -149,20 +149,20 @@ def frames(p: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return length, u
 
 
-def stretches(p: Problem, length: FloatArray) -> FloatArray:
+def stretches(p: SpringProblem, length: FloatArray) -> FloatArray:
     """Return l - r, zero for a slack spring."""
     stretch = length - p.rest_lengths
     return np.where(p.tension_only & (stretch < 0.0), 0.0, stretch)
 
 
-def spring_forces(p: Problem, x: FloatArray) -> FloatArray:
+def spring_forces(p: SpringProblem, x: FloatArray) -> FloatArray:
     """Return the springs' forces on the particles [N], shape (particle, 3)."""
     length, u = frames(p, x)
     pull = p.stiffnesses * stretches(p, length) * (1.0 if p.normalised else length)
     return -p.pulled.T @ (pull[:, None] * u)
 
 
-def damper_forces(p: Problem, x: FloatArray, v: FloatArray) -> FloatArray:
+def damper_forces(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return the dampers' forces at velocities v on the particles [N], shape (particle, 3)."""
     if not p.dampings.any():
         return np.zeros_like(x)
@@ -182,13 +182,13 @@ def damper_forces(p: Problem, x: FloatArray, v: FloatArray) -> FloatArray:
     return -p.pulled.T @ (c * rate)
 
 
-def all_forces(p: Problem) -> FloatArray:
+def all_forces(p: SpringProblem) -> FloatArray:
     """Return springs, dampers, gravity and external forces on the particles, (particle, 3) [N]."""
     x, v = p.positions, p.velocities
     return p.constant + spring_forces(p, x) + damper_forces(p, x, v)
 
 
-def accelerations(p: Problem, x: FloatArray, v: FloatArray) -> FloatArray:
+def accelerations(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return M^-1 f, pins included, shape (particle, 3) [m/s^2]."""
     total = p.constant
     if p.stiff:
@@ -198,7 +198,7 @@ def accelerations(p: Problem, x: FloatArray, v: FloatArray) -> FloatArray:
     return total / p.masses[:, None]
 
 
-def elastic_energy(p: Problem) -> float:
+def elastic_energy(p: SpringProblem) -> float:
     """Return the energy of the springs [J]."""
     length, _ = frames(p, p.positions)
     return float((0.5 * p.stiffnesses * stretches(p, length) ** 2).sum())

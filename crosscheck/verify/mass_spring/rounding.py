@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .model import Model
-from .problem import Problem
+from .model import StepModel
+from .problem import SpringProblem
 
 # A sum of some ten terms, a few products and a square root, each rounded by half an epsilon, as
 # the inputs themselves are in single precision.
@@ -23,7 +23,7 @@ class Rounding(NamedTuple):
     velocities: float  # [m/s]
 
 
-def rounding(p: Problem, model: Model, epsilon: float) -> Rounding:
+def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
     """Return bounds for an honest solver of that precision.
 
     A coordinate is rounded by epsilon of its size in each substep, always to the same side where
@@ -43,14 +43,14 @@ def rounding(p: Problem, model: Model, epsilon: float) -> Rounding:
     return Rounding(float(x), float(v))
 
 
-def _stiffest(p: Problem) -> float:
+def _stiffest(p: SpringProblem) -> float:
     """Return a bound of the largest eigenvalue of M^-1 L, dampers included [1/s²]."""
     stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
     return float((2.0 * np.abs(p.incidence).T @ stiffness / p.masses).max(initial=0.0))
 
 
 def apart(
-    p: Problem, predicted: Mapping[str, Any], answered: Mapping[str, Any], allowed: Rounding
+    p: SpringProblem, predicted: Mapping[str, Any], answered: Mapping[str, Any], allowed: Rounding
 ) -> float:
     """Return the largest difference of positions and velocities, over what they changed by.
 
@@ -68,7 +68,7 @@ def apart(
     return float(max(worst)) if worst and np.isfinite(worst).all() else np.inf
 
 
-def difference(p: Problem, name: str, one: Any, other: Any) -> float:
+def difference(p: SpringProblem, name: str, one: Any, other: Any) -> float:
     """Return the largest difference of a coordinate, the velocities of pins left out."""
     gap = np.abs(np.asarray(one) - np.asarray(other))
     if name == "velocities":

@@ -16,8 +16,8 @@ from ..contestant import Answer, Exchange
 from ..greeting import Step
 from .faults import ASPECTS, INTEGRATORS, Option, apply
 from .honest import compatible, domains
-from .model import PIN_STRENGTHS, Integrator, Model, predicted
-from .problem import Problem
+from .model import PIN_STRENGTHS, Integrator, StepModel, predicted
+from .problem import SpringProblem
 from .rounding import SOLVED, Rounding, apart, rounding
 
 MOST_FAULTS = 3
@@ -55,7 +55,7 @@ class Found(NamedTuple):
 class Probe(NamedTuple):
     """A problem, and what was answered."""
 
-    problem: Problem
+    problem: SpringProblem
     answered: Mapping[str, Any]
     name: str
 
@@ -192,7 +192,7 @@ class Search:
         A matrix without stiffness joins particles even where their spring has none, differently
         for each integrator, but leaves their centre where it is.
         """
-        problem, model = apply(options, probe.problem, Model(damper="none"))
+        problem, model = apply(options, probe.problem, StepModel(damper="none"))
         x, _ = predicted(problem, model).values()
         share = problem.masses / problem.masses.sum()
         centre = {"positions": share @ x, "velocities": np.zeros(0)}
@@ -201,7 +201,7 @@ class Search:
         error = apart(whole, centre, answered, self._rounding(probe, model))
         return None if error <= SOLVED else False
 
-    def _rounding(self, probe: Probe, model: Model) -> Rounding:
+    def _rounding(self, probe: Probe, model: StepModel) -> Rounding:
         key = probe.name, model.substeps, model.integrator.explicit
         if key not in self._roundings:
             self._roundings[key] = rounding(probe.problem, model, self.epsilon)
@@ -209,7 +209,7 @@ class Search:
 
     def _compare(self, options: tuple[Option, ...], probe: Probe) -> tuple[bool | None, bool]:
         """Return whether an answer is reproduced, and whether its positions may be."""
-        problem, model = apply(options, probe.problem, Model(damper="none"))
+        problem, model = apply(options, probe.problem, StepModel(damper="none"))
         values, answered = predicted(problem, model), probe.answered
         if _absurd(values):  # a singular matrix predicts nothing but that
             return (None if _absurd(answered) else False), True
@@ -285,11 +285,11 @@ def in_flight(how: Integrator) -> Integrator:
     return Integrator("newton", "x_n", 1, "gauss")
 
 
-def _has_springs(p: Problem) -> bool:
+def _has_springs(p: SpringProblem) -> bool:
     return bool(p.stiffnesses.any() or p.dampings.any())
 
 
-def _relevant(p: Problem) -> list[str]:
+def _relevant(p: SpringProblem) -> list[str]:
     """Return the aspects that matter in a problem, in the order in which they are chosen."""
     springs = ["springs"] if p.stiffnesses.any() else []
     dampers = ["damper", "damping"] if p.dampings.any() else []
@@ -302,7 +302,7 @@ def _keys(found: Found) -> tuple[str, ...]:
 
 
 def probes_of(
-    asked: Sequence[Exchange], problems: Mapping[str, Problem], every: bool = False
+    asked: Sequence[Exchange], problems: Mapping[str, SpringProblem], every: bool = False
 ) -> list[Probe]:
     """Return the probes, or every case, that were answered, in their order."""
     return [

@@ -22,8 +22,8 @@ from .cases import task_cases
 from .faults import ASPECTS, Option, apply
 from .honest import DAMPERS, HONEST_VELOCITIES, compatible, domains, honest
 from .laws import Context
-from .model import Model, predicted
-from .problem import Problem, problem_of, state_of, system_of
+from .model import StepModel, predicted
+from .problem import SpringProblem, problem_of, state_of, system_of
 from .rounding import SOLVED, apart, correct_digits, rounding
 from .search import Found, Probe, Search, probes_of
 
@@ -57,10 +57,10 @@ class Stepping(NamedTuple):
         return TaskReport(self.task, "", _with_faults(judgements, diagnosis, known), diagnosis)
 
 
-def problems_of(asked: Sequence[Exchange], greeting: Greeting) -> dict[str, Problem]:
+def problems_of(asked: Sequence[Exchange], greeting: Greeting) -> dict[str, SpringProblem]:
     """Return the problem of each case; a solver that goes on starts from its own answer."""
     by_name = {one.case.name: one for one in asked}
-    problems: dict[str, Problem] = {}
+    problems: dict[str, SpringProblem] = {}
     for one in asked:
         before = by_name.get(one.case.follows)
         h_before = before.case.inputs["h"] if before is not None else None
@@ -107,14 +107,14 @@ def describe_model(options: Sequence[Option]) -> Sentence:
 def _judge_case(
     one: Exchange,
     asked: Sequence[Exchange],
-    p: Problem,
+    p: SpringProblem,
     greeting: Greeting,
     options: tuple[Option, ...],
     known: bool,
 ) -> CaseJudgement:
     if not isinstance(one.answer, Answer):
         return CaseJudgement(one.case, one.answer, (), {})
-    _, model = apply(options, p, Model())
+    _, model = apply(options, p, StepModel())
     expected = predicted(p, model)
     context = Context(
         p, one.answer.values, rounding(p, model, greeting.epsilon), model, known,
@@ -164,7 +164,7 @@ def _digits(expected: Mapping[str, Any], answered: Mapping[str, Any]) -> float |
     return correct_digits(gap, float(np.abs(x).max())) if np.isfinite(gap) else None
 
 
-def _reference_seconds(p: Problem, model: Model) -> float:
+def _reference_seconds(p: SpringProblem, model: StepModel) -> float:
     """Return the compiled reference's time for as many steps of the same kind [s]."""
     system, state = system_of(p), state_of(p)
     if model.integrator.explicit:
@@ -251,7 +251,7 @@ def _errors(options: tuple[Option, ...], probes: Sequence[Probe], epsilon: float
     """Return how far each answer is from a step with these options, relative to what it moves."""
     errors = []
     for plain, answered, _ in probes:
-        p, model = apply(options, plain, Model(damper="none"))
+        p, model = apply(options, plain, StepModel(damper="none"))
         expected, allowed = predicted(p, model), rounding(plain, model, epsilon)
         errors.append(apart(plain, expected, answered, allowed) if expected else np.inf)
     return errors

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..contestant import Contestant
 from ..judgement import Report
 from ..sentence import sentence
-from ..solvers import LIMITS, Limits, open_contestant
+from ..solvers import LIMITS, ProcessLimits, open_contestant
 from ..solvers.files import FileContestant
 from ..verify import DISCIPLINES, judge_cases, verify
 from . import saved
@@ -22,7 +22,7 @@ Notify = Callable[[str, int, int], None]
 PROGRAM, ANSWERS = "--", "--answers"
 
 
-def limits(seconds: float | None, mebibytes: int | None) -> Limits:
+def limits(seconds: float | None, mebibytes: int | None) -> ProcessLimits:
     """Return the limits of a program; the first request of a task may take longer, to compile.
 
     Raises:
@@ -36,7 +36,7 @@ def limits(seconds: float | None, mebibytes: int | None) -> Limits:
     return chosen._replace(request=seconds, first=max(seconds, chosen.first))
 
 
-def opened(words: Sequence[str], chosen: Limits, say: Say) -> Contestant:
+def opened(words: Sequence[str], chosen: ProcessLimits, say: Say) -> Contestant:
     """Return the solver behind its door.
 
     Args:

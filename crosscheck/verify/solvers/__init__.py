@@ -6,14 +6,14 @@ from pathlib import Path
 
 from ..contestant import Contestant
 from .files import FileContestant
-from .losses import LIMITS, Limits
+from .losses import LIMITS, ProcessLimits
 from .program import ProgramContestant
 from .python_file import python_contestant
 
-__all__ = ["LIMITS", "Limits", "open_contestant"]
+__all__ = ["LIMITS", "ProcessLimits", "open_contestant"]
 
 
-def open_contestant(spec: str | Path | Sequence[str], limits: Limits = LIMITS) -> Contestant:
+def open_contestant(spec: str | Path | Sequence[str], limits: ProcessLimits = LIMITS) -> Contestant:
     """Return a solver, whatever it is; nothing of it is started before it is asked.
 
     Args:

@@ -48,7 +48,7 @@ class OfferError(ValueError):
     """A solver was loaded, but offers nothing that is understood; the message says why."""
 
 
-class Solver:
+class PythonSolver:
     """What a Python file or object offers.
 
     Attributes:
@@ -165,7 +165,7 @@ def _failed(failure: Failure) -> dict[str, Any]:
     return fields
 
 
-def load(spec: str) -> Solver:
+def load(spec: str) -> PythonSolver:
     """Return the solver in a Python file, file:object or module:object.
 
     Raises:
@@ -184,7 +184,7 @@ def load(spec: str) -> Solver:
     declared = _get(found, "PLUMBOB") or _get(module, "PLUMBOB") or {}
     if isinstance(found, type):
         found = found()
-    return Solver(found, attribute or Path(place).name, declared)
+    return PythonSolver(found, attribute or Path(place).name, declared)
 
 
 def _load_file(path: Path) -> Any:
@@ -284,7 +284,7 @@ def serve(spec: str, folder: str, patience: float) -> None:
             answers.flush()
 
 
-def _loaded(spec: str, folder: str) -> tuple[Solver | None, dict[str, Any]]:
+def _loaded(spec: str, folder: str) -> tuple[PythonSolver | None, dict[str, Any]]:
     try:
         return load(spec), {}
     except OfferError as error:

@@ -27,7 +27,7 @@ _SIGNALS: Mapping[int, Sentence] = {
 }
 
 
-class Limits(NamedTuple):
+class ProcessLimits(NamedTuple):
     """What a program may take.
 
     Attributes:
@@ -47,7 +47,7 @@ class Limits(NamedTuple):
     prints: int = 10_000
 
 
-LIMITS = Limits()
+LIMITS = ProcessLimits()
 
 
 class FailureError(Exception):
@@ -69,7 +69,7 @@ _WORDS = {
         "It printed more than {most} bytes without an end of line, beginning with: {line}"
     ),
     Loss.ENDED: sentence("It ended instead of answering: {how}."),
-    Loss.CUT: sentence("It ended in the middle of a line ({line}): {how}."),
+    Loss.TRUNCATED: sentence("It ended in the middle of a line ({line}): {how}."),
     Loss.CLOSED: sentence("It closed its standard output, but runs on."),
     Loss.DEAF: sentence("It closed its standard input before it had read the request."),
     Loss.UNFINISHED: sentence(
@@ -86,16 +86,18 @@ _WORDS = {
 }
 
 
-def failure_of(loss: Loss, process: ChildProcess, limits: Limits, patience: float) -> FailureError:
+def failure_of(
+    loss: Loss, process: ChildProcess, limits: ProcessLimits, patience: float
+) -> FailureError:
     """Return why a process was lost, after so much patience [s]."""
-    part = process.partial[-400:] if loss is Loss.CUT else process.partial[:400]
+    part = process.partial[-400:] if loss is Loss.TRUNCATED else process.partial[:400]
     values = {
         "limit": limits.memory / 1e9,
         "most": limits.line,
         "line": shown(bytes(part), 60),
-        "count": process.sent if loss is Loss.UNREAD else len(process.partial),
+        "count": process.request_length if loss is Loss.UNREAD else len(process.partial),
         "seconds": patience,
-        "how": ending(process.code) if loss in (Loss.ENDED, Loss.CUT) else "",
+        "how": ending(process.code) if loss in (Loss.ENDED, Loss.TRUNCATED) else "",
     }
     words = _WORDS[loss]._replace(values=values)
     if loss in (Loss.MEMORY, Loss.TOO_LONG):

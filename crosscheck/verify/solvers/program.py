@@ -14,7 +14,7 @@ from ..greeting import Greeting
 from ..sentence import Sentence, sentence
 from ..task import TASKS
 from .claimed_time import ClaimedTimes
-from .losses import LIMITS, FailureError, Limits, departure, failure_of, not_started
+from .losses import LIMITS, FailureError, ProcessLimits, departure, failure_of, not_started
 
 
 class ProgramContestant:
@@ -25,7 +25,7 @@ class ProgramContestant:
     """
 
     def __init__(
-        self, command: Sequence[str], folder: Path | None = None, limits: Limits = LIMITS
+        self, command: Sequence[str], folder: Path | None = None, limits: ProcessLimits = LIMITS
     ) -> None:
         if not command:
             raise ValueError("command: expected a program and its arguments, got nothing")

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from .losses import LIMITS, Limits
+from .losses import LIMITS, ProcessLimits
 from .program import ProgramContestant
 
 # After this share of its time a solver's line is noted, in case it takes longer.
@@ -23,7 +23,7 @@ serve(spec, folder, float(patience))
 """
 
 
-def python_contestant(spec: str, limits: Limits = LIMITS) -> ProgramContestant:
+def python_contestant(spec: str, limits: ProcessLimits = LIMITS) -> ProgramContestant:
     """Return the solver in a file, file.py:object or module:object.
 
     A file runs in its own folder, a module in the present one, by the interpreter that runs this.

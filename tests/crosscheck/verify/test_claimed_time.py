@@ -10,10 +10,10 @@ from plumbob.crosscheck.process_tree import main_thread_seconds
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers import Limits, open_contestant
+from plumbob.crosscheck.verify.solvers import ProcessLimits, open_contestant
 from plumbob.crosscheck.verify.solvers.claimed_time import contradicts
 
-LIMITS = Limits(first=60.0, request=60.0)
+LIMITS = ProcessLimits(first=60.0, request=60.0)
 # Seconds of 40 requests: what is computed for the messages, and what solves take; some are long.
 rng = np.random.default_rng(4)
 MESSAGES = rng.uniform(2e-4, 6e-4, 40)

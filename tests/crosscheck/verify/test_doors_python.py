@@ -22,7 +22,7 @@ from plumbob.crosscheck.verify.message import (
     encode_case,
 )
 from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers import Limits, host, open_contestant
+from plumbob.crosscheck.verify.solvers import ProcessLimits, host, open_contestant
 from plumbob.crosscheck.verify.solvers.files import FileContestant
 from plumbob.crosscheck.verify.solvers.program import ProgramContestant
 from plumbob.crosscheck.verify.task import TASKS
@@ -523,7 +523,7 @@ def test_a_door_opens_to_each_kind(tmp_path, kind):
     (tmp_path / "run").chmod(0o755)
     (tmp_path / "export.json").write_text("{}")
     spec = {"list": ["sh", "-c", "exit 3"], "program": tmp_path / "run", "folder": tmp_path}[kind]
-    contestant = open_contestant(spec, Limits())
+    contestant = open_contestant(spec, ProcessLimits())
     if kind == "folder":
         assert isinstance(contestant, FileContestant)
     else:

@@ -29,7 +29,7 @@ from plumbob.crosscheck.verify.judgement import CaseJudgement, Finding, Report, 
 from plumbob.crosscheck.verify.mass_spring import energy, forces, stepping
 from plumbob.crosscheck.verify.mass_spring.cases import task_cases
 from plumbob.crosscheck.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
-from plumbob.crosscheck.verify.mass_spring.model import Integrator, Model, simulate
+from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel, simulate
 from plumbob.crosscheck.verify.mass_spring.problem import (
     all_forces,
     problem_of,
@@ -80,15 +80,15 @@ def _solver(name, **options):
 STEPS = {
     "converged": (_solver("newton", tolerance=0.0), CONVERGED),
     "local_global": (_solver("local_global", tolerance=0.0, max_iterations=3),
-                     Model(Integrator("local_global", "y", 3))),
+                     StepModel(Integrator("local_global", "y", 3))),
     "newton": (_solver("newton", tolerance=0.0, max_iterations=2),
-               Model(Integrator("newton", "y", 2))),
+               StepModel(Integrator("newton", "y", 2))),
     "gauss_newton": (_solver("gauss_newton", tolerance=0.0, max_iterations=1),
-                     Model(Integrator("newton", "x_n", 1, "gauss"))),
+                     StepModel(Integrator("newton", "x_n", 1, "gauss"))),
     "symplectic": (symplectic_euler,
-                   Model(Integrator("symplectic"), 1, "explicit", velocity="separate")),
+                   StepModel(Integrator("symplectic"), 1, "explicit", velocity="separate")),
     "runge_kutta": (runge_kutta,
-                    Model(Integrator("runge_kutta"), 1, "explicit", velocity="separate")),
+                    StepModel(Integrator("runge_kutta"), 1, "explicit", velocity="separate")),
 }  # fmt: skip
 
 
@@ -134,7 +134,7 @@ def test_three_faults_at_once_are_named():
 # Besides those of the self-test.
 HONEST = {
     "explicit, undeclared": (
-        Model(Integrator("explicit"), 100, "explicit", velocity="separate"), Step(), "double",
+        StepModel(Integrator("explicit"), 100, "explicit", velocity="separate"), Step(), "double",
     ),
     "overwritten pins": (
         LOCAL_GLOBAL._replace(pins="overwritten"),
@@ -150,7 +150,7 @@ HONEST = {
     ),
     "substeps": (CONVERGED._replace(substeps=3), Step("converged", substeps=3), "double"),
     "from x_n": (
-        Model(Integrator("local_global", "x_n", 10), damper="none"),
+        StepModel(Integrator("local_global", "x_n", 10), damper="none"),
         Step("local_global", "x_n", 10), "double",
     ),
 }  # fmt: skip
@@ -214,14 +214,14 @@ def test_a_float_explicit_step_of_a_thousand_substeps_is_not_accused():
 
 
 def test_one_iteration_is_not_taken_for_convergence():
-    one = Model(Integrator("local_global", "x_n", 1))
+    one = StepModel(Integrator("local_global", "x_n", 1))
     found = report(Stepper(one), step=DECLARED["converged"][1])
     assert found.verdict is Verdict.WRONG
     assert any("local_global x_n 1" in key or "newton x_n 1" in key for key in named(found))
 
 
-ONE_ITERATION = Model(Integrator("local_global", "x_n", 1), damper="none")
-THOUSAND = Model(Integrator("explicit"), 1000, "explicit", velocity="separate")
+ONE_ITERATION = StepModel(Integrator("local_global", "x_n", 1), damper="none")
+THOUSAND = StepModel(Integrator("explicit"), 1000, "explicit", velocity="separate")
 LAB = System("one", "one", "one", "measured", "number")
 # What public programs do that declare nothing: model, faults, system, precision.
 UNDECLARED = {

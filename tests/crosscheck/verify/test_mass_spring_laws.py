@@ -12,14 +12,14 @@ from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.mass_spring import laws
 from plumbob.crosscheck.verify.mass_spring.laws import IMPRECISE, Context
-from plumbob.crosscheck.verify.mass_spring.model import Integrator, Model, predicted
+from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel, predicted
 from plumbob.crosscheck.verify.mass_spring.problem import problem_of
 from plumbob.crosscheck.verify.mass_spring.rounding import ROUNDINGS, SOLVED, rounding
 from plumbob.crosscheck.verify.sentence import sentence
 
 EPSILON = 2.0**-52
-LINEARISED = Model(Integrator("newton", "x_n", 1), damper="explicit")
-CONVERGED = Model(Integrator("converged", "y"))
+LINEARISED = StepModel(Integrator("newton", "x_n", 1), damper="explicit")
+CONVERGED = StepModel(Integrator("converged", "y"))
 RIGHT, RIGHT_BUT, WRONG = Verdict.RIGHT, Verdict.RIGHT_BUT, Verdict.WRONG
 
 
@@ -182,7 +182,7 @@ def test_a_solver_that_iterates_may_leave_a_part_of_the_momentum(share, verdict)
         LINEARISED._replace(scaling=0.98),
         LINEARISED._replace(damper="diagonal"),
         LINEARISED._replace(damper="blocks"),
-        Model(Integrator("descent")),
+        StepModel(Integrator("descent")),
     ],
 )
 def test_momentum_is_no_law_of_steps_that_do_not_keep_it(model):
@@ -257,7 +257,7 @@ def test_an_answer_turns_with_the_world_and_the_numbering(rng, name, share, verd
 def test_an_unstable_explicit_step_multiplies_its_rounding(substeps):
     """By hs² k / m in each substep after the first, of a length that is unstable."""
     stiff, soft = (triangle().changed(stiffnesses=np.full(3, k), h=0.1) for k in (1e5, 1.0))
-    model = Model(Integrator("symplectic"), substeps, "explicit", velocity="separate")
+    model = StepModel(Integrator("symplectic"), substeps, "explicit", velocity="separate")
     implicit = LINEARISED._replace(substeps=substeps)
     stiffest = 2.0 * (2e5 + (0.2 + 0.3) / 0.1) / 0.5  # of the lightest particle's two springs
     growth = (stiffest * (0.1 / substeps) ** 2) ** (substeps - 1)

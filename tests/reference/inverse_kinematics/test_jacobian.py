@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from plumbob.reference import forward_kinematics, local_from_global, rotation, scenes, solve_ik
 from plumbob.reference.inverse_kinematics.chain import new_chain, pose_chain
-from plumbob.reference.inverse_kinematics.jacobian import (
+from plumbob.reference.inverse_kinematics.jacobian_methods import (
     linearise,
     rotate_joints,
     solve_damped,

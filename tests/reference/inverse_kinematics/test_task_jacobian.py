@@ -19,14 +19,16 @@ from plumbob.reference import (
 from plumbob.reference.inverse_kinematics.box_step import (
     damped_step,
     linearise_task,
-    solve_damped,
+    solve_system,
     take_step,
     transposed_step,
     wrap,
 )
-from plumbob.reference.inverse_kinematics.damped_least_squares import DAMPING
-from plumbob.reference.inverse_kinematics.levenberg_marquardt import DAMPING as OF_POSITIONS
-from plumbob.reference.inverse_kinematics.levenberg_marquardt import DAMPING_OF_POSES
+from plumbob.reference.inverse_kinematics.jacobian_methods import (
+    DAMPING_OF_POSES,
+    DAMPING_OF_POSITIONS,
+    FIXED_DAMPING,
+)
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.jacobians import integrate, jacobian
 
@@ -113,7 +115,7 @@ def damped(J, e, damping):
 
 def sugihara(J, e, targets, reach):
     poses = any(target.rotation is not None for target in targets)
-    return damped(J, e, (DAMPING_OF_POSES if poses else OF_POSITIONS) * e @ e)
+    return damped(J, e, (DAMPING_OF_POSES if poses else DAMPING_OF_POSITIONS) * e @ e)
 
 
 def transposed(J, e, targets, reach):
@@ -124,7 +126,7 @@ def transposed(J, e, targets, reach):
 
 STEPS = {
     "levenberg_marquardt": sugihara,
-    "damped_least_squares": lambda J, e, targets, reach: damped(J, e, DAMPING * reach**2),
+    "damped_least_squares": lambda J, e, targets, reach: damped(J, e, FIXED_DAMPING * reach**2),
     "jacobian_transpose": transposed,
 }
 
@@ -308,7 +310,7 @@ def test_a_singular_system_has_a_finite_answer(chain_of_joints, machine, rng, ra
         system.active[:] = 0.0
         if rank == 0 and damping == 0.0:
             continue
-        solve_damped(system, damping)
+        solve_system(system, damping)
         assert np.isfinite(system.z).all()
         if rank and damping < 1e-11:
             moved = system.J.T @ (system.J @ system.z)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from plumbob.reference import rotation
 from plumbob.reference.inverse_kinematics.wahba import (
-    LEAST_ROTATION,
+    IDENTITY_WEIGHT,
     ZERO_MATRIX,
     add_outer,
     add_rotation,
@@ -75,7 +75,7 @@ def test_no_rotation_is_better_than_the_best(M):
     assert np.linalg.norm(S) == pytest.approx(1.0, abs=ROUNDING)
     assert S[0] >= 0.0
     size = np.abs(M).sum()
-    assert value(M, S) >= largest_value(M) - (4.0 * LEAST_ROTATION + ROUNDING) * size
+    assert value(M, S) >= largest_value(M) - (4.0 * IDENTITY_WEIGHT + ROUNDING) * size
 
 
 @given(M=matrices)
@@ -94,7 +94,7 @@ def test_noisy_arms_are_fitted_as_by_singular_values(seed, count):
     sign = np.sign(np.linalg.det(U @ Vt))
     kabsch = rotation.from_matrix(U @ np.diag([1.0, 1.0, sign]) @ Vt)
     # The least rotation shifts the optimum by its share of M over the curvature there.
-    allowed = 10.0 * LEAST_ROTATION * np.abs(M).sum() / (s[1] + sign * s[2])
+    allowed = 10.0 * IDENTITY_WEIGHT * np.abs(M).sum() / (s[1] + sign * s[2])
     assert rotation.angle(best(M), kabsch) <= allowed + ROUNDING
 
 

@@ -13,9 +13,9 @@ from plumbob.reference import scenes
 from plumbob.reference.backend import compiled
 from plumbob.reference.implicit_euler.objective import global_matrix
 from plumbob.reference.sparse import CholeskyFactor, NotPositiveDefiniteError
-from plumbob.reference.sparse.dense import PANEL, STRIP, eliminate
 from plumbob.reference.sparse.dissection import HARD, LEAF
 from plumbob.reference.sparse.linear_solver import factorize
+from plumbob.reference.sparse.multifrontal import PANEL, STRIP, eliminate
 from plumbob.reference.sparse.triangular import NEAR
 
 EPS = np.finfo(float).eps

@@ -1,0 +1,35 @@
+"""Settings of the documentation, which `make docs` builds with Sphinx into build/docs."""
+
+import re
+from importlib.metadata import version as installed_version
+
+project = "Plumbob"
+author = copyright = "The Plumbob authors"
+version = release = installed_version("plumbob")
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["sample", "gate"]
+source_suffix = {".md": "markdown"}
+myst_heading_anchors = 3
+default_role = "code"  # docstrings write names in single backticks
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = True
+
+html_theme = "furo"
+html_title = f"Plumbob {version}"
+html_show_sourcelink = False
+
+
+def escape_marks(app, what, name, object_, options, lines):
+    """Keep the bars and stars of formulas, such as |grad g|, from being read as markup."""
+    for number, line in enumerate(lines):
+        parts = re.split(r"(`+[^`]*`+)", line)
+        parts[::2] = [re.sub(r"(?<!\\)([|*])", r"\\\1", part) for part in parts[::2]]
+        lines[number] = "".join(parts)
+
+
+def setup(app):
+    """Escape before napoleon turns sections into markup, which happens at priority 500."""
+    app.connect("autodoc-process-docstring", escape_marks, priority=400)

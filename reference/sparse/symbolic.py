@@ -1,0 +1,342 @@
+"""Symbolic analysis: the order P and the supernodes of P A P' = L L', from the pattern of A.
+
+The elimination tree makes the parent of column j the first row below the diagonal of column j of L
+(Liu 1990, "The Role of Elimination Trees in Sparse Factorization"). Supernodes are runs of columns
+of L with one common pattern below them, stored and used as blocks. Fundamental ones follow from
+parents and column counts (Ng and Peyton 1993, "Block Sparse Cholesky Algorithms on Advanced
+Uniprocessor Computers"). Small ones are merged with their parents where that adds few explicit
+zeros (Ashcraft and Grimes 1989, "The Influence of Relaxed Supernode Partitions on the Multifrontal
+Method").
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .dissection import nested_dissection
+
+# A merged supernode of at most so many columns may hold such a share of explicit zeros.
+WIDTHS = (4, 16, 48)
+ZERO_SHARES = (0.4, 0.15, 0.05, 0.02)
+
+
+class Supernodes(NamedTuple):
+    """The pattern of L in blocks.
+
+    Attributes:
+        columns: the first column of each supernode, and n; shape (supernode + 1,).
+        starts: where the rows of each begin in `rows`, and their number; shape (supernode + 1,).
+        rows: the rows below the diagonal blocks, ascending, supernode by supernode.
+        tallest: number of rows of the tallest supernode, with its diagonal block.
+    """
+
+    columns: np.ndarray
+    starts: np.ndarray
+    rows: np.ndarray
+    tallest: int
+
+
+class UpdateTree(NamedTuple):
+    """The updates that go into each front.
+
+    Attributes:
+        starts: where each supernode's children begin in `children`; shape (supernode + 1,).
+        children: of each supernode, last one first, as their updates lie on the stack.
+        highest: the height of the stack of updates.
+        entries: the number of entries of L.
+    """
+
+    starts: np.ndarray
+    children: np.ndarray
+    highest: int
+    entries: int
+
+
+def analyse(graph, order):
+    """Return the order of elimination, its inverse, the supernodes and their family.
+
+    `order` lists all vertices of the graph; it is overwritten.
+    """
+    nested_dissection(graph, order)
+    parents = elimination_tree(graph, order, inverse(order))
+    relabelling = postorder(parents)
+    order, parents = composed(order, relabelling), relabelled(parents, relabelling)
+    counts = column_counts(graph, order, inverse(order), parents)
+    member = fundamental(parents, counts)
+    relabelling, columns = gather(member, amalgamate(member, parents, counts))
+    order, parents = composed(order, relabelling), relabelled(parents, relabelling)
+    counts, place = composed(counts, relabelling), inverse(order)
+    blocks, family = structure(graph, order, place, columns, parents, counts)
+    return order, place, blocks, family
+
+
+def inverse(order):
+    """Return where each vertex comes in an order."""
+    place = np.empty(len(order), np.int32)
+    for i in range(len(order)):
+        place[order[i]] = i
+    return place
+
+
+def composed(values, relabelling):
+    """Return the values in another order."""
+    result = np.empty(len(values), np.int32)
+    for i in range(len(values)):
+        result[i] = values[relabelling[i]]
+    return result
+
+
+def relabelled(parents, relabelling):
+    """Return the parents after their nodes are put into another order, each before its parent."""
+    place, result = inverse(relabelling), np.empty(len(parents), np.int32)
+    for i in range(len(parents)):
+        parent = parents[relabelling[i]]
+        result[i] = place[parent] if parent >= 0 else -1
+    return result
+
+
+def elimination_tree(graph, order, place):
+    """Return the parent of each column of P A P', -1 for a root (Liu 1990, algorithm 4.2).
+
+    `order` lists the vertices as they are eliminated, and `place` is its inverse.
+    """
+    n = len(order)
+    parents, ancestors = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    for i in range(n):
+        v = order[i]
+        for e in range(graph.indptr[v], graph.indptr[v + 1]):
+            k = place[graph.indices[e]]
+            while k >= 0 and k < i:  # climb to the root, and let the path point at i
+                above = ancestors[k]
+                ancestors[k] = i
+                if above < 0:
+                    parents[k] = i
+                k = above
+    return parents
+
+
+def postorder(parents):
+    """Return the nodes of a forest so that every subtree is consecutive and ends in its root."""
+    n = len(parents)
+    eldest, sibling = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    for j in range(n - 1, -1, -1):
+        if parents[j] >= 0:
+            sibling[j], eldest[parents[j]] = eldest[parents[j]], j
+    result, path, count = np.empty(n, np.int32), np.empty(n, np.int32), 0
+    for root in range(n):
+        if parents[root] >= 0:
+            continue
+        path[0], depth = root, 1
+        while depth > 0:
+            j = path[depth - 1]
+            child = eldest[j]
+            if child >= 0:
+                eldest[j] = sibling[child]
+                path[depth] = child
+                depth += 1
+            else:
+                result[count] = j
+                count, depth = count + 1, depth - 1
+    return result
+
+
+def column_counts(graph, order, place, parents):
+    """Return the number of entries in each column of L, the diagonal included.
+
+    The nodes are in postorder. Row i of L is the subtree of the nodes k with a_ik not zero and
+    their ancestors up to i; adding up over all rows, each leaf of a subtree counts one and each
+    meeting of two paths subtracts one (Gilbert, Ng, Peyton 1994, "An Efficient Algorithm to
+    Compute Row and Column Counts for Sparse Cholesky Factorization").
+    """
+    n = len(order)
+    first, counts = first_descendants(parents)
+    last_leaf, latest = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    roots = np.arange(n).astype(np.int32)
+    for j in range(n):
+        if parents[j] >= 0:
+            counts[parents[j]] -= 1
+        v = order[j]
+        for e in range(graph.indptr[v], graph.indptr[v + 1]):
+            i = place[graph.indices[e]]
+            if i > j and first[j] > latest[i]:  # j is a leaf of row i's subtree
+                counts[j] += 1
+                if last_leaf[i] >= 0:
+                    counts[current_root(roots, last_leaf[i])] -= 1
+                last_leaf[i] = j
+            if i > j:
+                latest[i] = max(latest[i], first[j])
+        if parents[j] >= 0:
+            roots[j] = parents[j]
+    for j in range(n):
+        if parents[j] >= 0:
+            counts[parents[j]] += counts[j]
+    return counts
+
+
+def first_descendants(parents):
+    """Return the first node of each subtree in postorder, and one for each leaf, else zero."""
+    n = len(parents)
+    first, counts = np.arange(n).astype(np.int32), np.ones(n, np.int32)
+    for j in range(n):
+        if parents[j] >= 0:
+            counts[parents[j]] = 0
+            first[parents[j]] = min(first[parents[j]], first[j])
+    return first, counts
+
+
+def current_root(roots, leaf):
+    """Return the current root of a node's tree, and let the path to it point there."""
+    root = leaf
+    while roots[root] != root:
+        root = roots[root]
+    while leaf != root:
+        above = roots[leaf]
+        roots[leaf] = root
+        leaf = above
+    return root
+
+
+def entries(width, height):
+    """Return the number of entries of the lower trapezoid of a block."""
+    return width * height - width * (width - 1) // 2
+
+
+def fundamental(parents, counts):
+    """Return the supernode of each column, columns being in postorder."""
+    n = len(parents)
+    children = np.zeros(n, np.int32)
+    for j in range(n):
+        if parents[j] >= 0:
+            children[parents[j]] += 1
+    member = np.zeros(n, np.int32)
+    for j in range(1, n):
+        chained = parents[j - 1] == j and counts[j - 1] == counts[j] + 1 and children[j] == 1
+        member[j] = member[j - 1] + (0 if chained else 1)
+    return member
+
+
+def amalgamate(member, parents, counts):
+    """Return the final supernode that each supernode becomes a part of."""
+    count = 0
+    for s in member:
+        count = max(count, s + 1)
+    last = np.zeros(count, np.int64)
+    width, filled = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    for j in range(len(member)):
+        last[member[j]] = j
+        width[member[j]] += 1
+        filled[member[j]] += counts[j]
+    target = np.arange(count).astype(np.int32)
+    for s in range(count):  # children come before their parents
+        above = parents[last[s]]
+        if above >= 0:
+            p = member[above]
+            together = width[s] + width[p]
+            below = counts[last[p]] - 1
+            zeros = entries(together, together + below) - filled[s] - filled[p]
+            if zeros <= allowed(together) * entries(together, together + below):
+                target[s] = p
+                width[p], filled[p] = together, filled[s] + filled[p]
+    for s in range(count - 1, -1, -1):
+        target[s] = target[target[s]]
+    return target
+
+
+def allowed(width):
+    """Return the share of explicit zeros that a supernode of a width may hold."""
+    for i in range(len(WIDTHS)):
+        if width <= WIDTHS[i]:
+            return ZERO_SHARES[i]
+    return ZERO_SHARES[-1]
+
+
+def gather(member, target):
+    """Return an order in which merged supernodes are consecutive, and their first columns.
+
+    Subtrees stay consecutive: a supernode comes where the last of its parts came.
+    """
+    count = len(target)
+    sizes = np.zeros(count + 1, np.int32)
+    for s in member:
+        sizes[target[s] + 1] += 1
+    merged_count = 0
+    columns = np.zeros(count + 1, np.int32)
+    for s in range(count):
+        if sizes[s + 1] > 0:
+            columns[merged_count] = sizes[s]
+            merged_count += 1
+        sizes[s + 1] += sizes[s]
+    columns[merged_count] = len(member)
+    order = np.empty(len(member), np.int32)
+    for j in range(len(member)):
+        s = target[member[j]]
+        order[sizes[s]] = j
+        sizes[s] += 1
+    return order, columns[: merged_count + 1].copy()
+
+
+def structure(graph, order, place, columns, parents, counts):
+    """Return the supernodes with the rows below each, and their family."""
+    count = len(columns) - 1
+    member, above = np.empty(len(order), np.int32), np.empty(count, np.int32)
+    starts, tallest = np.zeros(count + 1, np.int64), 0
+    for s in range(count):
+        below = counts[columns[s + 1] - 1] - 1
+        starts[s + 1] = starts[s] + below
+        tallest = max(tallest, columns[s + 1] - columns[s] + below)
+        for j in range(columns[s], columns[s + 1]):
+            member[j] = s
+    for s in range(count):
+        parent = parents[columns[s + 1] - 1]
+        above[s] = member[parent] if parent >= 0 else -1
+    rows = row_lists(graph, order, place, member, above, starts)
+    return Supernodes(columns, starts, rows, tallest), family(columns, starts, above)
+
+
+def row_lists(graph, order, place, member, above, starts):
+    """Return the rows below each supernode, one list after the other.
+
+    Row i of L reaches from the supernodes of its entries in A up to its own; running through the
+    rows in order leaves every list sorted.
+    """
+    rows, filled = np.empty(starts[-1], np.int32), starts.copy()
+    visited = np.empty(len(above), np.int32)
+    for s in range(len(above)):
+        visited[s] = -1
+    for i in range(len(order)):
+        visited[member[i]] = i
+        v = order[i]
+        for e in range(graph.indptr[v], graph.indptr[v + 1]):
+            k = place[graph.indices[e]]
+            if k < i:
+                s = member[k]
+                while visited[s] != i:
+                    visited[s] = i
+                    rows[filled[s]] = i
+                    filled[s] += 1
+                    s = above[s]
+    return rows
+
+
+def family(columns, starts, above):
+    """Return the children of each supernode, and the sizes of the updates and of L."""
+    count, total = len(above), 0
+    eldest, children = np.zeros(count + 1, np.int64), np.empty(count, np.int32)
+    waiting, top, highest = np.zeros(count, np.int64), 0, 0
+    for s in range(count):
+        width, below = columns[s + 1] - columns[s], starts[s + 1] - starts[s]
+        update = below * (below + 1) // 2
+        total += entries(width, width + below)
+        top += update - waiting[s]
+        highest = max(highest, top)
+        if above[s] >= 0:
+            waiting[above[s]] += update
+            eldest[above[s] + 1] += 1
+    for s in range(count):
+        eldest[s + 1] += eldest[s]
+    filled = eldest.copy()
+    for s in range(count - 1, -1, -1):
+        if above[s] >= 0:
+            children[filled[above[s]]] = s
+            filled[above[s]] += 1
+    return UpdateTree(eldest, children, highest, total)
