@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..peers.ik.protocol import Solve, UnableError, attempt
+from ..peers.ik.protocol import Solve, attempt
 from ..peers.ik.restarts import restarted
 from ..peers.protocol import NoAnswerError, OwnTime, describe, remark_of
+from ..problems.robots import UnableError
 from .isolation import WorkerProcess
 from .progress import TROUBLE, Progress
 from .stopwatch import Budget, time_call
@@ -53,7 +54,7 @@ class Job(NamedTuple):
         try:
             adapter = importlib.import_module(self.module)
             ask, setup = time_call(lambda: self._prepared(adapter))
-            first = self._solved(ask(*self.targets.request(0))) if self.warms_up else None
+            first = self._solved(ask(self.targets.request(0))) if self.warms_up else None
             if self.restarts and first is not None and first.claim < 0:
                 raise UnableError("not started again, for it claims nothing of its answers")
         except Exception as error:  # an exception of an engine is its result
@@ -73,7 +74,7 @@ class Job(NamedTuple):
         for i in range(self.targets.shape[0]):
             if budget.is_spent:
                 return
-            solve = ask(*self.targets.request(i))
+            solve = ask(self.targets.request(i))
             # So that caches are as in a loop of solves and nothing else.
             for _ in range(REPEATS if self.warms_up else 0):
                 if previous is None:

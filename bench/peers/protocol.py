@@ -36,10 +36,6 @@ class NoAnswerError(Exception):
     """A solver gave no answer; the message is a sentence that says why."""
 
 
-class UnableError(ValueError):
-    """What a solver cannot do by its making; the message says what."""
-
-
 def describe(error: Exception) -> str:
     """Return what an exception says, on one line; its type too unless it is a `NoAnswerError`."""
     kind = "" if isinstance(error, NoAnswerError) else f"{type(error).__name__}: "

@@ -1,8 +1,8 @@
 """Every solver that the bench knows: its name, its style, how many iterations it is given.
 
 A solver of the reference takes part as soon as the reference lists it; a line here gives it a
-label, a style and limits of its own. A peer is an adapter and an entry in `solvers.toml`. A user's solver
-is a peer of the run that it was entered for. Nothing here imports an engine.
+label, a style and limits of its own. A peer is an adapter and an entry in `solvers.toml`. A user's
+solver is a peer of the run that it was entered for. Nothing here imports an engine.
 """
 
 import functools

@@ -19,7 +19,7 @@ from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
-from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robots import robot
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import markdown
@@ -41,7 +41,8 @@ def prepare(robot, tolerance, manner="perfect", at=2):
         import an_engine_that_nobody_has
     asked = [-2]  # the first is for the warm-up
 
-    def ask(positions, rotations, start):
+    def ask(request):
+        start = request.start
         asked[0] += 1
         number = asked[0]
 
@@ -261,7 +262,8 @@ class Attempts:
     def __init__(self, *answers):
         self.answers, self.asked, self.starts = list(answers), [], []
 
-    def __call__(self, positions, rotations, start):
+    def __call__(self, request):
+        start = request.start
         self.asked.append(start)
 
         def solve():
@@ -294,7 +296,7 @@ NOTHING, LATER = SolverOutput(None, False), SolverOutput(np.ones(7), True)
 def test_restarts_end_with_the_first_claim_within_the_limits(answers, count, q, claimed, error):
     """Targets are converted for every restart before the clock runs, each from its own start."""
     attempts = Attempts(*answers)
-    solve = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))
+    solve = restarted(attempts, robot("iiwa14"), 3)(PoseRequest(None, None, np.full(7, 0.5)))
     assert len(attempts.asked) == 4
     assert not attempts.starts
     answer = solve()
