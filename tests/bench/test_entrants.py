@@ -292,7 +292,7 @@ def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
 
 
 def entrants(*words):
-    return opening.opened(opening.named(words), ["ik"])
+    return opening.opened(opening.addresses(words), ["ik"])
 
 
 @pytest.mark.parametrize("name", ["CCD", "mink", "TRAC-IK, 5 ms"])
