@@ -1,5 +1,6 @@
 """A line on a terminal while a kernel is compiled, lest its first call seem to hang."""
 
+import atexit
 import sys
 import threading
 from contextlib import ExitStack
@@ -8,6 +9,7 @@ from contextlib import ExitStack
 DELAY = 1.0
 
 _installed = ExitStack()
+atexit.register(_installed.close)  # while the modules that it needs are still there
 _timers: dict[tuple[int, str], threading.Timer] = {}
 
 

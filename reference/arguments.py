@@ -1,9 +1,9 @@
-"""What a caller passed, checked: the value asked for, or a ValueError that names the argument.
+"""Checks of arguments: each returns the value, or raises a ValueError that names the argument.
 
 One rule bounds all magnitudes: no number is beyond 1e75, and a size, which is a number that may not
-be negative, is 0 or at least 1e-75. `array`, `sizes` and `number` keep it; only what looks at the
-numbers itself, such as a kernel, may take them from `floats`. No copy that does not fit into memory
-is made; a boolean is no number and no integer.
+be negative, is 0 or at least 1e-75. `array`, `sizes` and `number` keep it; only a caller that
+checks the numbers itself, such as a kernel, may take them from `floats`. No copy that does not fit
+into memory is made; a boolean is no number and no integer.
 """
 
 import contextlib
@@ -27,13 +27,13 @@ FLOAT64 = np.dtype(np.float64)
 LARGEST_COORDINATE = 1e75
 # No size but 0 is below this, so that one can divide by its fourth power.
 SMALLEST_POSITIVE = 1e-75
-# The most particles, joints, points, poses or restarts: arrays of more fit no memory.
+# The largest number of particles, joints, points, poses or restarts: arrays of more fit no memory.
 LARGEST_COUNT = 10**8
-# The most numbers in an array whose shape is an argument, and the most lengths of that shape.
-LARGEST_ARRAY, MOST_LENGTHS = 4 * LARGEST_COUNT, 32
+# Bounds of an array whose shape is an argument: its numbers, and the lengths of its shape.
+LARGEST_ARRAY, LARGEST_RANK = 4 * LARGEST_COUNT, 32
 # Kinds of arrays that hold no numbers.
 KINDS = {"b": "booleans", "c": "complex numbers", "O": "objects", "U": "text", "M": "dates"}
-# What arrays are counted in.
+# Of the integers by which arrays are indexed.
 LARGEST_INTEGER = 2**63 - 1
 
 
@@ -41,7 +41,7 @@ def array(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
     """Return a finite, C-contiguous, writable float64 array whose last axes are `trailing`.
 
     An int in `trailing` is a length, a word stands for any length; a leading "..." allows batch
-    axes. The value itself is returned where it already fits, and must then not be written to.
+    axes. A value that fits already is returned itself, and must then not be written to.
     """
     return _bounded("numbers", name, value, *trailing)
 
@@ -63,18 +63,17 @@ def sizes(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
 
 
 def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
-    """Return the same as `array`, any number let through, for kernels that look themselves."""
+    """Return the same as `array` without a check of the numbers, for kernels that check them."""
     if type(value) is np.ndarray and value.dtype == FLOAT64 and value.flags.carray:
         if not _fits(value.shape, trailing):
             check_shape(name, value, *trailing)
         return value
-    given = _converted(name, value)
-    if given.dtype.kind not in "fiu":
-        got = KINDS.get(given.dtype.kind) if isinstance(value, np.ndarray) else None
-        got = got or shown(value)
-        raise ValueError(f"{name}: expected an array of numbers, got {got}")
-    check_shape(name, given, *trailing)
-    return copied(name, given, np.float64)
+    numbers = _converted(name, value)
+    if numbers.dtype.kind not in "fiu":
+        kind = KINDS.get(numbers.dtype.kind) if isinstance(value, np.ndarray) else None
+        raise ValueError(f"{name}: expected an array of numbers, got {kind or shown(value)}")
+    check_shape(name, numbers, *trailing)
+    return copied(name, numbers, np.float64)
 
 
 def number(
@@ -124,7 +123,7 @@ def integer(name: str, value: Any, *, least: int, below: int = LARGEST_INTEGER +
 
 
 def count(name: str, value: Any, *, least: int) -> int:
-    """Return an int, at least `least` and at most LARGEST_COUNT: of what arrays will be made."""
+    """Return an int, at least `least` and at most LARGEST_COUNT: a length of arrays."""
     result = integer(name, value, least=least)
     if result > LARGEST_COUNT:
         raise ValueError(f"{name}: expected at most {LARGEST_COUNT:,}, got {shown(result)}")
@@ -132,11 +131,11 @@ def count(name: str, value: Any, *, least: int) -> int:
 
 
 def lengths(name: str, value: Sequence[Any], width: int) -> tuple[int, ...]:
-    """Return leading axes, of 0 or more, of an array that will be made, its last axis so wide."""
+    """Return the leading axes, of 0 or more, of an array whose last axis has a width."""
     axes = tuple(integer(name, length, least=0) for length in value)
-    if len(axes) > MOST_LENGTHS or math.prod(max(n, 1) for n in (*axes, width)) > LARGEST_ARRAY:
+    if len(axes) > LARGEST_RANK or math.prod(max(n, 1) for n in (*axes, width)) > LARGEST_ARRAY:
         raise ValueError(
-            f"{name}: expected at most {MOST_LENGTHS} lengths, of an array of at most "
+            f"{name}: expected at most {LARGEST_RANK} lengths, of an array of at most "
             f"{LARGEST_ARRAY:,} numbers, got {shape(axes):.80}"
         )
     return axes
@@ -146,27 +145,25 @@ def indices(
     name: str, value: ArrayLike, *trailing: int | str, least: int, below: int
 ) -> IndexArray:
     """Return a C-contiguous int64 array of indices, at least `least` and less than `below`."""
-    given = _converted(name, value)
-    if given.dtype.kind not in ("iu" if given.size else "iuf"):  # no numbers at all are floats
-        raise ValueError(f"{name}: expected integer indices, got {given.dtype} values")
-    check_shape(name, given, *trailing)
-    result = copied(name, given, np.int64)
-    outside = (result < least) | (result >= below)
-    if outside.any():
-        raise ValueError(
-            f"{name}: expected indices from {least} to {below - 1}, got {given[outside][0]}"
-        )
+    integers = _converted(name, value)
+    if integers.dtype.kind not in ("iu" if integers.size else "iuf"):  # an empty list is of floats
+        raise ValueError(f"{name}: expected integer indices, got {integers.dtype} values")
+    check_shape(name, integers, *trailing)
+    result = copied(name, integers, np.int64)
+    outside = integers[(result < least) | (result >= below)]
+    if outside.size:
+        raise ValueError(f"{name}: expected indices from {least} to {below - 1}, got {outside[0]}")
     return result
 
 
 def flags(name: str, value: ArrayLike, count: int) -> BoolArray:
-    """Return booleans, shape (count,), of which one may be given for all."""
-    given = _converted(name, value)
-    if given.dtype != bool:
-        raise ValueError(f"{name}: expected booleans, got {given.dtype} values")
-    if given.shape != ():
-        check_shape(name, given, count)
-    return np.array(np.broadcast_to(given, (count,)))
+    """Return booleans, shape (count,); a single one stands for all."""
+    booleans = _converted(name, value)
+    if booleans.dtype != bool:
+        raise ValueError(f"{name}: expected booleans, got {booleans.dtype} values")
+    if booleans.shape != ():
+        check_shape(name, booleans, count)
+    return np.array(np.broadcast_to(booleans, (count,)))
 
 
 def boolean(name: str, value: Any) -> bool:
@@ -183,13 +180,13 @@ def text(name: str, value: Any) -> str:
     return value
 
 
-def sequence(name: str, value: Any, count: int, each: str) -> tuple[Any, ...]:
-    """Return a sequence of so many items, one for `each`, as a tuple."""
-    listed = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    if not (listed or (isinstance(value, np.ndarray) and value.ndim > 0)):
-        raise ValueError(f"{name}: expected {count} {name}, one {each}, got {shown(value)}")
-    if len(value) != count:
-        raise ValueError(f"{name}: expected {count} {name}, one {each}, got {len(value)}")
+def sequence(name: str, value: Any, count: int, owner: str) -> tuple[Any, ...]:
+    """Return a sequence of `count` elements, one an owner, as a tuple."""
+    is_list = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+    is_sequence = is_list or (isinstance(value, np.ndarray) and value.ndim > 0)
+    if not is_sequence or len(value) != count:
+        got = len(value) if is_sequence else shown(value)
+        raise ValueError(f"{name}: expected {count} {name}, one {owner}, got {got}")
     return tuple(value)
 
 
@@ -220,17 +217,17 @@ def generator(name: str, value: Any) -> np.random.Generator:
 
 
 def broadcast(
-    name: str, one: tuple[int, ...], other: tuple[int, ...], whose: str = ""
+    name: str, first: tuple[int, ...], second: tuple[int, ...], owner: str = ""
 ) -> tuple[int, ...]:
-    """Return two batches' common leading axes; `name` is the second's argument.
+    """Return two batches' common leading axes.
 
-    `whose` names those of the first in the error.
+    In the error, `name` is the argument of the second and `owner` is that of the first.
     """
     try:
-        return np.broadcast_shapes(one, other)
+        return np.broadcast_shapes(first, second)
     except ValueError:
-        expected = f"leading axes that broadcast with {whose}{shape(one)}"
-        raise ValueError(f"{name}: expected {expected}, got {shape(other)}") from None
+        expected = f"leading axes that broadcast with {owner}{shape(first)}"
+        raise ValueError(f"{name}: expected {expected}, got {shape(second)}") from None
 
 
 def together(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -239,19 +236,19 @@ def together(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, Float
     return spread(a, (*batch, a.shape[-1])), spread(b, (*batch, b.shape[-1]))
 
 
-def check_shape(name: str, given: np.ndarray, *trailing: int | str) -> None:
+def check_shape(name: str, values: np.ndarray, *trailing: int | str) -> None:
     """Raise a ValueError that names the argument if its shape is not as for `array`."""
-    if not _fits(given.shape, trailing):
-        raise ValueError(f"{name}: expected shape {shape(trailing)}, got {shape(given.shape)}")
+    if not _fits(values.shape, trailing):
+        raise ValueError(f"{name}: expected shape {shape(trailing)}, got {shape(values.shape)}")
 
 
-def copied(name: str, given: np.ndarray, dtype: Any) -> Any:
-    """Return a C-contiguous copy of another type; what overflows becomes infinite."""
+def copied(name: str, values: np.ndarray, dtype: Any) -> Any:
+    """Return a C-contiguous copy of another type; a number that overflows becomes infinite."""
     try:
         with np.errstate(over="ignore"):
-            return np.array(given, dtype=dtype, order="C")
+            return np.array(values, dtype=dtype, order="C")
     except MemoryError:
-        got = shape(given.shape)
+        got = shape(values.shape)
         raise ValueError(f"{name}: expected an array that fits into memory, got {got}") from None
 
 
@@ -263,14 +260,14 @@ def spread(values: FloatArray, lengths: Sequence[int]) -> FloatArray:
 
 
 def frozen(values: np.ndarray) -> np.ndarray:
-    """Return a read-only view, for models and results to show."""
+    """Return a read-only view, for the attributes of models and results."""
     view = values.view()
     view.setflags(write=False)
     return view
 
 
 class KeepsReadOnly:
-    """A model whose copies and pickles show the same arrays read-only as it does."""
+    """A model whose copies and pickles have the same arrays read-only."""
 
     def __getstate__(self) -> tuple[dict[str, Any], list[str]]:
         values = vars(self)
@@ -283,10 +280,10 @@ class KeepsReadOnly:
 
 
 def snapshot(name: str, value: Any) -> Any:
-    """Return a copy of an array or a list, which later changes do not reach; else the value."""
+    """Return a copy of an array or a list, safe from later changes; else the value."""
     if isinstance(value, np.ndarray) and not np.ma.is_masked(value):
         return copied(name, value, value.dtype)
-    with contextlib.suppress(Exception):  # what cannot be copied is refused where it is used
+    with contextlib.suppress(Exception):  # a list that cannot be copied is refused at its use
         return copy.deepcopy(value) if isinstance(value, list) else value
     return value
 
@@ -298,7 +295,7 @@ def shape(lengths: Sequence[int | str]) -> str:
 
 
 def shown(value: Any) -> str:
-    """Write a value for an error message, in short; of what cannot be written, the type."""
+    """Write a value for an error message, in short; its type if that fails."""
     try:
         return f"{value!r:.80}"
     except Exception:
@@ -306,7 +303,7 @@ def shown(value: Any) -> str:
 
 
 def digits_apart(number: float, bound: float, least: int = 6) -> int:
-    """Return with how many significant digits, at least some, two numbers differ as written."""
+    """Return the fewest significant digits, at least `least`, by which two numbers differ."""
     counts = (n for n in range(least, 17) if f"{number:.{n}g}" != f"{bound:.{n}g}")
     return next(counts, 17)
 
@@ -323,21 +320,21 @@ def _bounded(kind: str, name: str, value: ArrayLike, *trailing: int | str) -> Fl
     if largest <= LARGEST_COORDINATE:
         return result
     if not np.isfinite(result).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
-        raise ValueError(f"{name}: expected finite numbers, got {result[where]} at index {where}")
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
+        raise ValueError(f"{name}: expected finite numbers, got {result[index]} at index {index}")
     number, bound = distinct_texts(largest, LARGEST_COORDINATE)
     raise ValueError(f"{name}: expected {kind} of at most {bound}, got {number}")
 
 
 def _converted(name: str, value: Any) -> np.ndarray:
-    """Return the value as an array of whatever type, a view where it is one already."""
+    """Return the value as an array of any type, a view of an array."""
     try:
-        given = np.asarray(value)
-    except Exception:  # anything may come from an object's own conversion
+        values = np.asarray(value)
+    except Exception:  # an object's own conversion may raise any error
         raise ValueError(f"{name}: expected an array of numbers, got {shown(value)}") from None
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise ValueError(f"{name}: expected an array of numbers, got one with masked values")
-    return given
+    return values
 
 
 def _fits(actual: tuple[int, ...], trailing: tuple[int | str, ...]) -> bool:

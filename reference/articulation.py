@@ -171,13 +171,15 @@ class Articulation(KeepsReadOnly):
         """
         count = checked_skeleton(skeleton).joint_count
         names = _checked_kinds(kinds, count)
-        bounds = _checked_limits(lower, upper, count)
+        numbers = np.array([KINDS.index(kind) for kind in names])
+        bounds = _checked_limits(lower, upper, numbers)
         leaders = _checked_mimics({} if mimics is None else mimics, skeleton, names)
-        joints = _records(skeleton, np.array([KINDS.index(kind) for kind in names]), leaders)
+        joints = _records(skeleton, numbers, leaders)
         joints["lower"], joints["upper"] = bounds
-        _check_twists(joints)
         joints["frame"] = _per_joint("frames", rotation.unit("frames", frames), count, 4)
-        joints["axis"], joints["cone"] = _checked_axes(axes, count), _checked_cones(cones, count)
+        joints["axis"] = _checked_axes(axes, count)
+        joints["cone"] = tilts = _checked_bound("cones", cones, count)
+        arguments.sizes("cones", np.where(tilts == np.inf, 0.0, tilts), "...")
         joints["rotated"] = rotated_by_pi(joints)
         fields = zip(("lower", "upper", "frame", "axis", "cone"),
                      ("lower", "upper", "frames", "axes", "cones"), strict=True)  # fmt: skip
@@ -318,8 +320,9 @@ def joint_transform(joints, j, q):
     x, R = load_vector(joints["offset"], j), load_quaternion(joints["frame"], j)
     kind, at = joints["kind"][j], joints["coordinate"][j]
     if kind == HINGE:
-        angle = joints["multiplier"][j] * q[at] + joints["shift"][j]
-        R = rotated_by_half(R, load_quaternion(joints["rotated"], j), half_angle(angle))
+        c, s = half_angle(joints["multiplier"][j] * q[at] + joints["shift"][j])
+        P = load_quaternion(joints["rotated"], j)  # R axis
+        R = c * R[0] + s * P[0], c * R[1] + s * P[1], c * R[2] + s * P[2], c * R[3] + s * P[3]
     elif kind == SLIDE:
         distance = joints["multiplier"][j] * q[at] + joints["shift"][j]
         x = add(x, rotate(R, scale(distance, load_vector(joints["axis"], j))))
@@ -335,20 +338,6 @@ def rotated_by_pi(joints: RecordArray) -> FloatArray:
     """Return each joint's frame rotated by pi about its axis, (joint, 4)."""
     half = np.column_stack([np.zeros(len(joints)), joints["axis"]])
     return rotation.multiply(np.ascontiguousarray(joints["frame"]), half)
-
-
-def rotated_by_half(R, rotated, half):
-    """Return R rotated about an axis, c R + s (R axis), `half` being c, s of half the angle.
-
-    `rotated` is R axis: R rotated by pi about the axis.
-    """
-    c, s = half
-    return (
-        c * R[0] + s * rotated[0],
-        c * R[1] + s * rotated[1],
-        c * R[2] + s * rotated[2],
-        c * R[3] + s * rotated[3],
-    )
 
 
 def swing_twist(Q, axis):
@@ -501,15 +490,22 @@ def _checked_axes(axes: ArrayLike, count: int) -> FloatArray:
 
 
 def _checked_limits(
-    lower: ArrayLike, upper: ArrayLike, count: int
+    lower: ArrayLike, upper: ArrayLike, kinds: IndexArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Return both limits, in order, and kept by some twist from -pi to pi of each ball."""
+    count = len(kinds)
     lower, upper = _checked_bound("lower", lower, count), _checked_bound("upper", upper, count)
-    crossed = np.flatnonzero(lower > upper)
-    if len(crossed):
-        j = crossed[0]
+    for j in np.flatnonzero(lower > upper):
         number, limit = arguments.distinct_texts(lower[j], upper[j])
         raise ValueError(
             f"lower: expected at most the upper limit, {limit}, got {number} for joint {j}"
+        )
+    for j in np.flatnonzero((kinds == BALL) & ((lower > np.pi) | (upper < -np.pi))):
+        start, _ = arguments.distinct_texts(lower[j], np.pi)
+        end, _ = arguments.distinct_texts(upper[j], -np.pi)
+        raise ValueError(
+            f"lower: expected limits of a ball's twist within -pi to pi, got {start} to "
+            f"{end} for joint {j}"
         )
     return lower, upper
 
@@ -523,37 +519,28 @@ def _checked_bound(name: str, value: ArrayLike, count: int) -> FloatArray:
     return bounds
 
 
-def _check_twists(joints: RecordArray) -> None:
-    """Refuse limits of balls that no twist, from -pi to pi, could keep."""
-    lower, upper = joints["lower"], joints["upper"]
-    beyond = np.flatnonzero((joints["kind"] == BALL) & ((lower > np.pi) | (upper < -np.pi)))
-    if len(beyond):
-        j = beyond[0]
-        start, _ = arguments.distinct_texts(lower[j], np.pi)
-        end, _ = arguments.distinct_texts(upper[j], -np.pi)
-        raise ValueError(
-            f"lower: expected limits of a ball's twist within -pi to pi, got {start} to "
-            f"{end} for joint {j}"
-        )
-
-
-def _checked_cones(cones: ArrayLike, count: int) -> FloatArray:
-    bounds = _checked_bound("cones", cones, count)
-    arguments.sizes("cones", np.where(bounds == np.inf, 0.0, bounds), "...")
-    return bounds
-
-
 def _checked_mimics(
     mimics: Mapping[int | str, Mimic], skeleton: Skeleton, kinds: tuple[str, ...]
 ) -> dict[int, Mimic]:
     """Return the mimics by index, each with a leader that is no mimic joint itself."""
     if not isinstance(mimics, Mapping):
         raise ValueError(f"mimics: expected a mapping of joints, got {arguments.shown(mimics)}")
-    followers = {skeleton.index(j, "mimics"): _checked_mimic(m) for j, m in mimics.items()}
+    followers = {}
+    for joint, mimic in mimics.items():
+        if not isinstance(mimic, tuple | list) or not 1 <= len(mimic) <= 3:
+            raise ValueError(f"mimics: expected a Mimic, got {arguments.shown(mimic)}")
+        followers[skeleton.index(joint, "mimics")] = Mimic(*mimic)
     leaders = {joint: skeleton.index(mimic.leader, "mimics") for joint, mimic in followers.items()}
     checked: dict[int, Mimic] = {}
     for joint in followers:
-        for j in reversed(_chain_to_leader(joint, leaders, checked, skeleton)):
+        chain: dict[int, None] = {}  # towards the first leader
+        while joint in leaders and joint not in checked:
+            if joint in chain:
+                name = skeleton.names[joint]
+                raise ValueError(f"mimics: expected a leader, got {name!r} in a ring")
+            chain[joint] = None
+            joint = leaders[joint]
+        for j in reversed(chain):
             multiplier = arguments.number("mimics", followers[j].multiplier)
             shift = arguments.number("mimics", followers[j].shift)
             first, factor, offset = checked.get(leaders[j], Mimic(leaders[j]))
@@ -562,31 +549,10 @@ def _checked_mimics(
                 arguments.number("mimics", multiplier * factor),
                 arguments.number("mimics", multiplier * offset + shift),
             )
-            for k in (j, leaders[j]):
-                if kinds[k] not in ("hinge", "slide"):
-                    raise ValueError(
-                        f"mimics: expected hinges or slides, got {kinds[k]!r} for joint {k}"
-                    )
+    for k in {*followers, *leaders.values()}:
+        if kinds[k] not in ("hinge", "slide"):
+            raise ValueError(f"mimics: expected hinges or slides, got {kinds[k]!r} for joint {k}")
     return checked
-
-
-def _checked_mimic(mimic: Any) -> Mimic:
-    if not isinstance(mimic, tuple | list) or not 1 <= len(mimic) <= 3:
-        raise ValueError(f"mimics: expected a Mimic, got {arguments.shown(mimic)}")
-    return Mimic(*mimic)
-
-
-def _chain_to_leader(
-    joint: int, leaders: Mapping[int, int], checked: Mapping[int, Mimic], skeleton: Skeleton
-) -> list[int]:
-    """Return the mimic joints from one towards its first leader that are not yet checked."""
-    chain: dict[int, None] = {}
-    while joint in leaders and joint not in checked:
-        if joint in chain:
-            raise ValueError(f"mimics: expected a leader, got {skeleton.names[joint]!r} in a ring")
-        chain[joint] = None
-        joint = leaders[joint]
-    return list(chain)
 
 
 def _records(skeleton: Skeleton, kinds: IndexArray, mimics: Mapping[int, Mimic]) -> RecordArray:

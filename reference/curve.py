@@ -14,7 +14,7 @@ from .arguments import FloatArray
 from .backend.compiled import Kernel
 
 # A finer curve would not fit into memory.
-MOST_POINTS = 10_000_000
+MAX_POINTS = 10_000_000
 
 
 def circle(count: int = 150) -> FloatArray:
@@ -98,41 +98,40 @@ def resample(
         raise ValueError("curve: expected at least one point, got none")
     if closed:
         points = np.concatenate([points, points[:1]])
-    kept = _drop_close(points, min_spacing)
-    _check_count(kept, max_spacing)
-    spaced = _divide_gaps(kept, max_spacing)
+    selection = np.empty(len(points), dtype=np.int64)
+    points = points[selection[: _select(points, min_spacing, selection)]]
+    gaps = np.linalg.norm(np.diff(points, axis=0), axis=-1)
+    if (gaps / max_spacing).sum() > MAX_POINTS:
+        raise ValueError(
+            f"max_spacing: expected one for at most {MAX_POINTS:,} points, got {max_spacing:g}"
+        )
+    spaced = _divide_gaps(points, gaps, max_spacing)
     return spaced[:-1] if closed else spaced
 
 
-def _drop_close(points: FloatArray, min_spacing: float) -> FloatArray:
-    """Return points at least min_spacing from their predecessor, both ends included."""
-    kept = np.empty(len(points), dtype=np.int64)
-    return points[kept[: _keep(points, min_spacing, kept)]]
-
-
-def keep_spaced(points, min_spacing, kept):
-    """Store the indices of the points to keep, in order; return their count.
+def select_spaced(points, min_spacing, selection):
+    """Store the indices of both ends and of points min_spacing apart; return their count.
 
     Choose points greedily, then drop the last ones until the end of the curve is far enough from
-    the rest. If none remains between the ends, take a point far enough from both.
+    the last. If none remains between the ends, take a point far enough from both.
     """
     last = len(points) - 1
     count = 1
-    kept[0] = 0
+    selection[0] = 0
     for i in range(1, last):
-        if spacing(points, kept[count - 1], i) >= min_spacing:
-            kept[count] = i
+        if spacing(points, selection[count - 1], i) >= min_spacing:
+            selection[count] = i
             count += 1
-    while count > 1 and spacing(points, kept[count - 1], last) < min_spacing:
+    while count > 1 and spacing(points, selection[count - 1], last) < min_spacing:
         count -= 1
     if count == 1 and spacing(points, 0, last) < min_spacing:
         for i in range(last - 1, 0, -1):
             distance = min(spacing(points, 0, i), spacing(points, i, last))
             if distance >= min_spacing and count == 1:
-                kept[count] = i
+                selection[count] = i
                 count += 1
     if last > 0:
-        kept[count] = last
+        selection[count] = last
         count += 1
     return count
 
@@ -145,22 +144,13 @@ def spacing(points, i, j):
     return np.sqrt(x * x + y * y + z * z)
 
 
-_keep = Kernel(keep_spaced)
+_select = Kernel(select_spaced)
 
 
-def _check_count(points: FloatArray, max_spacing: float) -> None:
-    count = (np.linalg.norm(np.diff(points, axis=0), axis=-1) / max_spacing).sum()
-    if count > MOST_POINTS:
-        raise ValueError(
-            f"max_spacing: expected one for at most {MOST_POINTS:,} points, got {max_spacing:g}"
-        )
-
-
-def _divide_gaps(points: FloatArray, max_spacing: float) -> FloatArray:
+def _divide_gaps(points: FloatArray, gaps: FloatArray, max_spacing: float) -> FloatArray:
     """Return the points with evenly spaced ones added in gaps wider than max_spacing."""
     if len(points) == 1:
         return points
-    gaps = np.linalg.norm(np.diff(points, axis=0), axis=-1)
     pieces = np.maximum(np.ceil(gaps / max_spacing), 1).astype(np.int64)
     starts = np.repeat(np.arange(len(gaps)), pieces)
     first = np.cumsum(pieces) - pieces
@@ -189,11 +179,11 @@ def _stroke(corners: ArrayLike) -> Callable[[FloatArray], FloatArray]:
     x, z = np.asarray(corners, dtype=np.float64).T
     arc_length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
 
-    def at(s: FloatArray) -> FloatArray:
+    def points(s: FloatArray) -> FloatArray:
         length = s * arc_length[-1]
         return _in_plane(np.interp(length, arc_length, x), np.interp(length, arc_length, z))
 
-    return at
+    return points
 
 
 def _uneven(count: int, halts: int = 3) -> FloatArray:
@@ -209,7 +199,7 @@ def _body(u: FloatArray) -> FloatArray:
 
 
 def _eye(u: FloatArray) -> FloatArray:
-    """Return the ring to which the line is tied."""
+    """Return the ring that the line is tied to."""
     t = 2.0 * np.pi * u
     return _in_plane(0.06 * np.sin(t), 0.51 + 0.06 * np.cos(t))
 

@@ -1,9 +1,8 @@
 """Explicit integrators: symplectic Euler, and the classical Runge-Kutta method of order 4.
 
 Dampers pull with -c ((v_i - v_j)·u) u at the current velocities, unlike in a step of implicit
-Euler; `mass_spring.damper_forces` compares the two laws. A pin moves to its position at
-the end of the step in a straight line at constant velocity; the velocity of pins in the state is
-ignored.
+Euler; `mass_spring.damper_forces` compares the two laws. A pin moves to its position at the end of
+the step in a straight line at constant velocity; its velocity in the state is ignored.
 """
 
 import numpy as np
@@ -85,17 +84,11 @@ def _start(
     return x, v, targets
 
 
-def _end(
-    name: str,
-    system: MassSpring,
-    positions: FloatArray,
-    velocities: FloatArray,
-    targets: FloatArray,
-) -> State:
+def _end(name: str, system: MassSpring, x: FloatArray, v: FloatArray, targets: FloatArray) -> State:
     """Return the checked state with the pins exactly at their targets."""
-    positions[system.pinned] = targets
-    if not np.abs([positions, velocities]).max() <= LARGEST_COORDINATE:
+    x[system.pinned] = targets
+    if not np.abs([x, v]).max() <= LARGEST_COORDINATE:
         raise FloatingPointError(
             f"{name}: the step left the numbers up to {LARGEST_COORDINATE:g}; h is too large"
         )
-    return State.of(positions, velocities)
+    return State.of(x, v)

@@ -1,6 +1,7 @@
 """Forward kinematics of a tree of joints, and back from global to local rotations."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +10,7 @@ from . import arguments, rotation
 from .arguments import FloatArray, frozen
 from .articulation import Articulation
 from .backend.compiled import Kernel
-from .backend.simd.poses import (
+from .backend.simd.vectors import (
     LANES,
     in_lanes,
     load_position,
@@ -24,7 +25,7 @@ from .model import Model, checked_model
 from .quaternion import add, conjugate, load_vector, made_unit, multiply, rotate
 from .skeleton import Pose, Skeleton, SkeletonArrays, checked_skeleton
 
-# A slice of a batch with fewer joints than this is done before another thread has begun.
+# A slice of a batch with fewer joints than this takes less time than another thread to begin.
 THREAD_JOINTS = 100_000
 
 
@@ -81,11 +82,12 @@ def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
 def _in_slices(kernel: Kernel, tree: SkeletonArrays, *poses: FloatArray) -> bool:
     """Run a kernel on slices of arrays (..., joint, 3 or 4); return whether all were valid."""
     flat = [values.reshape(-1, *values.shape[-2:]) for values in poses]
-    least = math.ceil(THREAD_JOINTS / len(tree.parents))
-    done = in_slices(
-        kernel, len(flat[0]), lambda part: (*tree, *(values[part] for values in flat)), least=least
-    )
-    return all(done)
+    length = math.ceil(THREAD_JOINTS / len(tree.parents))
+
+    def arguments_of(part: slice) -> tuple[Any, ...]:
+        return (*tree, *(values[part] for values in flat))
+
+    return all(in_slices(kernel, len(flat[0]), arguments_of, least=length))
 
 
 def forward_pose(parents, offsets, local, positions, rotations):
@@ -132,16 +134,12 @@ def _forward_one(parents, offsets, poses, positions, rotations):
     return True
 
 
-def _forward_each(parents, offsets, poses, positions, rotations):
-    valid = True
-    for i in range(len(poses)):
-        valid &= _forward_one(parents, offsets, poses[i], positions[i], rotations[i])
-    return valid
-
-
 def _forward_many(parents, offsets, poses, positions, rotations):
     if len(poses) < LANES:
-        return _forward_each(parents, offsets, poses, positions, rotations)
+        valid = True
+        for i in range(len(poses)):
+            valid &= _forward_one(parents, offsets, poses[i], positions[i], rotations[i])
+        return valid
     local = np.empty((len(parents), 4, LANES))
     for i in range(0, len(poses), LANES):
         first = min(i, len(poses) - LANES)  # the last tile overlaps the one before
@@ -152,18 +150,14 @@ def _forward_many(parents, offsets, poses, positions, rotations):
     return True
 
 
-def _local_each(parents, poses, local):
-    rotations = np.empty(poses.shape[1:])
-    for i in range(len(poses)):
-        if not normalise(poses[i], rotations):
-            return False
-        local_pose(parents, rotations, local[i])
-    return True
-
-
 def _local_many(parents, offsets, poses, local):
     if len(poses) < LANES:
-        return _local_each(parents, poses, local)
+        unit = np.empty(poses.shape[1:])
+        for i in range(len(poses)):
+            if not normalise(poses[i], unit):
+                return False
+            local_pose(parents, unit, local[i])
+        return True
     rotations = np.empty((len(parents), 4, LANES))
     for i in range(0, len(poses), LANES):
         first = min(i, len(poses) - LANES)

@@ -138,9 +138,9 @@ class MassSpring(KeepsReadOnly):
     def _store(self, arrays: SystemArrays) -> None:
         free = np.ones(len(arrays.masses), dtype=bool)
         free[arrays.pinned] = False
-        shown = {name: frozen(values) for name, values in arrays._asdict().items()}
+        fields = {name: frozen(values) for name, values in arrays._asdict().items()}
         damped = bool(arrays.dampings.any())
-        self.__dict__.update(shown, free=frozen(free), damped=damped, arrays=arrays)
+        self.__dict__.update(fields, free=frozen(free), damped=damped, arrays=arrays)
 
     def replaced(self, **arrays: Any) -> "MassSpring":
         """Return the system with some of its `SystemArrays` replaced, unchecked and not copied."""
@@ -154,16 +154,16 @@ class MassSpring(KeepsReadOnly):
 
         These springs have no stiffness and follow all others. The system itself if there are none.
         """
-        both = np.flatnonzero(self.tension_only & (self.dampings > 0))
-        if len(both) == 0:
+        damped = np.flatnonzero(self.tension_only & (self.dampings > 0))
+        if len(damped) == 0:
             return self
-        arrays, zeros = self.arrays, np.zeros(len(both))
+        arrays, zeros = self.arrays, np.zeros(len(damped))
         dampings = np.where(self.tension_only, 0.0, self.dampings)
         return self.replaced(
-            springs=np.concatenate([arrays.springs, arrays.springs[both]]),
-            rest_lengths=np.concatenate([arrays.rest_lengths, arrays.rest_lengths[both]]),
+            springs=np.concatenate([arrays.springs, arrays.springs[damped]]),
+            rest_lengths=np.concatenate([arrays.rest_lengths, arrays.rest_lengths[damped]]),
             stiffnesses=np.concatenate([arrays.stiffnesses, zeros]),
-            dampings=np.concatenate([dampings, arrays.dampings[both]]),
+            dampings=np.concatenate([dampings, arrays.dampings[damped]]),
             tension_only=np.concatenate([arrays.tension_only, zeros > 0]),
         )
 

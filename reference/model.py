@@ -1,4 +1,4 @@
-"""What takes the place of a model at the borders: a Skeleton, an Articulation, or a Robot."""
+"""The models that public functions take: a Skeleton, an Articulation, or a Robot."""
 
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -25,7 +25,7 @@ def checked_model(model: Any, argument: str = "skeleton") -> Skeleton | Articula
 
 
 def coordinates_name(model: Skeleton | Articulation) -> str:
-    """Return what the coordinates of a model are called: q, or local_rotations of a Skeleton."""
+    """Return the name of a model's coordinates: q, or local_rotations of a Skeleton."""
     return "local_rotations" if isinstance(model, Skeleton) else "q"
 
 
@@ -45,11 +45,11 @@ def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> i
         return model.index(effector, "effector")
     if isinstance(model, Skeleton):
         return model.joint_count - 1
-    kept = model.__dict__
-    if "only_tip" not in kept:
+    cache = model.__dict__
+    if "only_tip" not in cache:
         ends = tips(model)
         if len(ends) > 1:
             names = ", ".join(model.names[j] for j in ends)
             raise ValueError(f"effector: expected one of the tips {names}, got none")
-        kept["only_tip"] = ends[0]
-    return kept["only_tip"]
+        cache["only_tip"] = ends[0]
+    return cache["only_tip"]

@@ -1,4 +1,4 @@
-"""How an iterative solve ended: an answer, never an exception."""
+"""The outcome of an iterative solve: a value, never an exception."""
 
 from enum import IntEnum
 
@@ -17,7 +17,7 @@ class Outcome(IntEnum):
 
     @property
     def unreachable(self) -> bool:
-        """Whether geometry proves that no pose reaches the target, settled or not."""
+        """Whether geometry proves that no pose reaches the target."""
         return self in (Outcome.UNREACHABLE, Outcome.UNREACHABLE_UNSETTLED)
 
     @property
@@ -27,7 +27,7 @@ class Outcome(IntEnum):
 
     @property
     def solved(self) -> bool:
-        """Whether the solve got as far as was asked for, or as rounding lets anyone get."""
+        """Whether the residual is within the tolerance, or within rounding."""
         return self in (Outcome.CONVERGED, Outcome.AT_ROUNDING)
 
 

@@ -40,31 +40,31 @@ def unit(name: str, q: ArrayLike) -> FloatArray:
 
 
 def normalise(quaternions: ArrayLike, name: str = "quaternions") -> tuple[FloatArray, FloatArray]:
-    """Return quaternions made unit, (..., 4), and how far their lengths were from one, (...).
+    """Return quaternions made unit, (..., 4), and the deviations of their lengths from 1, (...).
 
     `name` is the argument's, for the error.
 
     Raises:
-        ValueError: if they are not finite, or one has no length.
+        ValueError: if they are not finite, or a length is zero.
     """
-    given = arguments.array(name, quaternions, "...", 4)
-    largest = np.abs(given).max(axis=-1, keepdims=True)
+    q = arguments.array(name, quaternions, "...", 4)
+    largest = np.abs(q).max(axis=-1, keepdims=True)
     if not largest.all():
-        where = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
-        raise ValueError(f"{name}: expected lengths above 0, got 0 at index {where}")
-    scaled = given / largest  # no square overflows or vanishes
+        index = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
+        raise ValueError(f"{name}: expected lengths above 0, got 0 at index {index}")
+    scaled = q / largest  # no square overflows or vanishes
     lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
     return scaled / lengths, np.abs(lengths * largest - 1.0)[..., 0]
 
 
 def check_unit(name: str, lengths: FloatArray) -> None:
     """Raise a ValueError that names the first length further than 1e-6 from one."""
-    off = np.abs(lengths - 1.0) > UNIT_TOLERANCE
-    if off.any():
-        where = tuple(int(i) for i in np.argwhere(off)[0])
+    wrong = np.abs(lengths - 1.0) > UNIT_TOLERANCE
+    if wrong.any():
+        index = tuple(int(i) for i in np.argwhere(wrong)[0])
         raise ValueError(
             f"{name}: expected unit quaternions (w, x, y, z), "
-            f"got one of length {lengths[where]:.9g} at index {where}"
+            f"got one of length {lengths[index]:.9g} at index {index}"
         )
 
 
@@ -73,12 +73,12 @@ def multiply(a: ArrayLike, b: ArrayLike) -> FloatArray:
     a, b = arguments.together(
         "b", arguments.array("a", a, "...", 4), arguments.array("b", b, "...", 4)
     )
-    return _joined(quaternion.multiply(_parts(a), _parts(b)))
+    return _stack(quaternion.multiply(_parts(a), _parts(b)))
 
 
 def conjugate(q: ArrayLike) -> FloatArray:
     """Return the inverse rotations, (..., 4)."""
-    return _joined(quaternion.conjugate(_parts(arguments.array("q", q, "...", 4))))
+    return _stack(quaternion.conjugate(_parts(arguments.array("q", q, "...", 4))))
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
@@ -86,7 +86,7 @@ def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
     q, v = arguments.together(
         "v", arguments.array("q", q, "...", 4), arguments.array("v", v, "...", 3)
     )
-    return _joined(quaternion.rotate(_parts(q), _parts(v)))
+    return _stack(quaternion.rotate(_parts(q), _parts(v)))
 
 
 def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
@@ -171,7 +171,7 @@ def _parts(values: FloatArray) -> tuple[FloatArray, ...]:
     return tuple(np.moveaxis(values, -1, 0))
 
 
-def _joined(parts: tuple[FloatArray, ...]) -> FloatArray:
+def _stack(parts: tuple[FloatArray, ...]) -> FloatArray:
     return np.stack(parts, axis=-1)
 
 

@@ -13,7 +13,7 @@ from .arguments import FloatArray, IndexArray, KeepsReadOnly, frozen
 
 
 class SkeletonArrays(NamedTuple):
-    """What the kernels read of a skeleton."""
+    """The arrays of a skeleton that kernels read."""
 
     parents: IndexArray
     offsets: FloatArray
@@ -30,7 +30,7 @@ class Skeleton(KeepsReadOnly):
         offsets: each joint's position in its parent's frame [m], shape (joint, 3); the root's
             is its global position.
         names: each joint's name.
-        arrays: what the kernels read; never to be written to.
+        arrays: for kernels; do not write to them.
     """
 
     parents: IndexArray
@@ -116,7 +116,7 @@ def checked_skeleton(skeleton: Skeleton, name: str = "skeleton") -> Skeleton:
 
 
 class Pose(NamedTuple):
-    """Where every joint is; leading axes are batch or frame.
+    """Positions and rotations of all joints; leading axes are batch or frame.
 
     Attributes:
         positions: global positions [m], shape (..., joint, 3).
@@ -151,11 +151,11 @@ def _checked_tree(parents: ArrayLike, offsets: ArrayLike) -> tuple[IndexArray, F
 def _checked_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     if names is None:
         return tuple(f"joint{i}" for i in range(count))
-    given = arguments.sequence("names", names, count, "a joint")
-    for name in given:
+    names = arguments.sequence("names", names, count, "a joint")
+    for name in names:
         if not arguments.text("names", name):
             raise ValueError(f"names: expected {count} non-empty strings, got {names!r:.80}")
-    if len(set(given)) != count:
-        twice = next(name for name in given if given.count(name) > 1)
-        raise ValueError(f"names: expected distinct names, got {twice!r} more than once")
-    return given
+    if len(set(names)) != count:
+        repeated = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"names: expected distinct names, got {repeated!r} more than once")
+    return names

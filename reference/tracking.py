@@ -26,9 +26,9 @@ from .model import Model, checked_model
 from .outcome import Outcome
 from .skeleton import Skeleton
 
-# A frame that is nearer to its target than this, over the reach, or than this angle [rad], has met
-# it, whatever the tolerance.
-MET = 1e-6
+# A frame within this distance of its target, over the reach, and within this angle [rad] is on its
+# target, whatever the tolerance.
+ON_TARGET = 1e-6
 
 
 def track(
@@ -51,17 +51,17 @@ def track(
     A coherent motion is a smooth trajectory (`trajectory/`): solved frame by frame first, then in
     all frames together, until no small change lowers the sum of the squared displacements between
     neighbouring frames, over angles [rad], rotation vectors of balls [rad] and lengths over the
-    reach, with every effector on its target and every joint within its limits. Frames whose target
-    is not reached come as near to it as a penalty draws them. In the end every frame that is not
-    within the tolerance yet is solved once more from there.
+    reach, with every effector on its target and every joint within its limits. A penalty draws
+    frames that do not reach their targets towards them. Every frame that is then not within the
+    tolerance is solved once more from there.
 
     Args:
         skeleton: as for `solve_ik`.
         curve: the effector's global position in each frame [m], shape (frame, 3); or a Target whose
             position is that, and its rotation (frame, 4), or several for several effectors.
         solver: a name in IK_SOLVERS; by default CCD for one position on a Skeleton, and else
-            Levenberg-Marquardt. No frame is restarted from random poses, which would jump.
-        start: the pose to start from: local rotations, shape (joint, 4), identities if None; of an
+            Levenberg-Marquardt. There are no restarts from random poses: the motion would jump.
+        start: the first pose: local rotations, shape (joint, 4), identities if None; of an
             Articulation coordinates, (coordinate,), neutral ones if None.
         effector: the joint that follows, by index or name; by default as for `solve_ik`.
         warm: start each frame from the last one's solution, which keeps neighbouring frames alike;
@@ -72,7 +72,7 @@ def track(
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
         max_iterations: of a frame; by default as for `solve_ik`.
-        record: keep the residuals of all iterations in `history`; not of those over all frames.
+        record: keep the residuals of the iterations of single frames in `history`.
 
     Returns:
         IKSolution with the frames as leading axis. The iterations of a coherent motion are those of
@@ -90,21 +90,15 @@ def track(
     if solver is None:
         solver, _ = default_solver(model, curve)
         solver = "ccd" if solver == "fabrik" else solver
+    chained = arguments.boolean("warm", warm)
     settings = checked_settings(
-        solver,
-        tolerance,
-        tolerance_rotation,
-        max_iterations,
-        0,
-        0,
-        record,
-        arguments.boolean("warm", warm),
+        solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, chained
     )
     motion = solve_checked(model, _start(model, start), targets, settings)
     if not coherent:
         return motion
     q, reached, steps = _smoothed(model, motion, targets, closed)
-    return _settled(model, motion, targets, q, reached, steps, settings)
+    return _finished(model, motion, targets, q, reached, steps, settings)
 
 
 def _along(
@@ -112,25 +106,24 @@ def _along(
     curve: ArrayLike | Target | Sequence[Target],
     effector: int | str | None,
 ) -> list[CheckedTarget]:
-    """Return the targets of all effectors, in so many frames."""
+    """Return the targets of all effectors, each spread over all frames."""
     if not (isinstance(curve, Target) or are_targets(curve)):
         curve = arguments.coordinates("curve", cast(ArrayLike, curve), "frame", 3)
     targets = checked_targets(skeleton, curve, effector)
     batch = batch_shape((), targets, "start")
     if len(batch) != 1:
-        came = arguments.shape((*batch, 3))
-        raise ValueError(f"curve: expected shape (frame, 3), got {came}")
+        got = arguments.shape((*batch, 3))
+        raise ValueError(f"curve: expected shape (frame, 3), got {got}")
     if batch[0] == 0:
         raise ValueError("curve: expected at least one point, got none")
-    frames = batch[0]
     return [
-        one.mapped(lambda values: arguments.spread(values, (frames, values.shape[-1])))
-        for one in check_numbers(targets)
+        target.mapped(lambda values: arguments.spread(values, (batch[0], values.shape[-1])))
+        for target in check_numbers(targets)
     ]
 
 
 def _start(model: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
-    """Return the start, checked but not made unit, or the pose that stands for none."""
+    """Return the start, checked but not made unit, or the default."""
     if isinstance(model, Articulation):
         q = model.neutral() if start is None else start
         q = arguments.floats("start", q, model.coordinate_count)
@@ -148,20 +141,20 @@ def _smoothed(
     targets: list[CheckedTarget],
     closed: bool,
 ) -> tuple[FloatArray, np.ndarray, int]:
-    """Return the smooth trajectory, which frames meet their targets, and its Newton steps."""
+    """Return the smooth trajectory, the frames that reach their targets, and its Newton steps."""
     articulation = skeleton if isinstance(skeleton, Articulation) else balls(skeleton)
-    effectors = tuple(one.joint for one in targets)
-    oriented = tuple(one.rotation is not None for one in targets)
-    prepared = prepare(articulation, effectors, oriented)
-    mechanism, columns = prepared.mechanism, prepared.columns
-    near = np.asarray(motion.residual) <= MET * mechanism.reach
-    met = near & (np.asarray(motion.residual_rotation) <= MET)
-    reached, steps = met | (np.asarray(motion.outcome) == Outcome.CONVERGED), 0
+    effectors = tuple(target.joint for target in targets)
+    oriented = tuple(target.rotation is not None for target in targets)
+    mechanism = prepare(articulation, effectors, oriented).mechanism
+    columns = mechanism.columns
+    on_target = np.asarray(motion.residual) <= ON_TARGET * mechanism.reach
+    on_target &= np.asarray(motion.residual_rotation) <= ON_TARGET
+    reached, steps = on_target | (np.asarray(motion.outcome) == Outcome.CONVERGED), 0
     q = motion.coordinates.reshape(-1, articulation.coordinate_count).copy()
     if mechanism.freedoms:
         own, rows = np.ascontiguousarray(q[:, columns]), target_rows(targets, (len(q),))
         with contextlib.suppress(np.linalg.LinAlgError), np.errstate(all="ignore"):
-            q[:, columns] = np.nan  # what stays where the linear algebra meets infinity
+            q[:, columns] = np.nan  # remains where the linear algebra meets infinity
             q[:, columns], steps = trajectory.smooth(mechanism, rows, own, reached, closed)
     if not np.abs(q).max(initial=0.0) <= LARGEST_COORDINATE:
         raise FloatingPointError(
@@ -170,7 +163,7 @@ def _smoothed(
     return q.reshape(motion.coordinates.shape), reached, steps
 
 
-def _settled(
+def _finished(
     skeleton: Skeleton | Articulation,
     motion: IKSolution,
     targets: list[CheckedTarget],
@@ -179,19 +172,18 @@ def _settled(
     steps: int,
     settings: Settings,
 ) -> IKSolution:
-    """Return the motion q with its residuals, those of its frames solved again that need it."""
+    """Return the motion q with its residuals; frames that missed the tolerance are solved again."""
     limits = settings.limits._replace(chained=False)
     unchained = replace(settings, limits=limits, record=False)
     unmoved = replace(unchained, limits=limits._replace(max_iterations=0, far_iterations=0))
     last = solve_checked(skeleton, q, targets, unmoved)
-    off = np.flatnonzero(reached & (last.outcome != Outcome.CONVERGED))
+    unsolved = np.flatnonzero(reached & (last.outcome != Outcome.CONVERGED))
     iterations = np.asarray(motion.iterations) + steps
-    if len(off):
-        again = solve_checked(
-            skeleton, q[off], [one.mapped(lambda values: values[off]) for one in targets], unchained
-        )
-        q[off] = again.coordinates
-        iterations[off] += again.iterations
+    if len(unsolved):
+        parts = [target.mapped(lambda values: values[unsolved]) for target in targets]
+        solution = solve_checked(skeleton, q[unsolved], parts, unchained)
+        q[unsolved] = solution.coordinates
+        iterations[unsolved] += solution.iterations
         last = solve_checked(skeleton, q, targets, unmoved)
     outcome = np.where(reached | (last.outcome == Outcome.CONVERGED), last.outcome, motion.outcome)
     return last._replace(

@@ -733,7 +733,7 @@ def _files():
 
     pose = {name: moved[name] for name in ("skeleton", "local_rotations", "offsets")}
     return {
-        f + "bvh.motion.Motion.pose": Call(posed, pose),
+        f + "bvh.reader.Motion.pose": Call(posed, pose),
         f + "bvh.reader.read": named(bvh.read, text),
         f + "bvh.reader.parse": Call(bvh.parse, {"text": text}, names="BVH"),
         f + "bvh.writer.format": Call(bvh.format, moved, free="local_rotations"),

@@ -97,10 +97,8 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
     """Return the model of the links and joints of a URDF file.
 
     Shapes are removed because their files may be missing, inertias are replaced because MuJoCo
-    refuses many, and MuJoCo's fusion of links connected by fixed joints is disabled.
-
-    Raises:
-        ValueError: if MuJoCo does not read it.
+    refuses many, and MuJoCo's fusion of links connected by fixed joints is disabled. Raise a
+    ValueError if MuJoCo does not read it.
     """
     root = xml_root(path)
     for link in root.findall("link"):
@@ -116,10 +114,8 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
 def mujoco_mjcf(path: Path) -> mujoco.MjModel:
     """Return the model of an MJCF file, without shapes and masses if MuJoCo refuses it.
 
-    Files of shapes may be missing, and MuJoCo refuses some masses.
-
-    Raises:
-        ValueError: if MuJoCo does not read it.
+    Files of shapes may be missing, and MuJoCo refuses some masses. Raise a ValueError if MuJoCo
+    does not read it.
     """
     try:
         return mujoco.MjModel.from_xml_path(str(path))
@@ -162,8 +158,7 @@ def _joint_name(model: mujoco.MjModel, bodies: list[str], joint: int) -> str:
 def _followers(model: mujoco.MjModel) -> list[Follower]:
     """Return the joints that follow others, each after its leader.
 
-    Raises:
-        ValueError: if some follow each other in a ring.
+    Raise a ValueError if some follow each other in a ring.
     """
     equalities = np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT)
     followers = [

@@ -11,11 +11,9 @@ from ..arguments import LARGEST_COORDINATE, FloatArray, choice, frozen, instance
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
 from .certificate import Certificate, certify
-from .chebyshev import Chebyshev
-from .gauss_newton import GaussNewton
 from .lbfgs import LBFGS
-from .local_global import LocalGlobal
-from .newton import Newton
+from .local_global import Chebyshev, LocalGlobal
+from .newton import GaussNewton, Newton
 from .newton_cg import NewtonCG
 from .objective import STARTS, Iterate, Objective
 
@@ -103,8 +101,7 @@ class ImplicitEuler:
     def __post_init__(self) -> None:
         """Check the settings and prepare the solver.
 
-        Raises:
-            ValueError: if a setting is out of range or unknown.
+        Raise a ValueError if a setting is out of range or unknown.
         """
         instance("system", self.system, MassSpring)
         object.__setattr__(self, "h", number("h", self.h, above=0))

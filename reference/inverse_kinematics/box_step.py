@@ -11,8 +11,6 @@ there are. A freedom that a limit stops is active: the others are solved for aga
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from ..arguments import FloatArray
 from ..articulation import BALL, FREE, FREEDOMS, HINGE, SLIDE, clamp_joint
 from ..jacobians import accumulate, motion, move_joint, velocity_at
@@ -48,14 +46,6 @@ class TaskSystem(NamedTuple):
     active: FloatArray
 
 
-def new_task_system(mechanism):
-    """Return a system to be filled."""
-    m, n = mechanism.equations, mechanism.freedoms
-    return TaskSystem(
-        np.empty(m), np.empty((n, m)), np.empty((m, m)), np.empty(m), np.empty(n), np.empty(n)
-    )
-
-
 def linearise_task(mechanism, target, data, system):
     """Fill errors and Jacobian of a configuration."""
     fill_errors(mechanism, target, data, system.e)
@@ -75,27 +65,21 @@ def fill_errors(mechanism, target, data, e):
 
 def fill_jacobian(mechanism, target, data, J):
     """Fill the Jacobian transposed, (freedom, equation)."""
-    joints = mechanism.joints
+    joints, effectors, lever = mechanism.joints, mechanism.effectors, LEVER * mechanism.reach
     for k in range(len(J)):
         clear(J[k])
     for j in range(len(joints)):
+        x = load_vector(data.positions, j)
         for i in range(FREEDOMS[joints["kind"][j]]):
             angular, linear = motion(joints, j, i, data.rotations, mechanism.reach)
             row = J[joints["freedom"][j] + i]
-            add_motion(mechanism, target, data, j, angular, linear, row)
-
-
-def add_motion(mechanism, target, data, j, angular, linear, row):
-    """Add to a row what a motion of joint j does to the effectors below."""
-    effectors, lever = mechanism.effectors, LEVER * mechanism.reach
-    x = load_vector(data.positions, j)
-    for e in range(len(effectors)):
-        if mechanism.moves[j, e]:
-            at, root = effectors["row"][e], math.sqrt(target["weight"][e])
-            arm = subtract(effector_position(mechanism, data, e), x)
-            accumulate(row, at, scale(root, velocity_at(angular, linear, arm)))
-            if effectors["oriented"][e]:
-                accumulate(row, at + 3, scale(root * lever, angular))
+            for e in range(len(effectors)):
+                if mechanism.moves[j, e]:
+                    at, root = effectors["row"][e], math.sqrt(target["weight"][e])
+                    arm = subtract(effector_position(mechanism, data, e), x)
+                    accumulate(row, at, scale(root, velocity_at(angular, linear, arm)))
+                    if effectors["oriented"][e]:
+                        accumulate(row, at + 3, scale(root * lever, angular))
 
 
 def damped_step(mechanism, data, system, damping):
@@ -129,7 +113,7 @@ def far_damping(mechanism, target, data, system, damping):
     """
     if least_residual(mechanism, target) <= 0.0:
         return damping
-    square, factor, last_square = squared(system.e), data.far_step[0], data.far_step[1]
+    square, factor, last_square = inner(system.e, system.e), data.far_step[0], data.far_step[1]
     factor = factor * GROWTH if square > last_square else max(factor / DECAY, SMALLEST_FAR_DAMPING)
     if last_square == 0.0:
         factor = FAR_DAMPING
@@ -197,7 +181,7 @@ def along_gradient(system):
             system.step[k] = inner(system.J[k], system.e)
             for i in range(len(system.z)):
                 system.z[i] += system.step[k] * system.J[k, i]
-    return inner(system.e, system.z), squared(system.z)
+    return inner(system.e, system.z), inner(system.z, system.z)
 
 
 def stop_at_limits(mechanism, data, system):
@@ -289,11 +273,6 @@ def clear(row):
 def store(row, i, v):
     """Write a vector into three entries of a row."""
     row[i], row[i + 1], row[i + 2] = v
-
-
-def squared(v):
-    """Return the sum of the squares of an array's entries."""
-    return inner(v, v)
 
 
 def inner(a, b):

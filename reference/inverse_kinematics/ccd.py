@@ -20,7 +20,7 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .box_step import freedom_unit, inner, linearise_task, squared
+from .box_step import freedom_unit, inner, linearise_task
 from .chain import update_positions
 from .mechanism import (
     cost,
@@ -154,23 +154,14 @@ def rotate_within_limits(mechanism, target, data, work, j, M):
 
 def unlimited_rotation(mechanism, target, data, work, j, M):
     """Return the best rotation of joint j without limits, for one position the shortest one."""
-    e = only_position(mechanism, j)
-    if e < 0:
-        return best_rotation(M, work.eigen[0], work.eigen[1])
+    count, arm, direction = 0, ZERO, ZERO
     x = load_vector(data.positions, j)
-    arm = subtract(effector_position(mechanism, data, e), x)
-    return between(arm, subtract(load_vector(target["position"], e), x))
-
-
-def only_position(mechanism, j):
-    """Return the effector below joint j if it is the only one and its rotation free, else -1."""
-    only = -1
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
-            if only >= 0 or mechanism.effectors["oriented"][e]:
-                return -1
-            only = e
-    return only
+            count += 2 if mechanism.effectors["oriented"][e] else 1
+            arm = subtract(effector_position(mechanism, data, e), x)
+            direction = subtract(load_vector(target["position"], e), x)
+    return between(arm, direction) if count == 1 else best_rotation(M, work.eigen[0], work.eigen[1])
 
 
 def rotate_effectors(mechanism, data, j, Q):
@@ -196,7 +187,8 @@ def descend(mechanism, target, data, work, j):
     q, at, k = data.q, mechanism.joints["coordinate"][j], mechanism.joints["freedom"][j]
     update_forward_kinematics(mechanism, data)
     linearise_task(mechanism, target, data, work.system)
-    slope, square = inner(work.system.J[k], work.system.e), squared(work.system.J[k])
+    row = work.system.J[k]
+    slope, square = inner(row, work.system.e), inner(row, row)
     before, start = cost(mechanism, target, data), q[at]
     step = freedom_unit(mechanism, j) * slope / square if square > 0.0 else 0.0
     for _ in range(HALVINGS):

@@ -244,11 +244,11 @@ def fit_arms(mechanism, target, data, backward, j):
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             weight = target["weight"][e]
-            arm, to = effector_arms(mechanism, target, data, e, j)
+            arm, R = effector_below(mechanism, data, e, j)
+            to = subtract(load_vector(target["position"], e), load_vector(data.positions, j))
             M, total = add_outer(M, weight, to, arm), total + weight
             arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
             if mechanism.effectors["oriented"][e]:
-                R = rotation_below(mechanism, data, j, e)
                 error = multiply(load_quaternion(target["rotation"], e), conjugate(R))
                 M = add_rotation(M, weight * rotation_weight(mechanism), error)
     for c in range(j + 1, len(backward)):
@@ -278,34 +278,32 @@ def mean_displacement(mechanism, target, data, backward, j):
 
 def effector_arms(mechanism, target, data, e, j):
     """Return the vectors from joint j to an effector and to its target, in the world [m]."""
-    x = load_vector(mechanism.effectors["position"], e)
-    arm = arm_to(mechanism.joints, data, j, mechanism.effectors["joint"][e], x)
+    arm, _ = effector_below(mechanism, data, e, j)
     return arm, subtract(load_vector(target["position"], e), load_vector(data.positions, j))
+
+
+def effector_below(mechanism, data, e, j):
+    """Return the vector from joint j to an effector [m] and its rotation, in the world."""
+    effectors = mechanism.effectors
+    x, R = load_vector(effectors["position"], e), load_quaternion(effectors["rotation"], e)
+    return pose_below(mechanism.joints, data, j, effectors["joint"][e], x, R)
 
 
 def joint_arms(mechanism, data, backward, c, j):
     """Return the vectors from joint j to one below and to its backward position [m]."""
-    x, _ = joint_transform(mechanism.joints, c, data.q)
-    arm = arm_to(mechanism.joints, data, j, mechanism.joints["parent"][c], x)
+    x, R = joint_transform(mechanism.joints, c, data.q)
+    arm, _ = pose_below(mechanism.joints, data, j, mechanism.joints["parent"][c], x, R)
     return arm, subtract(load_vector(backward["position"], c), load_vector(data.positions, j))
 
 
-def arm_to(joints, data, j, k, x):
-    """Return the vector from joint j, in the world, to a point x of the frame of k, at or below j.
+def pose_below(joints, data, j, k, x, R):
+    """Return the vector from joint j to a point x of the frame of k, at or below j, and R likewise.
 
     The coordinates from j down count, since the poses below are not updated yet.
     """
     while k != j:
-        offset, R = joint_transform(joints, k, data.q)
-        x = add(offset, rotate(R, x))
+        offset, Q = joint_transform(joints, k, data.q)
+        x, R = add(offset, rotate(Q, x)), multiply(Q, R)
         k = joints["parent"][k]
-    return rotate(load_quaternion(data.rotations, j), x)
-
-
-def rotation_below(mechanism, data, j, e):
-    """Return the rotation of an effector as the coordinates from joint j down have it."""
-    R, k = load_quaternion(mechanism.effectors["rotation"], e), mechanism.effectors["joint"][e]
-    while k != j:
-        _, R_joint = joint_transform(mechanism.joints, k, data.q)
-        R, k = multiply(R_joint, R), mechanism.joints["parent"][k]
-    return multiply(load_quaternion(data.rotations, j), R)
+    Q = load_quaternion(data.rotations, j)
+    return rotate(Q, x), multiply(Q, R)

@@ -30,8 +30,8 @@ from .box_step import (
     ROUNDING_DAMPING,
     damped_step,
     far_damping,
+    inner,
     linearise_task,
-    squared,
     take_step,
     transposed_step,
 )
@@ -100,7 +100,7 @@ def levenberg_marquardt_update(state, target):
     linearise_task(mechanism, target, data, system)
     positions = 3 * len(mechanism.effectors) == mechanism.equations
     share = DAMPING_OF_POSITIONS if positions else DAMPING_OF_POSES
-    damping = share * squared(system.e) + BIAS * mechanism.reach * mechanism.reach
+    damping = share * inner(system.e, system.e) + BIAS * mechanism.reach * mechanism.reach
     damped_step(mechanism, data, system, far_damping(mechanism, target, data, system, damping))
     take_step(mechanism, data, system)
 

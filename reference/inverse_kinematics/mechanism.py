@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import BoolArray, FloatArray, IndexArray, RecordArray
-from ..articulation import FREE, WIDTHS, articulated_pose, ball_coordinate, clamp_ball
+from ..articulation import FREE, articulated_pose, ball_coordinate, clamp_ball
 from ..quaternion import (
     add,
     conjugate,
@@ -58,7 +58,7 @@ class Mechanism(NamedTuple):
 
     # those that move, fixed ones merged; coordinates are the mechanism's own, (joint,)
     joints: RecordArray
-    sources: IndexArray  # index of a joint's first coordinate in the articulation's, (joint,)
+    columns: IndexArray  # of its coordinates among the articulation's, (coordinate,)
     effectors: RecordArray  # (effector,)
     moves: BoolArray  # whether a joint moves an effector, (joint, effector)
     # whether a joint moves a joint below it, or an effector, and no joint between them does,
@@ -67,10 +67,8 @@ class Mechanism(NamedTuple):
     # the length of the longest path from the root to an effector, slides left out unless there is
     # nothing else [m]
     reach: float
-    # the numbers of
-    coordinates: int
-    freedoms: int
-    equations: int
+    freedoms: int  # their number
+    equations: int  # their number
 
 
 class ConfigurationData(NamedTuple):
@@ -85,7 +83,7 @@ class ConfigurationData(NamedTuple):
 
 def new_data(mechanism):
     """Return the data of a configuration, to be filled."""
-    count, n = len(mechanism.joints) + len(mechanism.effectors), mechanism.coordinates
+    count, n = len(mechanism.joints) + len(mechanism.effectors), len(mechanism.columns)
     state = np.zeros(n + 2)
     return ConfigurationData(
         state, state[:n], state[n:], np.empty((count, 3)), np.empty((count, 4))
@@ -94,25 +92,14 @@ def new_data(mechanism):
 
 def gather(mechanism, q, own):
     """Copy the mechanism's own coordinates out of the articulation's."""
-    at = 0
-    for j in range(len(mechanism.sources)):
-        for k in range(width(mechanism.joints, j)):
-            own[at] = q[mechanism.sources[j] + k]
-            at += 1
+    for k in range(len(mechanism.columns)):
+        own[k] = q[mechanism.columns[k]]
 
 
 def scatter(mechanism, own, q):
     """Copy the mechanism's own coordinates back among the articulation's."""
-    at = 0
-    for j in range(len(mechanism.sources)):
-        for k in range(width(mechanism.joints, j)):
-            q[mechanism.sources[j] + k] = own[at]
-            at += 1
-
-
-def width(joints, j):
-    """Return the number of a joint's own coordinates."""
-    return WIDTHS[joints["kind"][j]] if joints["leader"][j] == j else 0
+    for k in range(len(mechanism.columns)):
+        q[mechanism.columns[k]] = own[k]
 
 
 def update_forward_kinematics(mechanism, data):
@@ -185,13 +172,14 @@ def errors(mechanism, target, data, e):
     return distance, norm(logarithm(rotation_error(mechanism, target, data, e)))
 
 
-def residuals(mechanism, target, data):
+def residuals(state, target):
     """Return the largest distance [m] and angle [rad] from effector to target, their sum, a bound.
 
     The sum [m] is of all distances, and of all angles times the lever: it shows the progress of one
     effector while another, further from its target, stays. No effector is further above its own
     least distance than the bound [m] is above the largest of those.
     """
+    mechanism, data = state.mechanism, state.data
     largest, largest_angle, total, largest_bound, excess = 0.0, 0.0, 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
         distance, angle = errors(mechanism, target, data, e)
@@ -203,12 +191,12 @@ def residuals(mechanism, target, data):
     return largest, largest_angle, total, largest_bound + excess
 
 
-def merit_of(mechanism, target, data):
+def merit_of(state, target):
     """Return the root of the sum of weighted squares of distances and of lever times angles [m]."""
     total = 0.0
-    for e in range(len(mechanism.effectors)):
-        distance, angle = errors(mechanism, target, data, e)
-        total += weighted_square(mechanism, target["weight"][e], distance, angle)
+    for e in range(len(state.mechanism.effectors)):
+        distance, angle = errors(state.mechanism, target, state.data, e)
+        total += weighted_square(state.mechanism, target["weight"][e], distance, angle)
     return math.sqrt(total)
 
 

@@ -28,13 +28,10 @@ class Prepared(NamedTuple):
     """A mechanism and random restarts, made once for some effectors."""
 
     mechanism: Mechanism  # the joints that move the effectors
-    columns: IndexArray  # of its coordinates among the articulation's, (coordinate,)
     restarts: FloatArray  # the mechanism's coordinates in random poses, (restart, coordinate)
     # the effectors in these poses, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
-    # joints of the articulation and mechanism, one array or number after the other, and the two
-    # above
-    flat: tuple[Any, ...]
+    flat: tuple[Any, ...]  # joints of the articulation, fields of the mechanism, the two above
 
 
 def prepare(
@@ -47,50 +44,50 @@ def prepare(
     """Return the mechanism and its restarts, cached by the articulation."""
     key = effectors, oriented, restarts, seed
     if key not in articulation.mechanisms:
-        mechanism, columns = _prepared(articulation, effectors, oriented)
-        poses = _random_poses(articulation, restarts, seed)
+        mechanism, rng = _mechanism(articulation, effectors, oriented), np.random.default_rng(seed)
+        # in blocks: the first poses are those of any larger number of restarts
+        blocks = [articulation.random(rng, BLOCK) for _ in range(-(-restarts // BLOCK))]
+        poses = np.concatenate([*blocks, np.empty((0, articulation.coordinate_count))])[:restarts]
         effector_frames = np.empty((0, len(effectors), 7))
         if restarts:  # without, forward kinematics need not be compiled
             x, R = articulation.forward(poses)
             effector_frames = np.concatenate([x, R], axis=-1)[:, list(effectors)]
-        drawn = np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(effector_frames)
+        drawn = np.ascontiguousarray(poses[:, mechanism.columns]), effector_frames.copy()
         flat = (articulation.joints, *mechanism, *drawn)
-        articulation.mechanisms[key] = Prepared(mechanism, columns, *drawn, flat)
+        articulation.mechanisms[key] = Prepared(mechanism, *drawn, flat)
     return articulation.mechanisms[key]
 
 
-def _random_poses(articulation: Articulation, count: int, seed: int) -> FloatArray:
-    """Return random coordinates, (count, coordinate): the first of those of any larger count."""
-    rng, blocks = np.random.default_rng(seed), -(-count // BLOCK)
-    drawn = [articulation.random(rng, BLOCK) for _ in range(blocks)]
-    return np.concatenate([*drawn, np.empty((0, articulation.coordinate_count))])[:count]
-
-
-def _prepared(
+def _mechanism(
     articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
-) -> tuple[Mechanism, IndexArray]:
-    """Return the mechanism that moves some effectors, and which columns of q are its own."""
+) -> Mechanism:
+    """Return the mechanism that moves some effectors."""
     whole = articulation.joints
-    active = _active(articulation, effectors, oriented)
-    number = {int(j): k for k, j in enumerate(active)}
-    joints, columns = _moving_joints(whole, active, number)
+    moving = _moving(articulation, effectors, oriented)
+    number = {int(j): k for k, j in enumerate(moving)}
+    joints, columns = _moving_joints(whole, moving, number)
     ends = _attached(whole, effectors, oriented, number)
-    moves = _moves(joints, ends)
+    moves = np.zeros((len(joints), len(ends)), dtype=bool)
+    for e, j in enumerate(ends["joint"]):
+        while j >= 0:
+            moves[j, e] = True
+            j = joints["parent"][j]
     ends["first"] = np.where(moves.any(axis=0), moves.argmax(axis=0), -1) if len(joints) else -1
-    lengths = _path_lengths(joints, moves, ends)
-    travel = np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
-    ends["reach"] = lengths + travel
+    links = np.linalg.norm(joints["offset"], axis=1)
+    links[joints["parent"] < 0] = 0.0
+    last = np.where(ends["joint"] >= 0, np.linalg.norm(ends["position"], axis=1), 0.0)
+    lengths = moves.astype(np.int64).T @ links + last
+    ends["reach"] = lengths + np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
     furthest = ends["reach"].max(where=np.isfinite(ends["reach"]), initial=0.0)
     reach = float(lengths.max() or furthest or 1.0)
-    freedoms = int(FREEDOMS[joints["kind"][joints["leader"] == np.arange(len(joints))]].sum())
-    mechanism = Mechanism(
-        joints, whole["coordinate"][active].copy(), ends, moves, _adjacent(joints, ends, reach),
-        reach, len(columns), freedoms, int(np.where(oriented, 6, 3).sum()),
+    leads = joints["leader"] == np.arange(len(joints))
+    return Mechanism(
+        joints, columns, ends, moves, _adjacent(joints, ends, SPOT * reach), reach,
+        int(FREEDOMS[joints["kind"][leads]].sum()), int(np.where(oriented, 6, 3).sum()),
     )  # fmt: skip
-    return mechanism, columns
 
 
-def _active(
+def _moving(
     articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
 ) -> IndexArray:
     """Return the joints that move on the paths to the effectors, and those that they follow.
@@ -138,43 +135,26 @@ def _attached(
 
 
 def _moving_joints(
-    whole: RecordArray, active: IndexArray, number: dict[int, int]
+    whole: RecordArray, moving: IndexArray, number: dict[int, int]
 ) -> tuple[RecordArray, IndexArray]:
-    """Return the joints of the mechanism, and the columns of q that are theirs."""
-    joints, at = whole[active], whole["coordinate"][active]
+    """Return the joints of the mechanism, and their columns of q."""
+    joints, starts = whole[moving], whole["coordinate"][moving]
     joints["leader"] = [number[int(j)] for j in joints["leader"]]
     followers = joints["leader"] != np.arange(len(joints))
     joints["followed"] = False
     joints["followed"][joints["leader"][followers]] = True
     widths = number_coordinates(joints)
-    for k, j in enumerate(active):
+    for k, j in enumerate(moving):
         joints["parent"][k], joints["offset"][k], joints["frame"][k] = _merged(whole, j, number)
     joints["rotated"] = rotated_by_pi(joints)
-    columns = [np.arange(a, a + w) for a, w in zip(at, widths, strict=True)]
+    columns = [np.arange(start, start + n) for start, n in zip(starts, widths, strict=True)]
     return joints, np.concatenate([*columns, np.empty(0, dtype=np.int64)])
 
 
-def _moves(joints: RecordArray, ends: RecordArray) -> BoolArray:
-    moves = np.zeros((len(joints), len(ends)), dtype=bool)
-    for e, j in enumerate(ends["joint"]):
-        while j >= 0:
-            moves[j, e] = True
-            j = joints["parent"][j]
-    return moves
-
-
-def _path_lengths(joints: RecordArray, moves: BoolArray, ends: RecordArray) -> FloatArray:
-    """Return the length of the links from the first joint to each effector [m], (effector,)."""
-    lengths = np.linalg.norm(joints["offset"], axis=1)
-    lengths[joints["parent"] < 0] = 0.0
-    last = np.where(ends["joint"] >= 0, np.linalg.norm(ends["position"], axis=1), 0.0)
-    return moves.astype(np.int64).T @ lengths + last
-
-
-def _adjacent(joints: RecordArray, ends: RecordArray, reach: float) -> BoolArray:
+def _adjacent(joints: RecordArray, ends: RecordArray, margin: float) -> BoolArray:
     """Return which joints and effectors each joint is the last above them to move.
 
-    A point on a hinge's axis or in a ball's centre stays, so that the next ones down are looked at.
+    A point on a hinge's axis or in a ball's centre stays, and the next ones down are adjacent.
     """
     count = len(joints)
     adjacent = np.zeros((count, count + len(ends)), dtype=bool)
@@ -182,22 +162,15 @@ def _adjacent(joints: RecordArray, ends: RecordArray, reach: float) -> BoolArray
         fixed = {j}
         for c in range(j + 1, count):
             if joints["parent"][c] in fixed:
-                if _stays(joints, j, c, SPOT * reach):
-                    fixed.add(c)
-                else:
+                offset = joints["offset"][c]
+                if joints["parent"][c] == j and joints["kind"][j] == HINGE:
+                    offset = np.cross(joints["axis"][j], offset)
+                if joints["kind"][c] in (SLIDE, FREE) or np.linalg.norm(offset) > margin:
                     adjacent[j, c] = True
+                else:
+                    fixed.add(c)
         adjacent[j, count:] = np.isin(ends["joint"], list(fixed))
     return adjacent
-
-
-def _stays(joints: RecordArray, j: int, c: int, margin: float) -> bool:
-    """Return whether rotating joint j leaves joint c in place, if it does so with c's parent."""
-    offset = joints["offset"][c]
-    if joints["kind"][c] in (SLIDE, FREE):
-        return False
-    if joints["parent"][c] == j and joints["kind"][j] == HINGE:
-        offset = np.cross(joints["axis"][j], offset)
-    return bool(np.linalg.norm(offset) <= margin)
 
 
 def _travel(joints: RecordArray) -> FloatArray:

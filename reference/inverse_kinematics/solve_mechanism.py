@@ -28,7 +28,7 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .box_step import TaskSystem, clear, new_task_system
+from .box_step import TaskSystem, clear
 from .ccd import ccd_update
 from .chain import BEND, POSITION_ROUNDING
 from .fabrik import BACKWARD, fabrik_update
@@ -101,7 +101,7 @@ class MechanismState(NamedTuple):
 
 
 def solve_mechanisms(
-    joints, own_joints, sources, effectors, moves, adjacent, reach, width, freedoms, equations,
+    joints, own_joints, columns, effectors, moves, adjacent, reach, freedoms, equations,
     restarts, restart_frames, numbers, starts, targets, local,
     positions, figures, history, coordinates,
 ):  # fmt: skip
@@ -115,7 +115,7 @@ def solve_mechanisms(
     """
     limits = limits_of(numbers)
     mechanism = Mechanism(
-        own_joints, sources, effectors, moves, adjacent, reach, width, freedoms, equations
+        own_joints, columns, effectors, moves, adjacent, reach, freedoms, equations
     )
     data = new_data(mechanism)
     state = MechanismState(
@@ -150,8 +150,11 @@ def solve_mechanisms(
 
 def new_workspace(mechanism):
     """Return a workspace, not filled."""
-    backward = np.empty(len(mechanism.joints), BACKWARD)
-    return Workspace(new_task_system(mechanism), backward, np.empty((2, 4, 4)))
+    m, n = mechanism.equations, mechanism.freedoms
+    system = TaskSystem(
+        np.empty(m), np.empty((n, m)), np.empty((m, m)), np.empty(m), np.empty(n), np.empty(n)
+    )
+    return Workspace(system, np.empty(len(mechanism.joints), BACKWARD), np.empty((2, 4, 4)))
 
 
 def normalise_target(target):
@@ -205,16 +208,6 @@ def errors_of_pose(mechanism, target, positions, rotations):
         largest, largest_angle = max(largest, distance), max(largest_angle, angle)
         total += weighted_square(mechanism, target["weight"][e], distance, angle)
     return largest, largest_angle, math.sqrt(total)
-
-
-def mechanism_error(state, target):
-    """Return the largest distance [m] and angle [rad] to the target, their sum, and a bound [m]."""
-    return residuals(state.mechanism, target, state.data)
-
-
-def mechanism_merit(state, target):
-    """Return the root of the sum of weighted squares of distances and levered angles [m]."""
-    return merit_of(state.mechanism, target, state.data)
 
 
 def perturb_mechanism(state, _target, _criteria, first):
@@ -288,9 +281,8 @@ def take_nearest(state, q):
 
 
 operations = Operations(
-    ccd_update, mechanism_error, mechanism_merit, perturb_mechanism, place_mechanism,
-    draw_mechanism,
-)  # fmt: skip
+    ccd_update, residuals, merit_of, perturb_mechanism, place_mechanism, draw_mechanism
+)
 UPDATES = {
     "ccd": ccd_update,
     "fabrik": fabrik_update,

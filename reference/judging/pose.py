@@ -120,11 +120,17 @@ def judge_pose(
     x = None
     if positions is not None:
         x = arguments.coordinates("positions", positions, tree.joint_count, 3)
-    if pose is None:
-        placed, deviation, excess = _unrotated(x, targets), 0.0, np.zeros(tree.joint_count)
-    else:
+    excess, deviation = np.zeros(tree.joint_count), 0.0
+    if pose is not None:
         unit, deviation = _normalised(model, pose)
-        placed, excess = forward_kinematics(model, unit), _limit_excess(model, unit)
+        placed = forward_kinematics(model, unit)
+        if isinstance(model, Articulation):
+            for j in range(model.joint_count):
+                excess[j] = joint_excess(model.joints, j, unit)
+    elif x is None or any(goal.rotation is not None for goal in targets):
+        raise ValueError("pose: expected rotations or coordinates, got None")
+    else:
+        placed = Pose(frozen(np.array(x)), np.full((tree.joint_count, 4), np.nan))
     distances = [_distance(goal, placed.positions[goal.joint]) for goal in targets]
     angles = [_angle(goal, placed.rotations[goal.joint]) for goal in targets]
     errors = lengths = None
@@ -137,13 +143,6 @@ def judge_pose(
         arguments.number("tolerance", tolerance, least=0.0),
         arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
     )  # fmt: skip
-
-
-def _unrotated(positions: FloatArray | None, targets: Sequence[CheckedTarget]) -> Pose:
-    """Return positions as a pose with unknown rotations."""
-    if positions is None or any(target.rotation is not None for target in targets):
-        raise ValueError("pose: expected rotations or coordinates, got None")
-    return Pose(frozen(np.array(positions)), np.full((len(positions), 4), np.nan))
 
 
 def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatArray, float]:
@@ -177,12 +176,6 @@ def _check_single(name: str, values: FloatArray, length: int) -> None:
     if values.ndim != 1:
         got = arguments.shape(values.shape)
         raise ValueError(f"{name}: expected shape ({length},), got {got}")
-
-
-def _limit_excess(model: Skeleton | Articulation, q: FloatArray) -> FloatArray:
-    if isinstance(model, Skeleton):
-        return np.zeros(model.joint_count)
-    return np.array([joint_excess(model.joints, j, q) for j in range(model.joint_count)])
 
 
 def _length_errors(model: Skeleton | Articulation, tree: Skeleton, x: FloatArray) -> FloatArray:

@@ -29,18 +29,13 @@ def fill_displacements(problem, q, d):
         g = (f + 1) % len(q)
         for j in range(len(joints)):
             joint_difference(joints, j, q[g], q[f], d[f])
-            if g < f and is_continuous(joints, j):
+            unlimited = joints["lower"][j] == -math.inf and joints["upper"][j] == math.inf
+            leads = joints["leader"][j] == j and not joints["followed"][j]
+            if g < f and joints["kind"][j] == HINGE and unlimited and leads:
                 k = joints["freedom"][j]
                 d[f, k] -= 2.0 * math.pi * round(d[f, k] / (2.0 * math.pi))
         for k in range(len(units)):
             d[f, k] /= units[k]
-
-
-def is_continuous(joints, j):
-    """Return whether a joint is a hinge without limits that no mimic joint follows."""
-    if joints["kind"][j] != HINGE or joints["leader"][j] != j or joints["followed"][j]:
-        return False
-    return joints["lower"][j] == -math.inf and joints["upper"][j] == math.inf
 
 
 def integrate_frames(problem, step, q):

@@ -21,6 +21,7 @@ from ..inverse_kinematics.mechanism import (
     new_data,
     update_forward_kinematics,
 )
+from ..inverse_kinematics.restarts import copy_row
 from ..jacobians import motion, velocity_at
 from ..quaternion import add, cross, dot, load_vector, scale, store_vector, subtract
 
@@ -41,7 +42,8 @@ def fill_errors_and_jacobians(problem, q, e, J):
     mechanism, targets = problem.mechanism, problem.targets
     data = new_data(mechanism)
     for f in range(len(q)):
-        set_frame(mechanism, q[f], data)
+        copy_row(q[f], data.q)
+        update_forward_kinematics(mechanism, data)
         fill_errors(mechanism, targets[f], data, e[f])
         fill_jacobian(mechanism, targets[f], data, J[f].T)
 
@@ -53,18 +55,12 @@ def subtract_second_derivatives(problem, q, m, diagonal):
     angular, linear, moments = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     motions = Motions(np.empty((count, 2), dtype=np.int64), angular, linear, moments)
     for f in range(len(q)):
-        set_frame(mechanism, q[f], data)
+        copy_row(q[f], data.q)
+        update_forward_kinematics(mechanism, data)
         fill_motions(mechanism, data, motions)
         for e in range(len(mechanism.effectors)):
             fill_moments(mechanism, problem.targets[f], data, motions, m[f], e)
             subtract_effector(mechanism, motions, e, diagonal[f])
-
-
-def set_frame(mechanism, q, data):
-    """Compute the forward kinematics of one frame."""
-    for c in range(len(q)):
-        data.q[c] = q[c]
-    update_forward_kinematics(mechanism, data)
 
 
 def fill_motions(mechanism, data, motions):
@@ -83,20 +79,16 @@ def fill_moments(mechanism, target, data, motions, m, e):
     """Fill the moments of all motions for an effector."""
     effectors = mechanism.effectors
     row, root = effectors["row"][e], np.sqrt(target["weight"][e])
-    force, x = scale(root, vector_from(m, row)), effector_position(mechanism, data, e)
+    force, x = scale(root, (m[row], m[row + 1], m[row + 2])), effector_position(mechanism, data, e)
     for b in range(len(motions.owners)):
         angular, linear = load_vector(motions.angular, b), load_vector(motions.linear, b)
         arm = subtract(x, load_vector(data.positions, motions.owners[b, 0]))
         moment = cross(velocity_at(angular, linear, arm), force)
         if effectors["oriented"][e]:
             lever = 0.5 * root * LEVER * mechanism.reach
-            moment = add(moment, cross(angular, scale(lever, vector_from(m, row + 3))))
+            torque = scale(lever, (m[row + 3], m[row + 4], m[row + 5]))
+            moment = add(moment, cross(angular, torque))
         store_vector(motions.moments, b, moment)
-
-
-def vector_from(m, i):
-    """Return three entries from the i-th on."""
-    return m[i], m[i + 1], m[i + 2]
 
 
 def subtract_effector(mechanism, motions, e, diagonal):

@@ -32,7 +32,7 @@ from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
-from plumbob.bench.tables.table import markdown
+from plumbob.bench.tables.writers import markdown
 
 TINY = Scale(targets=3, seconds=0.001)
 ROOT = Path(__file__).parents[2]

@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.chain import figures as chain_figures
+from plumbob.bench.experiments.arm.tables import residuals_chart
 from plumbob.bench.experiments.chain import measurement as chain
+from plumbob.bench.experiments.chain.tables import iterations_chart
 from plumbob.bench.experiments.cloth_peers import figures as cloth_figures
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import stopwatch
@@ -100,9 +101,9 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
         for row in shown[name].rows:
             claims = [cell for cell in row if str(cell).endswith("claimed")]
             assert bool(claims) == ("My FABRIK" in row), (name, row)
-    for draw in (chain_figures.ik_residuals, chain_figures.iterations):
+    for draw in (residuals_chart, iterations_chart):
         assert "My FABRIK" in drawn(draw(Results(records()))).svg
-    shows = chain_figures.iterations(Results(records())).shows
+    shows = iterations_chart(Results(records())).shows
     assert shows.endswith("Entrants claim their iterations.")
     printed = capsys.readouterr().out
     assert re.search(r"^My FABRIK, chain of balls: rank \d of 3 solvers", printed, re.MULTILINE)
@@ -209,7 +210,7 @@ def test_a_budget_goes_by_the_seconds_that_a_solver_behind_a_slow_door_counts(fo
     (folder / "slow.py").write_text(slow.replace("import json", "import json, time"))
     entrant = Entrant("slow", "", (sys.executable, str(folder / "slow.py")), tasks=(CHAIN_TASK,))
     (peer,) = registry.chain_peers([entrant])
-    limits = chain.Limits(1e-4, 5)
+    limits = chain.SolverLimits(1e-4, 5)
     found = chain.solve_one_by_one(chain_targets("near", 6), peer, limits, budget=0.2)
     assert np.isfinite(found.arrays["residual"]).sum() == done
     assert ("cut by its time budget" in found.notes["remark"]) == (done < 6)
@@ -330,7 +331,7 @@ def test_a_hostile_name_can_be_shown_anywhere(folder, name, make):
     RecordFile("out").append([record])
     (record,) = records()
     assert record.solver == one.name
-    assert "<script>" not in drawn(chain_figures.ik_residuals(Results([record]))).svg
+    assert "<script>" not in drawn(residuals_chart(Results([record]))).svg
 
 
 def test_each_method_has_rows_of_its_own(folder):

@@ -14,15 +14,18 @@ import pytest
 
 from plumbob import bench
 from plumbob.bench.experiments import SUITES
-from plumbob.bench.experiments.chain import tables as kinematics
+from plumbob.bench.experiments.arm.tables import accuracy
+from plumbob.bench.experiments.chain.tables import beyond_reach, rivals
 from plumbob.bench.experiments.check import tables as check
+from plumbob.bench.experiments.closed_curves.tables import jitter
 from plumbob.bench.experiments.cloth import tables as cloth
 from plumbob.bench.experiments.cloth_peers import SOLVED
 from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.report.sections import SECTIONS, tables
 from plumbob.bench.tables.results import Results, label
-from plumbob.bench.tables.table import comma_separated, markdown, words
+from plumbob.bench.tables.table import words
 from plumbob.bench.tables.tex_text import escaped
+from plumbob.bench.tables.writers import comma_separated, markdown
 
 
 def column(table, heading):
@@ -78,9 +81,8 @@ def phrases(path):
     """The strings of a file that have several words, docstrings and columns left out."""
     if path.suffix == ".toml":
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        tables.pop("columns", None)
-        for texts in tables.values():
-            yield from texts.values()
+        for texts in (tables[name] for name in tables.keys() - {"columns", "folded"}):
+            yield from (" ".join(text.split()) for text in texts.values())
         return
     tree = ast.parse(path.read_text(encoding="utf-8"))
     bodies = [node.body for node in ast.walk(tree) if isinstance(getattr(node, "body", 0), list)]
@@ -109,7 +111,7 @@ def test_a_missed_claim_is_named_in_table_and_answer(make):
 
 
 def test_chains_are_counted_as_straight_only_if_they_are(make):
-    table = kinematics.beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
+    table = beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
     assert column(table, "off the line, largest [m]") == [0.5, 1e-9]
     ccd, fabrik = table.summary.points
     assert ccd == "CCD: 1/2 = 50 % (9.5–90.5)"
@@ -134,7 +136,7 @@ def test_targets_without_an_answer_are_said_to_have_none(make):
     ]
     made = {table.name: table for table in tables(Results([*beyond, *others]))}
     q1 = made["q1_beyond_reach"]
-    assert column(q1, "targets without an answer") == [1, 2]
+    assert column(q1, "targets without a solution") == [1, 2]
     assert list(map(words, column(q1, "off the line, largest [m]"))) == ["no answer"] * 2
     assert list(map(words, column(made["accuracy"], "residual, largest [m]"))) == ["no answer"]
     assert column(made["cloth_peers_step"], "least error") == ["diverged"]
@@ -144,7 +146,7 @@ def test_targets_without_an_answer_are_said_to_have_none(make):
 
 
 def test_iterations_count_for_whoever_needs_fewer(records):
-    table = kinematics.rivals(Results(records))
+    table = rivals(Results(records))
     assert column(table, "problem") == ["arm, circle", "arm, beyond", "chain, near"]
     assert column(table, "CCD / FABRIK, means") == [2.5, 1.0, 1.0]
     tied = (
@@ -158,7 +160,7 @@ def test_iterations_are_fewer_only_where_the_same_targets_say_so(make):
         made = [replace(r, arrays={**r.arrays, "iterations": np.asarray(c)})
                 for r, c in zip((make.beyond("ccd", 0.0), make.beyond("fabrik", 0.0)), counts,
                                 strict=True)]  # fmt: skip
-        return kinematics.rivals(Results(made)).summary.sentence
+        return rivals(Results(made)).summary.sentence
 
     few, many = np.arange(3, 13), np.arange(4, 14)
     assert "fewer iterations than CCD on 1 of 1 problems" in pair([many, few])
@@ -167,22 +169,22 @@ def test_iterations_are_fewer_only_where_the_same_targets_say_so(make):
 
 
 def test_who_meets_most_targets_ties_within_chance(make):
-    def accuracy(misses):
+    def summary(misses):
         made = []
         for solver, missed in misses.items():
             r = make.drawn(solver, False, 1.0)
             residual = np.where(np.arange(40) < missed, 1.0, 1e-9)
             made.append(replace(r, arrays={**r.arrays, "residual": residual}))
-        return kinematics.accuracy(Results(made)).summary
+        return accuracy(Results(made)).summary
 
-    said = accuracy({"ccd": 1, "fabrik": 3})
+    said = summary({"ccd": 1, "fabrik": 3})
     assert said.sentence.endswith("first: CCD, in a tie with FABRIK:")
     assert said.points[0] == "CCD: 39/40 = 97.5 % (87.1–99.6)"
-    assert accuracy({"ccd": 20, "fabrik": 3}).sentence.endswith("first: FABRIK:")
+    assert summary({"ccd": 20, "fabrik": 3}).sentence.endswith("first: FABRIK:")
 
 
 def test_jitter_is_the_largest_angle_in_degrees_and_the_closing_one_stands_apart(make):
-    table = kinematics.jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
+    table = jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
     for mode, degrees in (("cold", 180 / math.pi), ("warm", 90 / math.pi)):
         assert column(table, f"largest rotation, {mode} [°]") == [pytest.approx(degrees)]
         assert column(table, f"mean rotation, {mode} [°]") == [pytest.approx(degrees / 4)]
@@ -192,18 +194,18 @@ def test_jitter_is_the_largest_angle_in_degrees_and_the_closing_one_stands_apart
 
 
 def test_jitter_that_grows_is_said_too(make):
-    table = kinematics.jitter(Results(make.followed("ccd", cold=0.1, warm=0.1, coherent=1.0)))
+    table = jitter(Results(make.followed("ccd", cold=0.1, warm=0.1, coherent=1.0)))
     assert "in 0 of 1 cases" in table.summary.sentence
 
 
 def test_a_curve_that_was_not_followed_in_all_modes_has_no_row(make):
     records = make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)[:2]
-    assert kinematics.jitter(Results(records)).rows == ()
+    assert jitter(Results(records)).rows == ()
 
 
 def test_a_smooth_motion_stands_beside_its_price_and_its_drift(make):
     records = make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)
-    table = kinematics.jitter(Results(records + make.drifted("ccd")))
+    table = jitter(Results(records + make.drifted("ccd")))
     assert column(table, "iterations over all frames at once") == [7]
     assert [share.hits for share in column(table, "within tolerance, coherent")] == [3]
     drifts = [column(table, f"drift, {mode}, after {i} [°]")[0]
@@ -211,11 +213,11 @@ def test_a_smooth_motion_stands_beside_its_price_and_its_drift(make):
     assert [round(drift) for drift in drifts] == [6, 11, 17, 0, 0, 0]
     assert "together 7 to 7 times" in table.summary.points[3]
     assert "17.2° to 17.2° from its first pose" in table.summary.points[4]
-    assert len(kinematics.jitter(Results(records)).summary.points) == 4
+    assert len(jitter(Results(records)).summary.points) == 4
 
 
 def test_success_is_counted_by_the_residual_not_by_the_solver(records):
-    table = kinematics.accuracy(Results(records))
+    table = accuracy(Results(records))
     shares = column(table, "within tolerance (95 % interval)")
     assert [(share.hits, share.total) for share in shares] == [(2, 3)] * 4 + [(2, 2)] * 3
     assert max(column(table, "residual, largest [m]")) == 3e-4
@@ -301,7 +303,7 @@ def test_a_plain_copy_stands_in_a_column_and_is_called_no_limit(make):
 
 def test_a_failed_block_gives_no_row(make):
     failed = make.record("arm", "arm/beyond", "ccd", notes={"failed": "ValueError: no"})
-    assert kinematics.beyond_reach(Results([failed])).rows == ()
+    assert beyond_reach(Results([failed])).rows == ()
 
 
 def test_every_suite_has_a_chapter_and_its_tables_are_some_of_all():

@@ -275,7 +275,7 @@ def solved(spec, targets):
     (peer,) = registry.chain_peers([Entrant("hostile", "", spec, tasks=(TASK,))])
     skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
     problem = TargetsForSkeleton("", "", skeleton, SKELETON["local_rotations"], targets)
-    return chain.solve_one_by_one(problem, peer, chain.Limits(1e-4, HOSTILE), budget=60.0)
+    return chain.solve_one_by_one(problem, peer, chain.SolverLimits(1e-4, HOSTILE), budget=60.0)
 
 
 @pytest.mark.parametrize("name", rows("bench", "claims -5 iterations"))

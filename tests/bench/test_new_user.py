@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from plumbob.bench.experiments import SUITES, blocks
-from plumbob.bench.experiments.chain import figures
-from plumbob.bench.experiments.chain.tables import accuracy, beyond_reach
-from plumbob.bench.experiments.robots.participants import participants
+from plumbob.bench.experiments.arm.tables import accuracy, residuals_chart
+from plumbob.bench.experiments.chain.tables import beyond_reach, iterations_chart
+from plumbob.bench.experiments.robots.tables import participants
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening, registry
@@ -65,21 +65,21 @@ def made(records):
     return {table.name: table for table in tables(Results(records), ["ik"])}
 
 
-def test_iterations_that_nobody_counts_are_unsaid_and_no_number(printed, made):
+def test_iterations_that_nobody_counts_are_not_reported_and_no_number(printed, made):
     assert "not a number" not in printed
-    assert "iterations unsaid" in made["published_ik"].rows[0]
+    assert "iterations not reported" in made["published_ik"].rows[0]
     for name in ("accuracy", "q1_beyond_reach", "published_ik"):
         (row, *_) = made[name].rows
         said = {c.heading: words(v) for c, v in zip(made[name].columns, row, strict=True)}
-        counts = [v for h, v in said.items() if h.startswith("iterations, ") or "here" in h]
+        counts = [v for h, v in said.items() if h.startswith("iterations, ") or "measured" in h]
         assert set(counts) == {"–"}, name
         assert "not a number" not in said.values()
 
 
 def test_who_counts_nothing_has_no_curve_over_iterations(records):
     results = Results(records)
-    assert figures.iterations(results) is None
-    assert "my_ik.py" in drawn(figures.ik_residuals(results)).svg
+    assert iterations_chart(results) is None
+    assert "my_ik.py" in drawn(residuals_chart(results)).svg
 
 
 def test_peers_that_were_not_asked_are_not_said_to_be_missing(printed, records, made):

@@ -175,7 +175,8 @@ def test_files_are_listed_with_what_each_engine_reads(capsys, tmp_path, monkeypa
     about = (re.search(r"^Files\n(.*\n)*?(?=file +format)", out, re.MULTILINE)[0],)
     assert assert_printed(printed_table.below(out, about), headings, rows, width) == headings
     about = "Of 3 files 1 reading disagrees; 1 is a part that others include, 1 XML file is of "
-    headings = ["format", "beside", "files", "agrees", "differs", "not read", "agrees within"]
+    headings = ["format", "compared with", "files"]
+    headings += ["agrees", "differs", "not read", "agrees within"]
     rows = [
         ["URDF", "Pinocchio", "1", "0", "0", "1", "–"],
         ["URDF", "MuJoCo", "1", "1", "0", "0", "2.0e-16"],
@@ -229,7 +230,7 @@ def test_compare_prints_whole_sentences_in_ten_lines(capsys, tmp_path, monkeypat
     assert lines[:2] == ["12 rows worse", "12 LESS RIGHT"]
     sentences = re.split(r"LESS RIGHT ", " ".join(" ".join(lines[2:]).split()))[1:]
     more = 12 - len(sentences)
-    assert f"and {more} more: --markdown FILE or --json FILE has all" in sentences[-1]
+    assert f"and {more} more: --markdown FILE or --json FILE writes all" in sentences[-1]
     solvers = [re.match(r"arm/circle, (solver \d+), residual: (.*?), now (\S+)", s).groups()
                for s in sentences]  # fmt: skip
     assert len({solver for solver, *_ in solvers}) == len(sentences) > 2

@@ -2,8 +2,11 @@
 
 import pytest
 
-from plumbob.bench.experiments.robot_models.measurement import compare
-from plumbob.bench.experiments.robot_models.peers import beside, differences
+from plumbob.bench.experiments.robot_models.measurement import (
+    compare,
+    compare_effectors,
+    effector_differences,
+)
 from plumbob.bench.experiments.robot_models.tables import readers
 from plumbob.bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
 from plumbob.bench.problems.robots import ALL, CHARACTER, is_installed
@@ -78,7 +81,7 @@ def test_an_engine_with_a_known_cause_is_left_out_of_the_numbers(compared):
     table = readers(Results([pinocchio, mujoco]))
     assert column(table, "positions, of the extent")[0] < 1e-14
     assert column(table, "engines") == ["MuJoCo"]
-    assert column(table, "remark") == ["Pinocchio is off by 0.250: something is not read"]
+    assert column(table, "remark") == ["Pinocchio differs by 0.250: something is not read"]
     assert table.summary.points[0].endswith("1 of them otherwise than MuJoCo's documentation says")
 
 
@@ -90,7 +93,7 @@ def test_the_engine_of_a_peer_puts_effectors_where_we_do(peer, name):
         pytest.skip(f"{peer.package} or the robot is not installed")
     if name == CHARACTER and peer is not DRAKE:
         pytest.skip("takes chains only")
-    apart = differences(peer.module, name)
+    apart = effector_differences(peer.module, name)
     most = 1e-6 if peer.title in SINGLE_PRECISION else 1e-14
     assert all(0.0 < value < most for value in apart.values())
 
@@ -99,7 +102,7 @@ def test_what_an_engine_does_not_take_is_said_and_what_it_rounds_too(make):
     peer = next((peer for peer in KINEMATICS if peer.version and peer is not DRAKE), None)
     if peer is None:
         pytest.skip("none of the engines is installed")
-    measured = beside(peer, CHARACTER)
+    measured = compare_effectors(peer, CHARACTER)
     assert measured.notes["remark"].endswith("takes one chain of hinges only")
     assert not measured.arrays
 

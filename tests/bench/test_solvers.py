@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments.chain import CHAIN
-from plumbob.bench.experiments.chain.measurement import Limits, solve_targets, solve_with_engine
+from plumbob.bench.experiments.chain.measurement import (
+    SolverLimits,
+    solve_targets,
+    solve_with_engine,
+)
 from plumbob.bench.experiments.chain.tables import beyond_reach
 from plumbob.bench.harness.record import Record
 from plumbob.bench.peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
@@ -82,7 +86,7 @@ def test_a_start_at_the_target_takes_no_iteration_and_what_is_out_of_reach_takes
 @pytest.mark.parametrize("engine", SKELETON_ENGINES)
 def test_beyond_reach_the_loop_on_an_engine_does_as_the_reference_does(engine):
     """Towards the far target itself it swung for all iterations: 22 of 60 straight, not 60."""
-    problem, limits = chain_targets("beyond", 60), Limits(1e-6, 1000)
+    problem, limits = chain_targets("beyond", 60), SolverLimits(1e-6, 1000)
     ours = solve_targets(problem, "levenberg_marquardt", limits).arrays
     theirs = solve_with_engine(problem, engine, limits).arrays
     np.testing.assert_array_equal(theirs["iterations"], ours["iterations"])

@@ -17,7 +17,7 @@ from plumbob.bench.harness.measure import measure
 from plumbob.bench.harness.record import Record, decode, encode, key
 from plumbob.bench.harness.run import now
 from plumbob.bench.tables.results import Results
-from plumbob.bench.tables.table import markdown
+from plumbob.bench.tables.writers import markdown
 from plumbob.reference import ImplicitEuler
 
 TINY = Scale(targets=3, seconds=0.001)

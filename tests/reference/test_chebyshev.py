@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from plumbob.reference import ImplicitEuler, scenes
-from plumbob.reference.implicit_euler import chebyshev
-from plumbob.reference.implicit_euler.chebyshev import PLAIN, Acceleration
+from plumbob.reference.implicit_euler import local_global
+from plumbob.reference.implicit_euler.local_global import PLAIN, Acceleration
 
 h = 1 / 30
 
@@ -74,7 +74,7 @@ def test_g_does_not_grow_whatever_the_weights(monkeypatch):
         leaps.append(size)
         return (1.0, 10.0) if len(leaps) % 3 == 2 else (1.0, 1.0)
 
-    monkeypatch.setattr(chebyshev.Acceleration, "next", leaping)
+    monkeypatch.setattr(local_global.Acceleration, "next", leaping)
     integrator = ImplicitEuler(system, h=h, solver="chebyshev")
     iterates = list(itertools.islice(integrator.iterates(swinging), 31))
     for before, after in itertools.pairwise(iterates):

@@ -18,11 +18,7 @@ from plumbob.reference import (
 )
 from plumbob.reference.formats import urdf
 from plumbob.reference.implicit_euler.certificate import Certificate, Coverage
-from plumbob.reference.inverse_kinematics.box_step import (
-    activate_limits,
-    new_task_system,
-    take_step,
-)
+from plumbob.reference.inverse_kinematics.box_step import activate_limits, take_step
 from plumbob.reference.inverse_kinematics.mechanism import new_data
 from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.restarts import (
@@ -34,7 +30,7 @@ from plumbob.reference.inverse_kinematics.restarts import (
     Limits,
     most_promising,
 )
-from plumbob.reference.inverse_kinematics.solve_mechanism import mechanism_criteria
+from plumbob.reference.inverse_kinematics.solve_mechanism import mechanism_criteria, new_workspace
 from plumbob.reference.judging import judge_pose
 
 # ---- limits
@@ -48,7 +44,7 @@ def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_ci
     arm = Articulation(chain, ["hinge", "hinge", "fixed"], lower=-4.0, upper=4.0, mimics=mimics)
     mechanism = prepare(arm, (2,), (False,)).mechanism
     for step, expected in ((0.3, end), (-7.8, -3.9)):
-        data, system = new_data(mechanism), new_task_system(mechanism)
+        data, system = new_data(mechanism), new_workspace(mechanism).system
         data.q[:], system.step[:], system.J[:], system.e[:] = 0.0, 0.0, 1.0, 0.0
         system.active[:] = 0.0
         data.q[0], system.step[0] = 3.9, step

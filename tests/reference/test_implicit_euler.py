@@ -9,8 +9,8 @@ import pytest
 from plumbob.reference import rotation, scenes
 from plumbob.reference.backend import compiled
 from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
-from plumbob.reference.implicit_euler.chebyshev import PLAIN
 from plumbob.reference.implicit_euler.line_search import line_search
+from plumbob.reference.implicit_euler.local_global import PLAIN
 from plumbob.reference.implicit_euler.newton_cg import _product
 from plumbob.reference.implicit_euler.objective import Objective, global_matrix
 from plumbob.reference.mass_spring import (

@@ -382,17 +382,7 @@ def problem_of(name, closed, rng, drawn_to=()):
     constrained = ~np.isin(np.arange(4), drawn_to)
     rows["position"][~constrained] += 0.1
     mechanism = prepared.mechanism
-    columns = np.concatenate([
-        np.arange(model.coordinate_count)[model.coordinates_of(j)] for j in range(5)
-        if j not in mimics and j in joints_of(mechanism, model)
-    ])  # fmt: skip
-    return new_problem(mechanism, rows, constrained, closed), q[:, columns].copy()
-
-
-def joints_of(mechanism, model):
-    """The articulation's joints that are the mechanism's."""
-    sources = set(mechanism.sources.tolist())
-    return [j for j in range(5) if model.coordinates_of(j).start in sources]
+    return new_problem(mechanism, rows, constrained, closed), q[:, mechanism.columns].copy()
 
 
 @pytest.mark.parametrize("closed", [False, True])

@@ -1,4 +1,4 @@
 """The lab's arm: curves drawn by its effector, and targets out of reach."""
 
-# What a record is about.
+# The tasks of records.
 CURVE, BEYOND = "curve", "beyond"

@@ -11,12 +11,12 @@ from plumbob.reference.arguments import FloatArray
 
 from ...harness.block import Block, Measured, Scale
 from ...problems.curves import FollowedCurve, arm_beyond, arm_curves
-from ..chain.measurement import BEYOND_TOLERANCE, Limits, solve_targets
+from ..chain.measurement import BEYOND_TOLERANCE, SolverLimits, solve_targets
 from . import BEYOND, CURVE
-from .values import Followed
+from .values import FollowedMotion
 
-LIMITS = Limits(tolerance=1e-4, max_iterations=100)
-BEYOND_LIMITS = Limits(BEYOND_TOLERANCE, max_iterations=1000)
+LIMITS = SolverLimits(tolerance=1e-4, max_iterations=100)
+BEYOND_LIMITS = SolverLimits(BEYOND_TOLERANCE, max_iterations=1000)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -28,25 +28,25 @@ def blocks(scale: Scale) -> Iterator[Block]:
                 settings = {**LIMITS._asdict(), "warm": warm}
                 measure = partial(follow, curve, solver, {"warm": warm})
                 yield Block("arm", curve.name, solver, measure, settings, facts=facts)
-    far = arm_beyond(scale.targets)
-    facts = {"task": BEYOND, "title": far.title}
+    beyond, limits = arm_beyond(scale.targets), BEYOND_LIMITS._asdict()
+    facts = {"task": BEYOND, "title": beyond.title}
     for solver in IK_SOLVERS:
-        measure = partial(solve_targets, far, solver, BEYOND_LIMITS)
-        yield Block("arm", far.name, solver, measure, BEYOND_LIMITS._asdict(), scale.targets, facts)
+        measure = partial(solve_targets, beyond, solver, BEYOND_LIMITS)
+        yield Block("arm", beyond.name, solver, measure, limits, scale.targets, facts)
 
 
 def follow(
     problem: FollowedCurve, solver: str, options: dict[str, Any], closed: bool = False
 ) -> Measured:
-    """Follow a curve once; residuals are recomputed by forward kinematics of the answers.
+    """Follow a curve once; recompute residuals by forward kinematics of the solutions.
 
-    The last angle of a closed curve is that from the last frame back to the first.
+    The last angle of a closed curve is from the last frame back to the first.
     """
-    motion = tracked(problem, solver, options)
+    motion = solve_frames(problem, solver, options)
     pose = forward_kinematics(problem.model, motion.coordinates)
     angles = _joint_angles(problem, motion)[: None if closed else -1]
     return Measured(
-        Followed(
+        FollowedMotion(
             residual=np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
             iterations=np.asarray(motion.iterations),
             outcome=np.asarray(motion.outcome),
@@ -56,7 +56,7 @@ def follow(
     )
 
 
-def tracked(problem: FollowedCurve, solver: str, options: dict[str, Any]) -> IKSolution:
+def solve_frames(problem: FollowedCurve, solver: str, options: dict[str, Any]) -> IKSolution:
     """Return the solutions of all frames of a curve."""
     limits: dict[str, Any] = {**LIMITS._asdict(), **options}
     return track(problem.model, problem.curve, solver, problem.start, **limits)
@@ -65,8 +65,8 @@ def tracked(problem: FollowedCurve, solver: str, options: dict[str, Any]) -> IKS
 def _joint_angles(problem: FollowedCurve, motion: IKSolution) -> FloatArray:
     """Return the angle by which each joint rotates to the following frame [rad], (frame, joint).
 
-    After the last frame follows the first. A hinge's angle is not reduced to half a revolution,
-    though its link looks the same.
+    The first frame follows the last. A hinge's angle is not reduced to half a revolution, though
+    its link looks the same.
     """
     if isinstance(problem.model, Skeleton):
         # The effector keeps its rotation and would only dilute the mean.

@@ -1,11 +1,11 @@
 """The records of the lab's arm: curves that it draws, and targets beyond its reach."""
 
 from ...harness.values import Floats1, Integers1, Kind, Values
-from ..chain.values import Reached, ReachedDetails
+from ..chain.values import ChainSolves, SolveDetails
 from . import BEYOND, CURVE
 
 
-class Followed(Values, frozen=True):
+class FollowedMotion(Values, frozen=True):
     """A motion along a curve, (frame,): an outcome is the number of an `Outcome`.
 
     The angles are those by which joints rotate from each frame to the next [rad].
@@ -18,4 +18,4 @@ class Followed(Values, frozen=True):
     mean_angle: Floats1
 
 
-KINDS = {CURVE: Kind(Followed, ReachedDetails), BEYOND: Kind(Reached, ReachedDetails)}
+KINDS = {CURVE: Kind(FollowedMotion, SolveDetails), BEYOND: Kind(ChainSolves, SolveDetails)}

@@ -4,5 +4,5 @@ from ...problems.chains import BEYOND
 
 __all__ = ["BEYOND", "CHAIN"]
 
-# What a record is about.
+# The task of records.
 CHAIN = "chain"

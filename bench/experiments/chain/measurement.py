@@ -9,7 +9,7 @@ import numpy as np
 
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
-from plumbob.reference import IK_SOLVERS, forward_kinematics, solve_ik
+from plumbob.reference import IK_SOLVERS, IKSolution, forward_kinematics, solve_ik
 from plumbob.reference.arguments import FloatArray
 
 from ...harness import metrics
@@ -25,28 +25,26 @@ from ...peers.protocol import NoAnswerError
 from ...peers.registry import ChainPeer
 from ...problems.chains import BEYOND, STRATA, ChainRequests, TargetsForSkeleton, chain_targets
 from . import CHAIN
-from .values import Reached
+from .values import ChainSolves
 
 SUITE = "ik"
 TOLERANCE = 1e-4
-# Beyond reach it is the distance from the best answer there is; small, to see how straight it is.
+# Beyond reach: of the distance from the closest pose; small, so that the chain must be straight.
 BEYOND_TOLERANCE = 1e-6
 MAX_ITERATIONS = 1000
-# The residuals of so many iterations are kept for the figure; of a user's solver those of so many
-# targets and iterations, each a solve from the start with that many at most.
+# The residuals of so many iterations are kept for the figure. A user's solver is followed over so
+# many targets and iterations, each by a solve from the start with that many at most.
 HISTORY = 200
 FOLLOWED_TARGETS, FOLLOWED_ITERATIONS = 20, 30
 # Seconds that a user's solver has for a stratum, for those of a scale: enough for as many
 # iterations as ours may make, in the interpreter.
 BUDGET = 250.0
 NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
-
-
 NOT_FOLLOWED = "not followed, for its answers do not depend on max_iterations"
 
 
-class Limits(NamedTuple):
-    """When a solver stops: the distance that counts as reached [m], and the most iterations."""
+class SolverLimits(NamedTuple):
+    """The residual at which a target is reached [m], and the most iterations."""
 
     tolerance: float
     max_iterations: int
@@ -57,10 +55,10 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for stratum in STRATA:
         problem = chain_targets(stratum, scale.targets)
         tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
-        yield from _blocks_on(problem, stratum, Limits(tolerance, MAX_ITERATIONS), scale)
+        yield from _blocks_on(problem, stratum, SolverLimits(tolerance, MAX_ITERATIONS), scale)
+    limits = SolverLimits(TOLERANCE, MAX_ITERATIONS)
     for own in scale.problems:
         if own.targets is not None:
-            limits = Limits(TOLERANCE, MAX_ITERATIONS)
             yield from (b.on(own) for b in _blocks_on(own.targets, "yours", limits, scale))
     facts = {"task": CHAIN, "stratum": BEYOND, "title": "every chain"}
     for entrant in scale.entrants:
@@ -70,7 +68,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def _blocks_on(
-    problem: TargetsForSkeleton, stratum: str, limits: Limits, scale: Scale
+    problem: TargetsForSkeleton, stratum: str, limits: SolverLimits, scale: Scale
 ) -> Iterator[Block]:
     """Yield targets for every solver of ours, for one loop on each engine, and for users'."""
     facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
@@ -86,7 +84,7 @@ def _blocks_on(
 
 
 def blocks_of_users(
-    problem: TargetsForSkeleton, limits: Limits, scale: Scale, followed: bool = False
+    problem: TargetsForSkeleton, limits: SolverLimits, scale: Scale, followed: bool = False
 ) -> Iterator[Block]:
     """Yield targets for each method of users' solvers."""
     budget, settings = BUDGET * scale.seconds, limits._asdict()
@@ -97,34 +95,31 @@ def blocks_of_users(
 
 
 def solve_targets(
-    problem: TargetsForSkeleton, solver: str, limits: Limits, record: bool = False
+    problem: TargetsForSkeleton, solver: str, limits: SolverLimits, record: bool = False
 ) -> Measured:
-    """Solve all targets with a solver of ours; residuals are recomputed from the answers.
+    """Solve all targets with a solver of ours; recompute residuals from the solutions.
 
-    `record` keeps residuals by iteration, and times.
+    `record` keeps residuals by iteration, and the seconds of each target by a call of its own.
     """
-    asked = (problem.skeleton, problem.starts, problem.targets, solver)
-    solution = solve_ik(*asked, **limits._asdict(), record=record)
+
+    def solve(starts: FloatArray, targets: FloatArray, record: bool = False) -> IKSolution:
+        options = {**limits._asdict(), "record": record}
+        return solve_ik(problem.skeleton, starts, targets, solver, **options)
+
+    solution = solve(problem.starts, problem.targets, record)
     positions = forward_kinematics(problem.skeleton, solution.local_rotations).positions
     arrays = _evaluated(problem, limits, positions, solution.iterations)
     arrays["outcome"] = np.asarray(solution.outcome)
     if record:
-        arrays |= _convergence(solution.history[:, : HISTORY + 1])
-        arrays["seconds"] = _seconds(problem, solver, limits)
-    return Measured(Reached(**arrays))
+        arrays |= _quantiles(solution.history[:, : HISTORY + 1])
+        pairs = zip(problem.every_start, problem.targets, strict=True)
+        calls = [partial(solve, start, target) for start, target in pairs]
+        calls[0]()  # may compile
+        arrays["seconds"] = np.array([time_call(call)[1] for call in calls])
+    return Measured(ChainSolves(**arrays))
 
 
-def _seconds(problem: TargetsForSkeleton, solver: str, limits: Limits) -> FloatArray:
-    """Return how long each target takes by a call of its own [s], (target,)."""
-    solves = [
-        partial(solve_ik, problem.skeleton, start, target, solver, **limits._asdict())
-        for start, target in zip(problem.every_start, problem.targets, strict=True)
-    ]
-    solves[0]()  # may compile
-    return np.array([time_call(solve)[1] for solve in solves])
-
-
-def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) -> Measured:
+def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: SolverLimits) -> Measured:
     """Solve all targets by Levenberg-Marquardt on an engine's kinematics."""
     engine = SKELETON_ENGINES[name](problem.skeleton)
     effector, root = problem.skeleton.joint_count - 1, problem.skeleton.offsets[0]
@@ -136,41 +131,41 @@ def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) ->
     rotations = np.array([answer.q[engine.columns] for answer, _ in results])
     positions = forward_kinematics(problem.skeleton, rotations).positions
     arrays = _evaluated(problem, limits, positions, [answer.iterations for answer, _ in results])
-    return Measured(Reached(**arrays, seconds=np.array([seconds for _, seconds in results])))
+    return Measured(ChainSolves(**arrays, seconds=np.array([seconds for _, seconds in results])))
 
 
 def solve_one_by_one(
     problem: TargetsForSkeleton,
     peer: ChainPeer,
-    limits: Limits,
+    limits: SolverLimits,
     budget: float,
     followed: bool = False,
 ) -> Measured:
-    """Put all targets to a user's solver, for as long as its budget lasts.
+    """Have a user's solver solve all targets, for as long as its budget lasts.
 
     A target without an answer, or never begun, counts as infinitely far from being reached.
     """
     count = len(problem.targets)
     requests = ChainRequests(problem, np.full(count, limits.max_iterations))
     outcome = _performed(requests, peer, limits.tolerance, budget)
-    if not outcome.solved:
+    solves, begun = outcome.solved, len(outcome.solved)
+    if not solves:
         raise NoAnswerError(outcome.trouble or "It answered nothing.")
     arrays = _evaluated(problem, limits, *_answers(requests, outcome))
-    done = len(outcome.solved)
-    answered = np.isfinite(arrays["residual"][:done])
-    arrays["solved"] = arrays["solved"][:done]
-    arrays["claimed"] = np.where(answered, [one.claim for one in outcome.solved], -1)
-    arrays["seconds"] = np.where(answered, [one.seconds for one in outcome.solved], 0.0)
+    answered = np.isfinite(arrays["residual"][:begun])
+    arrays["solved"] = arrays["solved"][:begun]
+    arrays["claimed"] = np.where(answered, [solve.claim for solve in solves], -1)
+    arrays["seconds"] = np.where(answered, [solve.seconds for solve in solves], 0.0)
     remarks = [outcome.note]
-    if done < count:
-        why = "" if outcome.is_lost else f" by its time budget of {budget:g} s"
-        remarks += [f"cut{why} at {done} of {count} targets, the others count as not reached"]
+    if begun < count:
+        reason = "" if outcome.is_lost else f" by its time budget of {budget:g} s"
+        remarks += [f"cut{reason} at {begun} of {count} targets, the others count as not reached"]
     if followed and not outcome.is_lost:
-        history = _followed(problem, peer, limits, budget)
+        history = _history(problem, peer, limits, budget)
         arrays |= history
         remarks += [] if history else [NOT_FOLLOWED]
-    facts = {"trouble": raised(outcome.solved)}
-    return Measured(Reached(**arrays), {"remark": "; ".join(filter(None, remarks))}, facts)
+    facts = {"trouble": raised(solves)}
+    return Measured(ChainSolves(**arrays), {"remark": "; ".join(filter(None, remarks))}, facts)
 
 
 def _performed(
@@ -186,14 +181,14 @@ def _performed(
 def _answers(requests: ChainRequests, outcome: Outcome) -> tuple[FloatArray, FloatArray]:
     """Return the joints' positions and the iterations of every target; NaN where there are none."""
     answers = np.full(requests.shape, np.nan)
-    answers[: len(outcome.solved)] = [one.q for one in outcome.solved]
+    answers[: len(outcome.solved)] = [solve.q for solve in outcome.solved]
     return answers[:, 1:].reshape(len(answers), -1, 3), answers[:, 0]
 
 
 def _evaluated(
-    problem: TargetsForSkeleton, limits: Limits, positions: FloatArray, iterations: Any
+    problem: TargetsForSkeleton, limits: SolverLimits, positions: FloatArray, iterations: Any
 ) -> dict[str, Any]:
-    """Return what the joints' positions, (target, joint, 3), come to; no answer is NaN."""
+    """Return the errors of the joints' positions, (target, joint, 3); NaN without an answer."""
     reach = problem.skeleton.reach()
     distance = np.linalg.norm(problem.targets - problem.skeleton.offsets[0], axis=-1)
     residual = np.linalg.norm(positions[:, -1] - problem.targets, axis=-1)
@@ -204,7 +199,7 @@ def _evaluated(
     }
     answered = np.isfinite(residual)
     return {
-        **{name: np.where(answered, values, np.inf) for name, values in errors.items()},
+        **{name: np.where(answered, error, np.inf) for name, error in errors.items()},
         "solved": residual <= limits.tolerance,
         "iterations": np.asarray(iterations),
         "distance": distance,
@@ -212,13 +207,10 @@ def _evaluated(
     }
 
 
-def _followed(
-    problem: TargetsForSkeleton, peer: ChainPeer, limits: Limits, budget: float
+def _history(
+    problem: TargetsForSkeleton, peer: ChainPeer, limits: SolverLimits, budget: float
 ) -> dict[str, FloatArray]:
-    """Return how residuals fall with the iterations allowed; nothing if they do not depend on them.
-
-    A solver that makes as many as it likes answers the same whatever it is allowed.
-    """
+    """Return the residuals by the iterations allowed; nothing if they do not depend on them."""
     allowed = np.arange(1, FOLLOWED_ITERATIONS + 1)
     starts, targets = problem.every_start[:FOLLOWED_TARGETS], problem.targets[:FOLLOWED_TARGETS]
     first = forward_kinematics(problem.skeleton, starts).positions[:, -1]
@@ -228,16 +220,15 @@ def _followed(
     outcome = _performed(requests, peer, limits.tolerance, budget)
     if len(outcome.solved) < len(repeated):
         return {}
-    after = _answers(requests, outcome)[0][:, -1].reshape(len(targets), len(allowed), 3)
-    history = np.linalg.norm(
-        np.concatenate([first[:, None], after], axis=1) - targets[:, None], axis=-1
-    )
+    positions = _answers(requests, outcome)[0][:, -1].reshape(len(targets), len(allowed), 3)
+    effectors = np.concatenate([first[:, None], positions], axis=1)
+    history = np.linalg.norm(effectors - targets[:, None], axis=-1)
     if not np.isfinite(history).all() or (history[:, 1:] == history[:, 1:2]).all():
         return {}
-    return _convergence(history)
+    return _quantiles(history)
 
 
-def _convergence(history: FloatArray) -> dict[str, FloatArray]:
+def _quantiles(history: FloatArray) -> dict[str, FloatArray]:
     """Return the quantiles of residuals, (target, iteration), by names in records."""
-    convergence = metrics.convergence(history)
-    return {f"history_{name}": values for name, values in convergence._asdict().items()}
+    quantiles = metrics.convergence(history)._asdict()
+    return {f"history_{name}": residuals for name, residuals in quantiles.items()}

@@ -6,13 +6,13 @@ from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Valu
 from . import CHAIN
 
 
-class Reached(Values, frozen=True):
-    """The answers to a batch of targets, (target,); lengths in metres."""
+class ChainSolves(Values, frozen=True):
+    """The solutions of a batch of targets, (target,); lengths in metres."""
 
-    residual: Floats1  # infinite without an answer
-    iterations: Floats1  # NaN where the solver does not say them
+    residual: Floats1  # infinite without a solution
+    iterations: Floats1  # NaN where the solver does not report them
     distance: Floats1  # of the target from the root
-    bend: Floats1  # how far joints are off the line from root to target
+    bend: Floats1  # of the farthest joint from the line from root to target
     excess: Floats1  # residual above distance - reach
     reach: float
     solved: Booleans1 | None = None  # whether the residual is within the tolerance
@@ -21,11 +21,11 @@ class Reached(Values, frozen=True):
     history_median: Floats1 | None = None
     history_high: Floats1 | None = None  # 90th percentile
     seconds: Floats1 | None = None  # for a target by itself
-    claimed: Integers1 | None = None  # what a user's solver says: 1, 0, or -1 for nothing
+    claimed: Integers1 | None = None  # 1 or 0 as a user's solver claims, or -1 for no claim
 
 
-class ReachedDetails(Details, frozen=True):
-    """The tolerance [m], whether the solver starts warm, and what is reached for."""
+class SolveDetails(Details, frozen=True):
+    """The tolerance [m], whether the solver starts warm, and the stratum or curve."""
 
     tolerance: float = math.nan
     warm: bool | None = None
@@ -33,4 +33,4 @@ class ReachedDetails(Details, frozen=True):
     curve: str = ""
 
 
-KINDS = {CHAIN: Kind(Reached, ReachedDetails)}
+KINDS = {CHAIN: Kind(ChainSolves, SolveDetails)}

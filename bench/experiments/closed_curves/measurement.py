@@ -17,9 +17,9 @@ from ...problems.curves import (
     heart_three_times,
     robot_closed_curves,
 )
-from ..arm.measurement import LIMITS, follow, tracked
+from ..arm.measurement import LIMITS, follow, solve_frames
 from . import COHERENT, COLD, CURVE, DRIFT, WARM
-from .values import Drifted
+from .values import DriftAngles
 
 SUITE = "tracking"
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -33,13 +33,13 @@ ROBOT_SOLVER = "levenberg_marquardt"
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every curve for every solver in each mode, and the heart three times."""
-    some = [ROBOT_SOLVER] if scale.is_as_short_as("quick") else list(IK_SOLVERS)
-    for problems, solvers in ((arm_closed_curves(), IK_SOLVERS), (robot_closed_curves(), some)):
-        for problem in problems:
-            for solver in solvers:
-                for mode, options in OPTIONS.items():
-                    measure = partial(follow, problem, solver, options, closed=True)
-                    yield _block(problem, solver, mode, measure, CURVE)
+    robot_solvers = [ROBOT_SOLVER] if scale.is_as_short_as("quick") else list(IK_SOLVERS)
+    followed = [(curve, solver) for curve in arm_closed_curves() for solver in IK_SOLVERS]
+    followed += [(curve, solver) for curve in robot_closed_curves() for solver in robot_solvers]
+    for curve, solver in followed:
+        for mode, options in OPTIONS.items():
+            measure = partial(follow, curve, solver, options, closed=True)
+            yield _block(curve, solver, mode, measure, CURVE)
     heart = heart_three_times()
     for solver in IK_SOLVERS:
         for mode in (WARM, COHERENT):
@@ -54,13 +54,13 @@ def _block(
 
 
 def drift(problem: FollowedCurve, solver: str, mode: str) -> Measured:
-    """Follow the curve three times over; return how far the first pose is left behind after each.
+    """Follow the curve three times over; return the angles from the first pose after each.
 
     A coherent motion is closed: after its last frame comes its first.
     """
     if mode != COHERENT:
         problem = replace(problem, curve=np.append(problem.curve, problem.curve[:1], axis=0))
-    motion = tracked(problem, solver, OPTIONS[mode])
-    later = (DRIFT_FRAMES * np.arange(1, 4)) % len(problem.curve)
-    angles = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
-    return Measured(Drifted(angles.max(axis=-1), np.asarray(motion.residual)))
+    motion = solve_frames(problem, solver, OPTIONS[mode])
+    frames = (DRIFT_FRAMES * np.arange(1, 4)) % len(problem.curve)
+    angles = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[frames])
+    return Measured(DriftAngles(angles.max(axis=-1), np.asarray(motion.residual)))

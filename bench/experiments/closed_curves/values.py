@@ -1,22 +1,25 @@
 """The records of closed curves: one round, whose last angles lead back, and repetitions."""
 
 from ...harness.values import Details, Floats1, Kind, Values
-from ..arm.values import Followed
+from ..arm.values import FollowedMotion
 from . import CURVE, DRIFT
 
 
-class Drifted(Values, frozen=True):
-    """How far the first pose is left behind after each repetition [rad], (repetition,)."""
+class DriftAngles(Values, frozen=True):
+    """The largest angle of a joint from its first pose after each repetition [rad]."""
 
     drift: Floats1
     residual: Floats1
 
 
-class RoundDetails(Details, frozen=True):
-    """How the frames are solved, and to which tolerance [m]."""
+class TrackingDetails(Details, frozen=True):
+    """The mode in which the frames are solved, and the tolerance [m]."""
 
     mode: str
     tolerance: float
 
 
-KINDS = {CURVE: Kind(Followed, RoundDetails), DRIFT: Kind(Drifted, RoundDetails)}
+KINDS = {
+    CURVE: Kind(FollowedMotion, TrackingDetails),
+    DRIFT: Kind(DriftAngles, TrackingDetails),
+}

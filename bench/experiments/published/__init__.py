@@ -1,4 +1,4 @@
 """Published tables measured again in their own set-up."""
 
-# What a record is about.
+# The tasks of records.
 TRAC_IK, TOOLBOX, FABRIK = "TRAC-IK’s table", "the toolbox’s table", "FABRIK’s table"

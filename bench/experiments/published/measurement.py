@@ -17,67 +17,67 @@ from ...problems.chains import TargetsForSkeleton, unit
 from ...problems.evaluate import Tolerance
 from ...problems.robot_targets import uniform_targets
 from ...problems.robots import is_installed
-from ..chain.measurement import Limits, blocks_of_users
-from ..robots.measurement import SUITE, Run, solve
+from ..chain.measurement import SolverLimits, blocks_of_users
+from ..robots.measurement import SUITE, RobotJob, solve
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
-from .values import Iterations, Searches
+from .values import FabrikSolves, RobotSearches
 
-# Random targets, and seconds that a solver has for them, for those of a scale.
+# Random targets, and a solver's seconds for them, for those of a scale.
 _TARGETS = 5
 _BUDGET = 15.0
 _SEED = 2011
-_LIMITS = Limits(published.FABRIK_TOLERANCE, published.FABRIK_ITERATIONS)
+_LIMITS = SolverLimits(published.FABRIK.tolerance, published.FABRIK.iterations)
 # The solvers fast enough for 10,000 targets, with restarts as TRAC-IK has them.
 _FAST = (registry.PLUMBOB_LM, registry.TOOLBOX, registry.TRAC_IK)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield TRAC-IK's table, the toolbox's, FABRIK's; a solver that is missing is left out."""
+    """Yield TRAC-IK's table, the toolbox's, FABRIK's; leave out solvers that are not installed."""
     count, budget = _TARGETS * scale.targets, _BUDGET * scale.seconds
-    tolerance = Tolerance(*[math.sqrt(3.0) * published.TRAC_IK_TOLERANCE] * 2)
+    tolerance = Tolerance(*[math.sqrt(3.0) * published.TRAC_IK.tolerance] * 2)
     for peer in (peer for peer in _FAST if peer.is_installed):
-        for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK):
+        for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK.rates):
             if is_installed(robot):
-                run = Run(robot, peer, peer.entry(RESTARTS), tolerance, budget)
+                job = RobotJob(robot, peer, peer.entry(RESTARTS), tolerance, budget)
                 facts = {"task": TRAC_IK, "robot": robot, "title": robot}
-                measure = partial(_solve, run, count, middle=True)
-                yield run.block(f"published/trac_ik/{robot}", measure, count, facts)
-    tolerance = Tolerance(*[math.sqrt(2.0 * published.TOOLBOX_HALF_SQUARE)] * 2)
+                measure = partial(_solve, job, count, middle=True)
+                yield job.block(f"published/trac_ik/{robot}", measure, count, facts)
+    tolerance = Tolerance(*[math.sqrt(2.0 * published.TOOLBOX.half_square)] * 2)
     for peer, entry, infeasible in _toolbox() if is_installed("ur5") else ():
-        run = Run("ur5", peer, entry, tolerance, budget)
+        job = RobotJob("ur5", peer, entry, tolerance, budget)
         about: dict[str, Any] = {"task": TOOLBOX, "title": "ur5", "infeasible": infeasible}
-        measure = partial(_solve, run, count, middle=False)
-        yield run.block("published/toolbox/ur5", measure, count, about)
-    for stratum, distance in published.FABRIK_DISTANCES.items():
+        measure = partial(_solve, job, count, middle=False)
+        yield job.block("published/toolbox/ur5", measure, count, about)
+    for stratum, distance in published.FABRIK.distances.items():
         yield from _fabrik(stratum, distance, scale)
 
 
 def _toolbox() -> Iterator[tuple[Peer, PeerEntry, float | None]]:
-    """Yield what makes one search, and the rate of infeasible targets that was published."""
-    ours, toolbox = registry.PLUMBOB_LM, registry.TOOLBOX
-    once, iterations = ours.entry(ONE_START), {"iterations": published.TOOLBOX_ITERATIONS}
-    yield ours, replace(once, settings={**once.settings, **iterations}), None
-    for search in published.TOOLBOX if toolbox.is_installed else ():
+    """Yield solvers that search once, with the published share of infeasible targets."""
+    plumbob, toolbox = registry.PLUMBOB_LM, registry.TOOLBOX
+    entry, iterations = plumbob.entry(ONE_START), {"iterations": published.TOOLBOX.iterations}
+    yield plumbob, replace(entry, settings={**entry.settings, **iterations}), None
+    for search in published.TOOLBOX.searches if toolbox.is_installed else ():
         settings = {**search.settings, "searches": 1, "limits": False, **iterations}
         yield toolbox, PeerEntry(ONE_START, settings, note=search.title), search.infeasible
 
 
-def _solve(run: Run, count: int, middle: bool) -> Measured:
-    solves, notes, facts = solve(run, uniform_targets(run.robot, count, middle))
-    names = Searches.__struct_fields__
-    return Measured(Searches(**{name: getattr(solves, name) for name in names}), notes, facts)
+def _solve(job: RobotJob, count: int, middle: bool) -> Measured:
+    solves, notes, facts = solve(job, uniform_targets(job.robot, count, middle))
+    fields = {name: getattr(solves, name) for name in RobotSearches.__struct_fields__}
+    return Measured(RobotSearches(**fields), notes, facts)
 
 
 def _fabrik(stratum: str, distance: float, scale: Scale) -> Iterator[Block]:
     """Yield targets at a distance from the root of a straight chain, in random directions."""
-    links, length = published.FABRIK_LINKS, published.FABRIK_LENGTH
-    skeleton, rest = scenes.ball_chain(links=links, link_length=length)
+    chain = published.FABRIK
+    skeleton, rest = scenes.ball_chain(links=chain.links, link_length=chain.length)
     rng = np.random.default_rng(_SEED)
-    targets = distance * unit(rng.standard_normal((published.FABRIK_RUNS, 3)))
+    targets = distance * unit(rng.standard_normal((chain.runs, 3)))
     name, facts = f"published/fabrik/{stratum}", {"task": FABRIK, "stratum": stratum}
     problem = TargetsForSkeleton(name, name, skeleton, rest, targets)
-    for solver in published.FABRIK:
+    for solver in chain.means:
         measure = partial(iterations, problem, solver)
         yield Block(SUITE, name, solver, measure, _LIMITS._asdict(), facts=facts)
     for block in blocks_of_users(problem, _LIMITS, scale):
@@ -86,6 +86,7 @@ def _fabrik(stratum: str, distance: float, scale: Scale) -> Iterator[Block]:
 
 def iterations(problem: TargetsForSkeleton, solver: str) -> Measured:
     """Solve all targets with a solver of ours."""
-    asked = (problem.skeleton, problem.starts, problem.targets, solver)
-    solution = solve_ik(*asked, **_LIMITS._asdict())
-    return Measured(Iterations(np.asarray(solution.iterations), np.asarray(solution.residual)))
+    solution = solve_ik(
+        problem.skeleton, problem.starts, problem.targets, solver, **_LIMITS._asdict()
+    )
+    return Measured(FabrikSolves(np.asarray(solution.iterations), np.asarray(solution.residual)))

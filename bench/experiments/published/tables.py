@@ -1,79 +1,135 @@
-"""Published tables of solvers, and the same set-up here."""
+"""Published tables of solvers, and the same set-up measured here."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
-from ...tables.columns import folded, text
+import numpy as np
+
+from ...harness import metrics
+from ...harness.record import Record
+from ...peers import registry
+from ...tables.captions import Captions
 from ...tables.layout import Layout
-from ...tables.table import Cell, Column, Summary, listing, words
+from ...tables.results import Results, grouped, label
+from ...tables.table import Summary, listing, words
+from ..robots.readings import Score
 from ..robots.tables import RULE
+from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
-from .readings import Comparison, comparisons
+
+# A published number and the one measured here, by the titles of the columns.
+Row = dict[str, Any]
 
 
-def _here(comparison: Comparison, name: str = "value") -> Cell:
-    """Return a number measured here, or a bound of its interval, None where that is unknown."""
-    value = getattr(comparison.here, name, None)
-    return value if value == value else None
+def _rows(results: Results) -> list[Row]:
+    """Return all numbers of the published tables that have records."""
+    strata = list(published.FABRIK.distances)
+    trac_ik, toolbox = (
+        [record for record in results.all("ik", task=task) if "solved" in record.arrays]
+        for task in (TRAC_IK, TOOLBOX)
+    )
+    fabrik = sorted(results.all("ik", task=FABRIK), key=lambda r: strata.index(r.details.stratum))
+    rows = [*_of_trac_ik(trac_ik)]
+    rows += [row for record in toolbox for row in _of_toolbox(record)]
+    return rows + [row for record in fabrik for row in _of_fabrik(record)]
 
 
-def _summary(comparisons: Sequence[Comparison]) -> Summary:
-    both = (one for one in comparisons if one.published is not None and one.here)
-    return listing("Here, and as published:", map(_point, both))
+def _row(about: Row, quantity: str, number: float | None, measured: Sequence[float]) -> Row:
+    """Return the row of a number; `measured` may have the bounds of its 95 % interval."""
+    titles = ("measured", "measured, 95 % low", "measured, 95 % high")
+    cells = {t: None if np.isnan(x) else x for t, x in zip(titles, measured, strict=False)}
+    return {**about, "quantity": quantity, "published": number, **cells}
 
 
-def _point(one: Comparison) -> str:
-    low, high = _here(one, "low"), _here(one, "high")
+def _about(score: Score) -> Row:
+    row = {"record": score.records[0], "solver": score.solver, "targets": score.total}
+    return {**row, "mark": score.limits}
+
+
+def _of_trac_ik(records: Sequence[Record]) -> Iterator[Row]:
+    """Yield success rates and mean times, robot by robot, the published solvers first."""
+    titles = {peer.label_of(entry): peer.title for peer in registry.PEERS for entry in peer.entries}
+    for robot, members in grouped(published.TRAC_IK.rates, lambda rate: rate.robot).items():
+        rates = {rate.solver: rate for rate in members}
+        measured = {titles.get(r.solver, r.solver): r for r in records if r.details.robot == robot}
+        for solver in dict.fromkeys([*rates, *measured]) if measured else ():
+            *_, percent, milliseconds, source = rates.get(solver) or (None, None, "")
+            about = {"table": "TRAC-IK", "problem": robot, "solver": solver, "mark": ""}
+            about |= {"source": source}
+            share, time = [], []
+            if record := measured.get(solver):
+                score = Score(robot, "", record.solver, (record,))
+                about |= _about(score)
+                share, time = _percent(score.solved), [1e3 * metrics.mean(score.begun("seconds"))]
+            yield _row(about, "solved [%]", percent, share)
+            yield _row(about, "time, mean [ms]", milliseconds, time)
+
+
+def _of_toolbox(record: Record) -> Iterator[Row]:
+    """Yield the shares of targets that one search does not solve, and its time."""
+    score = Score(record.title, "", record.solver, (record,))
+    rate = record.details.infeasible
+    source = "" if rate is None else published.TOOLBOX.source
+    about = {"table": "Robotics Toolbox", "problem": record.title, "source": source}
+    about |= _about(score)
+    yield _row(about, "declared infeasible [%]", rate, _percent(score.all("claimed", 0) != 1))
+    yield _row(about, "not solved within the limits [%]", None, _percent(~score.solved))
+    yield _row(about, "time, median [µs]", None, [1e6 * x for x in score.median_time])
+
+
+def _of_fabrik(record: Record) -> Iterator[Row]:
+    """Yield the mean and the largest number of iterations of a solver in a stratum."""
+    stratum, is_claimed = record.details.stratum, record.facts.get("entrant") is True
+    number = published.FABRIK.means.get(record.solver, {}).get(stratum)
+    counts = record.values.iterations[~np.isnan(record.values.iterations)]
+    about = {
+        "record": record,
+        "table": "FABRIK",
+        "problem": stratum,
+        "solver": label(record.solver),
+        "targets": counts.size or None,
+        "mark": "claimed" * is_claimed if counts.size else "iterations not reported",
+        "source": "" if number is None else published.FABRIK.source,
+    }
+    mean = metrics.mean_interval(counts) if counts.size else ()
+    yield _row(about, "iterations, mean", number, mean)
+    yield _row(about, "iterations, largest", None, [float(counts.max())] if counts.size else ())
+
+
+def _percent(hits: np.ndarray) -> list[float]:
+    """Return a share with its interval [%]."""
+    share = metrics.share(hits)
+    return [100.0 * metrics.ratio(*share[:2]), 100.0 * share.low, 100.0 * share.high]
+
+
+def _summary(rows: Sequence[Row]) -> Summary:
+    complete = (r for r in rows if None not in (r["published"], r.get("measured")))
+    return listing("Here, and as published:", map(_point, complete))
+
+
+def _point(row: Row) -> str:
+    low, high = (row.get(f"measured, 95 % {bound}") for bound in ("low", "high"))
     interval = "" if low is None else f"{words(low)}–{words(high)}, "
-    mark = f", {one.mark}" if one.mark else ""
+    mark = f", {row['mark']}" if row["mark"] else ""
     return (
-        f"{one.problem}, {one.solver}: {one.quantity} {words(_here(one))} "
-        f"({interval}n = {words(one.targets)}), published {words(one.published)}{mark}"
+        f"{row['problem']}, {row['solver']}: {row['quantity']} {words(row['measured'])} "
+        f"({interval}n = {words(row['targets'])}), published {words(row['published'])}{mark}"
     )
 
 
-published_ik = Layout(
-    "What did others measure, and what do we?",
-    "published_ik",
-    "Published tables of inverse kinematics, and the same set-up here",
-    subjects=comparisons,
-    columns=(
-        text("table", lambda one: one.table),
-        text("problem", lambda one: one.problem),
-        text("solver", lambda one: one.solver),
-        text("quantity", lambda one: one.quantity),
-        Column("published", read=lambda one: one.published),
-        Column("here", read=_here),
-        text("mark", lambda one: one.mark),
-        *folded(
-            [
-                Column("here, 95 % from", read=lambda one: _here(one, "low")),
-                Column("here, 95 % to", read=lambda one: _here(one, "high")),
-                Column("targets here", read=lambda one: one.targets),
-                text("source", lambda one: one.source),
-            ]
-        ),
-    ),
-    shows="TRAC-IK: full poses at "
-    f"{words(published.TRAC_IK_TOLERANCE)} m and rad in each of 6 components, "
-    "every search from the middle of the limits, at most 5 ms for TRAC-IK; times of all targets, "
-    "those that failed included. Robotics Toolbox: random poses and starts, one search of at most "
-    f"{words(published.TOOLBOX_ITERATIONS)} iterations; infeasible is what the search does not "
-    "solve. The published searches look at no limits, nor do the toolbox’s here; “not solved "
-    "within the limits” counts answers beyond them as not solved. FABRIK: iterations for one "
-    "target, ten joints, no limits; here a target out of reach is recognised as such by geometry "
-    f"where the chain is straight. {RULE}",
-    measured="TRAC-IK: published with 10,000 reachable random poses on a machine of its time; here "
-    "evaluated by MuJoCo at the norm of three such components; the PR2’s continuous joints have "
-    "two revolutions in either direction. Robotics Toolbox: published with 10,000 poses, the "
-    "tutorial’s own Python loops (Haviland and Corke 2022; the rates of its other commits differ "
-    "by some tenths); here the toolbox’s compiled ones, and ours; half the squared error within "
-    f"{words(published.TOOLBOX_HALF_SQUARE)}. FABRIK: published with 20 runs in MATLAB, read in a "
-    "secondary source; chain, target and tolerance are not stated there. Here a guess: "
-    f"{published.FABRIK_LINKS} links of {published.FABRIK_LENGTH} m from straight, "
-    f"{published.FABRIK_RUNS} seeded directions, targets at "
-    f"{' and '.join(map(str, published.FABRIK_DISTANCES.values()))} m, "
-    f"to {words(published.FABRIK_TOLERANCE)} m.",
-    summary=_summary,
+_CAPTIONS = Captions(
+    __file__,
+    rule=RULE,
+    trac_ik_tolerance=words(published.TRAC_IK.tolerance),
+    toolbox_iterations=words(published.TOOLBOX.iterations),
+    toolbox_half_square=words(published.TOOLBOX.half_square),
+    links=str(published.FABRIK.links),
+    length=str(published.FABRIK.length),
+    runs=str(published.FABRIK.runs),
+    distances=" and ".join(map(str, published.FABRIK.distances.values())),
+    fabrik_tolerance=words(published.FABRIK.tolerance),
 )
+
+published_ik = Layout(**_CAPTIONS.of("published_ik"), subjects=_rows, summary=_summary)
 
 LAYOUTS = (published_ik,)

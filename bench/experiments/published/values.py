@@ -4,8 +4,8 @@ from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Valu
 from . import FABRIK, TOOLBOX, TRAC_IK
 
 
-class Searches(Values, frozen=True, kw_only=True):
-    """What became of targets: as of robots, without residuals."""
+class RobotSearches(Values, frozen=True, kw_only=True):
+    """Searches for targets of a robot, as in `RobotSolves`, without residuals."""
 
     solved: Booleans1 | None = None
     claimed: Integers1 | None = None
@@ -13,33 +13,33 @@ class Searches(Values, frozen=True, kw_only=True):
     setup: float
 
 
-class RobotDetails(Details, frozen=True):
+class TracIKDetails(Details, frozen=True):
     """The robot of TRAC-IK's table."""
 
     robot: str
 
 
-class SearchDetails(Details, frozen=True):
-    """Which share of targets was published as infeasible [%], None if none was."""
+class ToolboxDetails(Details, frozen=True):
+    """The published share of infeasible targets [%], None if there is none."""
 
     infeasible: float | None
 
 
-class Iterations(Values, frozen=True):
-    """The iterations of each solve, NaN where they are unsaid, and the distances left [m]."""
+class FabrikSolves(Values, frozen=True):
+    """The iterations of each solve, NaN if not reported, and the remaining distances [m]."""
 
     iterations: Floats1
     residual: Floats1
 
 
-class IterationDetails(Details, frozen=True):
+class FabrikDetails(Details, frozen=True):
     """The stratum of the targets."""
 
     stratum: str
 
 
 KINDS = {
-    TRAC_IK: Kind(Searches, RobotDetails),
-    TOOLBOX: Kind(Searches, SearchDetails),
-    FABRIK: Kind(Iterations, IterationDetails),
+    TRAC_IK: Kind(RobotSearches, TracIKDetails),
+    TOOLBOX: Kind(RobotSearches, ToolboxDetails),
+    FABRIK: Kind(FabrikSolves, FabrikDetails),
 }

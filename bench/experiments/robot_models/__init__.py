@@ -1,4 +1,4 @@
 """Robots and characters from files of others, read by engines and by us."""
 
-# What records of this suite about the bench's own robots in engines of peers are about.
+# The task of records on the bench's own robots in engines of peers.
 PEERS = "peers"

@@ -1,96 +1,120 @@
 """Robots and characters: how closely engines that read the same files agree with the reference."""
 
-from collections.abc import Iterator, Sequence
-from functools import partial
-from operator import methodcaller
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
-from ...tables.columns import folded, text
+from ...harness.record import Record
+from ...peers import registry
+from ...tables.captions import Captions
 from ...tables.layout import Layout
-from ...tables.results import counted, settings
-from ...tables.table import Column, Summary, words
-from .readings import QUANTITIES, Comparison, comparisons, largest
+from ...tables.results import Results, by_problem, counted, grouped, listed, settings
+from ...tables.table import Summary, words
+from . import PEERS
+from .values import FileDetails
+
+QUANTITIES = ("positions", "rotations", "jacobians")
+# A file in both engines, or a robot of the bench in the engine of a peer, by the titles of the
+# columns; "valid" are the records whose numbers count.
+Row = dict[str, Any]
 
 
-def _measured(comparisons: Sequence[Comparison]) -> str:
-    files, robots = (
-        settings((r for c in comparisons if c.is_file == of for r in c.records), "configurations")
-        for of in (True, False)
-    )
-    return (
-        f"{files or 'No'} random configurations of each file and {robots or 'none'} of each robot, "
-        "within the limits; links and joints are matched by name."
-    )
+def _rows(results: Results) -> list[Row]:
+    """Return files in both engines, and then robots of the bench in those of peers."""
+    files, robots = _parted(results.all("robot_models"))
+    return [*map(_of_file, by_problem(files).values()), *map(_of_robot, robots)]
 
 
-def _summary(comparisons: Sequence[Comparison]) -> Summary:
-    files = [comparison for comparison in comparisons if comparison.is_file]
-    valid = [record for file in files for record in file.valid]
-    worst = [words(largest(valid, quantity)) for quantity in QUANTITIES]
+def _parted(records: Iterable[Record]) -> tuple[list[Record], list[Record]]:
+    """Return the records of files of others, and those of the bench's own robots."""
+    parts = grouped(records, lambda record: record.facts.get("task") == PEERS)
+    return parts.get(False, []), parts.get(True, [])
+
+
+def _of_file(records: Sequence[Record]) -> Row:
+    """Return the row of a file; an engine that leaves mimics free has too many freedoms."""
+    valid = [record for record in records if record.values and not record.details.cause]
+    row: Row = {"records": records, "valid": valid, "robot": records[0].title}
+    row |= {"engines": listed([record.solver for record in valid]) or "none"}
+    row |= {"remark": "; ".join(filter(None, map(_remark, records)))}
+    if not valid:
+        return row
+    size = min(valid, key=lambda record: (record.values.freedoms, record.solver)).values
+    positions, rotations, jacobians = (_largest(quantity, valid) for quantity in QUANTITIES)
+    return row | {
+        "freedoms": size.freedoms,
+        "positions, of the extent": positions,
+        "rotations": rotations,
+        "Jacobians": jacobians,
+        "links": size.links,
+        "moving joints": size.joints,
+    }
+
+
+def _remark(record: Record) -> str:
+    details: FileDetails = record.details
+    if not record.values:
+        return details.unread
+    if details.cause:
+        difference = max(getattr(record.values, quantity) for quantity in QUANTITIES)
+        return f"{record.solver} differs by {words(difference)}: {details.cause}"
+    mimics = f"{record.solver} with mimic joints left free: {details.free_mimics}"
+    return mimics if details.free_mimics else ""
+
+
+def _of_robot(record: Record) -> Row:
+    return {
+        "records": [record],
+        "valid": [],
+        "robot": record.title,
+        "engines": f"{record.solver} {record.details.version}",
+        "positions": record.values and record.values.positions,
+        "rotations": record.values and record.values.rotations,
+        "remark": record.details.remark or registry.SINGLE_PRECISION.get(record.solver, ""),
+    }
+
+
+def _largest(quantity: str, records: Sequence[Record]) -> float | None:
+    """Return the largest difference in records, None if they have none."""
+    return max((getattr(record.values, quantity) for record in records), default=None)
+
+
+def _records(rows: Sequence[Row]) -> tuple[list[Record], list[Record]]:
+    return _parted(record for row in rows for record in row["records"])
+
+
+def _measured(rows: Sequence[Row]) -> dict[str, str]:
+    files, robots = (settings(records, "configurations") for records in _records(rows))
+    return {"files": files or "No", "robots": robots or "none"}
+
+
+def _summary(rows: Sequence[Row]) -> Summary:
+    files = [row["valid"] for row in rows if row["valid"]]
+    valid = [record for records in files for record in records]
+    positions, rotations, jacobians = (words(_largest(q, valid)) for q in QUANTITIES)
     sentence = (
-        f"Over {counted(sum(bool(f.valid) for f in files), 'file')} positions differ by at most "
-        f"{worst[0]} of the extent, rotations by {worst[1]}, Jacobians by {worst[2]}:"
+        f"Over {counted(len(files), 'file')} positions differ by at most "
+        f"{positions} of the extent, rotations by {rotations}, Jacobians by {jacobians}:"
     )
-    return Summary(sentence * bool(valid), tuple(_points(comparisons)))
+    return Summary(sentence * bool(valid), tuple(_points(*_records(rows))))
 
 
-def _points(comparisons: Sequence[Comparison]) -> Iterator[str]:
-    """Yield how many files each engine reads, and how far engines of peers place robots."""
-    files = [record for c in comparisons if c.is_file for record in c.records]
-    for engine in dict.fromkeys(record.solver for record in files):
-        mine = [record for record in files if record.solver == engine]
-        read = [record for record in mine if record.values]
+def _points(files: Sequence[Record], robots: Sequence[Record]) -> Iterator[str]:
+    """Yield how many files each engine reads, and how closely engines of peers place robots."""
+    for engine, records in grouped(files, lambda record: record.solver).items():
+        read = [record for record in records if record.values]
         different = sum(bool(record.details.cause) for record in read)
-        otherwise = f", {words(different)} of them otherwise than MuJoCo's documentation says"
-        count = f"{words(len(read))} of {counted(len(mine), 'file')} read"
-        yield f"{engine}: {count}{otherwise * bool(different)}"
-    robots = [r for c in comparisons if not c.is_file for r in c.records if r.values]
-    for engine in dict.fromkeys(record.solver for record in robots):
-        mine = [record for record in robots if record.solver == engine]
-        positions, rotations = (words(largest(mine, name)) for name in QUANTITIES[:2])
+        deviation = f", {words(different)} of them otherwise than MuJoCo's documentation says"
+        count = f"{words(len(read))} of {counted(len(records), 'file')} read"
+        yield f"{engine}: {count}{deviation * bool(different)}"
+    placed = (record for record in robots if record.values)
+    for engine, records in grouped(placed, lambda record: record.solver).items():
+        positions, rotations = (words(_largest(quantity, records)) for quantity in QUANTITIES[:2])
         yield (
             f"{engine} on the bench’s robots: effectors within {positions} m and {rotations} in a "
             "rotation matrix"
         )
 
 
-def _positions(of_files: bool, comparison: Comparison) -> float | None:
-    return comparison.largest("positions") if comparison.is_file == of_files else None
-
-
-readers = Layout(
-    "Do other engines read the same robots and characters?",
-    "readers",
-    "Robots and characters, as engines read them",
-    columns=(
-        text("robot", lambda comparison: comparison.records[0].title),
-        text("engines", lambda comparison: comparison.engines),
-        Column("freedoms", read=lambda comparison: comparison.size("freedoms")),
-        *(
-            Column(title, unit, group="largest difference", read=read)
-            for title, unit, read in (
-                ("positions, of the extent", "", partial(_positions, True)),
-                ("positions", "m", partial(_positions, False)),
-                ("rotations", "", methodcaller("largest", "rotations")),
-                ("Jacobians", "", methodcaller("largest", "jacobians")),
-            )
-        ),
-        text("remark", lambda comparison: comparison.remark),
-        *folded(
-            [
-                Column("links", read=lambda comparison: comparison.size("links")),
-                Column("moving joints", read=lambda comparison: comparison.size("joints")),
-            ]
-        ),
-    ),
-    subjects=comparisons,
-    shows="The reference reads each file itself. For files, differences are the largest of all "
-    "links in all configurations; positions are measured against the extent of the links, "
-    "Jacobians against that and one radian. An engine that is known to place links elsewhere "
-    "is left out of the numbers, and the cause is given. For the bench’s own robots, each engine "
-    "of a peer reads the same text as the reference, and the differences are of the effectors. "
-    "Rotations are compared entry by entry as matrices; rounding in double precision leaves 1e-15.",
-    measured=_measured,
-    summary=_summary,
-)
+readers = Layout(**Captions(__file__).of("readers", _measured), subjects=_rows, summary=_summary)
 
 LAYOUTS = (readers,)

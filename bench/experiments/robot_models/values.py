@@ -9,8 +9,8 @@ from . import PEERS
 class FileValues(Values, frozen=True):
     """The size of a file in an engine, and its largest differences from the reference.
 
-    Positions are over the extent of the links, rotations between entries of matrices, Jacobians
-    over the extent and one radian.
+    Positions are relative to the extent of the links, rotations are between entries of matrices,
+    Jacobians relative to the extent and one radian.
     """
 
     links: int
@@ -30,14 +30,14 @@ class FileDetails(Details, frozen=True):
     unread: str = ""
 
 
-class RobotValues(Values, frozen=True):
+class EffectorDifferences(Values, frozen=True):
     """The largest differences of effectors: positions [m], and entries of rotation matrices."""
 
     positions: float
     rotations: float
 
 
-class RobotDetails(Details, frozen=True):
+class EngineDetails(Details, frozen=True):
     """The engine's version, and why it does not take the robot."""
 
     configurations: int
@@ -45,4 +45,4 @@ class RobotDetails(Details, frozen=True):
     remark: str = ""
 
 
-KINDS = {"": Kind(FileValues, FileDetails), PEERS: Kind(RobotValues, RobotDetails)}
+KINDS = {"": Kind(FileValues, FileDetails), PEERS: Kind(EffectorDifferences, EngineDetails)}

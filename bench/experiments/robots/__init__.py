@@ -1,4 +1,4 @@
 """Robots and characters: every installed inverse-kinematics solver on the same targets."""
 
-# What a record is about: targets within reach of a robot, or out of it.
+# The tasks of records: targets within reach of a robot, or out of it.
 REACHABLE, UNREACHABLE = "reachable", "unreachable"

@@ -13,7 +13,7 @@ from ...harness import metrics
 from ...harness.metrics import Floats
 from ...tables.layout import Figure
 from ...tables.results import Results
-from .readings import STARTS, Score, fields_of, profiles, within_budgets
+from .readings import STARTS, Score, fields_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,34 +21,59 @@ if TYPE_CHECKING:
 
 # So many times the least time is drawn as the palest, and the least time as the fullest.
 SLOWEST = 1000.0
-# Maps of more robots than this stand below each other.
-MOST_BESIDE = 5
+# Maps of more robots than this are stacked.
+MAXIMUM_BESIDE = 5
 
 
-# Shares of targets by solver, at places along an axis.
-Curves = Callable[[Sequence[Score], Floats], list[tuple[Score, Floats]]]
+def budgets(start: str, results: Results) -> Sketch | None:
+    """Return the shares of targets that are solved within each budget of time."""
+
+    def rates(field: Sequence[Score], seconds: Floats) -> list[Floats]:
+        return [metrics.within_budget(score.seconds, score.solved, seconds) for score in field]
+
+    shows = (
+        "Share of the targets within reach that are solved within so much time for each; the "
+        "band is the 95 % interval (Wilson)."
+    )
+    titles = ("budget", "targets solved within a time", shows, "time for each target [s]")
+    return _chart(titles, rates, np.logspace(-6, 0, 121), start, results)
 
 
-def _curves(
-    name: str,
-    title: str,
-    shows: str,
-    axis: str,
-    read: Curves,
-    along: Floats,
+def performance_profiles(start: str, results: Results) -> Sketch | None:
+    """Return the performance profiles of solvers on the same targets (Dolan and Moré 2002)."""
+
+    def rates(field: Sequence[Score], ratios: Floats) -> list[Floats]:
+        seconds, solved = (np.array([getattr(s, n) for s in field]) for n in ("seconds", "solved"))
+        return list(metrics.performance_profiles(seconds, solved, ratios))
+
+    shows = (
+        "Share of the targets that a solver solves within so many times the time of the "
+        "fastest on that target (Dolan and Moré 2002); where a line ends is what it solves at all."
+    )
+    titles = ("profile", "performance profiles", shows, "time relative to the fastest on a target")
+    return _chart(titles, rates, np.logspace(0, 4, 121), start, results, same_targets=True)
+
+
+def _chart(
+    titles: tuple[str, str, str, str],
+    rates: Callable[[Sequence[Score], Floats], list[Floats]],
+    x: Floats,
     start: str,
     results: Results,
+    same_targets: bool = False,
 ) -> Sketch | None:
     """Return a panel of curves for each robot; None if there are no solvers with this start."""
-    panels = tuple(
-        Panel(robot, tuple(_share(score, along, rates) for score, rates in read(field, along)))
-        for robot, field in fields_of(results, start).items()
-    )
+    name, title, shows, axis = titles
+    panels = []
+    for robot, field in fields_of(results, start).items():
+        scores = [score for score in field if score.has_same_targets or not same_targets]
+        curves = zip(scores, rates(scores, x), strict=True)
+        panels.append(Panel(robot, tuple(_share(score, x, curve) for score, curve in curves)))
     chart = Chart(
-        f"{name}_{_stem(start)}",
+        f"{name}_{start.replace(' ', '_')}",
         f"Robots, {start}: {title}",
         shows,
-        panels,
+        tuple(panels),
         Axis(axis, log=True),
         Axis("targets [%]", limits=(-3, 103)),
         better=GREATER,
@@ -57,43 +82,17 @@ def _curves(
     return chart_sketch(chart) if panels else None
 
 
-def _stem(start: str) -> str:
-    return start.replace(" ", "_")
-
-
-def _share(score: Score, along: Floats, rates: Floats) -> Series:
+def _share(score: Score, x: Floats, rates: Floats) -> Series:
     """Return a share with the interval that holds the true one in 95 % of samples [%]."""
     low, high = metrics.wilson(rates, max(1, score.total))
-    return series(score.solver, along, 100 * rates, (100 * low, 100 * high))
+    return series(score.solver, x, 100 * rates, (100 * low, 100 * high))
 
 
-budgets = partial(
-    _curves,
-    "budget",
-    "targets solved within a time",
-    "Share of the targets within reach that are solved within so much time for each; the "
-    "band is the 95 % interval (Wilson).",
-    "time for each target [s]",
-    within_budgets,
-    np.logspace(-6, 0, 121),
-)
-performance_profiles = partial(
-    _curves,
-    "profile",
-    "performance profiles",
-    "Share of the targets that a solver solves within so many times the time of the "
-    "fastest on that target (Dolan and Moré 2002); where a line ends is what it solves at all.",
-    "times the fastest on a target",
-    profiles,
-    np.logspace(0, 4, 121),
-)
-
-
-# What a cell of a map is: how full it is drawn, from 0 to 1, and what is written on it.
+# A cell of a map: how full it is drawn, from 0 to 1, and its text.
 MapCell = tuple[float, str]
 
 
-class Map(NamedTuple):
+class RobotMaps(NamedTuple):
     """Maps of the same solvers and robots: by title a cell for each, None where it has none."""
 
     solvers: tuple[str, ...]
@@ -113,18 +112,15 @@ def heat_map(start: str, results: Results) -> Sketch | None:
 
     if not scores:
         return None
+    panels = {"solved [%]": panel(_success), "time relative to fastest": panel(_slowness)}
     return Sketch(
-        f"robots_map_{_stem(start)}",
+        f"robots_map_{start.replace(' ', '_')}",
         f"Robots, {start}: who is good at what",
         "Left: targets solved of all given. Right: the geometric mean of times over the "
         "least on that robot, unsolved targets with their penalty. Fuller is better; a star "
         "where a budget of time cut the solver short, no field where it does not take the "
         "robot.",
-        Map(
-            solvers,
-            tuple(fields),
-            {"solved [%]": panel(_success), "times the least time": panel(_slowness)},
-        ),
+        RobotMaps(solvers, tuple(fields), panels),
         draw_map,
     )
 
@@ -135,7 +131,7 @@ def _success(score: Score) -> MapCell:
 
 
 def _slowness(score: Score) -> MapCell:
-    ratio = score.times_the_least
+    ratio = score.relative_time
     fullness = 1.0 - np.log(max(ratio, 1.0)) / np.log(SLOWEST)
     size, unit = (ratio, "") if ratio < 999.5 else (ratio / 1e3, "k")  # as wide as a cell
     text = f"{size:.{1 if size < 10 else 0}f}{unit}{_star(score)}"
@@ -146,16 +142,16 @@ def _star(score: Score) -> str:
     return "" if score.is_ranked else "*"
 
 
-def draw_map(data: Map) -> "Canvas":
+def draw_map(maps: RobotMaps) -> "Canvas":
     """Return the maps as a figure of matplotlib's."""
     from ...figures.drawing import canvas
 
-    rows = 1 if len(data.robots) <= MOST_BESIDE else len(data.panels)
-    height = rows * (1.3 + 0.27 * len(data.solvers))
-    figure, axes = canvas(height, len(data.panels) // rows, rows, sharey=True)
-    for ax, (title, cells) in zip(axes, data.panels.items(), strict=True):
-        _draw_panel(ax, title, cells, data.robots)
-    axes[0].set_yticks(range(len(data.solvers)), [written(solver) for solver in data.solvers])
+    rows = 1 if len(maps.robots) <= MAXIMUM_BESIDE else len(maps.panels)
+    height = rows * (1.3 + 0.27 * len(maps.solvers))
+    figure, axes = canvas(height, len(maps.panels) // rows, rows, sharey=True)
+    for ax, (title, cells) in zip(axes, maps.panels.items(), strict=True):
+        _draw_panel(ax, title, cells, maps.robots)
+    axes[0].set_yticks(range(len(maps.solvers)), [written(solver) for solver in maps.solvers])
     axes[0].invert_yaxis()
     return figure
 
@@ -163,26 +159,17 @@ def draw_map(data: Map) -> "Canvas":
 def _draw_panel(
     ax: "Axes", title: str, rows: Sequence[Sequence[MapCell | None]], robots: Sequence[str]
 ) -> None:
-    for i, row in enumerate(rows):
-        for j, cell in enumerate(row):
-            if cell is not None:
-                _draw_cell(ax, i, j, cell)
+    cells = ((i, j, *cell) for i, row in enumerate(rows) for j, cell in enumerate(row) if cell)
+    for i, j, fullness, text in cells:
+        alpha = 0.06 + 0.5 * fullness
+        ax.barh(i, 0.96, 0.92, j - 0.48, color=COLOURS["blue"], alpha=alpha, linewidth=0)
+        ax.text(j, i, text, ha="center", va="center", fontsize=8)
     ax.set(title=title, xlim=(-0.5, len(robots) - 0.5), ylim=(-0.5, len(rows) - 0.5))
     names = [written(robot) for robot in robots]
     ax.set_xticks(range(len(robots)), names, rotation=25, ha="right", rotation_mode="anchor")
     ax.tick_params(length=0)
     ax.grid(visible=False)
     ax.spines[:].set_visible(False)
-
-
-def _draw_cell(ax: "Axes", i: int, j: int, cell: MapCell) -> None:
-    from matplotlib.patches import Rectangle
-
-    fullness, text = cell
-    box = Rectangle((j - 0.48, i - 0.46), 0.96, 0.92, color=COLOURS["blue"], linewidth=0)
-    box.set_alpha(0.06 + 0.5 * fullness)
-    ax.add_patch(box)
-    ax.text(j, i, text, ha="center", va="center", fontsize=8)
 
 
 FIGURES: tuple[Figure, ...] = tuple(

@@ -21,7 +21,6 @@ from ...peers import registry
 from ...peers.entrant import ROBOT_TASK
 from ...peers.registry import Peer, PeerEntry
 from ...problems.evaluate import Targets, Tolerance, evaluator_of
-from ...problems.own import OwnProblem
 from ...problems.robot_targets import STRATA, least_distances, robot_targets, unreachable_targets
 from ...problems.robots import PACKAGE, ROBOTS, enter, is_installed, title
 from . import REACHABLE, UNREACHABLE
@@ -29,21 +28,20 @@ from .values import RobotSolves
 
 SUITE = "ik"
 TOLERANCE = Tolerance(1e-3, 1e-3)
-# Targets in a stratum, and seconds that a solver has for a robot within reach and beyond, for
-# those of a scale.
+# Targets in a stratum, and a solver's seconds for a robot within reach and beyond, for those of a
+# scale.
 _TARGETS = 0.1
 _BUDGET, _BUDGET_BEYOND = 5.0, 3.0
 # Targets out of reach are no fewer than these, however few are asked for in a stratum.
 OUT_OF_REACH = 100
-EVERY_SOLVER = "all solvers"
 # Digits kept of times and residuals: more would fill the disk with noise.
 _DIGITS = 5
-ANY = {"kind": "any"}
+_ANY = {"kind": "any"}
 NO_ROBOTS = "not asked for robots: it offers no robot_inverse_kinematics"
 
 
-class Run(NamedTuple):
-    """One solver with its settings, on one robot."""
+class RobotJob(NamedTuple):
+    """A robot, and a solver with its settings, tolerance and budget [s]."""
 
     robot: str
     peer: Peer
@@ -52,9 +50,16 @@ class Run(NamedTuple):
     budget: float
 
     def block(self, problem: str, measure: Any, size: float, facts: dict[str, Any]) -> Block:
-        """Return the block of a problem for this solver."""
+        """Return the block of a problem; its settings are all that changes an answer."""
+        settings = {
+            **self.entry.settings,
+            "kind": self.entry.kind,
+            "attempts": self.entry.restarts + 1,
+            "version": self.peer.version,
+            "tolerance": self.tolerance.position,
+            "tolerance_rotation": self.tolerance.rotation,
+        }
         solver = self.peer.label_of(self.entry)
-        settings = settings_of(self.peer, self.entry, self.tolerance)
         block = Block(SUITE, problem, solver, measure, settings, size, facts, budget=self.budget)
         return block.of(self.peer.entrant)
 
@@ -62,108 +67,95 @@ class Run(NamedTuple):
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield each solver on each robot; one block for a solver or a robot that is not installed.
 
-    The solvers of a robot follow each other in an order drawn by lot, so that a machine that gets
-    slower or faster does so to all of them.
+    The solvers of a robot follow each other in a drawn order, so that a machine that gets slower or
+    faster does so to all of them.
     """
-    own: dict[str, OwnProblem] = {}
-    for problem in scale.problems:
+    own = {problem.name: problem for problem in scale.problems if problem.robot is not None}
+    for problem in own.values():
         if problem.robot is not None:
             enter(problem.robot)
-            own[problem.name] = problem
-    here = [name for name in ROBOTS if is_installed(name)]
+    installed = [name for name in ROBOTS if is_installed(name)]
     for name in ROBOTS:
-        if name not in here:
+        if name not in installed:
             absent, facts = partial(not_installed, PACKAGE), _facts(REACHABLE, title(name))
-            yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, ANY, 0, facts)
+            yield Block(SUITE, f"robots/{name}", "all solvers", absent, _ANY, 0, facts)
     peers = registry.robot_peers(scale.entrants)
-    made = by_lot(block for peer in peers for block in blocks_of(peer, [*here, *own], scale))
-    entered = {f"{kind}/{name}": own[name] for kind in ("robots", "unreachable") for name in own}
-    for block in made:
-        yield block.on(entered[block.problem]) if block.problem in entered else block
+    robots = [*installed, *own]
+    for block in _drawn(block for peer in peers for block in _blocks_of(peer, robots, scale)):
+        name = block.problem.partition("/")[2]
+        yield block.on(own[name]) if name in own else block
     for entrant in scale.entrants:
         if entrant.offers(SUITE) and ROBOT_TASK not in entrant.tasks:
             measure, facts = partial(not_asked, NO_ROBOTS), _facts(REACHABLE, "every robot")
-            yield Block(SUITE, "robots/all", entrant.name, measure, ANY, 0, facts).of(entrant)
+            yield Block(SUITE, "robots/all", entrant.name, measure, _ANY, 0, facts).of(entrant)
 
 
 def _facts(task: str, title: str) -> dict[str, Any]:
     return {"task": task, "title": title}
 
 
-def blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
-    """Yield a solver on robots that are installed, by each of its entries."""
+def _blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
+    """Yield a solver on installed robots, with each of its settings."""
     count = max(1, round(_TARGETS * scale.targets))
     beyond = max(OUT_OF_REACH, count)
     for entry in peer.entries:
         if not peer.is_installed:
-            run = Run("", peer, entry, TOLERANCE, 0.0)
             absent = partial(not_installed, peer.package)
-            yield run.block("robots/all", absent, 0, _facts(REACHABLE, "every robot"))
+            job = RobotJob("", peer, entry, TOLERANCE, 0.0)
+            yield job.block("robots/all", absent, 0, _facts(REACHABLE, "every robot"))
             continue
         for name in robots:
-            run = Run(name, peer, entry, TOLERANCE, _BUDGET * scale.seconds)
-            measure, size = partial(_solve_strata, run, count), count * len(STRATA)
-            yield run.block(f"robots/{name}", measure, size, _facts(REACHABLE, title(name)))
-            run = run._replace(budget=_BUDGET_BEYOND * scale.seconds)
-            measure = partial(_solve_unreachable, run, beyond)
-            facts = _facts(UNREACHABLE, title(name))
-            yield run.block(f"unreachable/{name}", measure, beyond, facts)
+            job = RobotJob(name, peer, entry, TOLERANCE, _BUDGET * scale.seconds)
+            measure, size = partial(_solve_strata, job, count), count * len(STRATA)
+            yield job.block(f"robots/{name}", measure, size, _facts(REACHABLE, title(name)))
+            job = job._replace(budget=_BUDGET_BEYOND * scale.seconds)
+            measure, facts = partial(_solve_beyond, job, beyond), _facts(UNREACHABLE, title(name))
+            yield job.block(f"unreachable/{name}", measure, beyond, facts)
 
 
-def by_lot(blocks: Iterable[Block]) -> list[Block]:
+def _drawn(blocks: Iterable[Block]) -> list[Block]:
     """Return blocks problem by problem, the solvers of each in an order of its own.
 
-    It is the same every time, whichever other solvers are asked for.
+    It is the same every time, whichever other solvers take part.
     """
-    problems: dict[str, list[Block]] = {}
-    for block in blocks:
-        problems.setdefault(block.problem, []).append(block)
-    return [block for group in problems.values() for block in sorted(group, key=_lot)]
+    blocks = list(blocks)
+    problems = list(dict.fromkeys(block.problem for block in blocks))
+
+    def rank(block: Block) -> tuple[int, int]:
+        lot = zlib.crc32(f"{block.problem}, {block.solver}".encode())
+        return problems.index(block.problem), lot
+
+    return sorted(blocks, key=rank)
 
 
-def _lot(block: Block) -> int:
-    return zlib.crc32(f"{block.problem}, {block.solver}".encode())
+def _solve_strata(job: RobotJob, count: int) -> Measured:
+    return solve(job, robot_targets(job.robot, count))
 
 
-def settings_of(peer: Peer, entry: PeerEntry, tolerance: Tolerance) -> dict[str, Any]:
-    """Return all that changes the answers of an entry, the version included."""
-    return {
-        **entry.settings,
-        "kind": entry.kind,
-        "attempts": entry.restarts + 1,
-        "version": peer.version,
-        "tolerance": tolerance.position,
-        "tolerance_rotation": tolerance.rotation,
-    }
-
-
-def _solve_strata(run: Run, count: int) -> Measured:
-    return solve(run, robot_targets(run.robot, count))
-
-
-def _solve_unreachable(run: Run, count: int) -> Measured:
+def _solve_beyond(job: RobotJob, count: int) -> Measured:
     """Solve targets out of reach; keep beside them how near any pose may come."""
-    targets = unreachable_targets(run.robot, count)
-    solves, notes, facts = solve(run, targets)
-    bound = least_distances(run.robot, targets)[: np.size(solves.solved)]
-    is_begun = solves.solved is not None
-    return Measured(replace(solves, bound=bound) if is_begun else solves, notes, facts)
+    targets = unreachable_targets(job.robot, count)
+    solves, notes, facts = solve(job, targets)
+    if solves.solved is not None:
+        bound = least_distances(job.robot, targets)[: np.size(solves.solved)]
+        solves = replace(solves, bound=bound)
+    return Measured(solves, notes, facts)
 
 
-def solve(run: Run, targets: Targets) -> Measured:
-    """Solve the targets, and evaluate what came of it, finished or not.
+def solve(job: RobotJob, targets: Targets) -> Measured:
+    """Solve the targets, and evaluate the answers, finished or not.
 
     Of targets never begun there is nothing, and tables count them as not solved.
     """
-    evaluator = evaluator_of(run.robot)
-    robot, outcome = evaluator.robot, _performed(run, targets, Budget(run.budget))
-    arrays = _evaluated(run, targets, outcome.solved) if outcome.solved else {}
+    evaluator = evaluator_of(job.robot)
+    robot, outcome = evaluator.robot, _performed(job, targets, Budget(job.budget))
+    arrays = _evaluated(job, targets, outcome.solved) if outcome.solved else {}
     return Measured(
         RobotSolves(**arrays, setup=outcome.setup),
         {"remark": outcome.note},
         {
             "strata": list(STRATA),
-            "tips": list(robot.effectors),  # as the file of records calls them
+            "tips": list(robot.effectors),
             "joints": len(robot.joints),
             "freedom": int(evaluator.model.nv),
             "wanted": "pose" if robot.oriented else "position",
@@ -172,37 +164,37 @@ def solve(run: Run, targets: Targets) -> Measured:
     )
 
 
-def _performed(run: Run, targets: Targets, budget: Budget) -> Outcome:
-    """Return what came of targets; where one costs the process, a new one goes on behind it."""
-    peer, entry, robot = run.peer, run.entry, evaluator_of(run.robot).robot
-    asked = (peer.module, robot, targets, run.tolerance, {**entry.settings, **peer.spec})
-    outcome = worker_process().perform(Job(*asked, entry.restarts, run.budget, peer.entrant_name))
+def _performed(job: RobotJob, targets: Targets, budget: Budget) -> Outcome:
+    """Return the solves of targets; where one costs the process, go on behind it in a new one."""
+    peer, entry, robot = job.peer, job.entry, evaluator_of(job.robot).robot
+    request = (peer.module, robot, targets, job.tolerance, {**entry.settings, **peer.spec})
+    outcome = worker_process().perform(Job(*request, entry.restarts, job.budget, peer.entrant_name))
     count, size = targets.shape
     if not outcome.is_lost or len(outcome.solved) == count:
         return outcome
-    lost = Solved(np.full(size, np.nan), 0, worker_process().patience, outcome.trouble)
-    done = [*outcome.solved, lost]
-    if budget.is_spent or len(done) == count:
-        return outcome._replace(solved=done)
-    following = _performed(run, targets.after(len(done)), budget)
-    done += following.solved
-    return following._replace(setup=outcome.setup, solved=done, trouble=raised(done))
+    crash = Solved(np.full(size, np.nan), 0, worker_process().patience, outcome.trouble)
+    solves = [*outcome.solved, crash]
+    if budget.is_spent or len(solves) == count:
+        return outcome._replace(solved=solves)
+    following = _performed(job, targets.after(len(solves)), budget)
+    solves += following.solved
+    return following._replace(setup=outcome.setup, solved=solves, trouble=raised(solves))
 
 
-def _evaluated(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.ndarray]:
-    answers = np.array([one.q for one in done])
-    evaluation = evaluator_of(run.robot).evaluate(targets, answers, run.tolerance)
+def _evaluated(job: RobotJob, targets: Targets, solves: list[Solved]) -> dict[str, np.ndarray]:
+    answers = np.array([solve.q for solve in solves])
+    evaluation = evaluator_of(job.robot).evaluate(targets, answers, job.tolerance)
     return {
         "solved": evaluation.solved,
-        "claimed": np.array([one.claim for one in done]),
-        "seconds": _short(np.array([one.seconds for one in done])),
-        "position": _short(evaluation.position),
-        "rotation": _short(evaluation.rotation),
-        "beyond": _short(evaluation.beyond),
-        "exception": np.array([bool(one.trouble) for one in done]),
-        "stratum": targets.strata[: len(done)],
+        "claimed": np.array([solve.claim for solve in solves]),
+        "seconds": _rounded([solve.seconds for solve in solves]),
+        "position": _rounded(evaluation.position),
+        "rotation": _rounded(evaluation.rotation),
+        "beyond": _rounded(evaluation.beyond),
+        "exception": np.array([bool(solve.trouble) for solve in solves]),
+        "stratum": targets.strata[: len(solves)],
     }
 
 
-def _short(values: np.ndarray) -> np.ndarray:
-    return np.array([float(f"{value:.{_DIGITS - 1}e}") for value in values])
+def _rounded(numbers: Iterable[float]) -> np.ndarray:
+    return np.array([float(f"{number:.{_DIGITS - 1}e}") for number in numbers])

@@ -8,16 +8,17 @@ from . import REACHABLE, UNREACHABLE
 
 
 class RobotSolves(Values, frozen=True, kw_only=True):
-    """What became of the targets that a solver began; only `setup` is there if it began none.
+    """The targets that a solver began, (target,); only `setup` is there if it began none.
 
     Attributes:
-        solved: whether the evaluation says so, (target,).
-        claimed: whether the solver says so: 1, 0, or -1 if it makes no claims, (target,).
-        seconds: how long each took [s], (target,).
-        position, rotation: how far the effectors are from it [m], [rad]; NaN without an answer.
+        solved: whether the evaluation finds the target solved.
+        claimed: 1 or 0 as the solver claims, or -1 if it makes no claims.
+        seconds: how long each took [s].
+        position, rotation: distance of the effectors from the target [m], [rad]; NaN without an
+            answer.
         beyond: by how much the answer oversteps limits [rad].
         exception: whether the solver raised, or its process was lost.
-        stratum: the number of the stratum of each.
+        stratum: the number of each target's stratum.
         setup: how long the solver took before the first [s].
         bound: how near any pose may come to a target out of reach [m].
     """
@@ -41,10 +42,9 @@ class RobotSolves(Values, frozen=True, kw_only=True):
 
 
 class RobotDetails(Details, frozen=True):
-    """The solver's start and version, why it does not take a robot, and what the robot is.
+    """The solver's start and version, why it does not take a robot, and a description of the robot.
 
-    Targets are solved within the tolerances [m], [rad]; tips are the effectors, of which a pose or
-    a position is wanted.
+    Targets, a pose or a position for each effector, are solved within the tolerances [m], [rad].
     """
 
     kind: str
@@ -53,10 +53,10 @@ class RobotDetails(Details, frozen=True):
     tolerance_rotation: float = 0.0
     remark: str = ""
     strata: list[str] = msgspec.field(default_factory=list)
-    tips: list[str] = msgspec.field(default_factory=list)
+    effectors: list[str] = msgspec.field(default_factory=list, name="tips")
     joints: int = 0
     freedom: int = 0
-    wanted: str = ""
+    target: str = msgspec.field(default="", name="wanted")
 
 
 KINDS = dict.fromkeys((REACHABLE, UNREACHABLE), Kind(RobotSolves, RobotDetails))

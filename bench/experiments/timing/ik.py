@@ -12,14 +12,14 @@ from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt
 from ...peers.ik.reference_kinematics import ReferenceKinematics
 from ...problems.chains import chain_targets
-from ..chain.measurement import MAX_ITERATIONS, TOLERANCE, Limits
+from ..chain.measurement import MAX_ITERATIONS, TOLERANCE, SolverLimits
 from .case import COMPILED, OURS, PLAIN, Case, Work
 
 STRATA = ("near", "far")
 TARGETS = 50
 # Plain Python takes milliseconds a solve; the first targets of the same set are enough.
 FEW_TARGETS = 5
-LIMITS = Limits(TOLERANCE, MAX_ITERATIONS)._asdict()
+LIMITS = SolverLimits(TOLERANCE, MAX_ITERATIONS)._asdict()
 LOOP = "levenberg_marquardt"
 
 

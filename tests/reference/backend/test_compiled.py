@@ -277,7 +277,7 @@ CALLER = textwrap.dedent("""
     import numpy as np
     from callee import callee
     from plumbob.reference.backend.compiled import Kernel
-    from plumbob.reference.backend.simd.lanes import LANES, store_vectors, load_vectors
+    from plumbob.reference.backend.simd.vectors import LANES, store_vectors, load_vectors
 
     def caller(tile):
         a, b, c = load_vectors(tile, 0)

@@ -1,6 +1,7 @@
 """Targets of position and rotation."""
 
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -144,7 +145,7 @@ def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
         assert rotation.angle(turned, Q) < 1e-13
     assert cost(mechanism, rows, data) == pytest.approx(total, rel=1e-13)
     assert rotation_weight(mechanism) == pytest.approx(0.5 * lever**2, rel=1e-15)
-    found = residuals(mechanism, rows, data)
+    found = residuals(SimpleNamespace(mechanism=mechanism, data=data), rows)
     expected = [furthest, largest, nearness, least + excess]
     np.testing.assert_allclose(found, expected, rtol=1e-13, atol=0)
     assert least > 0.0

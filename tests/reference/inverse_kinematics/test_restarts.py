@@ -88,7 +88,7 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     lever = LEVER * prepared.mechanism.reach
     expected = np.max(distances, axis=0) + lever * 4.0 * np.sin(angles / 4.0)
     np.testing.assert_allclose(state.ranks, expected, rtol=1e-12, atol=0)
-    taken = np.empty((9, prepared.mechanism.coordinates))
+    taken = np.empty((9, len(prepared.mechanism.columns)))
     for q in taken:
         take_nearest(state, q)
     assert (taken == prepared.restarts[np.argsort(expected)]).all()

@@ -1,8 +1,9 @@
-"""The compiled versions of the functions in `lanes.py`: vectors of doubles in LLVM's terms.
+"""The compiled versions of the functions in `vectors.py`, as LLVM's vectors of doubles.
 
-LLVM makes of a vector what the processor has: one register of AVX-512, two of AVX, four of SSE.
-Floating point is as strict as for floats. Whatever reads or writes a row of a tile also prefetches
-a share of the next tile: the processor does not foresee accesses so far apart.
+LLVM maps a vector of eight to a register of AVX-512, two of AVX or four of SSE. Floating point is
+as strict as for floats, except that products of rows may be fused with the differences that they go
+into, as everywhere in relaxed kernels. Functions that read or write a row of a tile also prefetch a
+share of the next tile: the processor does not foresee accesses so far apart.
 """
 
 import operator
@@ -19,27 +20,29 @@ from numba.extending import (
     type_callable,
 )
 
-from .lanes import LANES
+from .vectors import LANES
 
 DOUBLE, INT, POINTER = ir.DoubleType(), ir.IntType(32), ir.IntType(8).as_pointer()
 VECTOR = ir.VectorType(DOUBLE, LANES)
 HALF = LANES // 2
 MASK = ir.IntType(LANES)
+ROW = ir.VectorType(DOUBLE, 4)
 DOUBLE_BYTES, LINE_BYTES = 8, 64
+FUSED = ("contract",)
 INSTRUCTIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"}
 # The arguments of llvm.prefetch: read or write, keep in the nearest cache, data.
 READ, WRITE, NEAR, DATA = 0, 1, 3, 1
 
 
 class LanesType(types.Type):
-    """LANES doubles side by side; a float stands for as many equal ones."""
+    """LANES doubles side by side; a float is converted to equal doubles."""
 
     def can_convert_from(self, typingctx, other):
         """Say that floats convert."""
         return Conversion.safe if isinstance(other, types.Float) else None
 
     def unify(self, typingctx, other):
-        """Let a variable that is here a float and there lanes be lanes."""
+        """Give a variable that is a float in some branches the type of lanes."""
         return self if isinstance(other, types.Float) else None
 
 
@@ -48,7 +51,7 @@ lanes = LanesType("lanes")
 
 @register_model(LanesType)
 class LanesModel(models.PrimitiveModel):
-    """Lanes are one LLVM value."""
+    """Lanes are an LLVM value."""
 
     def __init__(self, manager, kind):
         super().__init__(manager, kind, VECTOR)
@@ -57,8 +60,7 @@ class LanesModel(models.PrimitiveModel):
 @lower_cast(types.Float, LanesType)
 def repeat(context, builder, kind, target, value):
     """Put a float into every lane."""
-    first = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, INT(0))
-    return _shuffled(builder, first, first, [0] * LANES)
+    return _repeated(builder, value, VECTOR)
 
 
 def define_arithmetic(operation, instruction):
@@ -158,6 +160,78 @@ def all_within(typingctx, value, bound):
     return types.boolean(lanes, lanes), generate
 
 
+class RowType(types.Type):
+    """Four doubles side by side."""
+
+
+row_type = RowType("row")
+
+
+@register_model(RowType)
+class RowModel(models.PrimitiveModel):
+    """A row is an LLVM value."""
+
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, ROW)
+
+
+@intrinsic
+def load_row(typingctx, y, i):
+    """Read four doubles."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.load(_row(context, builder, signature, arguments), align=DOUBLE_BYTES)
+
+    return row_type(_contiguous(y, 2), i), generate
+
+
+@intrinsic
+def store_row(typingctx, y, i, row):
+    """Write four doubles."""
+
+    def generate(context, builder, signature, arguments):
+        pointer = _row(context, builder, signature, arguments)
+        builder.store(arguments[2], pointer, align=DOUBLE_BYTES)
+        return context.get_dummy_value()
+
+    return types.none(_contiguous(y, 2), i, row_type), generate
+
+
+@intrinsic
+def scale_row(typingctx, factor, row):
+    """Multiply all four."""
+
+    def generate(context, builder, signature, arguments):
+        factor, row = arguments
+        return builder.fmul(_repeated(builder, factor, ROW), row)
+
+    return row_type(types.float64, row_type), generate
+
+
+@intrinsic
+def subtract_scaled(typingctx, row, factor, other):
+    """Multiply and subtract all four."""
+
+    def generate(context, builder, signature, arguments):
+        row, factor, other = arguments
+        product = builder.fmul(_repeated(builder, factor, ROW), other, flags=FUSED)
+        return builder.fsub(row, product, flags=FUSED)
+
+    return row_type(row_type, types.float64, row_type), generate
+
+
+@intrinsic
+def prefetch(typingctx, values, i):
+    """Prefetch a cache line; the address may be invalid."""
+
+    def generate(context, builder, signature, arguments):
+        entry = _pointer(context, builder, signature, *arguments)
+        _prefetch(builder, builder.bitcast(entry, POINTER), LINE_BYTES, READ)
+        return context.get_dummy_value()
+
+    return types.none(_contiguous(values, 1), i), generate
+
+
 def _reading(tile, count):
     def generate(context, builder, signature, arguments):
         pointers = _tile_row(context, builder, signature, arguments, count, READ)
@@ -185,10 +259,7 @@ def _writing(tile, count):
 
 
 def _transposed(builder, rows):
-    """Transpose the lower halves of four vectors as a 4 x 4 matrix, and likewise the upper ones.
-
-    So a pose with the one four lanes on makes four vectors of eight numbers, and back.
-    """
+    """Transpose the lower halves of four vectors as a 4 x 4 matrix, and the upper halves."""
     low, high = (0, 8, 2, 10, 4, 12, 6, 14), (1, 9, 3, 11, 5, 13, 7, 15)
     first, last = (0, 1, 8, 9, 4, 5, 12, 13), (2, 3, 10, 11, 6, 7, 14, 15)
     a, b, c, d = rows
@@ -199,17 +270,23 @@ def _transposed(builder, rows):
 
 
 def _fenced(builder, vector):
-    """Return a vector as it is; LLVM is not to cut the shuffles that make it into smaller ones."""
+    """Return a vector, and prevent LLVM from splitting the shuffles that make it."""
     kind = ir.FunctionType(VECTOR, [VECTOR])
     name = f"llvm.arithmetic.fence.v{LANES}f64"
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [vector])
 
 
-def _contiguous(array):
-    """Return the type if it is that of a C-contiguous array of three axes of doubles."""
-    if array != types.Array(types.float64, 3, "C"):
-        raise TypeError(f"expected a C-contiguous array of doubles with three axes, got {array}")
+def _contiguous(array, axes=3):
+    """Return the type if it is that of a C-contiguous array of doubles with so many axes."""
+    if array != types.Array(types.float64, axes, "C"):
+        raise TypeError(f"expected a C-contiguous array of doubles with {axes} axes, got {array}")
     return array
+
+
+def _repeated(builder, number, kind):
+    """Return a vector of equal numbers."""
+    first = builder.insert_element(ir.Constant(kind, ir.Undefined), number, INT(0))
+    return _shuffled(builder, first, first, [0] * kind.count)
 
 
 def _tile_row(context, builder, signature, arguments, count, access):
@@ -240,12 +317,12 @@ def _array(context, builder, signature, arguments):
 
 
 def _moved(builder, pointer, count, size):
-    """Return the pointer moved on by so many times so many bytes."""
+    """Return the pointer advanced by count times size bytes."""
     return builder.gep(pointer, [builder.mul(count, count.type(size))])
 
 
 def _prefetch(builder, pointer, size, access):
-    """Prefetch memory that will soon be read or written; any address is allowed."""
+    """Prefetch memory that will be read or written soon; any address is allowed."""
     kind = ir.FunctionType(ir.VoidType(), [POINTER, INT, INT, INT])
     fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
     for offset in range(0, size, LINE_BYTES):
@@ -257,3 +334,15 @@ def _shuffled(builder, a, b, indices):
     """Return a vector of the entries of two others, taken end to end, at these indices."""
     mask = ir.Constant(ir.VectorType(INT, len(indices)), [INT(i) for i in indices])
     return builder.shuffle_vector(a, b, mask)
+
+
+def _row(context, builder, signature, arguments):
+    """Return a pointer to a row of four."""
+    entry = builder.mul(arguments[1], arguments[1].type(ROW.count))
+    pointer = _pointer(context, builder, signature, arguments[0], entry)
+    return builder.bitcast(pointer, ROW.as_pointer())
+
+
+def _pointer(context, builder, signature, array, entry):
+    """Return a pointer to an entry, counted from an array's first."""
+    return builder.gep(context.make_array(signature.args[0])(context, builder, array).data, [entry])

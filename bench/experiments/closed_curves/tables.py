@@ -1,0 +1,145 @@
+"""How far joints rotate from frame to frame along closed curves: the lab's third question."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...figures.chart import SPAN, Axis, Chart, Panel, series
+from ...figures.sketch import Sketch, chart_sketch
+from ...harness import metrics
+from ...harness.record import Record
+from ...tables.captions import Captions
+from ...tables.columns import spread_of, words_in
+from ...tables.layout import Layout
+from ...tables.results import Results, by_problem, grouped, label
+from ...tables.table import Summary, in_unit, words
+from .. import arm
+from ..arm.values import FollowedMotion
+from ..chain.tables import within_tolerance
+from . import COHERENT, COLD, CURVE, DRIFT, WARM
+
+MODES = (COLD, WARM, COHERENT)
+# The step that closes a curve is as large as the others if it exceeds them by at most this share.
+ALIKE = 0.01
+# Repetitions of the curve that is drawn several times.
+REPETITIONS = (1, 2, 3)
+# The cells of a row by the titles of their columns, and its records by mode.
+Row = dict[str, Any]
+
+
+def _rows(results: Results) -> list[Row]:
+    """Return a row for each curve that a solver followed in all modes."""
+    followed, drifts = (_by_mode(results, task) for task in (CURVE, DRIFT))
+    return [
+        _row(by_mode, drifts.get((problem.replace("arm/", "drift/"), solver), {}))
+        for (problem, solver), by_mode in followed.items()
+        if by_mode.keys() >= set(MODES)
+    ]
+
+
+def _by_mode(results: Results, task: str) -> dict[tuple[str, str], dict[str, Record]]:
+    groups = grouped(results.all("tracking", task=task), lambda r: (r.problem, r.solver))
+    return {key: {r.details.mode: r for r in records} for key, records in groups.items()}
+
+
+def _row(by_mode: Mapping[str, Record], drifts: Mapping[str, Record]) -> Row:
+    """Return the cells of a curve; an iteration over all frames counts as one of each frame."""
+    iterations = {mode: record.values.iterations for mode, record in by_mode.items()}
+    row: Row = {
+        "by_mode": by_mode,
+        "drifts": drifts,
+        "curve": by_mode[WARM].title,
+        "solver": label(by_mode[WARM].solver),
+        "iterations over all frames at once": int((iterations[COHERENT] - iterations[WARM]).min()),
+        "frames": by_mode[WARM].values.residual.size,
+    }
+    for mode, record in by_mode.items():
+        motion: FollowedMotion = record.values
+        row |= {
+            f"largest rotation, {mode}": metrics.spread(motion.largest_angle[:-1]).largest,
+            f"closing rotation, {mode}": float(motion.largest_angle[-1]),
+            f"mean rotation, {mode}": metrics.mean(motion.mean_angle[:-1]),
+            f"mean iterations, {mode}": metrics.mean(record.values.iterations),
+            f"within tolerance, {mode}": metrics.share(within_tolerance(record)),
+            f"largest path error, {mode}": spread_of(record, "residual")[2],
+        }
+    for mode, record in drifts.items():
+        for i, angle in enumerate(record.values.drift, start=1):
+            row[f"drift, {mode}, after {i}"] = float(angle)
+    return row
+
+
+def _summary(rows: Sequence[Row]) -> Summary:
+    largest, closing = (f"{quantity} rotation, {COHERENT}" for quantity in ("largest", "closing"))
+    smoother = sum(row[largest] < row[f"largest rotation, {WARM}"] for row in rows)
+    closed = sum(row[closing] <= (1.0 + ALIKE) * row[largest] for row in rows)
+    return Summary(
+        "A coherent motion solves all frames together, so that the joints rotate as little as they "
+        "can from each frame to the next. The largest rotation of a joint is smaller than with "
+        f"warm starts in {smoother} of {len(rows)} cases, and in {closed} the step from the last "
+        "frame back to the first is no larger than others. The largest of all, and the frames "
+        "within tolerance:",
+        tuple(_points(rows)),
+    )
+
+
+def _points(rows: Sequence[Row]) -> Iterator[str]:
+    for mode in MODES:
+        worst = max(rows, key=lambda row: float(row[f"largest rotation, {mode}"]))
+        angle = words_in(worst[f"largest rotation, {mode}"], "°")
+        hits, total = np.sum([row[f"within tolerance, {mode}"][:2] for row in rows], axis=0)
+        frames = f"{words(int(hits))} of {words(int(total))} frames"
+        yield f"{mode}: {angle} ({worst['curve']}, {worst['solver']}); {frames}"
+    counts = [row["iterations over all frames at once"] for row in rows]
+    yield f"all frames are changed together {words(min(counts))} to {words(max(counts))} times"
+    warm = [
+        row[title] for row in rows if (title := f"drift, {WARM}, after {REPETITIONS[-1]}") in row
+    ]
+    titles = [f"drift, {COHERENT}, after {i}" for i in REPETITIONS]
+    closed = [row[title] for row in rows for title in titles if title in row]
+    if warm and closed:
+        yield (
+            f"after three repetitions warm starts leave the arm {words_in(min(warm), '°')} to "
+            f"{words_in(max(warm), '°')} from its first pose; the drift of the closed coherent "
+            f"motion is never more than {words_in(max(closed), '°')}"
+        )
+
+
+def jitter_chart(results: Results) -> Sketch | None:
+    """Show the largest rotation of a joint on each curve, from rest and from the last solution."""
+    curves = by_problem(results.all("arm", task=arm.CURVE, warm=False))
+    if not curves:
+        return None
+    spans = []
+    for row, records in enumerate(curves.values()):
+        for record in records:
+            warm = results.one("arm", record.problem, record.solver, warm=True)
+            motions = [motion for motion in (record, warm) if motion is not None]
+            angles = [in_unit(motion.values.largest_angle.max(), "°") for motion in motions]
+            spans.append(series(record.solver, angles, [row] * len(angles), form=SPAN))
+    return chart_sketch(
+        Chart(
+            "jitter",
+            "Largest rotation of a joint between neighbouring frames",
+            "Hollow: every frame solved from the rest pose; filled: every frame started from the "
+            "last solution.",
+            (Panel("", tuple(spans)),),
+            Axis("largest rotation of a joint between frames [°], log scale", log=True),
+            columns=1,
+            rows=tuple(str(records[0].details.curve) for records in curves.values()),
+            entrants=results.entrants,
+            hollow="from rest",
+            filled="from the last solution",
+        )
+    )
+
+
+jitter = Layout(
+    **Captions(__file__).of("q3_jitter"),
+    subjects=_rows,
+    summary=_summary,
+    figures=(jitter_chart,),
+)
+
+LAYOUTS = (jitter,)
