@@ -17,7 +17,7 @@ from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_mo
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import Outcome, WorkerProcess
-from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
+from plumbob.bench.harness.worker import Finished, Ready, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from plumbob.bench.problems.falling_cloth import (
@@ -377,7 +377,7 @@ def messages(cloth, manner, frames=5, repeats=1, budget=60.0):
 
 def test_a_job_says_when_it_is_ready_each_frame_and_the_end(cloth):
     sent = messages(cloth, "well", frames=2, repeats=2)
-    assert [type(message) for message in sent] == [Ready, *[Solved] * 4, Done]
+    assert [type(message) for message in sent] == [Ready, *[Solved] * 4, Finished]
     ends = [message.q for message in sent if isinstance(message, Solved)]
     np.testing.assert_array_equal(ends[1], ends[3])
     assert not np.array_equal(ends[0], ends[1])
@@ -386,11 +386,11 @@ def test_a_job_says_when_it_is_ready_each_frame_and_the_end(cloth):
 @pytest.mark.parametrize(
     ("manner", "budget", "finite", "last"),
     [
-        ("overflows", 60.0, [True, True, False], Done()),
-        ("explodes", 60.0, [True, True, False], Done()),
-        ("raises", 60.0, [True, True], Unfit("ArithmeticError: in one frame")),
-        ("unable", 60.0, [], Unfit("ValueError: takes no cloths")),
-        ("slow", 0.1, [True], Done()),
+        ("overflows", 60.0, [True, True, False], Finished()),
+        ("explodes", 60.0, [True, True, False], Finished()),
+        ("raises", 60.0, [True, True], Finished("ArithmeticError: in one frame")),
+        ("unable", 60.0, [], Finished("ValueError: takes no cloths")),
+        ("slow", 0.1, [True], Finished()),
     ],
 )
 def test_frames_before_an_overflow_an_exception_or_the_end_of_the_budget_are_kept(
@@ -462,7 +462,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
     class Silent:
         def perform(self, job):
             jobs.append(job)
-            return Outcome(0.0, [], "ended after 300 s of silence", silent=True)
+            return Outcome(0.0, [], "ended after 300 s of silence", is_silent=True)
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})

@@ -181,7 +181,7 @@ class RungResults:
             outcome = Outcome(0.0, [], _given_up[task])
         else:
             outcome = worker_process().perform(job(self._peer, cloth, rung.settings, shape))
-        if outcome.silent and not outcome.is_lost:
+        if outcome.is_silent and not outcome.is_lost:
             _given_up[task] = outcome.note
         if outcome.note:
             sentence = f"{cloth.size} × {cloth.size}, {rung.label}: {outcome.note}"
