@@ -16,7 +16,7 @@ from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_mo
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import Outcome, WorkerProcess
-from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
+from plumbob.bench.harness.worker import Finished, Ready, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from plumbob.bench.problems.falling_cloth import (
@@ -396,7 +396,7 @@ def messages(*args, **more):
 
 def test_a_job_says_when_it_is_ready_each_frame_and_the_end(cloth):
     said = messages(cloth, "well", frames=2, repeats=2)
-    assert [type(message) for message in said] == [Ready, *[Solved] * 4, Done]
+    assert [type(message) for message in said] == [Ready, *[Solved] * 4, Finished]
     ends = [message.q for message in said if isinstance(message, Solved)]
     np.testing.assert_array_equal(ends[1], ends[3])
     assert not np.array_equal(ends[0], ends[1])
@@ -415,12 +415,12 @@ def test_one_that_blows_up_ends_with_positions_that_are_not_finite(cloth, manner
 def test_one_that_raises_keeps_its_frames_and_says_why(cloth, manner, frames, why):
     said = messages(cloth, manner)
     assert sum(isinstance(message, Solved) for message in said) == frames
-    assert said[-1] == Unfit(why)
+    assert said[-1] == Finished(why)
 
 
 def test_a_job_without_time_left_begins_no_further_frame(cloth):
     said = messages(cloth, "slow", budget=0.1)
-    assert [type(message) for message in said] == [Ready, Solved, Done]
+    assert [type(message) for message in said] == [Ready, Solved, Finished]
 
 
 @pytest.fixture(scope="module")
@@ -483,7 +483,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
     class Silent:
         def perform(self, job):
             tried.append(job)
-            return Outcome(0.0, [], "ended after 300 s of silence", silent=True)
+            return Outcome(0.0, [], "ended after 300 s of silence", is_silent=True)
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})

@@ -81,8 +81,7 @@ def phrases(path):
     """The strings of a file that have several words, docstrings and columns left out."""
     if path.suffix == ".toml":
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        tables.pop("columns", None)
-        for texts in tables.values():
+        for texts in (tables[name] for name in tables.keys() - {"columns", "folded"}):
             yield from (" ".join(text.split()) for text in texts.values())
         return
     tree = ast.parse(path.read_text(encoding="utf-8"))

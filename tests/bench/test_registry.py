@@ -67,7 +67,7 @@ ADAPTER = """
 from plumbob.bench.peers.ik.protocol import SolverOutput
 
 def prepare(robot, tolerance):
-    return lambda positions, rotations, start: lambda: SolverOutput(start, False)
+    return lambda request: lambda: SolverOutput(request.start, False)
 """
 
 

@@ -12,7 +12,7 @@ from plumbob.reference.mass_spring import SystemArrays
 
 from ...harness.job import announced, solved_in, unfit
 from ...harness.stopwatch import Budget, time_call
-from ...harness.worker import Done, Message, Ready, Solved
+from ...harness.worker import Finished, Message, Ready, Solved
 from ...peers.cloth.protocol import Mover
 from ...peers.protocol import OwnTime, remark_of
 from ...problems.falling_cloth import FRAME
@@ -65,7 +65,7 @@ class ClothJob(NamedTuple):
             mover, setup = self._prepared(adapter)
             yield Ready(setup, remark_of(adapter))
             yield from announced(self._moved(mover), self.entrant)
-            yield Done()
+            yield Finished()
         except Exception as error:  # whatever an engine raises is its result
             yield from unfit(error, self.entrant)
 
@@ -84,7 +84,7 @@ class ClothJob(NamedTuple):
             for _ in range(self.shape.frames):
                 frame = advanced(mover, nowhere)
                 yield frame
-                budget.excuse(frame.at_door)
+                budget.excuse(frame.overhead)
                 if budget.is_spent or not np.isfinite(frame.q).all():
                     return
 

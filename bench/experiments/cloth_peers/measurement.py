@@ -214,7 +214,7 @@ def _tried(
         outcome = Outcome(0.0, [], _given_up[task])
     else:
         outcome = worker_process().perform(job(peer, cloth, rung.settings, shape))
-    if outcome.silent and not outcome.is_lost:
+    if outcome.is_silent and not outcome.is_lost:
         _given_up[task] = outcome.note
     if outcome.note:
         sentence = f"{cloth.size} × {cloth.size}, {rung.label}: {outcome.note}"
