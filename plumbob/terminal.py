@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from plumbob.bench.report.report import Written
+    from plumbob.bench.report.report import Report
     from plumbob.bench.tables.results import Results
     from plumbob.bench.tables.table import Table
     from plumbob.crosscheck.verdict import ClaimVerdict
@@ -63,12 +63,14 @@ def print_summary(table: "Table") -> None:
 
 def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe") -> None:
     """Print a table with what it says, as wide as the terminal; say what shows columns left out."""
-    from plumbob.bench.tables.aligned import filled, left_out
+    from plumbob.bench.tables.aligned import filled
+    from plumbob.reference.arguments import name_list
 
     print_summary(table)
-    missing = print_lines(table)
-    if missing:
-        print("\n".join(filled(left_out(table, missing, shown_by), width())))
+    if missing := print_lines(table):
+        count = f"{len(missing)} of {len(table.columns)} columns"
+        sentence = f"{count} left out ({name_list(missing)}); all: {shown_by}"
+        print("\n".join(filled(sentence, width())))
 
 
 def print_lines(table: "Table") -> list[str]:
@@ -84,7 +86,7 @@ def print_lines(table: "Table") -> list[str]:
     return made.left_out
 
 
-def print_outcome(written: "Written") -> None:
+def print_outcome(written: "Report") -> None:
     """Print what a report came to, in ten lines."""
     from plumbob.bench.report.outcome import outcome
 

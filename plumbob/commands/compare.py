@@ -70,9 +70,9 @@ def compare(
     stopped = comparison.failing(made.rows, limit)
     print("\n".join(comparison.summary(made, stopped, width())))
     if markdown:
-        from plumbob.bench.tables import table as tables
+        from plumbob.bench.tables import writers
 
-        _write(markdown, tables.markdown(comparison.table(made, stopped, old, new)))
+        _write(markdown, writers.markdown(comparison.table(made, stopped, old, new)))
     if json:
         _write(json, comparison.as_json(made, stopped, old, new))
     return MISSED if stopped else SUCCESS

@@ -143,11 +143,10 @@ def _list_columns(table: "Table") -> int:
 
 
 def _written(table: "Table", form: str, width: str) -> str:
-    from plumbob.bench.tables.fragment import fragment
     from plumbob.bench.tables.latex import latex
-    from plumbob.bench.tables.table import comma_separated, markdown
+    from plumbob.bench.tables.writers import comma_separated, html_fragment, markdown
 
-    forms = {"md": markdown, "csv": comma_separated, "html": fragment}
+    forms = {"md": markdown, "csv": comma_separated, "html": html_fragment}
     return latex(table, width) if form == "tex" else forms[form](table)
 
 

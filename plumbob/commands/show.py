@@ -14,7 +14,7 @@ from .options import REPORT, SUCCESS, known, writable
 from .verify import PROGRAM
 
 if TYPE_CHECKING:
-    from plumbob.bench.show.yours import Yours
+    from plumbob.bench.show.your_solver import YourSolver
 
 EXAMPLES = block(
     "Examples",
@@ -54,15 +54,15 @@ def show(
     be written as BVH, which animation programs open.
     """
     from plumbob.bench.harness.record import check_regular
-    from plumbob.bench.show.ours import SCENES
-    from plumbob.bench.show.yours import Yours
+    from plumbob.bench.show.scenes import SCENES
+    from plumbob.bench.show.your_solver import YourSolver
 
     words = _words(yours, context.meta.get(PROGRAM, ()))
     if scene is None and not words:
         raise ValueError(f"SCENE: expected one of {', '.join(SCENES)}, got none")
     if scene is not None:
         known("scene", scene, SCENES)
-    entrant = Yours(words) if words else None
+    entrant = YourSolver(words) if words else None
     try:
         name = scene or (entrant.scene if entrant else "")
         path = file or REPORT / f"{name}.gif"
@@ -84,9 +84,9 @@ def _words(yours: str | None, program: Any) -> list[str]:
 
 
 def _write(
-    name: str, path: Path, solver: str | None, coherent: bool, yours: "Yours | None"
+    name: str, path: Path, solver: str | None, coherent: bool, yours: "YourSolver | None"
 ) -> None:
-    from plumbob.bench.show.write import write
+    from plumbob.bench.show.scenes import write
 
     with progress() as bar:
         task = bar.add_task(name, total=None)
