@@ -108,14 +108,16 @@ class MassSpring(KeepsReadOnly):
         gravity: ArrayLike = (0.0, -9.81, 0.0),
         tension_only: ArrayLike = False,
     ) -> None:
-        """Check and copy the system; a property of springs may be one value for all of them.
+        """Check and copy the system; a property of springs may be a single number.
 
         Raises:
             ValueError: if a shape is wrong, a number is negative, not finite, beyond 1e75 or below
                 1e-75 but not 0, an index is out of range, a spring joins a particle to itself, or
                 a free particle has no mass.
         """
-        mass = _masses(masses)
+        mass = sizes("masses", masses, "particle").copy()
+        if len(mass) == 0:
+            raise ValueError("masses: expected at least one particle, got none")
         ends = _springs(springs, len(mass))
         self._store(
             SystemArrays(
@@ -169,7 +171,7 @@ class MassSpring(KeepsReadOnly):
 
     @property
     def particle_count(self) -> int:
-        """Number of particles, the pinned ones included."""
+        """Number of particles, pinned or free."""
         return len(self.arrays.masses)
 
     @functools.cached_property
@@ -186,7 +188,7 @@ class MassSpring(KeepsReadOnly):
 
     @functools.cached_property
     def regions(self) -> Regions | None:
-        """The partition of a large system for sums over several threads; None for a small one."""
+        """The partition of a large system for sums over threads; None for a small system."""
         large = len(self.arrays.springs) >= LARGE
         return cut(self.arrays.springs, self.particle_count) if large else None
 
@@ -214,7 +216,7 @@ class MassSpring(KeepsReadOnly):
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class State(KeepsReadOnly):
-    """Positions and velocities of the particles at one instant.
+    """Positions and velocities of the particles at an instant.
 
     Attributes:
         positions: [m], shape (particle, 3).
@@ -254,7 +256,7 @@ class Derivation(NamedTuple):
 
 
 def derivation(system: MassSpring) -> Derivation:
-    """Return A, S, L and J of the system, pinned particles treated as free ones."""
+    """Return A, S, L and J of the system, pinned particles treated as free."""
     A, K = incidence(system), scipy.sparse.diags_array(system.stiffnesses, format="csc")
     S = scipy.sparse.eye_array(len(system.springs), format="csc")
     return Derivation(A=A, S=S, L=A @ K @ A.T, J=A @ K @ S.T)
@@ -282,7 +284,7 @@ def lengths(system: MassSpring, positions: ArrayLike) -> FloatArray:
 
 
 def stretches(system: MassSpring, positions: ArrayLike) -> FloatArray:
-    """Return l - r of each spring [m], shape (spring,), zero for a slack tension-only one."""
+    """Return l - r of each spring [m], shape (spring,), zero for a slack tension-only spring."""
     return _stretches(_positions(system, positions), system.arrays)
 
 
@@ -293,7 +295,7 @@ def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
 
 
 def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
-    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over those not slack."""
+    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over all that are not slack."""
     stretch = stretches(system, positions)
     return float(np.sum(0.5 * system.stiffnesses * stretch**2))
 
@@ -397,13 +399,6 @@ def _system(system: MassSpring) -> MassSpring:
 
 def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
     return coordinates("positions", positions, _system(system).particle_count, 3)
-
-
-def _masses(masses: ArrayLike) -> FloatArray:
-    mass = sizes("masses", masses, "particle").copy()
-    if len(mass) == 0:
-        raise ValueError("masses: expected at least one particle, got none")
-    return mass
 
 
 def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:

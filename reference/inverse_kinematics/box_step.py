@@ -86,8 +86,8 @@ def damped_step(mechanism, data, system, damping):
     """Fill the step that minimises |e - J q|^2 + damping |q|^2 within the limits.
 
     A freedom that the step would take beyond its limit becomes active: it goes to the limit, its
-    effect is taken from e, and the others are solved for again. One that would then rather step
-    back is released.
+    effect is taken from e, and the others are solved for again. An active freedom that would
+    then rather step back is released.
     """
     clear(system.active)
     clear(system.step)
@@ -104,7 +104,7 @@ def damped_step(mechanism, data, system, damping):
 
 
 def far_damping(mechanism, target, data, system, damping):
-    """Return the damping [m²] towards a target proven out of reach, `damping` towards any other.
+    """Return the damping [m²] towards a target proven out of reach, else `damping`.
 
     The Hessian of |e|²/2 has second derivatives of the effectors too, up to the reach times |e|,
     which J' J leaves out. With a damping too small for them steps swing about the nearest pose for
@@ -160,7 +160,7 @@ def release(system):
 
 
 def transposed_step(mechanism, data, system):
-    """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without what limits stop."""
+    """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without the freedoms that limits stop."""
     clear(system.active)
     for _ in range(len(system.step) + 1):
         square, moved = along_gradient(system)

@@ -28,7 +28,7 @@ class Target(_TargetFields):
         position: global position [m], shape (3,), or (..., 3) for a batch.
         rotation: global rotation, shape (4,) or (..., 4); None if it is free.
         effector: the joint, by index or name; None for the default of `solve_ik`.
-        weight: of its squared error among those of other targets.
+        weight: of its squared error, relative to other targets.
     """
 
     __slots__ = ()
@@ -66,8 +66,8 @@ class IKSolution(NamedTuple):
             weight (distance² + (lever angle)²), the heaviest weight taken as 1, the angle only
             where the rotation is not free, the lever half the reach.
         excess: `residual` less a lower bound by geometry [m]: the distance beyond all links and
-            slides, and on a Skeleton with one position also that to the inner radius which the
-            longest link leaves; else 0.
+            slides, and on a Skeleton with a single position also inside the inner radius that
+            the longest link leaves; else 0.
     """
 
     local_rotations: FloatArray
@@ -91,7 +91,7 @@ class CheckedTarget(NamedTuple):
     weight: float  # greater than zero
 
     def mapped(self, change: Callable[[FloatArray], FloatArray]) -> "CheckedTarget":
-        """Return the target with its position and its rotation, if it has one, changed."""
+        """Return the target with its position and any rotation changed."""
         Q = None if self.rotation is None else change(self.rotation)
         return self._replace(position=change(self.position), rotation=Q)
 
@@ -102,8 +102,8 @@ def checked_targets(
     """Return the targets of all effectors, their numbers not yet checked.
 
     Raises:
-        ValueError: if it is no position or target; if there is no such joint, two targets are for
-            the same one, or target and argument name different ones.
+        ValueError: if it is no position or target; if a joint does not exist, two targets are for
+            the same joint, or target and argument name different joints.
     """
     if isinstance(target, Target):
         return [_checked(model, target, effector)]

@@ -51,7 +51,7 @@ class Settings:
 
     @functools.cached_property
     def numbers(self) -> FloatArray:
-        """The limits in one array, as kernels take them."""
+        """The limits as an array, as kernels take them."""
         return np.array(self.limits, dtype=np.float64)
 
 
@@ -65,7 +65,7 @@ def default_solver(model: Any, target: Any) -> tuple[str, int]:
 
 
 def checked_settings(*arguments: Any) -> Settings:
-    """Return the settings; recent ones are cached."""
+    """Return the settings, recent settings from a cache."""
     try:
         return _cached_settings(*arguments)
     except TypeError:  # some argument has no hash, and so is no number or name

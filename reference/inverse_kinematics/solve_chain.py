@@ -1,4 +1,4 @@
-"""One position to reach by a chain of unlimited balls: what the loops of `restarts.py` work on.
+"""A single position to reach by a chain of unlimited balls, for the loops of `restarts.py`.
 
 The textbook forms of the solvers on a chain are four times faster than on a mechanism.
 """
@@ -48,9 +48,9 @@ def solve_chains(
 ):
     """Solve target after target; return whether all starts and targets were valid.
 
-    Arrays come one by one, since tuples of them take longer from Python: those of the skeleton, the
-    joints from the root to the effector, the numbers of Limits, local rotations to start from,
-    (start, joint, 4), which the targets use one after the other, global positions [m], (target, 3),
+    Arrays come separately, since tuples of them take longer from Python: the skeleton's, the joints
+    from the root to the effector, the numbers of Limits, local rotations to start from, (start,
+    joint, 4), used by the targets in turn, global positions [m], (target, 3),
     and the fields of Result but its coordinates.
     """
     limits = limits_of(numbers)
@@ -83,7 +83,7 @@ def solve_chains(
 
 
 def largest(v):
-    """Return the largest magnitude of a vector's components, NaN if it has one."""
+    """Return the largest magnitude of a vector's components, or NaN."""
     x, y, z = abs(v[0]), abs(v[1]), abs(v[2])
     return x + y + z if x + y + z != x + y + z else max(x, y, z)
 

@@ -1,4 +1,4 @@
-"""Any targets of any mechanism: what the loops of `restarts.py` work on."""
+"""Any targets of any mechanism, for the loops of `restarts.py`."""
 
 import math
 from typing import NamedTuple
@@ -107,11 +107,11 @@ def solve_mechanisms(
 ):  # fmt: skip
     """Solve target after target; return whether all starts and targets were valid.
 
-    Arrays come one by one, since tuples of them take longer from Python: the joints of the
+    Arrays come separately, since tuples of them take longer from Python: the joints of the
     articulation, the fields of Mechanism, the restarts of MechanismState and their effectors, the
-    numbers of Limits, coordinates of the articulation to start from, (start, coordinate), which the
-    targets use one after the other, targets, records TARGET, (target, effector), whose rotations
-    are made unit, and the fields of Result.
+    numbers of Limits, coordinates of the articulation to start from, (start, coordinate), used by
+    the targets in turn, targets, records TARGET, (target, effector), to be made unit here, and the
+    fields of Result.
     """
     limits = limits_of(numbers)
     mechanism = Mechanism(
@@ -130,7 +130,11 @@ def solve_mechanisms(
         copy_row(coordinates[i - 1] if chained else starts[i % len(starts)], q)
         if not (normalise_start(joints, q) and normalise_target(target)):
             return False
-        begin(state, q)
+        gather(mechanism, q, data.q)
+        clear(data.far_step)
+        for j in range(len(own_joints)):
+            clamp_joint(own_joints, j, data.q)
+        update_forward_kinematics(mechanism, data)
         bound = least_residual(mechanism, target)
         criteria, past = mechanism_criteria(mechanism, bound, limits), history[i % len(history)]
         iterations, stalled = solve_with_restarts(
@@ -169,15 +173,6 @@ def normalise_target(target):
     return valid
 
 
-def begin(state, q):
-    """Bring a mechanism to coordinates of the articulation, within their limits."""
-    gather(state.mechanism, q, state.data.q)
-    clear(state.data.far_step)
-    for j in range(len(state.mechanism.joints)):
-        clamp_joint(state.mechanism.joints, j, state.data.q)
-    update_forward_kinematics(state.mechanism, state.data)
-
-
 def mechanism_criteria(mechanism, bound, limits):
     """Return the end criteria of attempts, where no pose has a residual below `bound` [m].
 
@@ -211,7 +206,7 @@ def errors_of_pose(mechanism, target, positions, rotations):
 
 
 def perturb_mechanism(state, _target, _criteria, first):
-    """Bend a mechanism that stalled at once, away from its target: all joints share one angle."""
+    """Bend a mechanism that stalled at once, away from its target: all joints share an angle."""
     mechanism, q, count = state.mechanism, state.data.q, len(state.mechanism.joints)
     missed_target = first[COST] > POSITION_ROUNDING * mechanism.reach
     if not (first[STATE] == STALLED and first[COUNT] < STUCK and missed_target):
@@ -240,7 +235,7 @@ def place_mechanism(state):
 
 
 def draw_mechanism(state, target, n):
-    """Bring the mechanism to the random configuration whose effectors are n-th nearest."""
+    """Bring the mechanism to the random configuration with the n-th nearest effectors."""
     if n == 1:
         rank_restarts(state, target)
     take_nearest(state, state.data.q)

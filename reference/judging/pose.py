@@ -112,7 +112,7 @@ def judge_pose(
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion has no length,
-            there is no such effector, or a pose is missing where it is needed.
+            an effector does not exist, or a pose is missing where it is needed.
     """
     model = checked_model(model, "model")
     targets = check_numbers(checked_targets(model, target, effector))

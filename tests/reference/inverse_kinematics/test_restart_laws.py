@@ -155,22 +155,6 @@ def test_restarts_never_make_an_answer_worse_for_every_count(name, solver):
             assert rises(name, solver, seed, COUNTS, settings) == []
 
 
-@pytest.mark.parametrize("solver", ["levenberg_marquardt", "fabrik"])
-def test_the_readme_s_robot_reaches_no_fewer_targets_with_restarts(solver):
-    model, _, _ = readme_robot()
-    rng = np.random.default_rng(0)
-    targets = forward_kinematics(model, model.random(rng, 300)).positions[:, -1]
-    counts = [
-        np.count_nonzero(
-            solve_ik(model, model.neutral(), targets, solver, restarts=n).outcome
-            == Outcome.CONVERGED
-        )
-        for n in (0, 1, 3)
-    ]
-    assert counts == sorted(counts)
-    assert counts[0] < counts[2]
-
-
 def test_random_poses_of_fewer_restarts_are_the_first_of_more():
     model, effectors, _ = seven_hinges()
     many = prepare(model, tuple(effectors), (True,), 40, 3).restarts
