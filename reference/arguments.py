@@ -37,18 +37,26 @@ KINDS = {"b": "booleans", "c": "complex numbers", "O": "objects", "U": "text", "
 LARGEST_INTEGER = 2**63 - 1
 
 
-def array(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
+def array(name: str, value: ArrayLike, *trailing: int | str, kind: str = "numbers") -> FloatArray:
     """Return a finite, C-contiguous, writable float64 array with `trailing` as its last axes.
 
     An int in `trailing` is a length, a word stands for any length; a leading "..." allows batch
     axes. A value that fits already is returned itself, and must then not be written to.
     """
-    return _bounded("numbers", name, value, *trailing)
+    result = floats(name, value, *trailing)
+    largest = np.abs(result).max(initial=0.0)
+    if largest <= LARGEST_COORDINATE:
+        return result
+    if not np.isfinite(result).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
+        raise ValueError(f"{name}: expected finite numbers, got {result[index]} at index {index}")
+    number, bound = distinct_texts(largest, LARGEST_COORDINATE)
+    raise ValueError(f"{name}: expected {kind} of at most {bound}, got {number}")
 
 
 def coordinates(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
     """Return the same as `array`; the error speaks of coordinates."""
-    return _bounded("coordinates", name, value, *trailing)
+    return array(name, value, *trailing, kind="coordinates")
 
 
 def sizes(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
@@ -211,11 +219,6 @@ def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
     return value
 
 
-def generator(name: str, value: Any) -> np.random.Generator:
-    """Return the value if it is a generator of random numbers."""
-    return instance(name, value, np.random.Generator)
-
-
 def broadcast(
     name: str, first: tuple[int, ...], second: tuple[int, ...], owner: str = ""
 ) -> tuple[int, ...]:
@@ -312,18 +315,6 @@ def distinct_texts(number: float, bound: float, least: int = 6) -> tuple[str, st
     """Write a number and its bound, for a message, with as many digits as tell them apart."""
     digits = digits_apart(number, bound, least)
     return f"{number:.{digits}g}", f"{bound:.{digits}g}"
-
-
-def _bounded(kind: str, name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
-    result = floats(name, value, *trailing)
-    largest = np.abs(result).max(initial=0.0)
-    if largest <= LARGEST_COORDINATE:
-        return result
-    if not np.isfinite(result).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
-        raise ValueError(f"{name}: expected finite numbers, got {result[index]} at index {index}")
-    number, bound = distinct_texts(largest, LARGEST_COORDINATE)
-    raise ValueError(f"{name}: expected {kind} of at most {bound}, got {number}")
 
 
 def _converted(name: str, value: Any) -> np.ndarray:

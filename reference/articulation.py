@@ -239,7 +239,7 @@ class Articulation(KeepsReadOnly):
         Without limits a hinge is drawn from all angles, a slide or a free joint from within a
         metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
         """
-        arguments.generator("rng", rng)
+        arguments.instance("rng", rng, np.random.Generator)
         shape = arguments.lengths("shape", shape, self.coordinate_count)
         q = np.empty((math.prod(shape), self.coordinate_count))
         for j in self._leading:

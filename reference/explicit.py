@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import LARGEST_COORDINATE, FloatArray, number
-from .mass_spring import MassSpring, State, checked_state, constant_forces, pin_targets
-from .springs import pulls
+from .mass_spring import MassSpring, State, checked_state, constant_forces, pin_targets, pulls
 
 
 def symplectic_euler(

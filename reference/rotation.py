@@ -26,7 +26,7 @@ def identity(*shape: int) -> FloatArray:
 
 def random(rng: np.random.Generator, *shape: int) -> FloatArray:
     """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors."""
-    rng = arguments.generator("rng", rng)
+    rng = arguments.instance("rng", rng, np.random.Generator)
     q = rng.standard_normal((*arguments.lengths("shape", shape, 4), 4))
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 

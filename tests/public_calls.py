@@ -672,7 +672,8 @@ def _samples():
         yield entry(getattr(samples, name), {"case": 0})
     yield entry(samples.network, {"case": 0, "damped": True})
     given = {"case": 0, "skeleton": samples.skeleton(3), "batch": 2}
-    yield entry(samples.local_rotations, given, names="shape")
+    yield entry(lambda case, skeleton, batch: samples.local_rotations(case, skeleton, batch),
+                given, of=samples.local_rotations, names="shape")  # fmt: skip
     yield entry(samples.highest_rate, {"system": system()[0]})
     yield entry(verdict.check_claim, {"claim": claim, "cases": 1})
 

@@ -8,8 +8,6 @@ attempt continues from.
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from ..arguments import FloatArray
 from ..backend.digest import PythonKernel
 from ..outcome import Outcome
@@ -68,13 +66,6 @@ class Criteria(NamedTuple):
     max_iterations: int  # of each attempt
 
 
-class Attempts(NamedTuple):
-    """The progress of the attempts at a target."""
-
-    saved: FloatArray  # rows of the state, one an attempt and in the last row the best end of one
-    progress: FloatArray  # see the columns above, (attempt + 1, 4); the last row is not used
-
-
 class Result(NamedTuple):
     """The arrays that kernels fill, a row a target."""
 
@@ -95,12 +86,7 @@ def limits_of(numbers):
     )
 
 
-def new_attempts(count, state):
-    """Return room for so many attempts, not filled."""
-    return Attempts(np.empty((count + 1, len(state.row))), np.empty((count + 1, WAIT + 1)))
-
-
-def solve_with_restarts(operations, state, attempts, target, limits, criteria, history):
+def solve_with_restarts(operations, state, saved, progress, target, limits, criteria, history):
     """Attempt from the start, then from random configurations, until the target is reached.
 
     While others may follow, an attempt at a target in reach is given up early. If none reaches it,
@@ -108,12 +94,12 @@ def solve_with_restarts(operations, state, attempts, target, limits, criteria, h
     attempt's number of iterations count as attempts too. So the result is no worse than
     from a single start, or with fewer restarts.
 
-    Saves the best attempt in the last row of `attempts.saved`.
+    The rows of `saved`, a row of the state each, and of `progress`, see the columns above, are of
+    attempts; their last rows are spare. The best attempt is saved in the last row.
 
     Returns:
         The iterations of all attempts, and whether the best of them stalled.
     """
-    saved, progress = attempts
     random = len(progress) - 2
     patience = PATIENCE if random > 0 and criteria.distance <= limits.tolerance else INFINITY
     for i in range(random + 1):

@@ -60,12 +60,12 @@ from .restarts import (
     OUTCOME,
     STALLED,
     STATE,
+    WAIT,
     Criteria,
     Operations,
     copy_row,
     fill_figures,
     limits_of,
-    new_attempts,
     outcome_of,
     solve_with_restarts,
 )
@@ -122,7 +122,8 @@ def solve_mechanisms(
         mechanism, data, data.state, new_workspace(mechanism), restarts, restart_frames,
         np.empty(len(restarts)),
     )  # fmt: skip
-    attempts = new_attempts(len(restarts) + 1, state)
+    count = len(restarts) + 2
+    saved, progress = np.empty((count, len(state.row))), np.empty((count, WAIT + 1))
     rotations = np.empty((len(joints), 4))
     for i in range(len(targets)):
         q, target = coordinates[i], targets[i]
@@ -138,9 +139,9 @@ def solve_mechanisms(
         bound = least_residual(mechanism, target)
         criteria, past = mechanism_criteria(mechanism, bound, limits), history[i % len(history)]
         iterations, stalled = solve_with_restarts(
-            operations, state, attempts, target, limits, criteria, past
+            operations, state, saved, progress, target, limits, criteria, past
         )
-        scatter(mechanism, attempts.saved[-1], q)
+        scatter(mechanism, saved[-1], q)
         articulated_pose(joints, q, positions[i], rotations)
         for j in range(len(joints)):
             _, Q = joint_transform(joints, j, q)

@@ -23,7 +23,7 @@ from .problem import (
     new_problem,
     project,
 )
-from .riemannian_newton import cost, minimise, zero_multipliers
+from .riemannian_newton import cost, minimise
 
 __all__ = ["smooth"]
 
@@ -46,8 +46,8 @@ def smooth(
     q = np.where(valid[:, None], projected, q)
     problem = problem._replace(constrained=reached & valid & ~near_singular(problem, q))
     result, steps = minimise_from_coarse(problem, q)
-    multipliers = zero_multipliers(problem, q)
-    if cost(problem, result, multipliers) > cost(problem, q, multipliers):
+    z = np.zeros((len(q), len(problem.limits)))  # multipliers
+    if cost(problem, result, z) > cost(problem, q, z):
         result, more = minimise(problem, q)
         steps += more
     return result, steps

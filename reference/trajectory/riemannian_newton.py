@@ -102,7 +102,7 @@ class CyclicBandedSystem:
 def minimise(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, int]:
     """Return the trajectory of least cost near q, which meets its targets, and the steps taken."""
     system = CyclicBandedSystem(len(q), problem.mechanism.freedoms, problem.closed)
-    z, shift = zero_multipliers(problem, q), FIRST_SHIFT
+    z, shift = np.zeros((len(q), len(problem.limits))), FIRST_SHIFT
     steps, converged = 0, False
     while steps < MAX_STEPS and not converged:
         steps += 1
@@ -116,11 +116,6 @@ def minimise(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, int
             change = _update_multipliers(problem, q, z)
         converged = is_negligible(predicted, model) and change <= MULTIPLIER_TOLERANCE
     return q, steps
-
-
-def zero_multipliers(problem: TrajectoryProblem, q: FloatArray) -> FloatArray:
-    """Return the first multipliers of the limits, (frame, limit)."""
-    return np.zeros((len(q), len(problem.limits)))
 
 
 def is_negligible(predicted: float, model: QuadraticModel) -> bool:
