@@ -14,13 +14,15 @@ from .articulation import Articulation
 from .inverse_kinematics.problem import (
     CheckedTarget,
     IKSolution,
+    Settings,
     Target,
     are_targets,
     check_numbers,
+    checked_settings,
     checked_targets,
+    default_solver,
 )
 from .inverse_kinematics.reduce import prepare
-from .inverse_kinematics.settings import Settings, checked_settings, default_solver
 from .inverse_kinematics.solve import balls, batch_shape, solve_checked, target_rows
 from .model import Model, checked_model
 from .outcome import Outcome

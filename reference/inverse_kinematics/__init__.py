@@ -12,8 +12,15 @@ from numpy.typing import ArrayLike
 
 from ..model import Model, checked_model
 from ..outcome import Outcome
-from .problem import IKSolution, Target, checked_targets
-from .settings import IK_SOLVERS, RESTARTS, checked_settings, default_solver
+from .problem import (
+    IK_SOLVERS,
+    RESTARTS,
+    IKSolution,
+    Target,
+    checked_settings,
+    checked_targets,
+    default_solver,
+)
 from .solve import solve_checked, solve_plain
 
 __all__ = ["IK_SOLVERS", "RESTARTS", "IKSolution", "Outcome", "Target", "solve_ik"]

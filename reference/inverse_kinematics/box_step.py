@@ -163,7 +163,13 @@ def transposed_step(mechanism, data, system):
     """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without the freedoms that limits stop."""
     clear(system.active)
     for _ in range(len(system.step) + 1):
-        square, moved = along_gradient(system)
+        clear(system.z)
+        for k in range(len(system.step)):
+            if system.active[k] == 0.0:
+                system.step[k] = inner(system.J[k], system.e)
+                for i in range(len(system.z)):
+                    system.z[i] += system.step[k] * system.J[k, i]
+        square, moved = inner(system.e, system.z), inner(system.z, system.z)
         for k in range(len(system.step)):
             if system.active[k] == 0.0 and moved > 0.0:
                 system.step[k] *= square / moved
@@ -171,17 +177,6 @@ def transposed_step(mechanism, data, system):
                 system.step[k] = 0.0
         if not stop_at_limits(mechanism, data, system):
             return
-
-
-def along_gradient(system):
-    """Fill the step J' e and z = J J' e over the freedoms not active; return <e, z> and |z|^2."""
-    clear(system.z)
-    for k in range(len(system.step)):
-        if system.active[k] == 0.0:
-            system.step[k] = inner(system.J[k], system.e)
-            for i in range(len(system.z)):
-                system.z[i] += system.step[k] * system.J[k, i]
-    return inner(system.e, system.z), inner(system.z, system.z)
 
 
 def stop_at_limits(mechanism, data, system):

@@ -27,10 +27,9 @@ from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
 from .mechanism import TARGET
-from .problem import CheckedTarget, IKSolution, Target, check_numbers
+from .problem import CheckedTarget, IKSolution, Settings, Target, check_numbers
 from .reduce import prepare
 from .restarts import FIGURES, ITERATIONS, MERIT, OUTCOME, Result
-from .settings import Settings
 
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
 SLICE_ON_CHAINS, SLICE_ON_MECHANISMS = 128, 16

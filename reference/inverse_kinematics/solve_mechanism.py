@@ -8,6 +8,7 @@ import numpy as np
 from ..arguments import LARGEST_COORDINATE, FloatArray, RecordArray
 from ..articulation import (
     BALL,
+    FIXED,
     FREE,
     HINGE,
     articulated_pose,
@@ -208,26 +209,20 @@ def errors_of_pose(mechanism, target, positions, rotations):
 
 def perturb_mechanism(state, _target, _criteria, first):
     """Bend a mechanism that stalled at once, away from its target: all joints share an angle."""
-    mechanism, q, count = state.mechanism, state.data.q, len(state.mechanism.joints)
-    missed_target = first[COST] > POSITION_ROUNDING * mechanism.reach
+    mechanism, q, angle = state.mechanism, state.data.q, BEND / max(len(state.mechanism.joints), 1)
+    joints, missed_target = mechanism.joints, first[COST] > POSITION_ROUNDING * mechanism.reach
     if not (first[STATE] == STALLED and first[COUNT] < STUCK and missed_target):
         return False
-    for j in range(count):
-        if mechanism.joints["leader"][j] == j:
-            perturb_joint(mechanism.joints, q, j, BEND / count)
+    for j in range(len(joints)):
+        kind = joints["kind"][j] if joints["leader"][j] == j else FIXED
+        if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
+            move_by(joints, q, j, -angle)
+        elif kind in (BALL, FREE):
+            bend = rotation_about(PERTURBATION_AXIS, angle)
+            store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), bend)))
+            clamp_joint(joints, j, q)
     update_forward_kinematics(mechanism, state.data)
     return True
-
-
-def perturb_joint(joints, q, j, angle):
-    """Rotate a joint by an angle [rad], always alike, within its limits."""
-    kind = joints["kind"][j]
-    if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
-        move_by(joints, q, j, -angle)
-    elif kind in (BALL, FREE):
-        bend = rotation_about(PERTURBATION_AXIS, angle)
-        store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), bend)))
-        clamp_joint(joints, j, q)
 
 
 def place_mechanism(state):

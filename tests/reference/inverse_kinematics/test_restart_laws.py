@@ -16,9 +16,8 @@ from plumbob.reference import (
     solve_ik,
 )
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
-from plumbob.reference.inverse_kinematics.problem import checked_targets
+from plumbob.reference.inverse_kinematics.problem import checked_settings, checked_targets
 from plumbob.reference.inverse_kinematics.reduce import prepare
-from plumbob.reference.inverse_kinematics.settings import checked_settings
 from plumbob.reference.inverse_kinematics.solve import solve_checked
 
 COUNTS = range(13)
