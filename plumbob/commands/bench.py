@@ -22,7 +22,7 @@ from .report import write_report
 from .verify import program_of
 
 if TYPE_CHECKING:
-    from plumbob.bench.harness.choice import Choice
+    from plumbob.bench.harness.block import Choice
     from plumbob.bench.harness.executor import Executor
     from plumbob.bench.harness.run import Event
 
@@ -150,7 +150,7 @@ def _choice(suites: Sequence[str], scale: str, asked: Asked) -> "Choice":
 
     from . import selection
 
-    entries = opening.named(asked.entered, asked.program)
+    entries = opening.addresses(asked.entered, asked.program)
     entrants = opening.opened(entries, suites)
     for found in opening.opened_where_possible(opening.installed(), suites, entrants):
         if isinstance(found, str):

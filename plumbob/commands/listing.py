@@ -8,8 +8,7 @@ from itertools import zip_longest
 from typing import Any
 
 from plumbob.bench.experiments import SUITES, blocks
-from plumbob.bench.harness.block import Block
-from plumbob.bench.harness.choice import Choice
+from plumbob.bench.harness.block import Block, Choice
 from plumbob.bench.harness.measure import not_asked, not_installed
 from plumbob.bench.peers import registry
 from plumbob.bench.tables.results import counted

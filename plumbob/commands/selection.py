@@ -8,8 +8,7 @@ from typing import NamedTuple
 from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
 from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
-from plumbob.bench.harness.block import Block, Scale
-from plumbob.bench.harness.choice import Choice
+from plumbob.bench.harness.block import Block, Choice, Scale
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.problems.own import OwnProblem

@@ -23,7 +23,7 @@ from plumbob.bench.experiments.cloth import tables as cloth
 from plumbob.bench.experiments.cloth_peers import SOLVED
 from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.report.sections import SECTIONS, tables
-from plumbob.bench.tables.results import Results, label
+from plumbob.bench.tables.results import Results, grouped, label
 from plumbob.bench.tables.table import words
 from plumbob.bench.tables.tex_text import escaped
 from plumbob.bench.tables.writers import comma_separated, markdown
@@ -54,9 +54,9 @@ def test_every_letter_of_ours_can_be_typeset(records):
 # Numbers of names, of mathematics, of statistics (`metrics.CONFIDENCE`) and of papers.
 FACTS = re.compile(
     r"Q[123]\.|UR5|PR2|RK4|\((?:[^()]* )?20\d\d\)|(?:Lasenby|Corke) 20\d\d|2(?:\.828)? / ω|y = 0"
-    r"|both are 1 at the start|each of 6 components|1e-15|0/|\b95 %|less than 5 %|\b[19]0th\b"
+    r"|[Bb]oth are 1 at the start|each of 6 components|1e-15|0/|\b95 %|less than 5 %|\b[19]0th\b"
     r"|^Published: 6,561|published with (?:10,000|20 runs)|table 1$|at most 5 ms for TRAC-IK"
-    r"|float64|25 digits|; 1 is no nearer"
+    r"|float64|25 digits|; 1 is no better"
 )
 SOURCES = sorted(
     path
@@ -85,6 +85,21 @@ def phrases(path):
 def test_no_setting_is_typed_into_a_sentence(path):
     """A number in a text comes from the constant that the measurement uses, or is a fact."""
     assert [text for text in phrases(path) if re.search(r"\d", FACTS.sub("", text))] == []
+
+
+def test_every_declared_column_has_a_cell(records, make):
+    """A title in `tables.toml` that no row has would make an empty column."""
+    solved = make.worked("MuJoCo Euler", error=(0.5, 1e-7))
+    swing = make.swung("RK4", left=np.ones(11))
+    results = Results([*records, solved, make.fell("MuJoCo Euler"), swing])
+    for layout in (layout for section in SECTIONS for layout in section.layouts):
+        rows = [row for row in layout.subjects(results) if isinstance(row, dict)]
+        if rows and not callable(layout.columns):
+            groups = grouped(layout.columns, lambda column: column.group or column.title)
+            titles = {title for row in rows for title in row}
+            assert [
+                g for g, columns in groups.items() if not titles & {c.title for c in columns}
+            ] == []
 
 
 def test_every_section_has_a_name_of_its_own():
@@ -128,7 +143,7 @@ def test_targets_without_a_solution_are_not_printed_as_infinite(make):
     assert column(q1, "targets without a solution") == [1, 2]
     assert list(map(words, column(q1, "off the line, largest [m]"))) == infinite * 2
     assert list(map(words, column(made["accuracy"], "residual, largest [m]"))) == infinite
-    assert column(made["cloth_peers_step"], "least error") == ["diverged"]
+    assert column(made["cloth_peers_step"], "smallest error") == ["diverged"]
     for table in made.values():
         text = markdown(table)
         assert not re.search(r"\binf(inite)?\b|no answer [m%µ]|not a number", text), table.name
@@ -209,7 +224,7 @@ def test_convergence_counts_iterations_drift_and_converged_steps(records):
     assert newton.startswith("Newton converged in 3 of 3")
     assert "at most 3 iterations" in newton
     for count in ("1 iteration", "10 iterations"):
-        assert column(table, f"steps of {count}, drift, share of the path [%]")[0] == 10.0
+        assert column(table, f"steps of {count}, drift relative to the path [%]")[0] == 10.0
     assert SOLVED in table.summary.sentence
 
 
@@ -227,7 +242,7 @@ def test_iterations_that_do_not_suffice_are_said_so(make):
 def test_times_are_medians_beside_ours(records):
     table = timing.kinematics(Results(records))
     assert column(table, "median [ns]") == pytest.approx([2000.0, 1000.0])
-    assert column(table, "of our compiled time") == [None, 0.5]
+    assert column(table, "relative to compiled") == [None, 0.5]
 
 
 def swept(make, solver, seconds, noise=0.01):
@@ -254,7 +269,7 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
     assert point.endswith("first: Plumbob")
     apart = replace(rival, facts={**rival.facts, "together": "another run"})
     (point,) = timing.kinematics(Results([ours, apart])).summary.points
-    assert point.endswith("timed apart, and not ranked")
+    assert point.endswith("not ranked")
     again = swept(make, "MuJoCo", 1e-6 * rng.permutation(drift))
     (point,) = timing.kinematics(Results([ours, again])).summary.points
     assert "in a tie with" in point
@@ -263,7 +278,7 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
 @pytest.mark.parametrize(("noise", "mark"), [(0.049, ""), (0.12, "noisy")])
 def test_a_machine_too_noisy_for_the_precision_aimed_at_is_said_to_be_so(make, noise, mark):
     table = timing.kinematics(Results([swept(make, "MuJoCo", np.ones(9), noise)]))
-    assert column(table, "mark") == [mark]
+    assert column(table, "remark") == [mark]
     assert ("too noisy for the 5 %" in table.measured) == bool(mark)
     assert table.summary.sentence.startswith("The machine was too noisy") == bool(mark)
 
@@ -272,8 +287,8 @@ def test_a_plain_copy_stands_in_a_column_and_is_called_no_limit(make):
     """Work that caches serve better takes half of its time: that is below no bound."""
     copy = make.timed("limit: copying as many bytes", 1e-6)
     table = timing.kinematics(Results([make.timed("Plumbob, compiled", 5e-7), copy]))
-    assert column(table, "by") == ["Plumbob, compiled"]
-    assert column(table, "times a plain copy") == pytest.approx([0.5])
+    assert column(table, "implementation") == ["Plumbob, compiled"]
+    assert column(table, "relative to a plain copy") == pytest.approx([0.5])
     assert "(0.500 times a plain copy)" in table.summary.points[0]
     assert "limit" not in markdown(table) + label(copy.solver)
 
