@@ -505,7 +505,7 @@ NUMBA = {
         ["check", "spring forces"],
         "NUMBA_NUM_THREADS=0",
         2,
-        "plumbob: NUMBA_NUM_THREADS: expected what numba takes: "
+        "plumbob: NUMBA_NUM_THREADS: expected a number that numba takes: "
         "Number of threads specified must be > 0.\n",
     ),
 }
