@@ -1,4 +1,4 @@
-"""How far rounding may take an answer from what exact arithmetic gives."""
+"""Bounds of the rounding error of an answer."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ SOLVED = 1e-6
 
 
 class Rounding(NamedTuple):
-    """What rounding may change."""
+    """Bounds of a rounding error."""
 
     positions: float  # [m]
     velocities: float  # [m/s]
@@ -29,7 +29,7 @@ def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
     A coordinate is rounded by epsilon of its size in each substep, always to the same side where
     the increments are alike. Lengths are rounded as coordinates are, and h² k / m of them enters
     the right-hand side of a step; M + h² L is conditioned by 1 + h² k / m. An unstable explicit
-    step multiplies what came before by hs² k / m. The largest eigenvalue of M^-1 L is bounded by
+    step multiplies earlier errors by hs² k / m. The largest eigenvalue of M^-1 L is bounded by
     the largest sum of |k| + |c| / h over the springs of a particle, times 2 / m.
     """
     stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
@@ -45,25 +45,25 @@ def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
 
 
 def relative_gap(
-    p: SpringProblem, predicted: Mapping[str, Any], answered: Mapping[str, Any], allowed: Rounding
+    p: SpringProblem, predicted: Mapping[str, Any], answers: Mapping[str, Any], allowed: Rounding
 ) -> float:
-    """Return the largest difference of positions and velocities, over what they changed by.
+    """Return the largest difference of positions and velocities, over their changes.
 
     Rounding counts as no difference; so a number above SOLVED means another step. Velocities of
-    pins are left out: they are nobody's.
+    pins are left out, for they affect no position.
     """
     gaps = [
-        coordinate_gap(p, name, predicted[name], answered[name])
+        coordinate_gap(p, name, predicted[name], answers[name])
         / (np.abs(predicted[name] - before).max(initial=0.0) + getattr(allowed, name) / SOLVED)
         for name, before in (("positions", p.positions), ("velocities", 0.0))
-        if name in answered
+        if name in answers
     ]
     return float(max(gaps)) if gaps and np.isfinite(gaps).all() else np.inf
 
 
-def coordinate_gap(p: SpringProblem, name: str, expected: Any, answered: Any) -> float:
+def coordinate_gap(p: SpringProblem, name: str, expected: Any, output: Any) -> float:
     """Return the largest difference of a coordinate, the velocities of pins left out."""
-    gap = np.abs(np.asarray(expected) - np.asarray(answered))
+    gap = np.abs(np.asarray(expected) - np.asarray(output))
     if name == "velocities":
         gap[..., p.pinned, :] = 0.0
     return float(gap.max(initial=0.0))

@@ -27,7 +27,7 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting, Step, System
 from plumbob.crosscheck.verify.judgement import CaseJudgement, Finding, Report, Verdict
 from plumbob.crosscheck.verify.mass_spring import energy, forces, stepping
-from plumbob.crosscheck.verify.mass_spring.cases import task_cases
+from plumbob.crosscheck.verify.mass_spring.cases import task_cases, trace_of
 from plumbob.crosscheck.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
 from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel, simulate
 from plumbob.crosscheck.verify.mass_spring.problem import (
@@ -319,7 +319,7 @@ def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family)
         judged("three", "cloth", Verdict.WRONG),
     ]))  # fmt: skip
     assert "in the case 'two': It is off." in told
-    assert (str(stepping.TRACES[family]) in told) is (first is not Verdict.UNDECIDED)
+    assert (str(trace_of(family)) in told) is (first is not Verdict.UNDECIDED)
     assert stepping._first_broken([judged("one", "flight", first)]) is None
 
 
