@@ -23,6 +23,7 @@ from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, combined
+from .laws import correct_digits
 from .model import StepModel
 from .problem import (
     SpringProblem,
@@ -32,7 +33,6 @@ from .problem import (
     state_of,
     system_of,
 )
-from .rounding import correct_digits
 
 TASK = "energy"
 Energies = Mapping[str, Any]

@@ -19,6 +19,7 @@ from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
+from .laws import correct_digits
 from .model import StepModel
 from .problem import (
     SpringProblem,
@@ -29,7 +30,6 @@ from .problem import (
     state_of,
     system_of,
 )
-from .rounding import correct_digits
 
 TASK = "mass_spring_forces"
 # Rounding of a length by the coordinates' epsilon, times the stiffness, and of some ten terms.

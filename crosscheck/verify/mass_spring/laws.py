@@ -1,9 +1,9 @@
-"""Laws of every step, and of the step that a solver declares."""
+"""Laws of every step and of the step that a solver declares, and the rounding that they allow."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,13 @@ from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
 from .model import StepModel
 from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of
-from .rounding import SOLVED, Rounding, coordinate_gap, relative_gap
 
+# A sum of some ten terms, a few products and a square root, each rounded by half an epsilon, as
+# the inputs themselves are in single precision.
+ROUNDINGS = 4.0
+# What an iterative linear solver may leave of a displacement, and a velocity, without being taken
+# for another model.
+SOLVED = 1e-6
 # Up to this share of what a step changes, an answer is called imprecise; beyond it is another step.
 IMPRECISE = 1e-3
 # So many times what rounding allows is imprecise as well.
@@ -25,6 +30,64 @@ ROUNDED = 30.0
 CONSISTENT = 0.1
 # The share of the largest displacement that a solver of nonlinear equations may leave to momentum.
 UNBALANCED = 1e-4
+
+
+class Rounding(NamedTuple):
+    """Bounds of a rounding error."""
+
+    positions: float  # [m]
+    velocities: float  # [m/s]
+
+
+def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
+    """Return bounds for an honest solver of that precision.
+
+    A coordinate is rounded by epsilon of its size in each substep, always to the same side where
+    the increments are alike. Lengths are rounded as coordinates are, and h² k / m of them enters
+    the right-hand side of a step; M + h² L is conditioned by 1 + h² k / m. An unstable explicit
+    step multiplies earlier errors by hs² k / m. The largest eigenvalue of M^-1 L is bounded by
+    the largest sum of |k| + |c| / h over the springs of a particle, times 2 / m.
+    """
+    stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
+    stiffest = float((2.0 * np.abs(p.incidence).T @ stiffness / p.masses).max(initial=0.0))
+    n, steps, growth = model.substeps, p.steps or 1, 1.0
+    if model.integrator.explicit:
+        growth = min(max(1.0, stiffest * (p.h / n) ** 2) ** (n - 1), 1e12)
+    size = np.abs(p.positions).max() + p.h * steps * np.abs(p.velocities).max()
+    size += (p.h * steps) ** 2 * float(np.linalg.norm(p.gravity))
+    x = ROUNDINGS * epsilon * size * (1.0 + n + p.h * p.h * stiffest) * growth * steps**2
+    v = 2.0 * x / p.h + ROUNDINGS * epsilon * float(np.abs(p.velocities).max())
+    return Rounding(float(x), float(v))
+
+
+def relative_gap(
+    p: SpringProblem, predicted: Mapping[str, Any], answers: Mapping[str, Any], allowed: Rounding
+) -> float:
+    """Return the largest difference of positions and velocities, over their changes.
+
+    Rounding counts as no difference; so a number above SOLVED means another step. Velocities of
+    pins are left out, for they affect no position.
+    """
+    gaps = [
+        coordinate_gap(p, name, predicted[name], answers[name])
+        / (np.abs(predicted[name] - before).max(initial=0.0) + getattr(allowed, name) / SOLVED)
+        for name, before in (("positions", p.positions), ("velocities", 0.0))
+        if name in answers
+    ]
+    return float(max(gaps)) if gaps and np.isfinite(gaps).all() else np.inf
+
+
+def coordinate_gap(p: SpringProblem, name: str, expected: Any, output: Any) -> float:
+    """Return the largest difference of a coordinate, the velocities of pins left out."""
+    gap = np.abs(np.asarray(expected) - np.asarray(output))
+    if name == "velocities":
+        gap[..., p.pinned, :] = 0.0
+    return float(gap.max(initial=0.0))
+
+
+def correct_digits(gap: float, size: float) -> float:
+    """Return how many digits of a number of this size are right, at most 16."""
+    return float(np.clip(-np.log10(max(gap / size, 1e-16)), 0.0, 16.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,9 +15,9 @@ from ..contestant import Answer, Exchange
 from ..greeting import Step
 from .faults import ASPECTS, MAX_FAULTS, STEP_FAULTS, Option, apply
 from .honest import compatible, domains
+from .laws import SOLVED, Rounding, relative_gap, rounding
 from .model import Integrator, StepModel, predicted
 from .problem import SpringProblem
-from .rounding import SOLVED, Rounding, relative_gap, rounding
 
 # Seconds of the processor for honest choices, one fault, two, and three.
 PATIENCE = (6.0, 6.0, 3.0, 3.0)

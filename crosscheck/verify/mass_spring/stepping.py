@@ -21,10 +21,9 @@ from . import laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
 from .honest import HONEST, compatible, domains, honest
-from .laws import StepContext
+from .laws import SOLVED, StepContext, correct_digits, relative_gap, rounding
 from .model import StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
-from .rounding import SOLVED, correct_digits, relative_gap, rounding
 from .search import ModelMatch, ModelSearch, Probe, probes_of
 
 MAX_EXPLANATIONS = 3
