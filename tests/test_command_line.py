@@ -213,8 +213,8 @@ def test_a_figure_that_cannot_be_drawn_costs_itself_and_a_sentence(capsys, monke
     def fail(*_):
         raise ValueError("arange: cannot compute length")
 
-    monkeypatch.setattr(sketch, "_files", fail)
-    monkeypatch.setattr(sketch, "_drawn", type(sketch._drawn)())
+    monkeypatch.setattr(sketch, "_draw", fail)
+    monkeypatch.setattr(sketch, "_cache", type(sketch._cache)())
     RecordFile("out").append([a_record()])
     code, out, err = plumbob(capsys, "report", "out")
     assert (code, err) == (0, "")
@@ -303,7 +303,7 @@ def test_ctrl_c_exits_130_and_says_what_is_kept(capsys, monkeypatch):
     code, out, err = plumbob(capsys)
     assert code == 130
     assert out == ""
-    assert err == "plumbob: interrupted; a bench keeps what it has finished\n"
+    assert err == "plumbob: interrupted; finished measurements are kept\n"
 
 
 def judged(missed):
@@ -499,7 +499,7 @@ NUMBA = {
         ["bench", "arm", "--quick"],
         "NUMBA_DISABLE_JIT=1",
         2,
-        "plumbob: NUMBA_DISABLE_JIT: expected it unset where times are taken, got it set\n",
+        "plumbob: NUMBA_DISABLE_JIT: expected it unset where times are measured, got it set\n",
     ),
     "no threads": (
         ["check", "spring forces"],

@@ -26,6 +26,11 @@ from .standings import Headline, of_finishers, solved, speed, standings
 MAX_NAMED = 2
 SUBJECTS = {"kinematics": "Forward kinematics", "ik": "Inverse kinematics", "cloth": "Cloth step"}
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
+# What the scales of a run mean.
+_SCALES = {
+    "quick": "Quick run: few targets and rounds",
+    "full": "Full run: all targets and rounds",
+}
 # Median times by problem and solver [s].
 Times = Mapping[str, Mapping[str, float]]
 
@@ -74,14 +79,17 @@ def headlines(results: Results) -> list[Headline]:
 
 
 def scale(results: Results) -> str:
-    """Return the scale of the run: "Quick run: 20 targets a stratum", "" if unknown."""
+    """Return the scale of the records: "Quick run: 20 targets a stratum", "" if unknown."""
     names = dict.fromkeys(r.notes.get("scale", "") for r in results.all(FINISHED))
     name = listed(list(filter(None, names)))
     records = results.all("ik", task=REACHABLE)
     counts = {int(r.size) // max(1, len(r.details.strata)) for r in records} - {0}
     targets = listed([words(count) for count in sorted(counts)], "or")
     run = f"{name} run".strip().capitalize()
-    return f"{run}: {targets} targets a stratum" if targets else run if name else ""
+    if targets:
+        return f"{run}: {targets} targets a stratum"
+    mixture = "Some suites were measured quickly, others at full length"
+    return _SCALES.get(name, mixture) if name else ""
 
 
 def absent(results: Results) -> list[str]:
