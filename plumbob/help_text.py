@@ -30,7 +30,7 @@ class FittingFormatter(_Formatter):  # type: ignore[misc]
         super().__init__(**{**options, "width": min(self.columns, WIDEST) - 2})
 
     def write_usage(self, prog: str, args: str = "", prefix: str | None = None) -> None:
-        """Write the line of usage, each argument in at most one pair of brackets."""
+        """Write the line of usage, each argument in at most a pair of brackets."""
         args = re.sub(r"\[\[(.*?)\]\]", r"[\1]", re.sub(r"\{(.*?)(\.\.\.)?\}", r"\1", args))
         super().write_usage(prog, args, prefix)
 
@@ -74,13 +74,13 @@ def fitted(line: str, width: int) -> list[str]:
 
 
 class FittingContext(_Context):  # type: ignore[misc]
-    """A context whose help fits the terminal."""
+    """A context with help that fits the terminal."""
 
     formatter_class = FittingFormatter
 
 
 class Command(TyperCommand):
-    """A command whose help fits the terminal."""
+    """A command with help that fits the terminal."""
 
     context_class = FittingContext
 
@@ -90,7 +90,7 @@ class Command(TyperCommand):
 
 
 class Group(TyperGroup):
-    """A group of commands whose help fits the terminal."""
+    """A group of commands with help that fits the terminal."""
 
     context_class = FittingContext
 

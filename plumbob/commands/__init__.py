@@ -1,1 +1,1 @@
-"""The commands: their options, and what they print; the work is done elsewhere."""
+"""The commands: their options and output; the work is done elsewhere."""

@@ -217,7 +217,7 @@ def _run_with_progress(
 def _listener(bar: Any, task: Any, events: "Sequence[Event]") -> Callable[[Progress], None]:
     """Return a function that shows progress, and prints the first failure of each solver at once.
 
-    `events` are those so far if blocks are measured one after the other, else empty.
+    `events` are all so far if blocks are measured one after the other, else empty.
     """
     solvers: set[str] = set()
 
@@ -238,10 +238,10 @@ def _print_counts(events: "Sequence[Event]", output: Path) -> None:
     from plumbob.bench.harness.record import RecordFile
 
     counts = Counter(event.state for event in events)
-    kept = visible(f"{counts[run.KEPT]} kept as on record, in {output}")
-    print(f"{counts[run.MEASURED]} measured, {kept}")
-    again = Counter(e.message for e in events if e.state == run.MEASURING and e.message)
-    for reason, count in again.items():
+    unchanged = visible(f"{counts[run.KEPT]} kept as on record, in {output}")
+    print(f"{counts[run.MEASURED]} measured, {unchanged}")
+    repeats = Counter(e.message for e in events if e.state == run.MEASURING and e.message)
+    for reason, count in repeats.items():
         print(visible(f"Measured again: {count}, for {reason}"))
     for event in events:
         if event.state == run.NOT_RUN:

@@ -27,7 +27,7 @@ def check(
         bool, typer.Option("--files", help="Read files and folders of files with both engines.")
     ] = False,
 ) -> int:
-    """Compare the reference with Pinocchio and MuJoCo, claim by claim; exit 1 if one is missed."""
+    """Compare the reference with Pinocchio and MuJoCo, claim by claim; exit 1 on a miss."""
     if files:
         return check_files(claims or [])
     from plumbob.crosscheck.claims import CLAIMS, run_claims
@@ -37,11 +37,11 @@ def check(
         for claim in CLAIMS.values():
             print(f"{claim.name}: {claim.quantity}, against {claim.counterpart}")
         return SUCCESS
-    chosen = [known("claim", name, CLAIMS) for name in claims or CLAIMS]
+    selection = [known("claim", name, CLAIMS) for name in claims or CLAIMS]
     with progress() as bar:
-        task = bar.add_task("", total=len(chosen))
+        task = bar.add_task("", total=len(selection))
         verdicts = run_claims(
-            chosen, lambda claim: bar.update(task, description=claim.name, advance=1)
+            selection, lambda claim: bar.update(task, description=claim.name, advance=1)
         )
     print_verdicts(verdicts)
     if missing := left_out():
@@ -50,7 +50,7 @@ def check(
 
 
 def check_files(paths: Sequence[str]) -> int:
-    """Compare what each engine reads of the files at some paths; return 1 if two disagree."""
+    """Compare how each engine reads the files at some paths; return 1 if two disagree."""
     if not paths:
         raise ValueError("--files: expected folders or files, got none")
     from plumbob.bench.experiments.check.files import report

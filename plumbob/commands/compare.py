@@ -59,7 +59,7 @@ def compare(
         OptionalFile, typer.Option(metavar="FILE", help="Write all rows as JSON.")
     ] = None,
 ) -> int:
-    """List what got faster, slower, more or less accurate between two runs or revisions.
+    """Compare two runs or revisions: faster, slower, more or less accurate.
 
     Answers are compared to the bit, times by confidence intervals. Differences within the drift of
     the machine are undecided; --rerun REV decides them. Exit code 1 if a row fails --fail.

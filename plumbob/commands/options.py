@@ -25,7 +25,7 @@ def writable(folder: Path) -> None:
     """Make a folder if necessary.
 
     Raises:
-        OSError: if nothing can be written there.
+        OSError: if the folder is not writable.
         ValueError: if it is not a folder.
     """
     from plumbob.bench.harness.record import check_folder

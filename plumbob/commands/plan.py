@@ -1,4 +1,4 @@
-"""What a bench can measure, and what a run would measure and how long that takes."""
+"""List problems and solvers of the bench, and the work and time of a run."""
 
 import re
 import textwrap
@@ -33,8 +33,8 @@ UNKNOWN = "unknown"
 def listed(suites: Sequence[str], choice: Choice) -> Iterator[str]:
     """Yield lines with all problems and solvers of a suite, or a summary of several suites."""
     for suite in suites:
-        chosen = list(filter(choice.takes, blocks(suite, choice.scale)))
-        problems, solvers = _problems(chosen), _solvers(chosen)
+        selection = list(filter(choice.takes, blocks(suite, choice.scale)))
+        problems, solvers = _problems(selection), _solvers(selection)
         yield f"{suite}: {SUITES[suite]}"
         if len(suites) == 1:
             yield from ("", "problems", *_aligned(problems.items()))
@@ -46,18 +46,18 @@ def listed(suites: Sequence[str], choice: Choice) -> Iterator[str]:
         yield "All problems and solvers of a suite: plumbob bench SUITE --list"
 
 
-def _problems(chosen: Iterable[Block]) -> dict[str, str]:
+def _problems(selection: Iterable[Block]) -> dict[str, str]:
     """Return the titles of problems by their names, "" for a title that repeats the name."""
     return {
         block.problem: _unless_repeated(block.problem, str(block.facts.get("title", "")))
-        for block in chosen
+        for block in selection
         if not _measures(block, not_installed, not_asked)
     }
 
 
-def _solvers(chosen: Iterable[Block]) -> list[tuple[str, str, str]]:
-    """Return name, different label and version of each solver, missing ones last."""
-    by_solver = {block.solver: block for block in chosen}
+def _solvers(selection: Iterable[Block]) -> list[tuple[str, str, str]]:
+    """Return name, different label and version of each solver, missing solvers last."""
+    by_solver = {block.solver: block for block in selection}
     missing = {name for name, block in by_solver.items() if _measures(block, not_installed)}
     names = [*(name for name in by_solver if name not in missing), *sorted(missing)]
     return [
@@ -79,7 +79,7 @@ def _unless_repeated(name: str, title: str) -> str:
 
 
 def _measures(block: Block, *functions: Callable[..., Any]) -> bool:
-    """Return whether a block is measured by one of some functions."""
+    """Return whether a block is measured by a given function."""
     return isinstance(block.measure, partial) and block.measure.func in functions
 
 
@@ -124,22 +124,22 @@ class Step(NamedTuple):
 
 
 def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
-    """Return lines on what a run would measure, and how long it takes."""
+    """Return lines on the work and time of a run."""
     present = {record.key: record for record in RecordFile(folder).read().records}
-    chosen = [b for suite in suites for b in filter(choice.takes, blocks(suite, choice.scale))]
-    reasons = [run.why_again(block, present, THIS_PROCESS) for block in chosen]
+    selection = [b for suite in suites for b in filter(choice.takes, blocks(suite, choice.scale))]
+    reasons = [run.why_again(block, present, THIS_PROCESS) for block in selection]
     steps = [
         Step(block, reason, *_estimate(block, present))
-        for block, reason in zip(chosen, reasons, strict=True)
+        for block, reason in zip(selection, reasons, strict=True)
         if reason is not None
     ]
-    lines = [f"{len(steps)} to measure, {len(chosen) - len(steps)} kept as on record"]
+    lines = [f"{len(steps)} to measure, {len(selection) - len(steps)} kept as on record"]
     by_solver: dict[tuple[str, str], list[Step]] = {}
     for step in steps:
         by_solver.setdefault((step.block.suite, step.block.solver), []).append(step)
     for (suite, solver), group in by_solver.items():
-        again = Counter(step.reason for step in group if step.reason)
-        whys = "".join(f"; again {count}, for {reason}" for reason, count in again.items())
+        repeats = Counter(step.reason for step in group if step.reason)
+        whys = "".join(f"; again {count}, for {reason}" for reason, count in repeats.items())
         time = duration(sum(step.seconds for step in group))
         lines.append(f"  {suite}: {solver}: {len(group)}, about {time}{whys}")
     return [*lines, _total(steps)]

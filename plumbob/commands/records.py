@@ -102,7 +102,7 @@ def drop(
         bool, typer.Option("--dry-run", help="Print the number of records, and keep them.")
     ] = False,
 ) -> int:
-    """Remove records for good: those that match all options."""
+    """Remove the records that match all options, for good."""
     from plumbob.bench.harness.folder_lock import locked
     from plumbob.bench.harness.record import RecordFile
 

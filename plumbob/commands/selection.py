@@ -31,7 +31,7 @@ class Request(NamedTuple):
         entrants: solvers of the user, as given to --with.
         program: of the user, behind --.
         solvers, problems, robots: by name; all if empty. Problems may be files.
-        targets: random targets a problem, if not those of the scale.
+        targets: random targets a problem, if not as in the scale.
         effector: link of the user's models that reaches the target.
         pins: rule for the pins of the user's cloths.
     """
@@ -70,10 +70,11 @@ def choose(suites: Sequence[str], scale: str, request: Request) -> Choice:
     problems += _recorded("robot", request.robots, every, _robot_names)
     choice = Choice(scale, size, tuple(solvers), tuple(problems), is_partial=True)
     if not any(map(choice.takes, every)):
-        asked = " and ".join(filter(None, map(name_list, (names, request.robots))))
+        names_text = " and ".join(filter(None, map(name_list, (names, request.robots))))
         raise ValueError(
-            f"solver: expected one that is asked {asked or 'something'} in {', '.join(suites)}, "
-            f"got {name_list(request.solvers)}; `plumbob bench {suites[0]} --list` lists all"
+            f"solver: expected one that is asked {names_text or 'something'} in "
+            f"{', '.join(suites)}, got {name_list(request.solvers)}; "
+            f"`plumbob bench {suites[0]} --list` lists all"
         )
     return choice
 
@@ -107,7 +108,7 @@ def _problem_names(block: Block) -> tuple[str, list[str]]:
 
 
 def _robot_names(block: Block) -> tuple[str, list[str]]:
-    """Return a problem's name in records, and the name of its robot if it has one."""
+    """Return a problem's name in records, and the name of its robot if any."""
     robot = block.problem.rpartition("/")[2]
     is_robot = block.facts.get("task") in ROBOT_TASKS and robot != "all"
     return block.problem, [robot] if is_robot else []
