@@ -14,7 +14,7 @@ from ..experiments.cloth_peers import MISSING, ONE_STEP, SOLVED
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.readings import STARTS, Score, fields_of, over_sets, ratio_of_times
-from ..experiments.timing.readings import median_time, ranked_by_time
+from ..experiments.timing.tables import median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED
 from ..peers import registry

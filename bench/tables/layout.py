@@ -71,30 +71,30 @@ class Layout:
             self.compared,
             frozenset(i for i, subject in enumerate(subjects) if not self.ranked(subject)),
             tuple(map(source, subjects)),
-            provenance(list(dict.fromkeys(_records(subjects)))),
+            provenance(list(dict.fromkeys(records_of(subjects)))),
         )
 
 
 def source(subject: Any) -> Source:
     """Return the measurements behind the row of this subject."""
-    records = [record for record in _records(subject) if record.arrays]
+    records = [record for record in records_of(subject) if record.arrays]
     if not records:
         return Source()
     problems, solvers = ({r.problem: 0 for r in records}, {r.solver: 0 for r in records})
     return Source(records[0].suite, tuple(problems), tuple(solvers))
 
 
-def _records(subject: Any) -> Iterator[Record]:
+def records_of(subject: Any) -> Iterator[Record]:
     """Yield the records in a subject; only its attribute `record` if it has one."""
     if isinstance(subject, Record):
         yield subject
     elif isinstance(getattr(subject, "record", None), Record):
         yield subject.record
     elif isinstance(subject, Mapping):
-        yield from _records(tuple(subject.values()))
+        yield from records_of(tuple(subject.values()))
     elif isinstance(subject, tuple | list):
         for part in subject:
-            yield from _records(part)
+            yield from records_of(part)
 
 
 def provenance(records: Sequence[Record]) -> str:

@@ -22,7 +22,7 @@ from .report import write_report
 from .verify import program_of
 
 if TYPE_CHECKING:
-    from plumbob.bench.harness.choice import Choice
+    from plumbob.bench.harness.block import Choice
     from plumbob.bench.harness.executor import Executor
     from plumbob.bench.harness.run import Event
 

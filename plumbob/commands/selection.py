@@ -9,8 +9,7 @@ from typing import NamedTuple
 from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
 from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
-from plumbob.bench.harness.block import Block, Scale
-from plumbob.bench.harness.choice import Choice
+from plumbob.bench.harness.block import Block, Choice, Scale
 from plumbob.bench.peers import opening, registry
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.problems import files
@@ -52,7 +51,7 @@ def choose(suites: Sequence[str], scale: str, request: Request) -> Choice:
     Raises:
         ValueError: if a solver or problem cannot be opened, or a name is unknown.
     """
-    entries = opening.named(request.entrants, request.program)
+    entries = opening.addresses(request.entrants, request.program)
     entrants = opening.opened(entries, suites)
     installed = opening.opened_where_possible(opening.installed(), suites, entrants)
     for entrant in installed:

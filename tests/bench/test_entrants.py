@@ -242,7 +242,7 @@ def test_a_request_that_a_solver_counts_no_time_of_takes_its_round_trip(
 
 def test_a_budget_ends_though_a_solver_counts_almost_nothing(pass_by):
     budget = stopwatch.Budget(1.0)
-    for _ in range(int(stopwatch.MOST_AT_DOORS)):
+    for _ in range(int(stopwatch.MAXIMUM_EXTENSION)):
         assert not budget.is_spent
         pass_by(1.0)
         budget.excuse(1.0 - 1e-12)
@@ -293,7 +293,7 @@ def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
 
 
 def entrants(*words):
-    return opening.opened(opening.named(words), ["ik"])
+    return opening.opened(opening.addresses(words), ["ik"])
 
 
 @pytest.mark.parametrize("name", ["CCD", "mink", "TRAC-IK, 5 ms"])

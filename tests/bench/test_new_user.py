@@ -163,7 +163,7 @@ def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder, mo
 
 
 def test_entrants_may_make_as_many_iterations_as_ours(folder, records, made):
-    entrants = opening.opened(opening.named(["my_ik.py"]), ["ik"])
+    entrants = opening.opened(opening.addresses(["my_ik.py"]), ["ik"])
     scale = selection.scale_of("quick", 2, entrants, [])
     asked: dict[str, dict[str, object]] = {}
     for block in blocks("ik", scale):

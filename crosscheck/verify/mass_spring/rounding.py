@@ -29,13 +29,14 @@ def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
     A coordinate is rounded by epsilon of its size in each substep, always to the same side where
     the increments are alike. Lengths are rounded as coordinates are, and h² k / m of them enters
     the right-hand side of a step; M + h² L is conditioned by 1 + h² k / m. An unstable explicit
-    step multiplies what came before by hs² k / m.
+    step multiplies what came before by hs² k / m. The largest eigenvalue of M^-1 L is bounded by
+    the largest sum of |k| + |c| / h over the springs of a particle, times 2 / m.
     """
-    stiffest, n = _stiffest(p), model.substeps
-    growth = 1.0
+    stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
+    stiffest = float((2.0 * np.abs(p.incidence).T @ stiffness / p.masses).max(initial=0.0))
+    n, steps, growth = model.substeps, p.steps or 1, 1.0
     if model.integrator.explicit:
         growth = min(max(1.0, stiffest * (p.h / n) ** 2) ** (n - 1), 1e12)
-    steps = p.steps or 1
     size = np.abs(p.positions).max() + p.h * steps * np.abs(p.velocities).max()
     size += (p.h * steps) ** 2 * float(np.linalg.norm(p.gravity))
     x = ROUNDINGS * epsilon * size * (1.0 + n + p.h * p.h * stiffest) * growth * steps**2
@@ -43,34 +44,26 @@ def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
     return Rounding(float(x), float(v))
 
 
-def _stiffest(p: SpringProblem) -> float:
-    """Return a bound of the largest eigenvalue of M^-1 L, dampers included [1/s²]."""
-    stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
-    return float((2.0 * np.abs(p.incidence).T @ stiffness / p.masses).max(initial=0.0))
-
-
-def apart(
+def relative_gap(
     p: SpringProblem, predicted: Mapping[str, Any], answered: Mapping[str, Any], allowed: Rounding
 ) -> float:
     """Return the largest difference of positions and velocities, over what they changed by.
 
-    Rounding counts as no difference; so a value above SOLVED means another step. Velocities of
+    Rounding counts as no difference; so a number above SOLVED means another step. Velocities of
     pins are left out: they are nobody's.
     """
-    moved = np.abs(np.asarray(predicted["positions"]) - p.positions).max(initial=0.0)
-    fastest = np.abs(predicted["velocities"]).max(initial=0.0)
-    scales = {
-        "positions": moved + allowed.positions / SOLVED,
-        "velocities": fastest + allowed.velocities / SOLVED,
-    }
-    worst = [difference(p, name, predicted[name], answered[name]) / scales[name]
-             for name in scales if name in answered]  # fmt: skip
-    return float(max(worst)) if worst and np.isfinite(worst).all() else np.inf
+    gaps = [
+        coordinate_gap(p, name, predicted[name], answered[name])
+        / (np.abs(predicted[name] - before).max(initial=0.0) + getattr(allowed, name) / SOLVED)
+        for name, before in (("positions", p.positions), ("velocities", 0.0))
+        if name in answered
+    ]
+    return float(max(gaps)) if gaps and np.isfinite(gaps).all() else np.inf
 
 
-def difference(p: SpringProblem, name: str, one: Any, other: Any) -> float:
+def coordinate_gap(p: SpringProblem, name: str, expected: Any, answered: Any) -> float:
     """Return the largest difference of a coordinate, the velocities of pins left out."""
-    gap = np.abs(np.asarray(one) - np.asarray(other))
+    gap = np.abs(np.asarray(expected) - np.asarray(answered))
     if name == "velocities":
         gap[..., p.pinned, :] = 0.0
     return float(gap.max(initial=0.0))
@@ -78,4 +71,4 @@ def difference(p: SpringProblem, name: str, one: Any, other: Any) -> float:
 
 def correct_digits(gap: float, size: float) -> float:
     """Return how many digits of a number of this size are right, at most 16."""
-    return float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))
+    return float(np.clip(-np.log10(max(gap / size, 1e-16)), 0.0, 16.0))

@@ -51,7 +51,7 @@ class Inside:
     """The host of a Python solver in this process, asked as a child process is."""
 
     def __init__(self, spec, folder):
-        self._solver, self._failure = host._loaded(spec, folder)
+        self._solver, self._failure = host.load_safely(spec, folder)
 
     @property
     def greeting(self):

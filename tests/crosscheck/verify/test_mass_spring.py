@@ -319,7 +319,7 @@ def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family)
         judged("three", "cloth", Verdict.WRONG),
     ]))  # fmt: skip
     assert "in the case 'two': It is off." in told
-    assert (str(stepping._TRACES[family]) in told) is (first is not Verdict.UNDECIDED)
+    assert (str(stepping.TRACES[family]) in told) is (first is not Verdict.UNDECIDED)
     assert stepping._first_broken([judged("one", "flight", first)]) is None
 
 
@@ -470,7 +470,9 @@ def energies(faults, shift=0.0):
 
 
 @pytest.mark.parametrize(
-    "fault", [one for one in energy.FAULTS if one.key not in NO_FORCES], ids=lambda one: one.key
+    "fault",
+    [one for one in energy.ENERGY_FAULTS if one.key not in NO_FORCES],
+    ids=lambda one: one.key,
 )
 def test_every_fault_of_energies_is_caught_and_named(fault):
     found = report(energies([fault]), "energy")
