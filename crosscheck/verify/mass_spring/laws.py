@@ -87,7 +87,7 @@ def coordinate_gap(p: SpringProblem, name: str, expected: Any, output: Any) -> f
 
 def correct_digits(gap: float, size: float) -> float:
     """Return how many digits of a number of this size are right, at most 16."""
-    return float(np.clip(-np.log10(max(gap / size, 1e-16)), 0.0, 16.0))
+    return float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))
 
 
 @dataclass(frozen=True, eq=False)
