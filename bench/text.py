@@ -1,4 +1,4 @@
-"""Names from elsewhere as text that no terminal, browser or parser takes for an instruction."""
+"""Names from elsewhere as text that no terminal, browser or parser reads as an instruction."""
 
 import functools
 import re
@@ -8,16 +8,16 @@ from plumbob.crosscheck.verify.sentence import all_visible, visible
 
 __all__ = ["all_visible", "chunks", "shortened", "visible"]
 
-# Where a word may be broken: after a dash and its like between letters, never in a number.
+# Where a word may be broken: after a dash or the like between letters, never in a number.
 _BREAK = re.compile(r"(?<=[^\W\d_][/_.-])(?=[^\W\d_])")
 
 
 def shortened(text: str, length: int) -> str:
-    """Return the text, its end cut off if it is longer."""
+    """Return a text of at most so many letters, its end cut off if necessary."""
     return text if len(text) <= length else f"{text[: length - 1]}…"
 
 
 @functools.lru_cache(maxsize=10_000)
 def chunks(text: str) -> Sequence[str]:
-    """Return a text in the parts between which a line may end: after spaces, dashes, slashes."""
+    """Return the parts of a text between which a line may end: after spaces, dashes, slashes."""
     return [part for token in text.split() for part in _BREAK.split(token)]

@@ -258,15 +258,15 @@ class ChildProcess:
             if key.fileobj is self._process.stdin:
                 self._write()
                 continue
-            chunk = _read(key.fileobj)
-            if chunk == b"":
-                self._forget(key.fileobj)
-                is_open &= key.fileobj is not self._process.stdout
-            elif key.fileobj is self._process.stdout:
-                self.partial += chunk or b""
-            else:
-                self.last_words += chunk or b""
-                del self.last_words[:-STDERR_LENGTH]
+            with contextlib.suppress(BlockingIOError):
+                chunk = os.read(key.fd, _CHUNK)
+                if not chunk:
+                    self._forget(key.fileobj)
+                    is_open &= key.fileobj is not self._process.stdout
+                elif key.fileobj is self._process.stdout:
+                    self.partial += chunk
+                else:
+                    self.last_words = (self.last_words + chunk)[-STDERR_LENGTH:]
         return is_open
 
     def _write(self) -> None:
@@ -340,27 +340,16 @@ class ChildProcess:
             return Loss.UNFINISHED
         if self._unsent:
             return Loss.UNREAD
-        return Loss.COMPUTING if self._computes() else Loss.WAITING
-
-    def _computes(self) -> bool:
-        """Return whether it computed, rather than waited, in most of its records."""
         if not self._looks:
-            return False
+            return Loss.WAITING
         runs = [any(process.runs for process in members) for _, members in self._looks]
         seconds = self._looks[-1][0] - self._looks[0][0]
-        return self._used() > IDLE * seconds or 2 * sum(runs) > len(runs)
+        computed = self._used() > IDLE * seconds or 2 * sum(runs) > len(runs)
+        return Loss.COMPUTING if computed else Loss.WAITING
 
 
 def _pipes(process: Any) -> list[Any]:
     return [pipe for pipe in (process.stdin, process.stdout, process.stderr) if pipe]
-
-
-def _read(pipe: Any) -> bytes | None:
-    """Return the next bytes, b"" at the end of the stream, None if there are none yet."""
-    try:
-        return os.read(pipe.fileno(), _CHUNK)
-    except BlockingIOError:
-        return None
 
 
 def _end(

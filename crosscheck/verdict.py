@@ -61,8 +61,7 @@ def each_case(compare: Callable[[int], Comparison]) -> Callable[[int], Iterable[
 def check_claim(claim: Claim, cases: int | None = None) -> ClaimVerdict:
     """Compare all cases of a claim, or the first few, and return the verdict.
 
-    Raises:
-        ValueError: if it is no claim, or the number not an integer of at least 0.
+    Raise a ValueError if it is no claim, or the number not an integer of at least 0.
     """
     arguments.instance("claim", claim, Claim)
     count = claim.cases if cases is None else arguments.integer("cases", cases, least=0)
@@ -86,8 +85,7 @@ def check_claim(claim: Claim, cases: int | None = None) -> ClaimVerdict:
 def _relative_difference(a: FloatArray, b: FloatArray, scale: float) -> float:
     """Return the largest difference over the scale, or NaN if a value is not finite.
 
-    Raises:
-        ValueError: if the shapes differ, which would broadcast, or are empty.
+    Raise a ValueError if the shapes differ, which would broadcast, or are empty.
     """
     if a.shape != b.shape or a.size == 0:
         raise ValueError(f"comparison: expected two equal shapes, got {a.shape} and {b.shape}")

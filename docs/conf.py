@@ -30,6 +30,13 @@ def escape_marks(app, what, name, object_, options, lines):
         lines[number] = "".join(parts)
 
 
+def shorten_types(app, what, name, object_, options, signature, returns):
+    """Write `ArrayLike` for NumPy's long union of that name."""
+    union = re.compile(r"_Buffer \| .*?complex \| bytes \| str\]")
+    return signature and union.sub("ArrayLike", signature), returns
+
+
 def setup(app):
-    """Escape before napoleon turns sections into markup, which happens at priority 500."""
+    """Connect the hooks; napoleon turns sections into markup at priority 500."""
     app.connect("autodoc-process-docstring", escape_marks, priority=400)
+    app.connect("autodoc-process-signature", shorten_types)

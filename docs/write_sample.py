@@ -10,8 +10,8 @@ import tempfile
 from pathlib import Path
 
 from plumbob.bench.harness.record import FILE_NAME, RecordFile
-from plumbob.bench.report.report import Written, write
-from plumbob.bench.tables.provenance import provenance
+from plumbob.bench.report.report import Report, write
+from plumbob.bench.tables.layout import provenance
 from plumbob.bench.tables.results import listed
 from plumbob.bench.tables.table import words
 
@@ -40,16 +40,16 @@ def write_sample(folder: Path) -> None:
     README.write_text(with_headlines(README.read_text(encoding="utf-8"), text), encoding="utf-8")
 
 
-def headlines(report: Written, folder: Path) -> str:
+def headlines(report: Report, folder: Path) -> str:
     """Return the headlines as a Markdown table, with the machine and the versions below it."""
     rows = ["| question | best | by how much |", "|---|---|---|"]
     if verdict := report.answers.verdict:
         rows.append(
-            f"| Is the reference right? | {verdict.held} of {verdict.total} claims hold "
+            f"| Is the reference right? | {verdict.holding} of {verdict.total} claims hold "
             f"| the narrowest uses {words(100 * verdict.used)} % of its tolerance |"
         )
     rows += [
-        f"| {line.chapter.capitalize()}, {line.asked.lower()} | {line.answer} | {line.detail} |"
+        f"| {line.chapter.capitalize()}, {line.question.lower()} | {line.answer} | {line.detail} |"
         for line in report.answers.headlines
     ]
     timing = [record for record in RecordFile(folder).read().records if record.suite == "timing"]

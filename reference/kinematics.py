@@ -10,7 +10,7 @@ from . import arguments, rotation
 from .arguments import FloatArray, frozen
 from .articulation import Articulation
 from .backend.compiled import Kernel
-from .backend.simd.poses import (
+from .backend.simd.vectors import (
     LANES,
     in_lanes,
     load_position,

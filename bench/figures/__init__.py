@@ -1,1 +1,1 @@
-"""Figures: charts as data, sketches, and how they are drawn."""
+"""Figures: charts as data, sketches, and their drawing."""

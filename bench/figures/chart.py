@@ -1,7 +1,4 @@
-"""A chart as data: panels of curves or of marks in rows, which of them are labelled, their looks.
-
-Nothing here draws, so that a chart is made in no time and compared with what was drawn before.
-"""
+"""A chart as data: panels of curves or of marks in rows, the labelled solvers, and their looks."""
 
 import zlib
 from collections.abc import Mapping, Sequence
@@ -17,23 +14,23 @@ from ..tables.results import label
 
 Floats = NDArray[np.float64]
 
-# So many curves are labelled; the others are grey.
-MOST = 6
+# Curves that are labelled; the others are grey.
+MAX_LABELLED = 6
 LINE, MARKS, SPAN = "line", "marks", "span"
 LESS, GREATER = "less", "greater"
-# Where curves are compared: so many places along their axis.
+# Places along the axis at which curves are compared.
 _PLACES = 64
 
 
 class Look(NamedTuple):
-    """A colour by its name in `style.COLOURS`, a line and a marker of matplotlib's."""
+    """A colour by its name in `style.COLOURS`, a line and a marker of matplotlib."""
 
     colour: str
     line: Any
     marker: str
 
 
-# Any two differ in all three, so that they are told apart without colour.
+# Any two differ in all three, and so without colour too.
 LOOKS = (
     Look("orange", "-", "o"),
     Look("blue", (0, (5, 1.6)), "s"),
@@ -49,9 +46,9 @@ class Series(NamedTuple):
     """A curve, or marks.
 
     Attributes:
-        solver: whose it is, as records call it.
-        x, y: where it goes; in a chart of rows y is the number of a row.
-        low, high: what it lies between, along y, or along x in a chart of rows; () if unknown.
+        solver: by its name in records.
+        x, y: coordinates; in a chart of rows y is the number of a row.
+        low, high: bounds along y, or along x in a chart of rows; () if unknown.
         form: a line, marks, or spans from a hollow mark to a filled one, a pair of points each.
     """
 
@@ -66,24 +63,24 @@ class Series(NamedTuple):
 def series(
     solver: str, x: Any, y: Any, between: tuple[Any, Any] = ((), ()), form: str = LINE
 ) -> Series:
-    """Return a curve of finite floats: points that are none are left out.
+    """Return a curve without the points that are not finite.
 
     Raises:
-        ValueError: if lengths differ, or a value is no number.
+        ValueError: if lengths differ, or an entry is no number.
     """
-    rows = [np.asarray(values, dtype=float) for values in (x, y, *between) if np.size(values)]
+    rows = [np.asarray(row, dtype=float) for row in (x, y, *between) if np.size(row)]
     if any(row.ndim != 1 or len(row) != len(rows[0]) for row in rows) or len(rows) not in (0, 2, 4):
         raise ValueError(f"x, y: expected rows of one length, got {[row.shape for row in rows]}")
     if not rows:
         return Series(solver, np.empty(0), np.empty(0), form=form)
-    whole = np.isfinite(rows[0]) & np.isfinite(rows[1])
-    valid = [row[whole] for row in rows]
-    low, high = valid[2:] or ((), ())
-    return Series(solver, valid[0], valid[1], low, high, form)
+    finite = np.isfinite(rows[0]) & np.isfinite(rows[1])
+    x, y, *bounds = (row[finite] for row in rows)
+    low, high = bounds or ((), ())
+    return Series(solver, x, y, low, high, form)
 
 
 class Axis(NamedTuple):
-    """What an axis is called, whether it is logarithmic, and between what it is drawn."""
+    """Label, scale and limits of an axis."""
 
     label: str = ""
     log: bool = False
@@ -94,9 +91,9 @@ NO_AXIS = Axis()
 
 
 class Panel(NamedTuple):
-    """One of the diagrams of a chart: its title, curves, and a line across (such as a tolerance).
+    """A diagram of a chart: title, curves, a line across (such as a tolerance), y label.
 
-    The label stands at its y axis if that is not the one of the chart.
+    An empty label is that of the chart.
     """
 
     title: str
@@ -107,19 +104,19 @@ class Panel(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """Panels of curves, or of marks in rows that have names.
+    """Panels of curves, or of marks in named rows.
 
     Attributes:
         name: the stem of its files.
-        title: what it is called.
-        shows: what can be read off.
+        title: heading.
+        shows: a sentence on its contents.
         panels: row by row.
-        x, y: its axes, the same for all panels.
-        columns: how many panels stand beside each other.
-        rows: the names of rows, from above; () if y is a quantity.
-        better: whether a curve is better if its values are less or greater.
+        x, y: axes of all panels.
+        columns: number of panels beside each other.
+        rows: names of rows from above; () if y is a quantity.
+        better: whether lower or higher curves are better.
         entrants: solvers that are always labelled.
-        hollow, filled: what the two marks of a span mean.
+        hollow, filled: meaning of the two marks of a span.
     """
 
     name: str
@@ -137,123 +134,117 @@ class Chart:
 
     @cached_property
     def solvers(self) -> list[str]:
-        """The solvers that are drawn, in the order of the panels."""
-        return list(dict.fromkeys(one.solver for panel in self.panels for one in panel.series))
+        """All solvers in the order of the panels."""
+        return list(dict.fromkeys(curve.solver for panel in self.panels for curve in panel.series))
 
     @cached_property
     def labelled(self) -> list[str]:
-        """The solvers that are labelled: all if they are few.
+        """The labelled solvers: all, or the entrants, the best of each side, and the next best.
 
-        Otherwise the entrants, the best of ours, the best of all others, and then the best.
+        The sides are Plumbob's solvers and all others.
         """
         names = self.solvers
-        if len(names) <= MOST:
+        if len(names) <= MAX_LABELLED:
             return names
-        cost = self.costs()
-        ranked = sorted(names, key=lambda name: cost[name])
+        costs = self.costs()
+        ranked = sorted(names, key=lambda name: costs[name])
         firsts = [name for name in ranked if name in self.entrants]
-        for mine in (True, False):
-            firsts += [n for n in ranked if is_ours(n) == mine and n not in self.entrants][:1]
-        chosen = list(dict.fromkeys([*firsts, *ranked]))[:MOST]
-        return [name for name in names if name in chosen]
+        for side in (True, False):
+            firsts += [n for n in ranked if is_ours(n) == side and n not in self.entrants][:1]
+        labelled = list(dict.fromkeys([*firsts, *ranked]))[:MAX_LABELLED]
+        return [name for name in names if name in labelled]
 
     @cached_property
-    def others(self) -> list[str]:
-        """The solvers that are grey."""
-        labelled = self.labelled
-        return [name for name in self.solvers if name not in labelled]
+    def unlabelled(self) -> list[str]:
+        """The grey solvers."""
+        return [name for name in self.solvers if name not in self.labelled]
 
     @property
     def caption(self) -> str:
-        """What can be read off, and who is grey."""
-        if not self.others:
+        """The sentence on its contents, and the names of the grey solvers."""
+        if not self.unlabelled:
             return self.shows
-        names = "; ".join(label(name) for name in self.others)
+        names = "; ".join(map(label, self.unlabelled))
         return f"{self.shows} Grey, named when pointed at: {names}."
 
     def costs(self) -> dict[str, float]:
-        """Return for each solver how far its curve is from the best, the mean over the panels.
+        """Return the distance of each solver's curve from the best, summed over the panels.
 
-        That is the area under the best it has reached so far, on the axes as they are drawn, from 0
-        (the best of the panel from the start) to 1 (absent, or the worst throughout).
+        It is the area under the best value reached so far, on the axes as drawn, from 0 (best from
+        the start) to 1 (absent, or worst throughout).
         """
-        total = dict.fromkeys(self.solvers, 0.0)
+        totals = dict.fromkeys(self.solvers, 0.0)
         for panel in self.panels:
-            found = self._areas(panel)
-            for name in total:
-                total[name] += found.get(name, 1.0)
-        return total
+            costs = self._row_costs(panel) if self.rows else self._curve_costs(panel)
+            for name in totals:
+                totals[name] += costs.get(name, 1.0)
+        return totals
 
-    def _areas(self, panel: Panel) -> dict[str, float]:
-        if self.rows:
-            return self._behind(panel)
-        points = {one.solver: self._on_axes(one) for one in panel.series if len(one.x)}
+    def _curve_costs(self, panel: Panel) -> dict[str, float]:
+        sign = -1.0 if self.better == GREATER else 1.0
+        points = {}
+        for curve in panel.series:
+            xy = np.stack([_scaled(curve.x, self.x), sign * _scaled(curve.y, self.y)])
+            points[curve.solver] = xy[:, np.isfinite(xy).all(axis=0)]
+        points = {name: xy for name, xy in points.items() if xy.size}
         if not points:
             return {}
         every = np.concatenate(list(points.values()), axis=1)
-        low, high = every.min(axis=1), every.max(axis=1)
+        low, high = every.min(axis=1, keepdims=True), every.max(axis=1, keepdims=True)
         size = np.where(high > low, high - low, 1.0)
-        places = np.linspace(0.0, 1.0, _PLACES)
-        return {
-            name: _area((xy - low[:, None]) / size[:, None], places) for name, xy in points.items()
-        }
+        return {name: _area((xy - low) / size) for name, xy in points.items()}
 
-    def _on_axes(self, one: Series) -> Floats:
-        """Return the points as they are drawn, a better one below."""
-        x, y = (_scaled(v, axis) for v, axis in ((one.x, self.x), (one.y, self.y)))
-        valid = np.isfinite(x) & np.isfinite(y)
-        return np.stack([x, -y if self.better == GREATER else y])[:, valid]
-
-    def _behind(self, panel: Panel) -> dict[str, float]:
-        """Return how far each solver is behind the best of the rows, from 0 to 1, absent ones 1."""
-        values = {
-            (one.solver, int(row)): _scaled(x, self.x)
-            for one in panel.series
-            for x, row in zip(one.x, one.y, strict=True)
+    def _row_costs(self, panel: Panel) -> dict[str, float]:
+        """Return the distance of each solver from the best of each row, from 0 to 1, on average."""
+        marks = {
+            (curve.solver, int(row)): x
+            for curve in panel.series
+            for x, row in zip(_scaled(curve.x, self.x), curve.y, strict=True)
+            if np.isfinite(x)
         }
-        costs = {one.solver: 0.0 for one in panel.series}
+        costs = {curve.solver: 0.0 for curve in panel.series}
         for row in range(len(self.rows)):
-            here = {name: v for (name, r), v in values.items() if r == row and np.isfinite(v)}
-            least, most = min(here.values(), default=0.0), max(here.values(), default=0.0)
+            xs = [x for (_, number), x in marks.items() if number == row]
+            low, high = min(xs, default=0.0), max(xs, default=0.0)
             for name in costs:
-                size = (most - least) or 1.0
-                costs[name] += (here[name] - least) / size if name in here else 1.0
+                x = marks.get((name, row))
+                costs[name] += 1.0 if x is None else (x - low) / ((high - low) or 1.0)
         return {name: float(cost) / max(1, len(self.rows)) for name, cost in costs.items()}
 
 
-def _scaled(values: Any, axis: Axis) -> Any:
+def _scaled(numbers: Any, axis: Axis) -> Any:
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.log10(values) if axis.log else np.asarray(values, dtype=float)
+        return np.log10(numbers) if axis.log else np.asarray(numbers, dtype=float)
 
 
-def _area(points: Floats, places: Floats) -> float:
-    """Return the mean over some places of the least y so far, 1 before the first point."""
+def _area(points: Floats) -> float:
+    """Return the mean of the lowest y so far over x from 0 to 1; 1 before the first point."""
     x, y = points
     order = np.argsort(x, kind="stable")
-    least = np.minimum.accumulate(y[order])
-    reached = np.searchsorted(x[order], places, side="right") - 1
-    return float(np.where(reached < 0, 1.0, least[np.maximum(reached, 0)]).mean())
+    lowest = np.minimum.accumulate(y[order])
+    reached = np.searchsorted(x[order], np.linspace(0.0, 1.0, _PLACES), side="right") - 1
+    return float(np.where(reached < 0, 1.0, lowest[np.maximum(reached, 0)]).mean())
 
 
 def is_ours(solver: str) -> bool:
-    """Return whether a solver is one of the reference."""
+    """Return whether a solver is Plumbob's."""
     return registry.find(solver).engine.casefold() == registry.PLUMBOB.casefold()
 
 
 def looks(names: Sequence[str]) -> Mapping[str, Look]:
-    """Return how each of a few solvers is drawn, those first that have a style of their own.
+    """Return the look of each of a few solvers, the same in every chart if it is free.
 
-    A solver gets the same in every chart, if those beside it leave it free.
+    Solvers with a style of their own choose first.
     """
-    own = [name for name in names if registry.find(name).style is not registry.OTHER]
-    found: dict[str, Look] = {}
-    for name in (*own, *(name for name in names if name not in own)):
-        found[name] = next(look for look in _preferred(name) if look not in found.values())
-    return found
+    styled = [name for name in names if registry.find(name).style is not registry.OTHER]
+    assigned: dict[str, Look] = {}
+    for name in dict.fromkeys([*styled, *names]):
+        assigned[name] = next(look for look in _preferred(name) if look not in assigned.values())
+    return assigned
 
 
 def _preferred(name: str) -> tuple[Look, ...]:
-    """Return all looks, beginning with that of the solver's own colour, or of its name."""
+    """Return all looks, first that of the solver's own colour, else by a hash of its name."""
     colours = [look.colour for look in LOOKS]
     own = registry.find(name).style.colour
     first = colours.index(own) if own in colours else zlib.crc32(name.encode()) % len(LOOKS)

@@ -1,23 +1,21 @@
-"""The common style of all figures, and how a chart is drawn; nothing here computes.
+"""The common style of all figures, and the drawing of charts.
 
-Colours are tuned for a white page and named in `style.COLOURS`, so that a page with a dark side
-can put its own in their place. Solvers differ in line and marker as well as in colour.
+Colours are from `style.COLOURS`, which the dark page replaces by its own. Solvers differ in
+line and marker as well as in colour.
 """
 
 import contextlib
 import io
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from markupsafe import escape
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 
 from ..tables.results import label
@@ -25,7 +23,7 @@ from ..text import shortened
 from .chart import GREY, LINE, SPAN, Axis, Chart, Look, Panel, Series, looks
 from .style import COLOURS, written
 
-# On the page no figure is narrower than 38 rem [inch]; letters there are never below 7 points.
+# Width of a figure [inch], at least 38 rem on the page, where letters stay above 7 points.
 WIDTH = 7.0
 SMALLEST = 8.0
 STYLE: dict[Any, Any] = {
@@ -64,10 +62,10 @@ for _axis in ("xtick", "ytick"):
     STYLE[f"{_axis}.labelsize"] = SMALLEST
 # Heights [inch] of a panel, of a row of marks, of a line of the legend.
 PANEL, ROW, LEGEND = 2.05, 0.3, 0.19
-# Letters of bold type to an inch, of the legend's, and of the name of a row at most.
-_BOLD, _PLAIN, _ROW = 11.0, 13.0, 34
+# Letters per inch of bold and of plain type; letters of the name of a row.
+_BOLD, _PLAIN, _ROW_NAME = 11.0, 13.0, 34
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Lines of the smallest letters beside a panel; steps between even ticks, most first.
+# Lines of the smallest letters beside a panel; numbers of steps between even ticks.
 _LINES, _STEPS = 14.0, range(6, 1, -1)
 # Marks along a line.
 _MARKS = 5
@@ -75,7 +73,7 @@ _MARKS = 5
 
 @contextlib.contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the common style, without a word on letters that a font does not have."""
+    """Draw in the common style, without warnings on letters that a font lacks."""
     with mpl.rc_context(STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         warnings.filterwarnings("ignore", "constrained_layout not applied")
@@ -92,85 +90,59 @@ def canvas(
 
 
 def svg_of(figure: Figure, title: str, mark: str = "") -> str:
-    """Return a figure as SVG, the same for the same figure, with a mark at its end."""
-    text = io.StringIO()
-    about = {"Date": None, "Creator": None, "Title": title}
-    figure.savefig(text, format="svg", metadata=about)
-    named = text.getvalue()
-    for i, name in enumerate(getattr(figure, "named", ())):
-        found = f'<g class="series"><title>{escape(label(name))}</title>'
-        named = named.replace(f'<g id="series-{i}">', found).replace(f'<g id="series-{i}"/>', "")
-    return f"{named}<!-- {mark} -->\n" if mark else named
+    """Return a figure as reproducible SVG, with a mark at its end."""
+    file = io.StringIO()
+    figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None, "Title": title})
+    text = file.getvalue()
+    for i, name in enumerate(getattr(figure, "series_names", ())):
+        group = f'<g class="series"><title>{escape(label(name))}</title>'
+        text = text.replace(f'<g id="series-{i}">', group).replace(f'<g id="series-{i}"/>', "")
+    return f"{text}<!-- {mark} -->\n" if mark else text
 
 
 def pdf_of(figure: Figure, title: str, mark: str = "") -> bytes:
-    """Return a figure as PDF with its fonts and its text, the same for the same figure."""
-    content = io.BytesIO()
+    """Return a figure as reproducible PDF with its fonts and text."""
+    file = io.BytesIO()
     about = {"CreationDate": None, "Creator": None, "Producer": None, "Keywords": mark or None}
     figure.set_layout_engine("none")
-    figure.savefig(content, format="pdf", metadata={**about, "Title": title})
-    return content.getvalue()
+    figure.savefig(file, format="pdf", metadata={**about, "Title": title})
+    return file.getvalue()
 
 
 def draw_chart(chart: Chart) -> Figure:
     """Return a chart drawn: panels, and a legend below them."""
     columns = max(1, min(chart.columns, len(chart.panels)))
-    lines = -(-len(chart.panels) // columns)
-    look = looks(chart.labelled)
-    entries = _entries(chart, look)
-    width = max((len(name) for _, name in entries), default=0) / _PLAIN + 0.6
-    beside = max(1, int(WIDTH / width))
-    tall = ROW * len(chart.rows) + 0.7 if chart.rows else PANEL
-    height = tall * lines + 0.25 + LEGEND * -(-len(entries) // beside)
-    figure, axes = canvas(height, columns, lines, sharex=not chart.rows, sharey=True)
-    drawer = _Drawer(chart, look)
+    rows = -(-len(chart.panels) // columns)
+    drawer = _ChartDrawer(chart, columns)
+    handles, names = drawer.legend()
+    legend_columns = max(1, int(WIDTH / (max(map(len, names), default=0) / _PLAIN + 0.6)))
+    panel_height = ROW * len(chart.rows) + 0.7 if chart.rows else PANEL
+    height = panel_height * rows + 0.25 + LEGEND * -(-len(names) // legend_columns)
+    figure, axes = canvas(height, columns, rows, sharex=not chart.rows, sharey=True)
     for i, (ax, panel) in enumerate(zip(axes, chart.panels, strict=False)):
         drawer.draw(ax, panel)
-        ax.set_title(_wrapped(panel.title, WIDTH / columns))
+        ax.set_title(_two_lines(panel.title, WIDTH / columns * _BOLD))
         if i + columns >= len(chart.panels):
-            ax.set_xlabel(_wrapped(chart.x.label, WIDTH / columns, _PLAIN))
+            ax.set_xlabel(_two_lines(chart.x.label, WIDTH / columns * _PLAIN))
             ax.tick_params(labelbottom=True)
-        if i % columns == 0 and (words := panel.label or chart.y.label):
-            ax.set_ylabel(written(words))
+        if i % columns == 0 and (title := panel.label or chart.y.label):
+            ax.set_ylabel(written(title))
     for ax in axes[: len(chart.panels)]:
         drawer.scale(ax)
     for ax in axes[len(chart.panels) :]:
         ax.remove()
-    if entries:
-        figure.legend(
-            *map(list, zip(*entries, strict=True)),
-            loc="outside lower left",
-            ncols=beside,
-            handler_map={tuple: HandlerTuple(ndivide=None)},
-        )
-    figure.named = chart.solvers  # type: ignore[attr-defined]
+    if names:
+        figure.legend(handles, names, loc="outside lower left", ncols=legend_columns)
+    figure.series_names = chart.solvers  # type: ignore[attr-defined]
     return figure
 
 
-def _wrapped(title: str, width: float, letters: float = _BOLD) -> str:
-    """Return a title on two lines if it is longer than a panel is wide [inch]."""
-    return _lines(title, max(12, int(width * letters)))
-
-
-def _lines(text: str, length: int) -> str:
-    """Return a text on two lines of so many letters at most, the end cut off if it is longer."""
-    lines = textwrap.wrap(text, length)
-    rest = [shortened(" ".join(lines[1:]), length)] if lines[1:] else []
-    return "\n".join(map(written, [*lines[:1], *rest]))
-
-
-def _entries(chart: Chart, look: Mapping[str, Look]) -> list[tuple[Any, str]]:
-    """Return handles and words of the legend; none if there is one curve without a name."""
-    marks = bool(chart.rows)
-    found = [(Line2D([], [], **_style(look[name], marks)), written(label(name))) for name in look]
-    if chart.others:
-        grey = Line2D([], [], **_style(GREY, marks))
-        found.append((grey, f"{len(chart.others)} other{'s' if chart.others[1:] else ''}"))
-    for words, face in ((chart.hollow, "none"), (chart.filled, COLOURS["faint"])):
-        if words:
-            plain: dict[str, Any] = {"color": COLOURS["faint"], "markerfacecolor": face}
-            found.append((Line2D([], [], marker="o", linestyle="none", **plain), written(words)))
-    return found
+def _two_lines(text: str, width: float) -> str:
+    """Return a text on at most two lines of so many letters, its end cut off if necessary."""
+    letters = max(12, int(width))
+    lines = textwrap.wrap(text, letters)
+    second = [shortened(" ".join(lines[1:]), letters)] if lines[1:] else []
+    return "\n".join(map(written, [*lines[:1], *second]))
 
 
 def _style(look: Look, marks: bool) -> dict[str, Any]:
@@ -184,112 +156,117 @@ def _style(look: Look, marks: bool) -> dict[str, Any]:
     return style
 
 
-class _Drawer:
-    """Draws the panels of one chart."""
+class _ChartDrawer:
+    """Draws the panels of a chart."""
 
-    def __init__(self, chart: Chart, look: Mapping[str, Look]) -> None:
-        self._chart, self._look = chart, look
-        self._order = list(look)
-        names = max((min(len(name), _ROW) for name in chart.rows), default=6)
-        columns = max(1, min(chart.columns, len(chart.panels)))
+    def __init__(self, chart: Chart, columns: int) -> None:
+        self._chart, self._looks = chart, looks(chart.labelled)
+        self._order = list(self._looks)
+        names = max((min(len(name), _ROW_NAME) for name in chart.rows), default=6)
         self._letters = (_PLAIN * WIDTH - names) / columns - 4
         self._numbers = {name: i for i, name in enumerate(chart.solvers)}
 
+    def legend(self) -> tuple[list[Line2D], list[str]]:
+        """Return handles and names of the legend."""
+        marks, count = bool(self._chart.rows), len(self._chart.unlabelled)
+        entries = {written(label(name)): _style(self._looks[name], marks) for name in self._order}
+        if count:
+            entries[f"{count} other{'s' if count > 1 else ''}"] = _style(GREY, marks)
+        faint = COLOURS["faint"]
+        for meaning, face in ((self._chart.hollow, "none"), (self._chart.filled, faint)):
+            if meaning:
+                plain = {"color": faint, "marker": "o", "linestyle": "none"}
+                entries[written(meaning)] = {**plain, "markerfacecolor": face}
+        return [Line2D([], [], **style) for style in entries.values()], list(entries)
+
     def draw(self, ax: Axes, panel: Panel) -> None:
-        """Draw the curves of a panel: the grey ones below."""
-        for one in sorted(panel.series, key=lambda one: one.solver in self._look):
-            for artist in self._drawn(ax, one):
-                artist.set_gid(f"series-{self._numbers[one.solver]}")
+        """Draw the curves of a panel: grey curves below."""
+        for curve in sorted(panel.series, key=lambda curve: curve.solver in self._looks):
+            draw = self._draw_marks if self._chart.rows else self._draw_line
+            for artist in draw(
+                ax, curve, _style(self._looks.get(curve.solver, GREY), curve.form != LINE)
+            ):
+                artist.set_gid(f"series-{self._numbers[curve.solver]}")
         if panel.across is not None:
             ax.axhline(panel.across, color=COLOURS["faint"], linewidth=0.8, dashes=(2, 2))
 
     def scale(self, ax: Axes) -> None:
         """Set up the axes of a panel, when all panels that share them have their curves."""
-        _scale(ax, "x", self._chart.x, self._letters)
+        _set_axis(ax, "x", self._chart.x, self._letters)
         if self._chart.rows:
-            names = [_lines(name, _ROW) for name in self._chart.rows]
+            names = [_two_lines(name, _ROW_NAME) for name in self._chart.rows]
             ax.set_yticks(range(len(names)), names)
             ax.set_ylim(len(names) - 0.5, -0.5)
         else:
-            _scale(ax, "y", self._chart.y, _LINES, is_upright=True)
+            _set_axis(ax, "y", self._chart.y, _LINES)
 
-    def _drawn(self, ax: Axes, one: Series) -> list[Artist]:
-        style = _style(self._look.get(one.solver, GREY), marks=one.form != LINE)
-        if self._chart.rows:
-            return self._marks(ax, one, style)
-        if one.solver in self._look:
-            _between(ax, one, style)
-            style["markevery"] = _every(one, self._order.index(one.solver))
-        elif len(one.x) <= 3 * _MARKS:
+    def _draw_line(self, ax: Axes, curve: Series, style: dict[str, Any]) -> list[Line2D]:
+        if curve.solver in self._looks:
+            if np.size(curve.low):
+                band = {"color": style["color"], "alpha": 0.13, "linewidth": 0}
+                ax.fill_between(curve.x, curve.low, curve.high, **band)
+            style["markevery"] = _marked_points(len(curve.x), self._order.index(curve.solver))
+        elif len(curve.x) <= 3 * _MARKS:
             style["marker"] = "."
-        return list(ax.plot(one.x, one.y, **style))
+        return list(ax.plot(curve.x, curve.y, **style))
 
-    def _marks(self, ax: Axes, one: Series, style: dict[str, Any]) -> list[Artist]:
-        """Draw marks in their rows, each solver a little below the one before."""
-        y = one.y + self._aside(one.solver)
+    def _draw_marks(self, ax: Axes, curve: Series, style: dict[str, Any]) -> list[Line2D]:
+        """Draw marks in their rows, each labelled solver a little below the last."""
+        x, y = curve.x, curve.y
+        is_labelled = curve.solver in self._looks
+        if is_labelled:
+            y = y + 0.7 * ((self._order.index(curve.solver) + 0.5) / len(self._order) - 0.5)
         faint = {"color": style["color"], "linewidth": 0.9, "alpha": 0.55}
-        if one.form == SPAN:
-            found: list[Artist] = []
+        if curve.form == SPAN:
+            artists = []
             for i in range(0, len(y), 2):
-                ax.plot(one.x[i : i + 2], y[i : i + 2], **faint)
-                found += ax.plot(one.x[i], y[i], **style, markerfacecolor="none")
-                found += ax.plot(one.x[i + 1 : i + 2], y[i + 1 : i + 2], **style)
-            return found
-        if np.size(one.low) and one.solver in self._look:
-            ax.hlines(y, one.low, one.high, **faint)
-        return list(ax.plot(one.x, y, **style))
-
-    def _aside(self, solver: str) -> float:
-        """Return how far from the middle of its row a labelled solver is drawn."""
-        if solver not in self._look:
-            return 0.0
-        return 0.7 * ((self._order.index(solver) + 0.5) / len(self._order) - 0.5)
+                ax.plot(x[i : i + 2], y[i : i + 2], **faint)
+                artists += ax.plot(x[i], y[i], **style, markerfacecolor="none")
+                artists += ax.plot(x[i + 1 : i + 2], y[i + 1 : i + 2], **style)
+            return artists
+        if np.size(curve.low) and is_labelled:
+            ax.hlines(y, curve.low, curve.high, **faint)
+        return list(ax.plot(x, y, **style))
 
 
-def _between(ax: Axes, one: Series, style: Mapping[str, Any]) -> None:
-    if np.size(one.low):
-        ax.fill_between(one.x, one.low, one.high, color=style["color"], alpha=0.13, linewidth=0)
-
-
-def _every(one: Series, i: int) -> Any:
-    """Return at which points a line has its marks: at all of a few, else spread and staggered."""
-    count = len(one.x)
+def _marked_points(count: int, i: int) -> list[int] | None:
+    """Return the points of curve i with marks, staggered; None for all of a few."""
     if count <= 3 * _MARKS:
         return None
     places = (np.arange(_MARKS) + (i % 6 + 0.5) / 6) / _MARKS
     return sorted(set((places * (count - 1)).astype(int).tolist()))
 
 
-def _scale(ax: Axes, which: str, axis: Axis, room: float, is_upright: bool = False) -> None:
-    """Set an axis up: its scale, its limits, and as many ticks as fit, by letters or by lines."""
-    along = ax.xaxis if which == "x" else ax.yaxis
+def _set_axis(ax: Axes, name: str, axis: Axis, space: float) -> None:
+    """Set scale, limits and as many ticks as fit, by letters along x and by lines along y."""
+    along = ax.xaxis if name == "x" else ax.yaxis
     if axis.log:
-        (ax.set_xscale if which == "x" else ax.set_yscale)("log")
+        ax.set(**{f"{name}scale": "log"})
     if axis.limits != (None, None):
-        (ax.set_xlim if which == "x" else ax.set_ylim)(*axis.limits)
+        ax.set(**{f"{name}lim": axis.limits})
     low, high = sorted(along.get_view_interval())
     write = power if axis.log and (low < 1e-3 or high > 1e7) else _plain
-    values = ticks(low, high, axis.log, room, lambda x: 1.8 if is_upright else len(write(x)) + 1.5)
-    along.set_major_locator(mpl.ticker.FixedLocator(values))
+    sizes = (lambda x: len(write(x)) + 1.5) if name == "x" else (lambda x: 1.8)
+    along.set_major_locator(mpl.ticker.FixedLocator(ticks(low, high, axis.log, space, sizes)))
     along.set_minor_locator(mpl.ticker.NullLocator())
     along.set_major_formatter(mpl.ticker.FuncFormatter(write))
 
 
 def ticks(
-    low: float, high: float, log: bool, room: float, size: Callable[[float], float]
+    low: float, high: float, log: bool, space: float, size: Callable[[float], float]
 ) -> list[float]:
     """Return as many round values between two ends as have labels that stand apart, or two.
 
-    The label of a value takes its size, with a gap, of the room along the axis.
+    The label of a value takes its size, with a gap, of the space along the axis.
     """
     scale: Callable[[Any], Any] = np.log10 if log else np.asarray
     sets = [v[(v >= low) & (v <= high)].tolist() for v in _round_values(low, high, log)]
-    sets = [values for values in sets if len(values) > 1]
-    for values in sets:
-        sizes = np.array([*map(size, values)])
-        distances = room * np.diff(scale(values)) / (scale(high) - scale(low))
+    sets = [ends for ends in sets if len(ends) > 1]
+    for places in sets:
+        sizes = np.array([*map(size, places)])
+        distances = space * np.diff(scale(places)) / (scale(high) - scale(low))
         if (distances >= (sizes[1:] + sizes[:-1]) / 2).all():
-            return values
+            return places
     return [sets[0][0], sets[0][-1]] if sets else []
 
 
@@ -309,7 +286,7 @@ def _plain(x: float, _: float = 0) -> str:
 
 
 def power(x: float, _: float = 0) -> str:
-    """Return a power of ten in letters of one size, which stay legible and are found as text."""
+    """Return a power of ten with a raised exponent in letters of equal size, legible as text."""
     exponent = np.floor(np.log10(x) + 1e-9)
     factor = f"{x / 10**exponent:.3g}·".removeprefix("1·")
     return f"{factor}10" + f"{exponent:.0f}".translate(_RAISED)

@@ -1,4 +1,4 @@
-"""Drawings of an arm and a cloth, seen in parallel projection."""
+"""Draw an arm and a cloth in parallel projection."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,14 +15,14 @@ from .view import ARM_VIEW, CLOTH_VIEW, seen
 Floats = NDArray[np.float64]
 
 LIGHT = np.array([0.4, 0.8, 0.45])
-# From near to far, each lighter than the one before: as in motion.js.
+# From near to far, ever lighter, as in motion.js.
 COLOUR_MAP = LinearSegmentedColormap.from_list(
     "distance", ["#3d4ec6", "#8f3fb5", "#d0486f", "#f08a3c", "#f5c33b"]
 )
 
 
 def draw_arm(ax: Axes, joints: Floats, alpha: float = 1.0) -> None:
-    """Draw one pose of a chain from its joints' positions, (joint, 3), and mark its root."""
+    """Draw a pose of a chain by the positions of its joints, (joint, 3), and mark its root."""
     x, y, _ = seen(joints, ARM_VIEW)
     ax.plot(x, y, "-", color=COLOURS["blue"], alpha=alpha, linewidth=2.4, zorder=3)
     ax.plot(
@@ -37,9 +37,9 @@ def draw_cloth(
     pinned: Sequence[int] | NDArray[np.int64],
     shares: Floats | None = None,
 ) -> None:
-    """Draw a square cloth from its particles' positions, (particle, 3), the far squares first.
+    """Draw a square cloth by the positions of its particles, (particle, 3), far squares first.
 
-    The shares colour it, from 0 at the near end of the colours to 1 at the far one, (particle,).
+    The shares colour it, from 0 to 1 on the colour map, (particle,).
     """
     size = round(len(positions) ** 0.5)
     i, j = np.divmod(np.arange((size - 1) ** 2), size - 1)

@@ -1,7 +1,6 @@
-"""Figures and pictures, drawn only when what they show has changed.
+"""Figures as data, drawn only when their data or the drawing code has changed.
 
-A figure is data first: a `Sketch` knows what it shows and how it is drawn. The digest of that
-stands in the files that were drawn, and files with the same digest serve again.
+A digest of both is written into the files of a figure; files with the same digest are kept.
 """
 
 import hashlib
@@ -22,15 +21,15 @@ if TYPE_CHECKING:
 
     from .chart import Chart
 
-# Drawings that are kept for as long as the process lives.
-_KEPT = 64
-_DIGEST = "plumbob figure"
-# What no drawing of ours has: a file from elsewhere brings no script and no address into the page.
+# Drawings kept in memory.
+_CACHE_SIZE = 64
+_MARK = "plumbob figure"
+# No drawing of ours contains these: a file from elsewhere brings no script into the page.
 _FOREIGN = re.compile(r"<(script|foreignObject)|\son\w+=|href=\"(?!#|data:image/png)")
 
 
 class Drawing(NamedTuple):
-    """A figure or picture: the stem of its file, what it shows, as SVG and as PDF."""
+    """A figure: the stem of its files, its title and caption, and its content."""
 
     name: str
     title: str
@@ -45,10 +44,10 @@ class Sketch:
 
     Attributes:
         name: the stem of its files.
-        title: what it is called.
-        shows: what can be read off.
-        data: all that the drawing depends on: arrays, words, numbers, and tuples of such.
-        draw: makes a figure of matplotlib's from the data; imports matplotlib only then.
+        title: heading.
+        shows: a sentence on its contents.
+        data: of the figure: arrays, words, numbers, and tuples of such.
+        draw: returns the figure of the data; imports matplotlib only then.
     """
 
     name: str
@@ -58,75 +57,76 @@ class Sketch:
     draw: Callable[[Any], "Figure"]
 
     def digest(self) -> str:
-        """Return what is another for other data, and for other code that draws."""
-        found = hashlib.blake2b(digest_size=12)
+        """Return a cache key of the data and the drawing code."""
+        digest = hashlib.blake2b(digest_size=12)
         for source in (inspect.getsourcefile(self.draw), *_SOURCES):
-            found.update(Path(str(source)).read_bytes())
-        _update(found, (self.name, self.title, self.data))
-        return found.hexdigest()
+            digest.update(Path(str(source)).read_bytes())
+        _update(digest, (self.name, self.title, self.data))
+        return digest.hexdigest()
 
 
 _SOURCES = [
     Path(__file__).with_name(f"{name}.py")
     for name in ("sketch", "style", "drawing", "chart", "scene_drawing", "view")
 ]
-_drawn: OrderedDict[str, tuple[str, bytes]] = OrderedDict()
+_cache: OrderedDict[str, tuple[str, bytes]] = OrderedDict()
 
 
 def drawn(sketch: Sketch, folder: Path | None = None) -> Drawing:
-    """Return a sketch drawn, taken from a folder's files if they show the same."""
+    """Return a sketch drawn, or its files in a folder if they have the same digest."""
     digest = sketch.digest()
-    files = _drawn.get(digest) or _on_file(sketch.name, folder, digest) or _files(sketch, digest)
-    _drawn[digest] = files
-    _drawn.move_to_end(digest)
-    if len(_drawn) > _KEPT:
-        _drawn.popitem(last=False)
+    files = _cache.get(digest) or _read(sketch.name, folder, digest) or _draw(sketch, digest)
+    _cache[digest] = files
+    _cache.move_to_end(digest)
+    if len(_cache) > _CACHE_SIZE:
+        _cache.popitem(last=False)
     return Drawing(sketch.name, sketch.title, sketch.shows, *files)
 
 
-def _on_file(name: str, folder: Path | None, digest: str) -> tuple[str, bytes] | None:
-    """Return what was drawn before, if it shows the same."""
+def _read(name: str, folder: Path | None, digest: str) -> tuple[str, bytes] | None:
+    """Return SVG and PDF of the files in a folder, None if they have another digest."""
     if folder is None:
         return None
-    svg, pdf = (folder / f"{name}.{suffix}" for suffix in ("svg", "pdf"))
     try:
-        check_regular(svg)
-        check_regular(pdf)
-        found = svg.read_text(encoding="utf-8"), pdf.read_bytes()
+        for suffix in ("svg", "pdf"):
+            check_regular(folder / f"{name}.{suffix}")
+        svg = (folder / f"{name}.svg").read_text(encoding="utf-8")
+        pdf = (folder / f"{name}.pdf").read_bytes()
     except (OSError, ValueError):
         return None
-    mark = f"{_DIGEST} {digest}"
-    is_ours = mark in found[0][-200:] and mark.encode() in found[1]
-    return found if is_ours and not _FOREIGN.search(found[0]) else None
+    mark = f"{_MARK} {digest}"
+    is_same = mark in svg[-200:] and mark.encode() in pdf and not _FOREIGN.search(svg)
+    return (svg, pdf) if is_same else None
 
 
-def _files(sketch: Sketch, digest: str) -> tuple[str, bytes]:
+def _draw(sketch: Sketch, digest: str) -> tuple[str, bytes]:
+    """Return SVG and PDF of a sketch."""
     from .drawing import pdf_of, styled, svg_of
 
-    mark = f"{_DIGEST} {digest}"
+    mark = f"{_MARK} {digest}"
     with styled():
         figure = sketch.draw(sketch.data)
         return svg_of(figure, sketch.title, mark), pdf_of(figure, sketch.title, mark)
 
 
-def _update(found: Any, value: Any) -> None:
-    """Take a value into a digest: arrays by their bytes, what holds others by its parts."""
+def _update(digest: Any, value: Any) -> None:
+    """Add a value to a digest: arrays by their bytes, containers by their parts."""
     if isinstance(value, np.ndarray):
-        found.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
+        digest.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
     elif isinstance(value, tuple | list | frozenset):
-        found.update(f"({len(value)}".encode())
+        digest.update(f"({len(value)}".encode())
         for part in sorted(value) if isinstance(value, frozenset) else value:
-            _update(found, part)
+            _update(digest, part)
     elif isinstance(value, Mapping):
-        _update(found, list(value.items()))
+        _update(digest, list(value.items()))
     elif is_dataclass(value):
-        _update(found, [getattr(value, field.name) for field in fields(value)])
+        _update(digest, [getattr(value, field.name) for field in fields(value)])
     else:
-        found.update(f"{type(value).__name__}:{value!r};".encode())
+        digest.update(f"{type(value).__name__}:{value!r};".encode())
 
 
 def chart_sketch(chart: "Chart") -> Sketch:
-    """Return a chart before it is drawn."""
+    """Return the sketch of a chart."""
     return Sketch(chart.name, chart.title, chart.caption, chart, _draw_chart)
 
 

@@ -1,4 +1,4 @@
-"""The colours of figures, and how names are written in them."""
+"""Colours of figures, and names in them."""
 
 from ..text import shortened
 
@@ -12,11 +12,11 @@ COLOURS = {
     "purple": "#8a4a9f",
     "brass": "#96690f",
 }
-# Letters of a name in a figure.
+# The most letters of a name.
 LONGEST = 60
 
 
 def written(name: str) -> str:
-    """Return a name as matplotlib writes it letter by letter: no formula, no label to be hidden."""
+    """Return a name that matplotlib reads as plain text: neither a formula nor a hidden label."""
     short = shortened(name, LONGEST).replace("$", r"\$")
     return f" {short}" if short.startswith("_") else short or "–"

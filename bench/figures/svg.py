@@ -1,4 +1,4 @@
-"""Figures as parts of a page: the text of an SVG file changed so that it can stand within HTML."""
+"""Figures as parts of a page: the text of an SVG file, shortened to stand within HTML."""
 
 import re
 import zlib
@@ -10,13 +10,13 @@ from markupsafe import Markup
 from .sketch import Drawing
 from .style import COLOURS
 
-# What describes the file, or styles it as a whole: the page has its own size of figures and fonts.
-_OF_THE_FILE = re.compile(r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", re.DOTALL)
-_OF_A_TAG = re.compile(
+# Parts that describe or style the whole file: the page sets sizes and fonts.
+_FILE_PARTS = re.compile(r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", re.DOTALL)
+_ATTRIBUTES = re.compile(
     r"(?<=<g) id=\"[^\"]*\"|font-family: [^;\"]*(?:; )?| xmlns(?::xlink)?=\"[^\"]*\""
     r"| (?:width|height)=\"[\d.]+pt\"| version=\"[^\"]*\"|xlink:(?=href)"
 )
-# Hundredths of a point are not seen.
+# Hundredths of a point are invisible.
 _DECIMALS = re.compile(r"(?<![\w#])-?\d+\.\d\d+(?![\w])")
 _FONT = re.compile(r"font: (?:(\d+) )?([\d.]+px) [^;\"]*")
 # Between the letters and numbers of a path, and within a style.
@@ -33,11 +33,8 @@ _NAMES = {colour: name for name, colour in COLOURS.items()}
 
 
 def inline(drawing: Drawing) -> Markup:
-    """Return an SVG that can stand in a page: own ids, colours by name, the page's fonts.
-
-    All drawings of a page share one name space of ids.
-    """
-    text = _OF_THE_FILE.sub("", drawing.svg[drawing.svg.index("<svg") :])
+    """Return an SVG for a page: unique ids, colours by name, the page's fonts."""
+    text = _FILE_PARTS.sub("", drawing.svg[drawing.svg.index("<svg") :])
     text = re.sub("<title>.*?</title>", "", text, count=1, flags=re.DOTALL)
     text = re.sub(r"(?<=>)\s+(?=<(?!tspan))", "", text)
     prefix = f"f{zlib.crc32(drawing.name.encode()):x}"[:6]
@@ -50,8 +47,8 @@ def inline(drawing: Drawing) -> Markup:
 
 
 def _shorter_tag(tag: str) -> str:
-    """Return a tag in few digits, its colours by name."""
-    tag = _OF_A_TAG.sub("", re.sub(r"\s+", " ", tag))
+    """Return a tag with few digits, its colours by name."""
+    tag = _ATTRIBUTES.sub("", re.sub(r"\s+", " ", tag))
     tag = _DECIMALS.sub(lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), tag)
     tag = _FONT.sub(r"font-size: \2; font-weight: \1", tag).replace("; font-weight: ;", ";")
     tag = _COLOURS.sub(lambda colour: f"var(--{_NAMES[colour[0]]})", tag)
@@ -59,7 +56,7 @@ def _shorter_tag(tag: str) -> str:
 
 
 def _with_classes(text: str, prefix: str) -> str:
-    """Return an SVG whose repeated styles are classes, declared once behind its first tag."""
+    """Return an SVG with repeated styles as classes, declared behind its first tag."""
     text = re.sub(r' clip-path="([^"]*)" style="', r' style="clip-path:\1;', text)
     counts = Counter(re.findall(r' style="([^"]*)"', text))
     repeated = [style for style, count in counts.items() if count > 1]

@@ -1,4 +1,4 @@
-"""A block: one problem for one solver, measured in one go."""
+"""A block: one problem for one solver, measured in one go; and the choice of blocks of a run."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 
 class Measured(NamedTuple):
-    """What a block found.
+    """The result of a block.
 
     Attributes:
         values: numbers, of the type that the experiment declares; None where there are none.
-        notes: sentences that belong to them, by name.
+        notes: sentences on them, by name.
         facts: what tables select and sort by, beside the facts of the block; see `Block`.
     """
 
@@ -25,7 +25,7 @@ class Measured(NamedTuple):
 
     @property
     def arrays(self) -> Mapping[str, Any]:
-        """The values by the names they have on record."""
+        """The values by their names on record."""
         from .values import stored  # the command line lists blocks without NumPy
 
         return {} if self.values is None else stored(self.values)
@@ -48,7 +48,7 @@ class Scale:
     problems: "tuple[OwnProblem, ...]" = ()
 
     def is_as_short_as(self, name: str) -> bool:
-        """Return whether benchmarks are as short as at a scale that has a name."""
+        """Return whether benchmarks are as short as at a named scale."""
         return self.seconds == SCALES[name].seconds
 
 
@@ -62,16 +62,16 @@ class Block:
     The numbers are made only when `measure` is called.
 
     Attributes:
-        suite: which family of problems.
+        suite: the family of problems.
         problem: the name of the problem; with suite, solver and settings it is the block's key.
-        solver: what solves it.
+        solver: the name of the solver.
         measure: measures it.
         settings: numbers, words and truth values that change the answer.
         size: how much is measured, where that varies: targets, or seconds of a benchmark.
-        facts: what the names say, as values: numbers, words, truth values and lists of words.
-            "title" is how the problem is written, "task" which of the suite's kinds it is.
+        facts: the names as values: numbers, words, truth values and lists of words. "title" is how
+            the problem is written, "task" the kind of its numbers, see `harness.values`.
         times: whether times are among the numbers, or end the work: see `Experiment`.
-        conditions: what its solver is measured under, beside what every record has.
+        conditions: of its solver, beside those of every record.
         budget: the time that bounds the work [s]; 0 if none does.
     """
 
@@ -87,7 +87,7 @@ class Block:
     budget: float = 0.0
 
     def of(self, entrant: Entrant | None) -> "Block":
-        """Return a block that says whose it is; what opens a user's solver changes no answer."""
+        """Return the block of a user's solver, with its version, facts and conditions."""
         if entrant is None:
             return self
         return replace(
@@ -98,5 +98,29 @@ class Block:
         )
 
     def on(self, problem: "OwnProblem") -> "Block":
-        """Return a block that is measured again once a user's problem is another."""
+        """Return the block of a user's problem, measured again when the problem changes."""
         return replace(self, facts={**self.facts, "problem_digest": problem.digest})
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The blocks of a run: all of them, or those that the user selected.
+
+    Attributes:
+        name: of the scale, "quick" or "full".
+        scale: how much is measured, and whose solvers and problems take part.
+        solvers: only these, by the names in records; all if none.
+        problems: only these.
+        is_partial: whether it leaves out something that the scale has.
+    """
+
+    name: str
+    scale: Scale
+    solvers: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
+    is_partial: bool = False
+
+    def takes(self, block: Block) -> bool:
+        """Return whether a block is selected."""
+        is_solver_selected = not self.solvers or block.solver in self.solvers
+        return is_solver_selected and (not self.problems or block.problem in self.problems)

@@ -1,4 +1,4 @@
-"""Where blocks are measured: what a run asks of an executor, and the one that is this process."""
+"""Where blocks are measured: the interface of an executor, and the one that is this process."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -10,17 +10,17 @@ from .record import Record
 
 
 class NotMeasured(NamedTuple):
-    """A block that could not even be tried, and why: there is no record of it."""
+    """A block that could not be tried, and why: it has no record."""
 
     block: Block
-    why: str
+    reason: str
 
 
 Step = Block | Record | NotMeasured
 
 
 class Executor:
-    """Where blocks are measured: in this process, one after the other, but for subclasses.
+    """Measure blocks in this process, one after the other; subclasses measure elsewhere.
 
     Attributes:
         takes_suites_together: whether the blocks of all suites are best given at once.
@@ -28,15 +28,15 @@ class Executor:
 
     takes_suites_together = False
 
-    def look_at(self, timed: Iterable[Record | None]) -> None:
-        """Take note of what is on record of all blocks that take times, asked for or not."""
+    def note_records(self, records: Iterable[Record | None]) -> None:
+        """Take note of the records of all blocks with times, selected or not."""
 
     def difference(self, block: Block, record: Record) -> str:
-        """Return in what a record differs from what would be measured now, "" if in nothing."""
+        """Return how a record differs from a measurement made now, "" if it does not."""
         return difference(record.stamp, stamp())
 
     def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
-        """Yield each block as it is begun, and what came of it, in any order."""
+        """Yield each block when it is begun, and its record or why there is none, in any order."""
         for block in blocks:
             yield block
             yield measure(block)
@@ -46,7 +46,7 @@ class Executor:
         return stamp()
 
     def close(self) -> None:
-        """Give up what is still to be measured, and whatever is held for it."""
+        """Cancel the remaining measurements and release their resources."""
 
 
 THIS_PROCESS = Executor()

@@ -1,4 +1,4 @@
-"""What is measured: an experiment is a folder, a suite is one experiment or several.
+"""Experiments and suites: an experiment is a folder, a suite is one experiment or several.
 
 A folder of `bench/experiments` holds a measurement, its tables and its figures.
 """
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from .block import Block, Scale
 
-# What the command line calls the suites, and what each answers.
+# The suites of the command line, and the subject of each.
 SUITES = {
     "check": "the reference against Pinocchio and MuJoCo, claim by claim",
     "self_test": "planted faults and honest solvers, judged by plumbob verify",
@@ -28,11 +28,11 @@ SUITES = {
 
 
 class Experiment(NamedTuple):
-    """What one folder of `bench/experiments` measures, without importing what measures it.
+    """One folder of `bench/experiments`, without importing it.
 
     Attributes:
         package: the folder, by its full name as a package.
-        suite: what the command line calls it; experiments may share a suite.
+        suite: its name on the command line; experiments may share a suite.
         chapter: the section of the report that shows it.
         times: whether times are among its numbers, or a budget of time ends its work; such blocks
             share no machine with others while they are measured.
@@ -44,7 +44,7 @@ class Experiment(NamedTuple):
     times: bool = True
 
     def blocks(self, scale: Scale) -> Iterator[Block]:
-        """Yield what there is to be measured; engines are imported only now."""
+        """Yield its blocks; engines are imported only now."""
         for block in importlib.import_module(f"{self.package}.measurement").blocks(scale):
             yield replace(block, times=self.times)
 

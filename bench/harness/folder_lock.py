@@ -13,9 +13,9 @@ LOCK_NAME = "records.lock"
 
 @contextlib.contextmanager
 def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
-    """Hold a folder for as long as the block lasts; a process that was killed holds nothing.
+    """Hold the lock of a folder inside the block; a process that was killed holds nothing.
 
-    On a file system without locks nothing is held. The file stays: to remove it would let two
+    A file system without locks allows everyone. The lock's file stays: to remove it would let two
     processes lock two files of one name.
 
     Raises:
@@ -25,41 +25,33 @@ def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor = open_lock(path, 0o644)
     try:
-        _lock(descriptor, path)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            number = path.read_text(encoding="utf-8")
+            raise ValueError(
+                f"{folder}: expected a folder that nobody writes to, got that of "
+                f"{f'process {number}' if number.isdigit() else 'another process'}; wait for it "
+                "to end, or name another folder"
+            ) from None
+        except OSError:  # a file system without locks
+            pass
+        else:
+            with contextlib.suppress(OSError):  # the number is for the reader; the disk may be full
+                os.ftruncate(descriptor, 0)
+                os.write(descriptor, str(os.getpid()).encode())
         yield
     finally:
         os.close(descriptor)
 
 
 def open_lock(path: Path, mode: int) -> int:
-    """Return the descriptor of a lock file, which is made with this mode where there is none.
-
-    A link is not followed: it could lead to any file of the user's, to be made or emptied.
+    """Return the descriptor of a lock file, which is created with this mode if it is missing.
 
     Raises:
-        ValueError: if there is a link, or anything else that is no file.
+        ValueError: if it is a link, which could lead to any file of the user's, or no file.
     """
     if path.is_symlink():
         raise ValueError(f"{path}: expected a file, got a link")
     check_regular(path)
     return os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, mode)
-
-
-def _lock(descriptor: int, path: Path) -> None:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise ValueError(
-            f"{path.parent}: expected a folder that nobody writes to, got that of "
-            f"{_holder(path)}; wait for it to end, or name another folder"
-        ) from None
-    except OSError:
-        return
-    with contextlib.suppress(OSError):  # the number is for the reader; the disk may be full
-        os.ftruncate(descriptor, 0)
-        os.write(descriptor, str(os.getpid()).encode())
-
-
-def _holder(path: Path) -> str:
-    number = path.read_text(encoding="utf-8")
-    return f"process {number}" if number.isdigit() else "another process"

@@ -3,7 +3,6 @@
 import contextlib
 import functools
 import hashlib
-import importlib.metadata
 import os
 import platform
 import re
@@ -14,38 +13,23 @@ from typing import Any
 
 import psutil
 
+from ..peers.registry import version
 from ..peers.sources import git_commit
 from .stopwatch import time_call
 
 PACKAGES = (
-    "plumbob",
-    "numpy",
-    "scipy",
-    "numba",
-    "cholespy",
-    "pin",
-    "mujoco",
-    "example-robot-data",
-    "gymnasium",
-    "dm_control",
-    "matplotlib",
+    *("plumbob", "numpy", "scipy", "numba", "cholespy", "pin", "mujoco", "example-robot-data"),
+    *("gymnasium", "dm_control", "matplotlib"),
 )
 ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("reference", "crosscheck", "bench")
-# What only shows numbers; all else may change one. None of these is imported by what measures.
+# Folders that only show numbers; all others may change one. Nothing that measures imports them.
 PRESENTATION = (
-    "bench/comparison",
-    "bench/figures",
-    "bench/motion",
-    "bench/report",
-    "bench/show",
-    "bench/tables",
-    "crosscheck/verify/output",
+    *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),
+    *("bench/tables", "crosscheck/verify/output"),
 )
 # Likewise in every experiment.
-PRESENTATION_FILES = (
-    *("tables.py", "tables.toml", "participants.py", "figures.py", "readings.py", "files.py"),
-)
+PRESENTATION_FILES = ("tables.py", "participants.py", "figures.py", "readings.py", "files.py")
 
 
 @functools.cache
@@ -55,7 +39,7 @@ def stamp() -> dict[str, Any]:
 
 
 def machine() -> dict[str, Any]:
-    """Return what the speed depends on; nothing that names the machine or its owner."""
+    """Return the facts that determine the speed; nothing that names the machine or its owner."""
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
@@ -65,16 +49,17 @@ def machine() -> dict[str, Any]:
 
 
 def conditions() -> dict[str, Any]:
-    """Return what may bear on a measurement at this moment, and does not make it another one.
+    """Return what may influence a measurement now, but does not make it a different one.
 
-    "commit" is that of our sources; "affinity" is on how many cores this process may run, "load"
-    the system's over the last minute, "pace" how long a fixed piece of work takes [s]: the drift of
-    a machine shows in it.
+    "commit" is that of our sources, "pace" how long a fixed piece of work takes [s], which shows
+    the drift of a machine, "affinity" on how many cores this process may run, and "load" the
+    system's over the last minute.
     """
-    conditions = {"commit": _our_commit(), "pace": pace()}
-    if hasattr(os, "sched_getaffinity"):
-        conditions["affinity"] = len(os.sched_getaffinity(0))
-    return {**conditions, "load": round(psutil.getloadavg()[0], 2)}
+    affinity = (
+        {"affinity": len(os.sched_getaffinity(0))} if hasattr(os, "sched_getaffinity") else {}
+    )
+    load = round(psutil.getloadavg()[0], 2)
+    return {"commit": _our_commit(), "pace": pace(), **affinity, "load": load}
 
 
 def pace() -> float:
@@ -93,7 +78,7 @@ def commit_of(root: Path) -> str:
 
 
 def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Return in what one stamp differs from another, "" if in nothing."""
+    """Return how one stamp differs from another, "" if it does not."""
     for part, title in (("machine", "another machine"), ("versions", "other versions")):
         old, new = before.get(part, {}), now.get(part, {})
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
@@ -106,13 +91,7 @@ def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that take part, "" where one is missing."""
-    found = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            found[package] = ""
-    return found
+    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
 def source_digest() -> str:
@@ -136,7 +115,7 @@ def _is_left_out(parts: tuple[str, ...]) -> bool:
 
 
 def _processor() -> str:
-    """Return the model of the processor, which psutil does not tell."""
+    """Return the model of the processor, which psutil does not know."""
     with contextlib.suppress(OSError):
         info = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
         if model := re.search(r"^model name\s*:(.*)", info, re.MULTILINE):

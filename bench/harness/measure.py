@@ -1,4 +1,4 @@
-"""Measure a block: what came of it, or why nothing did, becomes a record."""
+"""Measure a block and make a record of its result, or of its failure."""
 
 import time
 from datetime import UTC, datetime
@@ -22,36 +22,36 @@ def now() -> str:
 
 
 def measure(block: Block) -> Record:
-    """Measure a block; one that raises becomes a record that says why, and costs no other."""
+    """Measure a block; an exception becomes a record that says why, and costs no other block."""
     begin = time.perf_counter()
     try:
         measured = block.measure()
         record = record_of(block, measured, time.perf_counter() - begin)
         record.check()
         return record
-    except Exception as error:  # whatever a solver raises is a result of that solver
+    except Exception as error:  # an exception of a solver is its result
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
             raise KeyboardInterrupt from None
         return record_of(block, failure(describe(error)), time.perf_counter() - begin)
 
 
 def failure(why: str) -> Measured:
-    """Return a block without numbers that says why it could not be measured."""
+    """Return the result of a block that could not be measured."""
     return Measured(None, {"failed": why})
 
 
 def not_installed(package: str) -> Measured:
-    """Return a block without numbers that says what is missing."""
+    """Return the result of a block whose package is missing."""
     return Measured(None, {"remark": f"{package} is not installed"})
 
 
 def not_asked(why: str) -> Measured:
-    """Return a block without numbers that says why a solver is not asked."""
+    """Return the result of a block that a solver cannot take."""
     return Measured(None, {"remark": why})
 
 
 def record_of(block: Block, measured: Measured, seconds: float) -> Record:
-    """Return the record of what was measured here and now."""
+    """Return the record of a result that was measured here and now."""
     return Record(
         block.suite,
         block.problem,

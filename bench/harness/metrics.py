@@ -25,7 +25,7 @@ class Share(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Where a sample lies; NaN throughout if it is empty."""
+    """Quantiles of a sample; NaN throughout if it is empty."""
 
     median: float
     p95: float
@@ -49,7 +49,7 @@ class Interval(NamedTuple):
 
 
 class Ranking(NamedTuple):
-    """Names, the best first, and those of them that are not told from the first: it is in both."""
+    """Names, the best first, and those that tie with the first, itself included."""
 
     order: tuple[str, ...]
     first: tuple[str, ...]
@@ -65,17 +65,17 @@ class Timing(NamedTuple):
     interval: Interval
 
 
-# All that is stated holds in so many of all samples, over all comparisons of one ranking at once.
+# The share of samples in which a statement holds, over all comparisons of a ranking at once.
 CONFIDENCE = 0.95
-# Resamples of a bootstrap, and its seed; of more targets the normal distribution stands for it.
+# Resamples of a bootstrap, and its seed; more targets take the normal distribution instead.
 RESAMPLES, _SEED, LARGE = 400, 1979, 20_000
 _NORMAL = 1.959963984540054
-# The signs of so few differences are gone through one and all.
+# The signs of so few differences are enumerated.
 _FEW = 12
 
 
 class PairedRatio(NamedTuple):
-    """By what factor one of two samples of pairs exceeds the other, with its 95 % interval."""
+    """The factor by which one of two paired samples exceeds the other, with its 95 % interval."""
 
     mean: float
     low: float
@@ -101,7 +101,7 @@ def share(hits: NDArray[np.bool_]) -> Share:
 
 
 def wilson(rates: Floats, total: int) -> tuple[Floats, Floats]:
-    """Return between what the true rates lie in 95 % of samples of this size (Wilson 1927)."""
+    """Return bounds of the true rates in 95 % of samples of this size (Wilson 1927)."""
     z = _NORMAL
     centre = (rates + z**2 / (2 * total)) / (1 + z**2 / total)
     half = z * np.sqrt(rates * (1 - rates) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
@@ -128,20 +128,20 @@ def effort(seconds: Floats) -> Effort:
 def median_interval(values: Floats) -> Interval:
     """Return the median and its interval by order statistics; NaN bounds of fewer than six.
 
-    So many values lie below the median as heads fall in as many throws of a coin, whatever the
-    distribution (Conover 1999, section 3.2).
+    The number of values below the median is that of heads in as many throws of a coin, whatever
+    the distribution (Conover 1999, section 3.2).
     """
     ordered = np.sort(np.asarray(values, dtype=float).ravel())
     if not len(ordered):
         return Interval(math.nan, math.nan, math.nan)
-    cut = _coin_quantile(len(ordered))
-    low, high = (ordered[cut], ordered[-1 - cut]) if cut >= 0 else (math.nan, math.nan)
+    rank = _coin_quantile(len(ordered))
+    low, high = (ordered[rank], ordered[-1 - rank]) if rank >= 0 else (math.nan, math.nan)
     return Interval(float(np.median(ordered)), float(low), float(high))
 
 
 @functools.cache
 def _coin_quantile(throws: int) -> int:
-    """Return the greatest k for which k heads or fewer fall in 2.5 % of cases at most, else -1."""
+    """Return the greatest k with at most 2.5 % probability of k heads or fewer, else -1."""
     return int(stats.binom.ppf((1 - CONFIDENCE) / 2, throws, 0.5)) - 1
 
 
@@ -155,13 +155,12 @@ def mean_interval(values: Floats) -> Interval:
 
 
 def ranking(scores: Mapping[str, Floats]) -> Ranking:
-    """Return who has the greatest mean score, and who is not told from that one.
+    """Return the order by mean score, and the names that tie with the greatest.
 
-    The scores are of the same targets, (target,) each, so they are compared in pairs: what makes a
-    target easy or hard for all of them says nothing about any of them. Two are told apart if their
-    mean difference is larger than 95 % of those that arise as each difference takes either sign by
-    lot (Fisher 1935, section 21). For truth values that is McNemar's exact test (1947). Of several
-    rivals the chances are raised by Holm (1979).
+    The scores are of the same targets, (target,) each, so they are compared in pairs: a target may
+    be easy or hard for all. Two differ if their mean difference is larger than 95 % of those under
+    random signs (Fisher 1935, section 21). For truth values that is McNemar's exact test (1947).
+    With several rivals the probabilities are adjusted by Holm (1979).
     """
     order = sorted(scores, key=lambda name: -mean(scores[name]))
     if not order:
@@ -173,28 +172,28 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
 
 
 def chance_of_pairs(a: Floats, b: Floats) -> float:
-    """Return how likely two are as far apart on average if signs are drawn by lot, (target,) each.
+    """Return the probability of such a mean difference under random signs, (target,) each.
 
-    Exact for differences of one size, and for few; else the sum is taken for normal, with the
-    variance that the lots give it.
+    Exact for differences of one size, and for few; else the sum is taken to be normal.
     """
-    apart = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
-    apart = apart[apart != 0]
-    total, size = abs(float(apart.sum())), np.abs(apart)
-    if not len(apart):
+    differences = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
+    differences = differences[differences != 0]
+    total, size = abs(float(differences.sum())), np.abs(differences)
+    if not len(differences):
         return 1.0
     if size.min() == size.max():
-        return float(stats.binomtest(int(np.sum(apart > 0)), len(apart)).pvalue)
-    if len(apart) <= _FEW:
-        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(apart))))
+        successes = int(np.sum(differences > 0))
+        return float(stats.binomtest(successes, len(differences)).pvalue)
+    if len(differences) <= _FEW:
+        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(differences))))
         return float(np.mean(np.abs(signs @ size) >= total * (1.0 - 1e-12)))
-    return math.erfc(total / math.sqrt(2.0 * float(apart @ apart)))
+    return math.erfc(total / math.sqrt(2.0 * float(differences @ differences)))
 
 
 def adjusted(chances: Sequence[float]) -> Floats:
-    """Return chances that hold over all comparisons at once, whatever they share (Holm 1979).
+    """Return probabilities that hold over all comparisons at once (Holm 1979).
 
-    A share of false ones (Benjamini & Hochberg 1995) would not do: one false alarm stops a merge.
+    A false discovery rate (Benjamini & Hochberg 1995) would not do: one false alarm stops a merge.
     """
     raw = np.asarray(chances, dtype=float)
     order = np.argsort(raw, kind="stable")
@@ -203,15 +202,15 @@ def adjusted(chances: Sequence[float]) -> Floats:
 
 
 def penalised(seconds: Floats, solved: NDArray[np.bool_], penalty: float) -> Floats:
-    """Return seconds where solved; else the penalty, or what it took if that is longer."""
+    """Return seconds where solved; else the penalty, or the seconds if they are more."""
     return np.where(solved, seconds, np.maximum(np.nan_to_num(seconds, posinf=penalty), penalty))
 
 
 def shifted_geometric_mean(seconds: Floats, shift: float, groups: Sequence[int] = ()) -> Interval:
     """Return exp(mean(log(seconds + shift))) - shift and its interval by the bootstrap.
 
-    Targets are drawn again within each group; `groups` says how many targets each has, in order,
-    such as those of one robot. All are one group if none is given. The draws are seeded.
+    Targets are resampled within each group, such as those of one robot; `groups` are the sizes of
+    the groups, in order, one group by default. The draws are seeded.
     """
     logs = np.log(np.asarray(seconds, dtype=float) + shift)
     sizes = tuple(groups) or (len(logs),)
@@ -255,21 +254,21 @@ def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Flo
     Dolan & Moré 2002, eq. 2.1: rho(tau) over the targets that any of the solvers solves. The
     arguments are (solver, target) and (ratio,), ascending; the result is (solver, ratio).
     """
-    taken = np.where(solved, seconds, np.inf)
-    best = taken.min(axis=0, initial=np.inf)
-    taken, best = taken[:, np.isfinite(best)], best[np.isfinite(best)]
+    times = np.where(solved, seconds, np.inf)
+    best = times.min(axis=0, initial=np.inf)
+    times, best = times[:, np.isfinite(best)], best[np.isfinite(best)]
     if not len(best):
-        return np.full((len(taken), len(ratios)), math.nan)
-    slower = np.sort(taken / best, axis=-1)
+        return np.full((len(times), len(ratios)), math.nan)
+    slower = np.sort(times / best, axis=-1)
     return np.array([np.searchsorted(row, ratios, side="right") for row in slower]) / len(best)
 
 
-def paired_ratio(values: Floats, others: Floats) -> PairedRatio:
-    """Return the geometric mean of values / others over the pairs in which both are numbers.
+def paired_ratio(a: Floats, b: Floats) -> PairedRatio:
+    """Return the geometric mean of a / b over the pairs in which both are numbers.
 
     The interval is Student's, of the logarithms; a single pair leaves the factor open.
     """
-    logs = np.log(np.asarray(values) / np.asarray(others))
+    logs = np.log(np.asarray(a) / np.asarray(b))
     logs = logs[np.isfinite(logs)]
     middle, low, high = np.exp(mean_interval(logs))
     if len(logs) < 2:
@@ -287,8 +286,8 @@ def timing(seconds: Floats) -> Timing:
     """Return the median, the 10th and 90th percentiles of the rounds, and the median's interval.
 
     `seconds` are those of rounds, (round,), or of the rounds of each sweep, (sweep, round). The
-    median is that of all rounds, which every record holds. Rounds of one sweep follow each other
-    and are alike, so how sure it is, and who ties, follows from the sweeps' medians.
+    median is that of all rounds. Successive rounds of one sweep are correlated, so the interval is
+    that of the sweeps' medians.
     """
     rounds = np.asarray(seconds, dtype=float)
     low, median, high = np.quantile(rounds, [0.1, 0.5, 0.9])
@@ -298,7 +297,7 @@ def timing(seconds: Floats) -> Timing:
 
 
 def bend(positions: Floats, target: Floats) -> Floats:
-    """Return how far a chain strays from the straight line through root and target [m], (...,).
+    """Return the largest distance of a joint from the line through root and target [m], (...,).
 
     `positions` are its joints, (..., joint, 3), the root first; `target` is (..., 3).
     """
@@ -306,8 +305,8 @@ def bend(positions: Floats, target: Floats) -> Floats:
     line = target - positions[..., 0, :]
     direction = line / np.linalg.norm(line, axis=-1, keepdims=True)
     along = np.einsum("...jk,...k->...j", arms, direction)
-    aside = arms - along[..., None] * direction[..., None, :]
-    return np.linalg.norm(aside, axis=-1).max(axis=-1)
+    offsets = arms - along[..., None] * direction[..., None, :]
+    return np.linalg.norm(offsets, axis=-1).max(axis=-1)
 
 
 def excess(residual: Floats, distance: Floats, reach: float) -> Floats:
@@ -324,7 +323,7 @@ def rotation_angles(local_rotations: Floats) -> Floats:
 
 
 def relative_error(x: Floats, exact: Floats, start: Floats) -> float:
-    """Return |x - exact| / |start - exact|: what is left of the error of the start."""
+    """Return |x - exact| / |start - exact|."""
     return float(np.linalg.norm(x - exact) / np.linalg.norm(start - exact))
 
 
@@ -366,9 +365,3 @@ def first_below(values: Floats, limit: float) -> int | None:
     """Return the index of the first value at or below the limit, None if there is none."""
     below = np.flatnonzero(np.asarray(values) <= limit)
     return int(below[0]) if below.size else None
-
-
-def cheapest_within(seconds: Floats, errors: Floats, limit: float) -> int | None:
-    """Return the index of the least time whose error is within the limit, None if none is."""
-    reached = np.flatnonzero(np.asarray(errors) <= limit)
-    return int(reached[np.argmin(np.asarray(seconds)[reached])]) if reached.size else None

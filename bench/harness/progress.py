@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from typing import NamedTuple
 
-# The state of a user's solver that gives no answer for the first time; the message says why.
+# The state when a user's solver gives no answer for the first time; the message says why.
 TROUBLE = "trouble"
 
 
 class Progress(NamedTuple):
-    """What is being done; `state` and `message` where that changes the state of a case."""
+    """A step of a measurement; `state` and `message` where it changes the state of a case."""
 
     what: str
     state: str = ""
@@ -31,7 +31,7 @@ def listening(listener: Callable[[Progress], None]) -> Iterator[None]:
 
 
 def announce(what: str, state: str = "", message: str = "") -> None:
-    """Pass what is being done to the listener, if there is one."""
+    """Report a step to the listener, if there is one."""
     listener = _listener.get()
     if listener is not None:
         listener(Progress(what, state, message))

@@ -1,7 +1,7 @@
-"""Result files: one record a line of JSON, appended as it is produced, the later of a key counts.
+"""Result files: one record a line of JSON, appended as it is produced; the last of a key counts.
 
-This is the only file of the bench that opens a result file. A record is one block: what was
-solved, by what, with which settings, the arrays that came out, and where it was measured.
+No other file of the bench opens a result file. A record is one block: suite, problem, solver and
+settings, the arrays that came out, and where it was measured.
 """
 
 import contextlib
@@ -11,7 +11,7 @@ import json
 import mmap
 import os
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, TypedDict
@@ -25,17 +25,16 @@ FORMAT = 3
 FILE_NAME = "records.jsonl"
 # Reading a file takes several times its size of memory; the whole bench writes a hundredth of this.
 LARGEST = 1 << 30
-# The suite of the records that say of each other suite that it was gone through to its end.
+# The suite of the records that say of each other suite that it was run to its end.
 FINISHED = "finished"
-
-# So many lines that are no records are named; of the others only how many there are.
-NAMED = 5
-# What a number that JSON has no sign for is written as.
+# How many invalid lines a warning lists; it counts the others.
+LISTED_LINES = 5
+# How numbers are written for which JSON has no sign.
 _WORDS = {"nan", "inf", "-inf"}
 
 Key = tuple[str, str, str, str]
 
-_Single = str | int | float | bool | None
+_Scalar = str | int | float | bool | None
 _Moment = Annotated[
     str, msgspec.Meta(pattern=r"^(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(Z|[+-]\d\d:\d\d))?$")
 ]
@@ -55,20 +54,20 @@ class _Stamp(TypedDict, total=False):
 
 
 class _Line(msgspec.Struct):
-    """What a line has to hold."""
+    """The fields of a line."""
 
     format: Literal[3]
     suite: str
     problem: str
     solver: str
-    settings: dict[str, _Single]
+    settings: dict[str, _Scalar]
     size: float
     arrays: dict[str, Any]
     notes: dict[str, str]
     stamp: _Stamp
     when: _Moment
     seconds: float
-    facts: dict[str, _Single | list[str]]
+    facts: dict[str, _Scalar | list[str]]
     conditions: dict[str, str | int | float | None]
 
 
@@ -81,19 +80,19 @@ class Record:
     """One block of results.
 
     Attributes:
-        suite: which family of problems, such as "arm".
+        suite: the family of problems, such as "arm".
         problem: the name of the problem.
-        solver: what solved it.
+        solver: the name of the solver.
         settings: numbers, words and truth values that change the answer.
         size: how much was measured, such as the number of random targets.
-        arrays: what came out, each an array of numbers with one entry a target, frame or step.
+        arrays: the results, arrays of numbers with one entry a target, frame or step.
         notes: words that belong to it; "failed" says why there are no arrays.
         stamp: machine, versions and digest of the sources, see `plumbob.bench.harness.machine`.
         when: the moment it was produced, ISO 8601 with time zone.
         seconds: how long it took to produce.
         facts: what tables select and sort by: numbers, words, truth values and lists of words.
-        conditions: what it was measured under that makes it no other measurement: the commit of
-            the sources, affinity, load, pace.
+        conditions: of the measurement, which do not make it a different one: the commit of the
+            sources, affinity, load, pace.
     """
 
     suite: str
@@ -126,7 +125,7 @@ class Record:
         return kind and values.read(kind.details, {**self.settings, **self.notes, **self.facts})
 
     def check(self) -> None:
-        """Make sure that the record is of its type, unless nothing shows it any more.
+        """Make sure that the record is of its type, unless it is superseded.
 
         Raises:
             ValueError: naming a field that is missing, or of another type.
@@ -136,7 +135,7 @@ class Record:
 
     @property
     def trouble(self) -> str:
-        """What its solver raised, and how often; "" if nothing."""
+        """The most frequent exception of its solver with its count, else ""."""
         return str(self.facts.get("trouble", ""))
 
     @property
@@ -146,7 +145,7 @@ class Record:
 
     @property
     def key(self) -> Key:
-        """What makes two records the same measurement."""
+        """The same for two records of one measurement."""
         return key(self.suite, self.problem, self.solver, self.settings)
 
     @property
@@ -156,7 +155,7 @@ class Record:
 
     @property
     def superseded(self) -> bool:
-        """Whether its block is now asked for under other settings: it is kept, but not shown."""
+        """Whether its block now has other settings: it is kept, but not shown."""
         return "superseded" in self.notes
 
     @property
@@ -166,16 +165,25 @@ class Record:
         return commit[:7] + ("+" if changes else "")
 
 
+def key(suite: str, problem: str, solver: str, settings: Mapping[str, Any]) -> Key:
+    """Return the key of a record; the order of the settings does not matter."""
+    return suite, problem, solver, json.dumps(dict(settings), sort_keys=True)
+
+
 class Reading(NamedTuple):
-    """What a result file holds: its records, and a sentence on the lines that are none, else ""."""
+    """The records of a result file, and a sentence on its invalid lines, "" if there are none."""
 
     records: list[Record]
     warning: str
 
 
-def key(suite: str, problem: str, solver: str, settings: Mapping[str, Any]) -> Key:
-    """Return the key of a record; the order of the settings does not matter."""
-    return suite, problem, solver, json.dumps(dict(settings), sort_keys=True)
+class _DecodedLine(NamedTuple):
+    """A line of a result file: its record, and why it has none or one of the wrong type."""
+
+    number: int
+    text: bytes
+    record: Record | None
+    error: str
 
 
 class RecordFile:
@@ -187,26 +195,38 @@ class RecordFile:
     def read(self, typed: bool = True) -> Reading:
         """Return the records, the later of two with the same key; none if there is no file.
 
-        A line that is no record costs itself and a part of the sentence; so does one whose fields
-        are not of the type that its experiment declares, unless `typed` is false.
+        Lines without a record are left out and listed in the warning; so are records whose fields
+        are not of the type that their experiment declares, unless `typed` is false.
 
         Raises:
             ValueError: naming the file, if it is no regular file, or no line of it is a record.
         """
         lines, unfinished = self._lines()
-        valid = [line for line in lines if line.record and not (typed and line.why)]
-        records = {line.record.key: line.record for line in valid if line.record}
-        wrong = [line for line in lines if line.why and (typed or not line.record)]
-        left_out = [one for one in wrong if not one.record or one.record.key not in records]
-        sentences = [_cut_off(self.path)] * bool(unfinished)
-        sentences += [_no_records(self.path, left_out)] * bool(left_out)
-        return Reading(list(records.values()), " ".join(sentences))
+        records, invalid = {}, []
+        for line in lines:
+            if line.record and not (typed and line.error):
+                records[line.record.key] = line.record
+            else:
+                invalid.append(line)
+        invalid = [line for line in invalid if not line.record or line.record.key not in records]
+        warnings = [
+            f"The last line of {self.path.name} was cut off and is left out; "
+            "its block is measured again by the next bench."
+        ] * bool(unfinished)
+        if invalid:
+            reasons = [f"line {line.number} ({line.error})" for line in invalid[:LISTED_LINES]]
+            if len(invalid) > LISTED_LINES:
+                reasons.append(f"{len(invalid) - LISTED_LINES} more")
+            warnings.append(
+                f"Left out of {self.path.name}, for they are no records: {'; '.join(reasons)}."
+            )
+        return Reading(list(records.values()), " ".join(warnings))
 
     def append(self, records: Iterable[Record]) -> None:
         """Write the records to the end of the file and to the disk: all of them, or none.
 
-        An unfinished record, left by a run that was killed, is cut off first; whatever else is in
-        the file stays.
+        An unfinished record, left by a run that was killed, is cut off first; all else in the file
+        stays.
 
         Raises:
             OSError: naming the file, if it cannot be written to, as on a full disk.
@@ -214,9 +234,13 @@ class RecordFile:
         text = "".join(encode(record) + "\n" for record in records).encode()
         self.path.parent.mkdir(parents=True, exist_ok=True)
         check_regular(self.path)
-        with _naming(self.path), self.path.open("ab", buffering=0) as file:
-            text = self._mend() + text
-            end = file.tell()
+        with _write_errors_named(self.path), self.path.open("ab", buffering=0) as file:
+            begin, last_line = self._last_line()
+            if _is_unfinished(last_line):
+                file.truncate(begin)
+            elif last_line:
+                text = b"\n" + text
+            end = self.path.stat().st_size
             try:
                 _write(file, text)
             except OSError:
@@ -224,64 +248,62 @@ class RecordFile:
                     file.truncate(end)
                 raise
 
-    def drop(self, unwanted: Callable[[Record], bool]) -> None:
+    def drop(self, is_unwanted: Callable[[Record], bool]) -> None:
         """Remove records; the old file stays whole until the new one is, and all else stays in it.
 
         Raises:
             ValueError: as `read` does.
         """
         lines, _ = self._lines()
-        of_their_type_last = sorted(lines, key=lambda line: not line.why)
-        latest = {line.record.key: line.record for line in of_their_type_last if line.record}
-        if any(map(unwanted, latest.values())):
-            kept = {id(record) for record in latest.values() if not unwanted(record)}
-            self._replace(line.text for line in lines if not line.record or id(line.record) in kept)
+        valid_last = sorted(lines, key=lambda line: not line.error)
+        latest = {line.record.key: line.record for line in valid_last if line.record}
+        if any(map(is_unwanted, latest.values())):
+            remaining = {id(record) for record in latest.values() if not is_unwanted(record)}
+            self._replace(
+                line.text for line in lines if not line.record or id(line.record) in remaining
+            )
 
     def arrange(self, order: Iterable[Key]) -> None:
-        """Bring the records of these keys into order, each in the place of one of them.
+        """Sort the records of these keys, each into the line of one of them.
 
-        Tables show rows as they are on record, and blocks that are measured at the same time may
-        end in any order. All else keeps its place, and the old file stays whole until the new one
-        is.
+        Tables show rows in the order of the file, and blocks that are measured at the same time
+        end in any order. All other lines keep their place, and the old file stays whole until the
+        new one is.
 
         Raises:
             ValueError: as `read` does.
         """
         lines, _ = self._lines()
         rank = {key: i for i, key in enumerate(order)}
-        places = [i for i, line in enumerate(lines) if line.record and line.record.key in rank]
-        ranks = [rank[record.key] for i in places if (record := lines[i].record)]
-        if (firsts := list(dict.fromkeys(ranks))) != sorted(firsts):
+        ranks = {
+            i: rank[line.record.key]
+            for i, line in enumerate(lines)
+            if line.record and line.record.key in rank
+        }
+        firsts = list(dict.fromkeys(ranks.values()))
+        if firsts != sorted(firsts):
             texts = [line.text for line in lines]
-            for place, (_, source) in zip(
-                places, sorted(zip(ranks, places, strict=True)), strict=True
-            ):
+            for place, source in zip(ranks, sorted(ranks, key=ranks.__getitem__), strict=True):
                 texts[place] = lines[source].text
             self._replace(texts)
 
-    def _lines(self) -> tuple[list["_Decoded"], bytes]:
+    def _lines(self) -> tuple[list[_DecodedLine], bytes]:
         """Return all lines with text, and the last one if it is a record that was cut off."""
         check_regular(self.path)
         content = self.path.read_bytes() if self.path.exists() else b""
-        *texts, last = content.split(b"\n")
-        unfinished = last if _is_begun(last) else b""
-        texts += [] if unfinished else [last]
-        decoded = enumerate(map(_record_of, texts), 1)
-        lines = [_Decoded(i, *one) for i, one in decoded if one[0].strip()]
+        *texts, last_line = content.split(b"\n")
+        unfinished = last_line if _is_unfinished(last_line) else b""
+        texts += [] if unfinished else [last_line]
+        lines = [
+            _DecodedLine(i, *_decoded(text)) for i, text in enumerate(texts, 1) if text.strip()
+        ]
         if lines and not any(line.record for line in lines):
-            raise ValueError(f"{self.path}, line {lines[0].number}: not a record ({lines[0].why})")
+            first = lines[0]
+            raise ValueError(f"{self.path}, line {first.number}: not a record ({first.error})")
         return lines, unfinished
 
-    def _mend(self) -> bytes:
-        """Cut off an unfinished record; return what ends the last line if it is something else."""
-        begin, last = self._last_line()
-        if _is_begun(last):
-            os.truncate(self.path, begin)
-            return b""
-        return b"\n" if last else b""
-
     def _last_line(self) -> tuple[int, bytes]:
-        """Return where the line after the last end of a line begins, and what it holds."""
+        """Return where the text after the last end of a line begins, and the text."""
         if not self.path.stat().st_size:
             return 0, b""
         with (
@@ -292,21 +314,21 @@ class RecordFile:
             return begin, content[begin:]
 
     def _replace(self, lines: Iterable[bytes]) -> None:
-        beside = self.path.with_suffix(".new")
-        check_regular(beside)
+        new = self.path.with_suffix(".new")
+        check_regular(new)
         try:
-            with _naming(self.path), beside.open("wb", buffering=0) as file:
+            with _write_errors_named(self.path), new.open("wb", buffering=0) as file:
                 _write(file, b"".join(line + b"\n" for line in lines))
-            beside.replace(self.path)
+            new.replace(self.path)
         finally:
-            beside.unlink(missing_ok=True)
+            new.unlink(missing_ok=True)
 
 
 def on_record(folder: Path, typed: bool = True) -> Reading:
-    """Return what a folder has on record; see `RecordFile.read`.
+    """Return the records of a folder; see `RecordFile.read`.
 
     Raises:
-        ValueError: if that is nothing, or cannot be read.
+        ValueError: if there are none, or they cannot be read.
     """
     check_folder(folder)
     reading = RecordFile(folder).read(typed)
@@ -318,14 +340,14 @@ def on_record(folder: Path, typed: bool = True) -> Reading:
 
 def _write(file: io.FileIO, content: bytes) -> None:
     """Write all of the content to the disk."""
-    rest = memoryview(content)
-    while rest:
-        rest = rest[file.write(rest) :]
+    unwritten = memoryview(content)
+    while unwritten:
+        unwritten = unwritten[file.write(unwritten) :]
     os.fsync(file.fileno())
 
 
 @contextlib.contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def _write_errors_named(path: Path) -> Iterator[None]:
     """Let a failure to write name the file, and say that nothing is lost."""
     try:
         yield
@@ -334,17 +356,8 @@ def _naming(path: Path) -> Iterator[None]:
         raise OSError(error.errno, why, str(path)) from None
 
 
-class _Decoded(NamedTuple):
-    """A line of a result file: its record, and why it is none, or not of its type."""
-
-    number: int
-    text: bytes
-    record: Record | None
-    why: str = ""
-
-
 def check_regular(path: Path) -> None:
-    """Make sure that a file is one that can be read to its end, or is not there.
+    """Make sure that a path is a file that can be read to its end, or does not exist.
 
     Raises:
         ValueError: if it is a folder, a pipe or a device, or larger than `LARGEST`.
@@ -360,7 +373,7 @@ def check_regular(path: Path) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Make sure that a folder is one, or is not there.
+    """Make sure that a path is a folder, or does not exist.
 
     Raises:
         ValueError: if it is a file, a pipe or a device.
@@ -375,17 +388,17 @@ def _kind_of_file(mode: int) -> str:
     return kinds.get(stat.S_IFMT(mode), "special file")
 
 
-def _is_begun(line: bytes) -> bool:
+def _is_unfinished(line: bytes) -> bool:
     """Return whether a line is the beginning of a record, and not a whole one."""
     begin = f'{{"format": {FORMAT}, "suite": '.encode()
     is_ours = bool(line) and (line.startswith(begin) or begin.startswith(line))
-    return is_ours and _record_of(line)[1] is None
+    return is_ours and _decoded(line)[1] is None
 
 
-# A run reads its file again and again: so many lines are decoded once.
+# A run reads its file again and again; each line is decoded once.
 @functools.lru_cache(maxsize=4096)
-def _record_of(text: bytes) -> tuple[bytes, Record | None, str]:
-    """Return a line, its record, or None and why it is none; or why it is not of its type."""
+def _decoded(text: bytes) -> tuple[bytes, Record | None, str]:
+    """Return a line, its record or None, and why it is none or of the wrong type."""
     record = None
     try:
         record = untyped(text)
@@ -395,25 +408,14 @@ def _record_of(text: bytes) -> tuple[bytes, Record | None, str]:
     return text, record, ""
 
 
-def _cut_off(path: Path) -> str:
-    return (
-        f"The last line of {path.name} was cut off and is left out; "
-        "its block is measured again by the next bench."
-    )
-
-
-def _no_records(path: Path, damaged: Sequence[_Decoded]) -> str:
-    """Return a sentence that names lines that are no records, and why the first few are none."""
-    numbers = [f"line {line.number} ({line.why})" for line in damaged[:NAMED]]
-    numbers += [f"{len(damaged) - NAMED} more"] * (len(damaged) > NAMED)
-    return f"Left out of {path.name}, for they are no records: {'; '.join(numbers)}."
-
-
 def encode(record: Record) -> str:
     """Return the record as one line of standard JSON; NaN and infinities become words."""
     content = {"format": FORMAT} | {name: getattr(record, name) for name in _FIELDS}
-    content["arrays"] = {name: _words(np.asarray(a)) for name, a in record.arrays.items()}
-    content["notes"] = {name: _in_unicode(text) for name, text in record.notes.items()}
+    content["arrays"] = {name: _nested_list(np.asarray(a)) for name, a in record.arrays.items()}
+    # Names of files may bring halves of surrogate pairs along.
+    content["notes"] = {
+        name: text.encode(errors="replace").decode() for name, text in record.notes.items()
+    }
     return json.dumps(content, allow_nan=False)
 
 
@@ -440,31 +442,26 @@ def untyped(line: bytes | str) -> Record:
     except RecursionError:
         raise ValueError("nested too deeply") from None
     fields = {name: getattr(content, name) for name in _FIELDS}
-    fields["arrays"] = {name: _numbers(name, values) for name, values in content.arrays.items()}
+    fields["arrays"] = {name: _array(name, numbers) for name, numbers in content.arrays.items()}
     return Record(**fields)
 
 
-def _in_unicode(text: str) -> str:
-    """Return text without halves of surrogate pairs, which names of files may bring along."""
-    return text.encode(errors="replace").decode()
+def _nested_list(array: np.ndarray) -> Any:
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"arrays: expected numbers, got {array.dtype} values")
+    if np.isfinite(array).all():
+        return array.tolist()
+    words = [repr(float(x)) if not np.isfinite(x) else float(x) for x in array.ravel()]
+    return np.array(words, dtype=object).reshape(array.shape).tolist()
 
 
-def _words(values: np.ndarray) -> Any:
-    if values.dtype.kind not in "biuf":
-        raise ValueError(f"arrays: expected numbers, got {values.dtype} values")
-    if np.isfinite(values).all():
-        return values.tolist()
-    words = [repr(float(x)) if not np.isfinite(x) else float(x) for x in values.ravel()]
-    return np.array(words, dtype=object).reshape(values.shape).tolist()
-
-
-def _numbers(name: str, values: Any) -> np.ndarray:
+def _array(name: str, numbers: Any) -> np.ndarray:
     """Return nested lists as an array: of truth values, of integers, or of floating point."""
-    leaves = np.array(values, dtype=object).ravel().tolist()
+    leaves = np.array(numbers, dtype=object).ravel().tolist()
     kinds = set(map(type, leaves))
     words = {leaf for leaf in leaves if isinstance(leaf, str)}
     if (kinds <= {int, float, str} or kinds == {bool}) and words <= _WORDS:
-        array = np.array(values, dtype=np.float64 if words else None)
+        array = np.array(numbers, dtype=np.float64 if words else None)
         if array.dtype.kind in "biuf":  # and no integers of more than 64 bits
             return array
     raise ValueError(f"arrays: expected numbers in {name[:40]!r}")

@@ -11,8 +11,7 @@ import numpy as np
 
 from plumbob.reference.arguments import distinct_texts
 
-from .block import SCALES, Block
-from .choice import Choice
+from .block import SCALES, Block, Choice
 from .executor import THIS_PROCESS, Executor, NotMeasured
 from .experiment import blocks
 from .folder_lock import locked
@@ -30,7 +29,7 @@ class Event(NamedTuple):
 
     Attributes:
         state: "kept" if a record of it was there, "measuring", "measured", "failed", or "not run"
-            for records of a solver that nothing asks for.
+            for records of a solver that are not part of this run.
         suite: the suite.
         what: problem and solver.
         message: why it is measured again, why it failed, or how many were not run; else "".
@@ -45,11 +44,11 @@ class Event(NamedTuple):
 def run(
     suites: Sequence[str], scale: str | Choice, folder: Path, executor: Executor = THIS_PROCESS
 ) -> Iterator[Event]:
-    """Measure suites, yielding what happens; records already there are kept.
+    """Measure suites, yielding events; valid records are kept.
 
     A block is measured again where its record is from other sources, versions or another machine,
-    smaller than asked for, or failed. Records that nothing asks for are kept. In this process
-    suites are measured in order. The scale is a name, or a choice of what there is at one.
+    is smaller than requested, or failed. Records of other blocks are kept. In this process suites
+    are measured in order. The scale is a name, or a choice of blocks.
 
     Raises:
         ValueError: if the result file cannot be read, or another run writes to it; or if the
@@ -58,40 +57,44 @@ def run(
     file, choice = RecordFile(folder), chosen(scale)
     with locked(folder):
         present = {record.key: record for record in file.read().records}
-        for together in [suites] if executor.takes_suites_together else [[s] for s in suites]:
+        for group in [suites] if executor.takes_suites_together else [[s] for s in suites]:
             begin = time.perf_counter()
-            every = [block for suite in together for block in blocks(suite, choice.scale)]
-            executor.look_at(present.get(block_key(block)) for block in every if block.times)
-            wanted = [block for block in every if choice.takes(block)]
-            yield from _run_blocks(wanted, choice, file, present, executor)
-            file.arrange(map(block_key, wanted))
-            spent = time.perf_counter() - begin
-            for suite in together:
-                asked = {block_key(block) for block in wanted if block.suite == suite}
-                if not choice.is_partial:
-                    _finish(_finished(suite, choice.name, len(asked), spent, executor), asked, file)
-                yield from _not_asked_for(suite, asked, file, choice.is_partial)
+            every = [block for suite in group for block in blocks(suite, choice.scale)]
+            executor.note_records(present.get(block_key(block)) for block in every if block.times)
+            selected = [block for block in every if choice.takes(block)]
+            yield from _run_blocks(selected, choice, file, present, executor)
+            file.arrange(map(block_key, selected))
+            seconds = time.perf_counter() - begin
+            for suite in group:
+                suite_keys = {block_key(block) for block in selected if block.suite == suite}
+                if choice.is_partial:
+                    yield from _unselected(suite, suite_keys, file)
+                else:
+                    _record_finish(suite, suite_keys, choice.name, seconds, executor, file)
+                    yield from _unrequested(suite, suite_keys, file)
 
 
 def _run_blocks(
-    wanted: Sequence[Block],
+    selected: Sequence[Block],
     choice: Choice,
     file: RecordFile,
     present: Mapping[Key, Record],
     executor: Executor,
 ) -> Iterator[Event]:
-    """Have the blocks measured that are not on record; write each record as it comes."""
-    again = {block_key(block): why_again(block, present, executor) for block in wanted}
-    for block in wanted:
-        if again[block_key(block)] is None:
+    """Measure the blocks that are not on record; write each record as it comes."""
+    reasons = {block_key(block): why_again(block, present, executor) for block in selected}
+    missing = []
+    for block in selected:
+        if reasons[block_key(block)] is None:
             yield _event(KEPT, block)
-    missing = [block for block in wanted if again[block_key(block)] is not None]
+        else:
+            missing.append(block)
     for step in executor.measure(missing, choice.scale):
         match step:
             case Block():
-                yield _event(MEASURING, step, again[block_key(step)] or "")
-            case NotMeasured(block, why):
-                yield _event(FAILED, block, why)
+                yield _event(MEASURING, step, reasons[block_key(step)] or "")
+            case NotMeasured(block, reason):
+                yield _event(FAILED, block, reason)
             case Record():
                 file.append([step])
                 yield _event(FAILED if step.failed else MEASURED, step, step.failed)
@@ -101,35 +104,40 @@ def _event(state: str, of: Block | Record, message: str = "") -> Event:
     return Event(state, of.suite, f"{of.problem}, {of.solver}", message)
 
 
-def _finished(suite: str, scale: str, count: int, seconds: float, executor: Executor) -> Record:
-    """Return the record that says that a suite was gone through to its end."""
-    return Record(
-        FINISHED, suite, "", size=count, notes={"scale": scale}, stamp=executor.stamp(),
+def _record_finish(
+    suite: str,
+    suite_keys: Set[Key],
+    scale: str,
+    seconds: float,
+    executor: Executor,
+    file: RecordFile,
+) -> None:
+    """Record that a suite was run to its end, if all of its blocks are on record."""
+    finished = Record(
+        FINISHED, suite, "", size=len(suite_keys), notes={"scale": scale}, stamp=executor.stamp(),
         when=now(), seconds=seconds, conditions=conditions(),
     )  # fmt: skip
-
-
-def _finish(finished: Record, asked: Set[Key], file: RecordFile) -> None:
-    """Put on record that a suite was gone through, if it is new and all is on record."""
     records = {record.key: record for record in file.read().records}
-    before = records.get(finished.key)
-    is_said = before is not None and all(
-        getattr(before, name) == getattr(finished, name) for name in ("size", "notes", "stamp")
+    previous = records.get(finished.key)
+    is_recorded = previous is not None and all(
+        getattr(previous, name) == getattr(finished, name) for name in ("size", "notes", "stamp")
     )
-    if asked <= records.keys() and not is_said:
+    if suite_keys <= records.keys() and not is_recorded:
         file.append([finished])
 
 
-def _not_asked_for(
-    suite: str, asked: Set[Key], file: RecordFile, is_partial: bool
-) -> Iterator[Event]:
-    """Say how many records of a suite were not asked for; mark those under settings of before."""
-    extra = [r for r in file.read().records if r.suite == suite and r.key not in asked]
-    if is_partial:
-        if extra:
-            yield Event(NOT_RUN, suite, "", f"{_records(len(extra))} of what was not chosen kept")
-        return
-    old = [record for record in extra if _is_superseded(record, asked)]
+def _unselected(suite: str, suite_keys: Set[Key], file: RecordFile) -> Iterator[Event]:
+    """Report how many records of a suite the choice left out."""
+    count = sum(r.suite == suite and r.key not in suite_keys for r in file.read().records)
+    if count:
+        yield Event(NOT_RUN, suite, "", f"{_records(count)} of what was not chosen kept")
+
+
+def _unrequested(suite: str, suite_keys: Set[Key], file: RecordFile) -> Iterator[Event]:
+    """Report the records of a suite that are not part of it now; mark those with old settings."""
+    extra = [r for r in file.read().records if r.suite == suite and r.key not in suite_keys]
+    current = {key[:3] for key in suite_keys}
+    old = [record for record in extra if _is_missing(record) or record.key[:3] in current]
     if newly := [record for record in old if not record.superseded]:
         file.append([replace(r, notes={**r.notes, "superseded": now()}) for r in newly])
     for solver, count in Counter(record.solver for record in old).items():
@@ -139,23 +147,17 @@ def _not_asked_for(
         yield Event(NOT_RUN, suite, solver, f"{_records(count)} of {solver} kept, not run")
 
 
+def _is_missing(record: Record) -> bool:
+    """Return whether a record says only that something was missing."""
+    return not (record.arrays or record.failed or record.facts.get("entrant"))
+
+
 def _records(count: int) -> str:
     return f"{count} record{'' if count == 1 else 's'}"
 
 
-def _is_superseded(record: Record, asked: Set[Key]) -> bool:
-    """Return whether a record that is not asked for belongs to what is, or to nothing measured.
-
-    Its problem and solver are asked for under other settings, or it says only that something was
-    missing.
-    """
-    if not record.arrays and not record.failed and not record.facts.get("entrant"):
-        return True
-    return record.key[:3] in {key[:3] for key in asked}
-
-
 def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
-    """Return a sentence for each claim on record, of the suites given, that does not hold."""
+    """Return a sentence for each recorded claim of the suites that does not hold."""
     if "check" not in suites:
         return []
     checks = [r for r in RecordFile(folder).read().records if r.suite == "check"]
@@ -164,17 +166,17 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
 
 
 def forget(suites: Sequence[str], scale: str | Choice, folder: Path) -> None:
-    """Remove the records of what is to be measured; those that nothing asks for stay.
+    """Remove the records of the blocks that are to be measured; others stay.
 
     Raises:
         ValueError: if the result file cannot be read, or a run writes to it.
     """
-    asked = {key for suite in suites for key in keys(suite, scale)}
-    begun = () if chosen(scale).is_partial else suites
+    selected = {key for suite in suites for key in keys(suite, scale)}
+    restarted = () if chosen(scale).is_partial else suites
     with locked(folder):
         RecordFile(folder).drop(
             lambda record: (
-                record.key in asked or (record.suite == FINISHED and record.problem in begun)
+                record.key in selected or (record.suite == FINISHED and record.problem in restarted)
             )
         )
 
@@ -185,7 +187,7 @@ def count(suites: Sequence[str], scale: str | Choice) -> int:
 
 
 def keys(suite: str, scale: str | Choice) -> set[Key]:
-    """Return the keys of all records of a suite that was gone through."""
+    """Return the keys of the blocks of a suite that are selected."""
     choice = chosen(scale)
     return set(map(block_key, filter(choice.takes, blocks(suite, choice.scale))))
 
@@ -196,7 +198,7 @@ def chosen(scale: str | Choice) -> Choice:
 
 
 def why_again(block: Block, present: Mapping[Key, Record], executor: Executor) -> str | None:
-    """Return why a block is measured though there is a record, "" if there is none, or None."""
+    """Return why a block is measured again, "" if it has no record, None if its record is valid."""
     record = present.get(block_key(block))
     if record is None:
         return ""

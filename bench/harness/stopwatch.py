@@ -5,10 +5,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 T = TypeVar("T")
-
-
 # A budget ends after so many times its seconds, whatever a solver counts.
-MOST_AT_DOORS = 10.0
+MAXIMUM_EXTENSION = 10.0
 
 
 def time_call(call: Callable[[], T]) -> tuple[T, float]:
@@ -19,18 +17,18 @@ def time_call(call: Callable[[], T]) -> tuple[T, float]:
 
 
 class Budget:
-    """A stretch of time from the moment it is made, without what doors cost."""
+    """A time limit that starts now and does not count the overhead of requests."""
 
     def __init__(self, seconds: float) -> None:
-        self._seconds, self._begin, self._at_doors = seconds, time.perf_counter(), 0.0
+        self._seconds, self._begin, self._excused = seconds, time.perf_counter(), 0.0
 
-    def excuse(self, at_door: float) -> None:
-        """Charge no more for time [s] that was a door's rather than a solver's."""
-        self._at_doors += at_door
+    def excuse(self, seconds: float) -> None:
+        """Do not count these seconds, which a request cost beside the solver."""
+        self._excused += seconds
 
     @property
     def is_spent(self) -> bool:
-        """Whether it is over."""
+        """Whether the time is over."""
         passed = time.perf_counter() - self._begin
-        is_over = passed - self._at_doors >= self._seconds
-        return is_over or passed >= MOST_AT_DOORS * self._seconds
+        limit = min(self._seconds + self._excused, MAXIMUM_EXTENSION * self._seconds)
+        return passed >= limit

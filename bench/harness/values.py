@@ -1,7 +1,7 @@
-"""Typed fields of records: what an experiment measures, and what is said of it.
+"""Typed fields of records: the numbers of an experiment, and its settings, notes and facts.
 
-An experiment declares its types in `values.py`, in `KINDS`. What stands in the file of results is
-read into them, so that a record that lacks a field, or has one of another type, is refused.
+An experiment declares its types in `values.py`, in `KINDS`. Records are read into them, so that a
+record that lacks a field, or has one of another type, is refused.
 """
 
 import functools
@@ -18,12 +18,12 @@ Floats3 = np.ndarray[tuple[int, int, int], np.dtype[np.float64]]
 Integers1 = np.ndarray[tuple[int], np.dtype[np.int64]]
 Booleans1 = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
-# Which kinds of numbers a field takes, by its own kind: whole numbers may stand for others.
+# The kinds of numbers that a field takes, by its own kind: integers may stand for floats.
 _TAKES = {"f": "fiu", "i": "iu", "b": "b"}
 
 
 class Values(msgspec.Struct, frozen=True, eq=False):
-    """What a block measured: arrays of one axis or more, and single numbers.
+    """The numbers of a block: arrays of one axis or more, and scalars.
 
     A field that is None is not on record. A name that is no identifier is given as
     `msgspec.field(name="cold wall")`.
@@ -31,9 +31,9 @@ class Values(msgspec.Struct, frozen=True, eq=False):
 
 
 class Details(msgspec.Struct, frozen=True):
-    """What is said of a block: its settings, its notes, and its facts.
+    """The settings, notes and facts of a block.
 
-    What a measurement says, and not its block, needs a default, since it may fail.
+    Notes and facts of a measurement need a default, since it may fail.
     """
 
 
@@ -55,7 +55,7 @@ def kind_of(suite: str, task: str) -> Kind | None:
     """
     from .experiment import EXPERIMENTS
 
-    modules = [f"{made.package}.values" for made in EXPERIMENTS if made.suite == suite]
+    modules = [f"{e.package}.values" for e in EXPERIMENTS if e.suite == suite]
     kinds = {name: kind for module in modules
              for name, kind in importlib.import_module(module).KINDS.items()}  # fmt: skip
     if kinds and task not in kinds:
@@ -67,39 +67,40 @@ Typed = TypeVar("Typed", bound=msgspec.Struct)
 
 
 def read(kind: type[Typed], fields: Mapping[str, Any]) -> Typed:
-    """Return fields, by the names they have on record, as a type; more of them are left out.
+    """Return fields, by their names on record, as a type; unknown ones are left out.
 
     Raises:
         ValueError: if there is no such field, or it is of another type or number of axes.
     """
-    known = {name: _single(value) for name, value in fields.items()}
+    scalars = {
+        name: field.item() if isinstance(field, np.ndarray) and not field.ndim else field
+        for name, field in fields.items()
+    }
     try:
-        return msgspec.convert(known, kind, dec_hook=_array)
+        return msgspec.convert(scalars, kind, dec_hook=_array)
     except msgspec.ValidationError as error:
         raise ValueError(str(error).replace("$.", "")) from None
 
 
 def stored(values: Values) -> dict[str, Any]:
-    """Return values by the names they have on record, without those that are None."""
+    """Return values by their names on record, without those that are None."""
     fields = msgspec.structs.fields(values)
-    every = {field.encode_name: getattr(values, field.name) for field in fields}
-    return {name: value for name, value in every.items() if value is not None}
+    return {
+        field.encode_name: number
+        for field in fields
+        if (number := getattr(values, field.name)) is not None
+    }
 
 
-def _single(value: Any) -> Any:
-    """Return an array without axes as a number."""
-    return value.item() if isinstance(value, np.ndarray) and not value.ndim else value
-
-
-def _array(kind: Any, value: Any) -> np.ndarray:
-    """Return an array of the kind; nothing at all is of every type."""
+def _array(kind: Any, nested: Any) -> np.ndarray:
+    """Return an array of the kind; an empty one is of every type."""
     shape, dtype = get_args(kind)
-    axes, wanted = len(get_args(shape)), np.dtype(get_args(dtype)[0])
-    array = np.asarray(value)
+    axes, expected = len(get_args(shape)), np.dtype(get_args(dtype)[0])
+    array = np.asarray(nested)
     if not array.size:
-        return np.empty((0,) * axes, wanted)
+        return np.empty((0,) * axes, expected)
     if array.ndim != axes:
         raise ValueError(f"expected {axes} dimensions, got {array.ndim}")
-    if array.dtype.kind not in _TAKES[wanted.kind]:
-        raise ValueError(f"expected {wanted.name}, got {array.dtype.name}")
-    return array.astype(wanted, copy=False)
+    if array.dtype.kind not in _TAKES[expected.kind]:
+        raise ValueError(f"expected {expected.name}, got {array.dtype.name}")
+    return array.astype(expected, copy=False)

@@ -1,12 +1,10 @@
 """The messages of a worker process, and its side of the connection: jobs in, messages out.
 
-A solver may print, crash or hang: it does so in a process of its own, which `isolation` starts.
-Only messages go through the connection.
+A solver may print, crash or hang, so it works in a process of its own, which `isolation` starts.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from multiprocessing.connection import Connection
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,15 +15,15 @@ from .progress import Progress, listening
 
 
 class Begun(NamedTuple):
-    """The job was read and is begun."""
+    """The worker has read the job and begins it."""
 
 
 class Ready(NamedTuple):
-    """The solver is set up, in so long [s] without imports, and did one target, not counted.
+    """The solver is set up and has solved one target that does not count.
 
     Attributes:
-        setup: how long that took [s].
-        remark: what is to be said of its numbers, else "".
+        setup: how long the set-up took, without imports [s].
+        remark: how to read the solver's numbers, else "".
     """
 
     setup: float
@@ -33,15 +31,15 @@ class Ready(NamedTuple):
 
 
 class Solved(NamedTuple):
-    """One target is done.
+    """The answer for one target.
 
     Attributes:
         q: the coordinates, NaN if there are none.
-        claim: 1 if the solver says that it is solved, 0 if not, -1 if it does not say.
+        claim: 1 if the solver says that it solved the target, 0 if not, -1 if it does not say.
         seconds: how long it took.
-        trouble: what the solver raised, else "".
-        round_trip: how long its door took, 0 without one [s].
-        doubt: why the seconds, where it counts them itself, cannot be right, else "".
+        trouble: the exception that the solver raised, else "".
+        round_trip: duration of the request, 0 without one [s].
+        doubt: why the seconds that the solver counted cannot be right, else "".
     """
 
     q: np.ndarray
@@ -52,77 +50,61 @@ class Solved(NamedTuple):
     doubt: str = ""
 
     @property
-    def at_door(self) -> float:
-        """What its door cost beside it [s]."""
+    def overhead(self) -> float:
+        """Time of the request that the solver did not use [s]."""
         return max(0.0, self.round_trip - self.seconds)
 
 
-class Unfit(NamedTuple):
-    """The solver cannot do this job; `why` says what came of trying."""
+class Numbers(NamedTuple):
+    """The result of a calculation, by name."""
 
-    why: str
-
-
-class Done(NamedTuple):
-    """There is nothing more to come."""
+    by_name: Mapping[str, Any]
 
 
-class Found(NamedTuple):
-    """What was measured, by name."""
+class Finished(NamedTuple):
+    """The last message: the end of the job, of its solver, or of the process.
 
-    values: Mapping[str, Any]
+    Attributes:
+        trouble: why the job was not done, "" if it was.
+        is_lost: whether the process ended.
+        is_silent: whether it was ended for its silence.
+    """
 
-
-class Lost(NamedTuple):
-    """The process is gone; `why` says how, `silent` whether it was ended since it was silent."""
-
-    why: str
-    silent: bool = False
-
-
-Message = Begun | Ready | Progress | Solved | Found | Unfit | Done | Lost
-# After one of these there is no more to come.
-LAST = (Unfit, Done, Lost)
+    trouble: str = ""
+    is_lost: bool = False
+    is_silent: bool = False
 
 
-class Work(Protocol):
-    """What a worker can be sent: it knows how it is done."""
-
-    def perform(self) -> Iterator[Message]:
-        """Yield what comes of it, each part as soon as it is there."""
+Message = Begun | Ready | Progress | Solved | Numbers | Finished
 
 
 class Calculation(NamedTuple):
-    """A job that is one call, which returns what was measured, by name."""
+    """A job that is one call, which returns numbers by name."""
 
     function: Callable[..., Mapping[str, Any]]
     arguments: tuple[Any, ...]
 
     def perform(self) -> Iterator[Message]:
-        """Yield what is measured."""
+        """Yield the numbers."""
         try:
-            yield Found(self.function(*self.arguments))
-            yield Done()
+            yield Numbers(self.function(*self.arguments))
+            yield Finished()
         except Exception as error:
-            yield Unfit(describe(error))
+            yield Finished(describe(error))
 
 
-def serve(requests: Connection, answers: Connection) -> None:
-    """Perform jobs until there are no more."""
+def main() -> None:
+    """Perform the jobs of the process that started this one until there are no more."""
+    requests, answers = connect()
     with listening(answers.send):
         while True:
             try:
                 job = requests.recv()
             except EOFError:
                 return
-            except Exception as error:  # a class that cannot be imported here, or is another
-                answers.send(Unfit(describe(error)))
+            except Exception as error:  # a class that cannot be imported here, or has changed
+                answers.send(Finished(describe(error)))
                 continue
             answers.send(Begun())
             for message in job.perform():
                 answers.send(message)
-
-
-def main() -> None:
-    """Serve the process that started this one."""
-    serve(*connect())

@@ -1,4 +1,4 @@
-"""The user's solver that works in this process's child: one at a time, opened when first asked."""
+"""The user's solver that works in this worker's child: one at a time, opened at its first use."""
 
 from collections.abc import Mapping
 from time import perf_counter
@@ -32,7 +32,7 @@ class Contestant:
 
     @property
     def greeting(self) -> Greeting:
-        """What it says of itself."""
+        """Its description of itself."""
         return self._door.greeting
 
     def close(self) -> None:
@@ -40,10 +40,10 @@ class Contestant:
         self._door.close()
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], OwnTime]:
-        """Return what it answers, and its time.
+        """Return its answer and its time.
 
         Raises:
-            NoAnswerError: if it answers nothing.
+            NoAnswerError: if it gives no answer.
         """
         begin = perf_counter()
         answer = self._door.answer(Case("of the bench", task, inputs, "bench", _ABOUT))
@@ -60,14 +60,14 @@ _open: dict[Spec, Contestant] = {}
 
 
 def opened(spec: Spec) -> Contestant:
-    """Return a solver, the same as before if it is asked again; any other is ended."""
+    """Return an open solver; any other is ended."""
     if spec not in _open:
-        for other in list(_open):
-            _open.pop(other).close()
+        while _open:
+            _open.popitem()[1].close()
         _open[spec] = Contestant(spec)
     return _open[spec]
 
 
 def remark() -> str:
-    """Return what is to be said of the times of the solver that works."""
+    """Return how the open solver's times are taken, where that is not by its own clock."""
     return next(iter(_open.values())).remark if _open else ""

@@ -1,4 +1,4 @@
-"""A solver that a user entered: what it is called, where it comes from, what it offers."""
+"""A solver that a user entered: its name, its address, its tasks."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,19 +8,19 @@ Spec = str | tuple[str, ...]
 
 CHAIN_TASK, ROBOT_TASK = "inverse_kinematics", "robot_inverse_kinematics"
 STEP_TASK, MOTION_TASK = "mass_spring_step", "mass_spring_motion"
-# The tasks that each suite asks of an entrant.
+# The tasks that each suite has for an entrant.
 SUITE_TASKS = {"ik": (CHAIN_TASK, ROBOT_TASK), "cloth": (STEP_TASK, MOTION_TASK)}
 
 
 @dataclass(frozen=True)
 class Entrant:
-    """A solver that was opened once and said what it is.
+    """A solver that was opened once to describe itself.
 
     Attributes:
-        name: of its own, or as the user calls it.
+        name: its own, or the user's name for it.
         door: its address as the user gave it.
         spec: what opens it.
-        version: of its own; "" if it says none.
+        version: its own; "" if it states none.
         commit: of its sources, and whether they were changed since; "" outside of git.
         digest: twelve hex digits over its sources.
         tasks: that it offers.
@@ -46,14 +46,14 @@ class Entrant:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What every record of it says of it."""
+        """Facts of all its records."""
         return {"entrant": True, "door": self.door, "digest": self.digest}
 
     @property
     def conditions(self) -> dict[str, Any]:
-        """What it was measured under that makes it no other measurement."""
+        """Conditions of all its records."""
         return {"solver_commit": self.commit}
 
     def offers(self, suite: str) -> list[str]:
-        """Return which of its tasks a suite asks for."""
+        """Return its tasks in a suite."""
         return [task for task in SUITE_TASKS.get(suite, ()) if task in self.tasks]

@@ -10,16 +10,13 @@ from pathlib import Path
 
 
 def python(name: str) -> Path:
-    """Return where the Python of a peer's environment is, or would be."""
-    return _folder(name) / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+    """Return the path of the Python of a peer's environment, which need not exist."""
+    place = "Scripts/python.exe" if sys.platform == "win32" else "bin/python"
+    return Path(sys.prefix, "peers", name, place)
 
 
 def distribution(name: str, package: str) -> importlib.metadata.Distribution | None:
     """Return a package in a peer's environment, or in ours if its name is "", None if it lacks."""
-    places = [str(path) for path in _folder(name).glob("lib/python*/site-packages")]
-    found = importlib.metadata.distributions(name=package, path=places if name else sys.path)
-    return next(iter(found), None)
-
-
-def _folder(name: str) -> Path:
-    return Path(sys.prefix) / "peers" / name
+    path = map(str, Path(sys.prefix, "peers", name).glob("lib/python*/site-packages"))
+    places = list(path) if name else sys.path
+    return next(iter(importlib.metadata.distributions(name=package, path=places)), None)

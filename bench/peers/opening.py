@@ -1,4 +1,4 @@
-"""Open the solvers that a user enters, once, and put down what they say of themselves."""
+"""Open the solvers that a user enters, once, and note how they describe themselves."""
 
 import importlib.metadata
 from collections.abc import Iterator, Sequence
@@ -19,36 +19,35 @@ GROUP = "plumbob.solvers"
 
 
 class SolverAddress(NamedTuple):
-    """A solver as it is asked for: its address, what opens it, and how the user calls it."""
+    """A solver that is to be opened: its address, its spec, and the user's name for it."""
 
     door: str
     spec: Spec
-    called: str = ""
+    name: str = ""
     version: str = ""
 
 
-def named(words: Sequence[str], program: Sequence[str] = ()) -> list[SolverAddress]:
-    """Return what --with and a program behind -- mean.
+def addresses(words: Sequence[str], program: Sequence[str] = ()) -> list[SolverAddress]:
+    """Return the addresses in --with and in a program behind --.
 
     Args:
         words: each a Python file, module:object, a program's file, or NAME= before one of these.
         program: a command and its arguments.
     """
-    entries = [_entry(word) for word in words]
-    return [*entries, SolverAddress(" ".join(program), tuple(program))] if program else entries
+    entered = [_address(word) for word in words]
+    return [*entered, SolverAddress(" ".join(program), tuple(program))] if program else entered
 
 
-def _entry(word: str) -> SolverAddress:
-    called, equals, door = word.partition("=")
+def _address(word: str) -> SolverAddress:
+    name, equals, door = word.partition("=")
     if not equals or Path(word).exists():
-        called, door = "", word
+        name, door = "", word
     if not door:
         raise ValueError(f"with: expected NAME=FILE, got {word!r}")
     place, colon, attribute = door.partition(":")
     is_file = Path(place).exists()
-    return SolverAddress(
-        door, f"{Path(place).resolve()}{colon}{attribute}" if is_file else door, called
-    )
+    spec = f"{Path(place).resolve()}{colon}{attribute}" if is_file else door
+    return SolverAddress(door, spec, name)
 
 
 def installed() -> list[SolverAddress]:
@@ -64,44 +63,41 @@ def installed() -> list[SolverAddress]:
     ]
 
 
-def opened(entries: Sequence[SolverAddress], suites: Sequence[str]) -> list[Entrant]:
-    """Return the solvers, each started once to say what it is.
+def opened(entered: Sequence[SolverAddress], suites: Sequence[str]) -> list[Entrant]:
+    """Return the solvers, each started once to describe itself.
 
     Raises:
-        ValueError: if one cannot be opened, offers nothing that the suites ask for, or has the name
-            of another.
+        ValueError: if one cannot be opened, offers no task of the suites, or has the name of
+            another.
     """
-    entrants = [_opened(entry) for entry in entries]
-    doors: dict[str, str] = {}
+    entrants = [_opened(address) for address in entered]
     for entrant in entrants:
         if not any(map(entrant.offers, suites)):
-            asked = [f"{suite} ({', '.join(tasks)})" for suite, tasks in SUITE_TASKS.items()]
+            tasks = [f"{suite} ({', '.join(tasks)})" for suite, tasks in SUITE_TASKS.items()]
             raise ValueError(
                 f"with: expected a solver for one of the suites that are run; {entrant.door} "
                 f"offers {', '.join(entrant.tasks)}, and suites that ask entrants are "
-                f"{' and '.join(asked)}"
+                f"{' and '.join(tasks)}"
             )
+    doors: dict[str, str] = {}
     for entrant in entrants:
-        before = doors.setdefault(entrant.name.casefold(), entrant.door)
-        if before is not entrant.door:
+        first = doors.setdefault(entrant.name.casefold(), entrant.door)
+        if first is not entrant.door:
             raise ValueError(
-                f"with: expected solvers of different names, got {entrant.name!r} twice, {before} "
+                f"with: expected solvers of different names, got {entrant.name!r} twice, {first} "
                 f"and {entrant.door}; call one otherwise: --with 'another name={entrant.door}'"
             )
     return entrants
 
 
 def opened_where_possible(
-    entries: Sequence[SolverAddress], suites: Sequence[str], before: Sequence[Entrant]
+    installed: Sequence[SolverAddress], suites: Sequence[str], entered: Sequence[Entrant]
 ) -> Iterator[Entrant | str]:
-    """Yield each installed solver, or a sentence on why it takes no part.
-
-    One that offers nothing to the suites is passed over.
-    """
-    names = {entrant.name.casefold() for entrant in before}
-    for entry in entries:
+    """Yield each installed solver with a task of the suites, or why it takes no part."""
+    names = {entrant.name.casefold() for entrant in entered}
+    for address in installed:
         try:
-            entrant = _opened(entry)
+            entrant = _opened(address)
             if not any(map(entrant.offers, suites)):
                 continue
             if entrant.name.casefold() in names:
@@ -109,39 +105,39 @@ def opened_where_possible(
             names.add(entrant.name.casefold())
             yield entrant
         except ValueError as error:
-            yield f"{entry.door} takes no part: {error}"
+            yield f"{address.door} takes no part: {error}"
 
 
-def _opened(entry: SolverAddress) -> Entrant:
-    contestant = open_contestant(entry.spec, LIMITS)
+def _opened(address: SolverAddress) -> Entrant:
+    contestant = open_contestant(address.spec, LIMITS)
     try:
         greeting = contestant.greeting
     except NoGreetingError as error:
         why = shown(str(error.failure.sentence), 300)
         raise ValueError(
-            f"with: expected a solver that says what it is, got {entry.door}: {why}"
+            f"with: expected a solver that says what it is, got {address.door}: {why}"
         ) from None
     finally:
         contestant.close()
     return Entrant(
-        _name(entry, greeting),
-        clean(entry.door),
-        entry.spec,
-        clean(greeting.version or entry.version),
-        commit_of(entry.spec),
-        digest_of(entry.spec),
+        _name(address, greeting),
+        clean(address.door),
+        address.spec,
+        clean(greeting.version or address.version),
+        commit_of(address.spec),
+        digest_of(address.spec),
         greeting.tasks,
         tuple(map(clean, greeting.methods)),
         greeting.step.method,
     )
 
 
-def _name(entry: SolverAddress, greeting: Greeting) -> str:
-    """Return a name that is no solver's of ours or of a peer: the address is put behind it."""
-    said = greeting.name
-    if said == Greeting(greeting.protocol, ()).name:  # it says none
-        words = entry.spec if isinstance(entry.spec, tuple) else (entry.spec,)
-        said = Path(words[0].partition(":")[0]).name
-    name = clean(entry.called or said) or clean(entry.door)
-    taken = {taken.casefold() for taken in registry.names()}
-    return f"{name} ({clean(entry.door)})" if name.casefold() in taken else name
+def _name(address: SolverAddress, greeting: Greeting) -> str:
+    """Return a name that no other solver has: the address is appended where it is needed."""
+    own_name, door = greeting.name, clean(address.door)
+    if own_name == Greeting(greeting.protocol, ()).name:  # it has none
+        word = address.spec if isinstance(address.spec, str) else address.spec[0]
+        own_name = Path(word.partition(":")[0]).name
+    name = clean(address.name or own_name) or door
+    taken_names = set(map(str.casefold, registry.names()))
+    return f"{name} ({door})" if name.casefold() in taken_names else name

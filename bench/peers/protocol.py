@@ -1,16 +1,16 @@
-"""What adapters of all kinds share: the time that a solver counts itself, and why it fails."""
+"""What adapters of all kinds share: the time that a solver measures itself, and its failures."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 
 class OwnTime(NamedTuple):
-    """The time that a solver, or its adapter, has counted itself.
+    """The time that a solver, or its adapter, has measured itself.
 
     Attributes:
-        seconds: by that count [s].
+        seconds: by its own clock [s].
         round_trip: of its requests, 0 without any [s].
-        doubt: why the count cannot be right, else "".
+        doubt: why its clock cannot be right, else "".
     """
 
     seconds: float
@@ -18,17 +18,17 @@ class OwnTime(NamedTuple):
     doubt: str = ""
 
     @property
-    def at_door(self) -> float:
-        """What requests have cost beside the solver [s], which is charged to no budget."""
+    def overhead(self) -> float:
+        """Time of requests that the solver did not use [s], which is charged to no budget."""
         return max(0.0, self.round_trip - self.seconds)
 
 
 def total(times: Iterable[OwnTime | None]) -> OwnTime | None:
-    """Return the time of several calls, None if none of them counted its own."""
-    counts = [time for time in times if time is not None]
-    if not counts:
+    """Return the time of several calls, None if none of them measured its own."""
+    measured = [time for time in times if time is not None]
+    if not measured:
         return None
-    seconds, round_trips, doubts = zip(*counts, strict=True)
+    seconds, round_trips, doubts = zip(*measured, strict=True)
     return OwnTime(sum(seconds), sum(round_trips), max(doubts))
 
 
@@ -36,16 +36,12 @@ class NoAnswerError(Exception):
     """A solver gave no answer; the message is a sentence that says why."""
 
 
-class UnableError(ValueError):
-    """What a solver cannot do by its making; the message says what."""
-
-
 def describe(error: Exception) -> str:
-    """Return what an exception says, on one line; its type too unless it is a `NoAnswerError`."""
+    """Return an exception on one line; with its type unless it is a `NoAnswerError`."""
     kind = "" if isinstance(error, NoAnswerError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())[:300]
 
 
 def remark_of(adapter: Any) -> str:
-    """Return what an adapter has to say of its numbers, by a function `remark`, else ""."""
+    """Return an adapter's remark on its numbers, by its function `remark`, else ""."""
     return str(adapter.remark()) if hasattr(adapter, "remark") else ""

@@ -1,4 +1,4 @@
-"""The files that a user's solver is made of: their digest and their commit."""
+"""The files of a user's solver: their digest and their commit."""
 
 import ast
 import hashlib
@@ -25,7 +25,7 @@ def digest_of(spec: Spec) -> str:
 def commit_of(spec: Spec) -> str:
     """Return the commit of a solver's files, and whether they were changed since; "" if none."""
     files = source_files(spec)
-    return git_commit(files[0].parent, [str(path) for path in files]) if files else ""
+    return git_commit(files[0].parent, list(map(str, files))) if files else ""
 
 
 def git_commit(folder: Path, paths: Sequence[str]) -> str:
@@ -34,23 +34,23 @@ def git_commit(folder: Path, paths: Sequence[str]) -> str:
     try:
         head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, check=True)
         status = [*git, "status", "--porcelain", "--", *paths]
-        changed = subprocess.run(status, capture_output=True, check=True).stdout
+        changes = subprocess.run(status, capture_output=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError):  # no git, or no commit yet
         return ""
-    return head.stdout.decode().strip() + (" with changes" if changed else "")
+    return head.stdout.decode().strip() + (" with changes" if changes else "")
 
 
 def source_files(spec: Spec) -> list[Path]:
     """Return the files of a Python file, of a module, or of a command, the main one first.
 
-    Of a Python file those of its own folder that it imports belong to it, of a module its package.
+    A Python file brings along those of its own folder that it imports, a module its package.
     """
     if not isinstance(spec, str):
         paths = [Path(word).resolve() for word in spec if "/" in word or "." in word]
         return list(filter(_is_source, paths))
     place = spec.partition(":")[0]
     if place.endswith(".py"):
-        return list(dict.fromkeys(_with_imports(Path(place).resolve(), set())))
+        return list(_with_imports(Path(place).resolve(), {}))
     if Path(place).is_file():
         return list(filter(_is_source, [Path(place).resolve()]))
     return _files_of_module(place)
@@ -60,29 +60,28 @@ def _is_source(path: Path) -> bool:
     return path.is_file() and path.stat().st_size <= _LARGEST
 
 
-def _with_imports(path: Path, seen: set[Path]) -> Iterator[Path]:
-    """Yield a file and those of its folder that it imports, however deep."""
-    if path in seen or not _is_source(path):
-        return
-    seen.add(path)
-    yield path
-    for name in _imported(path):
-        place = path.parent.joinpath(*name.split("."))
-        yield from _with_imports(place.with_name(f"{place.name}.py"), seen)
-        yield from _with_imports(place / "__init__.py", seen)
+def _with_imports(path: Path, files: dict[Path, None]) -> dict[Path, None]:
+    """Add a file and those of its folder that it imports, however deep."""
+    if path not in files and _is_source(path):
+        files[path] = None
+        for name in _imported(path):
+            place = path.parent.joinpath(*name.split("."))
+            _with_imports(place.with_name(f"{place.name}.py"), files)
+            _with_imports(place / "__init__.py", files)
+    return files
 
 
 def _imported(path: Path) -> Iterator[str]:
     try:
         tree = ast.parse(path.read_bytes())
-    except (SyntaxError, ValueError):  # whoever loads it will say so
+    except (SyntaxError, ValueError):  # an error for whoever loads it
         return
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            inside = f"{node.module}." if node.module else ""
-            yield from (inside + alias.name for alias in node.names)
+            prefix = f"{node.module}." if node.module else ""
+            yield from (prefix + alias.name for alias in node.names)
             yield from [node.module] if node.module else []
 
 
@@ -91,6 +90,6 @@ def _files_of_module(name: str) -> list[Path]:
     package = importlib.machinery.PathFinder.find_spec(name.split(".")[0], path)
     if package is None or not package.origin:
         return []
-    folders = [Path(folder) for folder in package.submodule_search_locations or ()]
-    inside = sorted(path for folder in folders for path in folder.rglob("*.py"))
-    return list(dict.fromkeys([Path(package.origin), *inside]))
+    folders = map(Path, package.submodule_search_locations or ())
+    submodules = sorted(path for folder in folders for path in folder.rglob("*.py"))
+    return list(dict.fromkeys([Path(package.origin), *submodules]))

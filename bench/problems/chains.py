@@ -41,6 +41,14 @@ class TargetsForSkeleton:
         return np.broadcast_to(self.starts, shape)
 
 
+class ChainRequest(NamedTuple):
+    """One target [m], (3,), local rotations to start from, (joint, 4), and allowed iterations."""
+
+    target: FloatArray
+    start: FloatArray
+    iterations: int
+
+
 class ChainRequests(NamedTuple):
     """Targets as a user's solver is asked for them, one by one.
 
@@ -57,9 +65,10 @@ class ChainRequests(NamedTuple):
         """The number of targets, and of numbers of an answer: iterations, then positions."""
         return len(self.iterations), 1 + 3 * self.problem.skeleton.joint_count
 
-    def request(self, i: int) -> tuple[FloatArray, FloatArray, int]:
-        """Return a target, the start and the iterations that are allowed."""
-        return self.problem.targets[i], self.problem.every_start[i], int(self.iterations[i])
+    def request(self, i: int) -> ChainRequest:
+        """Return one target."""
+        targets, starts = self.problem.targets, self.problem.every_start
+        return ChainRequest(targets[i], starts[i], int(self.iterations[i]))
 
 
 def chain_targets(stratum: str, count: int) -> TargetsForSkeleton:

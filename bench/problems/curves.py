@@ -34,13 +34,13 @@ DRIFT_FRAMES = 60
 
 @dataclass(frozen=True)
 class FollowedCurve:
-    """A curve that an effector is to follow, frame by frame.
+    """A curve that an effector follows, frame by frame.
 
     Attributes:
         name: of the problem.
         title: how it is written.
-        model: what follows.
-        start: its pose at the start: local rotations of a Skeleton, else coordinates.
+        model: the arm.
+        start: its initial pose: local rotations of a Skeleton, else coordinates.
         curve: the target of the effector in each frame [m], (frame, 3).
     """
 
@@ -52,13 +52,13 @@ class FollowedCurve:
 
 
 def arm_curves() -> list[FollowedCurve]:
-    """Return the arm with every named curve; the custom one evened out."""
+    """Return the arm with every named curve; the custom one resampled evenly."""
     skeleton, rest = scenes.lab_arm()
-    even = {name: curves[name](frames) for name, frames in FRAMES.items()}
-    even[CUSTOM] = evened_custom_curve()
+    drawn = {name: curves[name](frames) for name, frames in FRAMES.items()}
+    drawn[CUSTOM] = evened_custom_curve()
     return [
         FollowedCurve(f"arm/{name}", spaced(name), skeleton, rest, curve)
-        for name, curve in even.items()
+        for name, curve in drawn.items()
     ]
 
 
@@ -88,7 +88,7 @@ def arm_beyond(count: int) -> TargetsForSkeleton:
 
 @functools.cache
 def arm_closed_curves() -> Sequence[FollowedCurve]:
-    """Return the lab's arm on the lab's curves; the custom one evened out, its ends joined."""
+    """Return the lab's arm on the lab's curves; the custom one resampled and closed."""
     skeleton, rest = scenes.lab_arm()
     drawn = {name: curves[name](FRAMES[name]) for name in ARM_CURVES}
     spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}

@@ -6,10 +6,12 @@ angle of each effector from its target, and by how much a joint is beyond its li
 
 import functools
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from plumbob.reference.arguments import FloatArray
 
@@ -17,14 +19,45 @@ from .robots import LIMIT_TOLERANCE, Robot, robot
 
 
 class Tolerance(NamedTuple):
-    """When an effector has reached its target."""
+    """When an effector has reached its target: a distance [m] and an angle [rad]."""
 
     position: float
     rotation: float
 
 
+class PoseRequest(NamedTuple):
+    """One target.
+
+    Attributes:
+        positions: of the effectors [m], (effector, 3).
+        rotations: of the effectors, (effector, 3, 3).
+        start: coordinates to start from, (coordinate,).
+    """
+
+    positions: FloatArray
+    rotations: FloatArray
+    start: FloatArray
+
+    @property
+    def poses(self) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Position and rotation of each effector."""
+        return zip(self.positions, self.rotations, strict=True)
+
+    @property
+    def matrix(self) -> FloatArray:
+        """The pose of the first effector, (4, 4)."""
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = self.rotations[0], self.positions[0]
+        return T
+
+    @property
+    def quaternion(self) -> FloatArray:
+        """The rotation of the first effector, w last, (4,)."""
+        return Rotation.from_matrix(self.rotations[0]).as_quat()
+
+
 class Targets(NamedTuple):
-    """Where effectors are wanted.
+    """The targets of a robot's effectors.
 
     Attributes:
         positions: [m], (target, effector, 3).
@@ -43,9 +76,9 @@ class Targets(NamedTuple):
         """The number of targets, and of coordinates."""
         return len(self.starts), self.starts.shape[-1]
 
-    def request(self, i: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return what a solver is asked for."""
-        return self.positions[i], self.rotations[i], self.starts[i].copy()
+    def request(self, i: int) -> PoseRequest:
+        """Return one target."""
+        return PoseRequest(self.positions[i], self.rotations[i], self.starts[i].copy())
 
     def after(self, count: int) -> "Targets":
         """Return the targets after the first ones."""
@@ -53,11 +86,12 @@ class Targets(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """What the answers come to, one entry a target.
+    """The errors of the answers, one entry a target.
 
     Attributes:
-        position: the farthest effector's distance from its target [m]; NaN if there is no answer.
-        rotation: the largest angle of an effector from its target [rad]; zero where none is wanted.
+        position: the largest distance of an effector from its target [m]; NaN without an answer.
+        rotation: the largest angle of an effector from its target [rad]; zero without a target
+            rotation.
         beyond: by how much the worst joint is beyond its limit [rad].
         solved: whether all three are within tolerance.
     """
@@ -69,7 +103,7 @@ class Evaluation(NamedTuple):
 
 
 def mujoco_model(robot: Robot) -> Any:
-    """Return the robot in MuJoCo, all of its links kept."""
+    """Return the robot in MuJoCo with all of its links."""
     tree = ElementTree.fromstring(robot.text)
     if robot.is_chain:
         extension = ElementTree.SubElement(tree, "mujoco")
@@ -97,28 +131,29 @@ class Evaluator:
         return positions, rotations.reshape(*shape, 3, 3)
 
     def jacobians(self, q: FloatArray) -> FloatArray:
-        """Return the Jacobians of positions and rotations, (row, 6 effector, freedom)."""
-        J = np.empty((len(q), 6 * len(self._effectors), self.model.nv))
+        """Return the Jacobians of positions and rotations, (row, effector, 2, 3, freedom)."""
+        J = np.empty((len(q), len(self._effectors), 2, 3, self.model.nv))
         for i, row in enumerate(q):
             self._update_kinematics(row)
             mujoco.mj_comPos(self.model, self._data)
             for k, effector in enumerate(self._effectors):
-                linear, angular = J[i, 6 * k : 6 * k + 3], J[i, 6 * k + 3 : 6 * k + 6]
-                mujoco.mj_jacBody(self.model, self._data, linear, angular, effector)
+                mujoco.mj_jacBody(self.model, self._data, *J[i, k], effector)
         return J
 
     def evaluate(self, targets: Targets, q: FloatArray, tolerance: Tolerance) -> Evaluation:
-        """Return what answers (target, coordinate) to the first targets come to; NaN is none."""
-        answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
-        positions, rotations = self.forward(np.where(answered[:, None], q, targets.starts[:count]))
+        """Return the errors of answers (target, coordinate) to the first targets; NaN is none."""
+        is_answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
+        poses = np.where(is_answered[:, None], q, targets.starts[:count])
+        positions, rotations = self.forward(poses)
         distance = np.linalg.norm(positions - targets.positions[:count], axis=-1).max(axis=-1)
         angle = angle_between(rotations, targets.rotations[:count]).max(axis=-1)
-        over = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
-        errors = np.stack([distance, angle * self.robot.oriented, over])
-        errors[:, ~answered] = np.nan
+        excess = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
+        errors = np.stack([distance, angle * self.robot.oriented, excess])
+        errors[:, ~is_answered] = np.nan
         limits = np.array([*tolerance, LIMIT_TOLERANCE])[:, None]
+        position, rotation, beyond = errors
         solved = np.asarray((errors <= limits).all(axis=0))
-        return Evaluation(errors[0], errors[1], errors[2], solved)
+        return Evaluation(position, rotation, beyond, solved)
 
     def _update_kinematics(self, q: FloatArray) -> None:
         self._data.qpos[:] = q

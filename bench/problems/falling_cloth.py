@@ -25,8 +25,8 @@ STIFFNESSES = (1e2, 1e3, 1e4)
 FRAME = 1 / 60
 FALLING = 24
 _SEED = 2013
-# Steps of the fall, for those at the limit of stability; a spring's damping over a particle's mass
-# [1/s] in it; how uneven the cloth is at first, in units of the spacing.
+# Steps of the fall, in units of those at the limit of stability; a spring's damping over a
+# particle's mass [1/s] in it; the random displacement at first, in units of the spacing.
 _FALL_MARGIN, _FALL_DAMPING, _UNEVEN = 1.5, 20.0, 1e-3
 
 
@@ -54,7 +54,7 @@ class FallingCloth:
 
     @property
     def beat(self) -> float:
-        """The highest frequency, in frames of ours [rad/s]: so many explicit steps it asks for."""
+        """The highest frequency per `FRAME` [rad/s], which sets the number of explicit steps."""
         return self.frequency * self.frame / FRAME
 
 
@@ -66,8 +66,9 @@ def own_cloth(problem: OwnProblem) -> FallingCloth:
     frequency = highest_frequency(system, start.positions)
     extent = float(np.ptp(start.positions, axis=0).max())
     stiffness = float(system.stiffnesses.mean())
-    known = (system.particle_count, stiffness, system, start, frequency)
-    return FallingCloth(*known, problem.h, extent)
+    return FallingCloth(
+        system.particle_count, stiffness, system, start, frequency, problem.h, extent
+    )
 
 
 @functools.cache

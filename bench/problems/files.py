@@ -27,10 +27,10 @@ _OF_CLOTH |= {"gravity", "rest_lengths", "h"}
 def read(
     words: Sequence[str], suites: Sequence[str], effector: str | None, pins: str | None
 ) -> tuple[list[OwnProblem], list[str]]:
-    """Return the problems in files, and the names of all problems that are meant.
+    """Return the problems in files, and the names of all selected problems.
 
     Raises:
-        ValueError: if a file cannot be read, or holds nothing that the suites ask.
+        ValueError: if a file cannot be read, or holds nothing for the suites.
     """
     own: list[OwnProblem] = []
     names: list[str] = []
@@ -39,7 +39,7 @@ def read(
         if not path.exists() and path.suffix.lower() not in SUFFIXES:
             names.append(word)
             continue
-        problems = [problem for problem in _in(path, effector, pins) if problem.suite in suites]
+        problems = [problem for problem in _read(path, effector, pins) if problem.suite in suites]
         if not problems:
             raise ValueError(f"problem: expected one for {' or '.join(suites)}, got {word}")
         own += problems
@@ -50,10 +50,10 @@ def read(
     return own, names
 
 
-def _in(path: Path, effector: str | None, pins: str | None) -> list[OwnProblem]:
+def _read(path: Path, effector: str | None, pins: str | None) -> list[OwnProblem]:
     if path.is_dir():
         files = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
-        return [problem for file in files for problem in _in(file, effector, pins)]
+        return [problem for file in files for problem in _read(file, effector, pins)]
     if not path.is_file():
         raise ValueError(f"problem: expected a file or a folder, got {path}, which does not exist")
     suffix, name, digest = path.suffix.lower(), clean(path.stem), _digest(read_bytes(path))
@@ -87,10 +87,10 @@ def _in_python(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
         assert spec is not None and spec.loader is not None  # noqa: PT018
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
-        for name, value in vars(module).items():
-            is_own = inspect.isfunction(value) and value.__module__ == module.__name__
-            if is_own and name[0] != "_" and not inspect.signature(value).parameters:
-                problems.append((name, value()))
+        for name, member in vars(module).items():
+            is_own = inspect.isfunction(member) and member.__module__ == module.__name__
+            if is_own and name[0] != "_" and not inspect.signature(member).parameters:
+                problems.append((name, member()))
         listed = enumerate(getattr(module, LIST, []), 1)
         problems += [(f"problem {i}", fields) for i, fields in listed]
     except (Exception, SystemExit) as error:
@@ -106,15 +106,14 @@ def _in_python(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 def _of_dict(path: Path, name: str, fields: Mapping[str, Any]) -> OwnProblem:
     """Return the problem of a dict: a cloth if it has springs, else targets of a skeleton."""
-    is_cloth = "springs" in fields
-    known = _OF_CLOTH if is_cloth else _OF_SKELETON
+    read_fields, allowed = (_cloth, _OF_CLOTH) if "springs" in fields else (_skeleton, _OF_SKELETON)
     try:
-        if unknown := sorted(map(str, fields.keys() - known)):
-            raise ValueError(f"expected keys of {', '.join(sorted(known))}, got {unknown[0]!r}")
-        return _cloth(name, fields) if is_cloth else _skeleton(name, fields)
+        if unknown := sorted(map(str, fields.keys() - allowed)):
+            raise ValueError(f"expected keys of {', '.join(sorted(allowed))}, got {unknown[0]!r}")
+        return read_fields(name, fields)
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        what = f"lacks {error}" if isinstance(error, KeyError) else str(error)
-        raise ValueError(f"{path}: {name}: {what}") from None
+        why = f"lacks {error}" if isinstance(error, KeyError) else str(error)
+        raise ValueError(f"{path}: {name}: {why}") from None
 
 
 def _skeleton(name: str, fields: Mapping[str, Any]) -> OwnProblem:
@@ -141,9 +140,9 @@ def _cloth(name: str, fields: Mapping[str, Any]) -> OwnProblem:
     x, springs = np.asarray(fields["positions"], dtype=float), np.asarray(fields["springs"])
     lengths = np.linalg.norm(x[springs[:, 0]] - x[springs[:, 1]], axis=1)
     masses = np.broadcast_to(np.asarray(fields["masses"], dtype=float), (len(x),))
-    more = {key: fields[key] for key in ("pinned", "gravity") if key in fields}
-    known = (masses, springs, fields.get("rest_lengths", lengths), fields["stiffness"])
-    system = MassSpring(*known, **more)
+    optional = {key: fields[key] for key in ("pinned", "gravity") if key in fields}
+    rest_lengths = fields.get("rest_lengths", lengths)
+    system = MassSpring(masses, springs, rest_lengths, fields["stiffness"], **optional)
     h = float(fields.get("h", 1 / 60))
     if not 0.0 < h < np.inf:
         raise ValueError(f"h: expected seconds above 0, got {h}")

@@ -19,9 +19,9 @@ from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
 from .chains import TargetsForSkeleton, random_rotations
 from .robots import TWO_REVOLUTIONS, Robot, chain_from
 
-# Of cloths from meshes.
+# Springs [N/m] and mass [kg] of cloths from meshes.
 STIFFNESS, MASS = 1000.0, 1.0
-# Of the height of a mesh, what counts as its highest point.
+# The share of a mesh's height that counts as its highest point.
 _TOP = 1e-3
 # Poses for each target of a skeleton, of which those that reach far or near are taken.
 _POOL, _EXTREME = 40, 0.05
@@ -40,10 +40,10 @@ def robot(path: Path, name: str, effector: str | None) -> Robot:
     tip = _effector(model.skeleton, model.names, effector)
     steps = [int(j) for j in model.skeleton.path(tip)]
     kinds = ["mimic joint" if j in model.mimics else model.kinds[j] for j in steps]
-    others = [f"a {kind}" for kind in kinds if kind not in ("hinge", "fixed")]
-    if others or "hinge" not in kinds:
-        found = [*others, "none"][0]
-        raise ValueError(f"{path}: expected hinges to {model.names[tip]!r}, got {found}")
+    wrong = [f"a {kind}" for kind in kinds if kind not in ("hinge", "fixed")]
+    if wrong or "hinge" not in kinds:
+        got = [*wrong, "none"][0]
+        raise ValueError(f"{path}: expected hinges to {model.names[tip]!r}, got {got}")
     text, root, last = _urdf(model, steps)
     return chain_from(name, name, text, root, last)
 
@@ -103,19 +103,19 @@ def skeletons(
     rng = np.random.default_rng(_SEED)
     pool = random_rotations(rng, _POOL * count, chain.joint_count)
     reached = forward_kinematics(chain, pool).positions[:, -1]
-    far = np.argsort(np.linalg.norm(reached - chain.offsets[0], axis=-1))
-    few = max(count, round(_EXTREME * len(far)))
-    chosen = {
+    order = np.argsort(np.linalg.norm(reached - chain.offsets[0], axis=-1))
+    few = max(count, round(_EXTREME * len(order)))
+    strata = {
         ANYWHERE: np.arange(count),
-        OUTER: rng.choice(far[-few:], count, replace=False),
-        INNER: rng.choice(far[:few], count, replace=False),
+        OUTER: rng.choice(order[-few:], count, replace=False),
+        INNER: rng.choice(order[:few], count, replace=False),
     }
     starts = random_rotations(rng, count, chain.joint_count)
     return [
         TargetsForSkeleton(
-            f"chain/{title}, {name}", f"{title}, {name}", chain, starts, reached[which]
+            f"chain/{title}, {name}", f"{title}, {name}", chain, starts, reached[poses]
         )
-        for name, which in chosen.items()
+        for name, poses in strata.items()
     ]
 
 

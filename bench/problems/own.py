@@ -9,26 +9,26 @@ from ..text import visible
 from .chains import TargetsForSkeleton
 from .robots import Robot
 
-# Letters of a name that a user gives to a problem or a solver.
+# Letters of a user's name for a problem or a solver.
 _LONGEST = 60
 
 
 def clean(name: str) -> str:
-    """Return a name on one line, without what cannot be shown."""
+    """Return a name on one line with printable letters only."""
     return shown(visible(name.encode(errors="replace").decode()), _LONGEST)
 
 
 @dataclass(frozen=True, eq=False)
 class OwnProblem:
-    """A problem that a user entered: one of targets of balls, a chain of hinges, or a cloth.
+    """A problem that a user entered: targets of balls, a chain of hinges, or a cloth.
 
     Attributes:
         name: as it stands in tables.
-        digest: twelve hex digits over what it is made of.
-        suite: which asks it, "ik" or "cloth".
+        digest: twelve hex digits over its contents.
+        suite: "ik" or "cloth".
         targets: of a skeleton of balls, its last joint the effector.
         robot: a chain of hinges.
-        cloth: particles, springs and the state it is let go from.
+        cloth: particles, springs and the initial state.
         h: the frame of a cloth [s].
     """
 

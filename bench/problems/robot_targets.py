@@ -1,8 +1,8 @@
 """Targets for the effectors of robots: strata, all from seeded poses, so that they can be reached.
 
 Targets come from a pool of random poses within the limits. Those of a stratum are drawn from the
-poses of the pool that belong to it. Unreachable ones are made up: they lie farther from the first
-joint than all links in a row are long.
+poses of the pool that belong to it. Unreachable targets lie farther from the first joint than the
+sum of all link lengths.
 """
 
 import functools
@@ -36,11 +36,8 @@ def robot_targets(name: str, count: int) -> Targets:
     """Return `count` targets in each stratum, the strata alternating, and random starts."""
     evaluator = evaluator_of(name)
     rng = np.random.default_rng([_SEED, seed_of(name)])
-    poses = stratum_poses(evaluator, rng, count).values()
-    positions, rotations = (
-        np.stack(parts, axis=1).reshape(count * len(STRATA), *parts[0].shape[1:])
-        for parts in zip(*(evaluator.forward(q) for q in poses), strict=True)
-    )
+    poses = np.stack(list(stratum_poses(evaluator, rng, count).values()), axis=1)
+    positions, rotations = evaluator.forward(poses.reshape(-1, poses.shape[-1]))
     strata = np.tile(np.arange(len(STRATA)), count)
     return Targets(positions, rotations, evaluator.robot.draw(rng, len(strata)), strata)
 
@@ -52,7 +49,7 @@ def stratum_poses(
     pool = evaluator.robot.draw(rng, _POOL * count)
     effectors, _ = evaluator.forward(pool)
     distance = np.linalg.norm(effectors - root(evaluator), axis=-1).max(axis=-1)
-    chosen = [
+    poses = [
         pool[:count],
         pool[spread(rng, effectors, count)],
         pool[_extreme(rng, -distance, count)],
@@ -60,25 +57,35 @@ def stratum_poses(
         pool[_extreme(rng, least_singular_values(evaluator, pool), count)],
         _at_a_limit(rng, evaluator, count),
     ]
-    return dict(zip(STRATA, chosen, strict=True))
+    return dict(zip(STRATA, poses, strict=True))
 
 
 @functools.lru_cache(maxsize=16)
 def unreachable_targets(name: str, count: int) -> Targets:
-    """Return targets 1.05 to 1.5 times as far from the first joint as all links in a row reach."""
+    """Return targets 1.05 to 1.5 times as far from the first joint as any pose reaches."""
     evaluator, rng = evaluator_of(name), np.random.default_rng([_SEED, seed_of(name), 1])
-    poses = _unreachable(rng, evaluator, count)
-    return Targets(*poses, evaluator.robot.draw(rng, count), np.zeros(count, dtype=int))
+    shape = (count, len(evaluator.robot.effectors))
+    distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (*shape, 1))
+    positions = root(evaluator) + distance * unit(rng.standard_normal((*shape, 3)))
+    w, x, y, z = np.moveaxis(random_rotations(rng, *shape), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    rotations = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    starts = evaluator.robot.draw(rng, count)
+    return Targets(positions, rotations, starts, np.zeros(count, dtype=int))
 
 
 def least_distances(name: str, targets: Targets) -> FloatArray:
-    """Return a bound below which no pose brings the farther effector to its target [m], (target,).
+    """Return a lower bound of the farther effector's distance from its target [m], (target,).
 
-    It is how much farther the target is from the first joint than all links in a row are long.
+    The target's distance from the first joint exceeds the sum of all link lengths by that much.
     """
     evaluator = evaluator_of(name)
-    away = np.linalg.norm(targets.positions - root(evaluator), axis=-1)
-    return np.maximum(away - farthest(evaluator), 0.0).max(axis=-1)
+    distance = np.linalg.norm(targets.positions - root(evaluator), axis=-1)
+    return np.maximum(distance - farthest(evaluator), 0.0).max(axis=-1)
 
 
 @functools.lru_cache(maxsize=16)
@@ -95,21 +102,21 @@ def uniform_targets(name: str, count: int, middle: bool) -> Targets:
 
 def least_singular_values(evaluator: Evaluator, q: FloatArray) -> FloatArray:
     """Return the least singular value of each pose's Jacobian, lengths in units of the reach."""
-    J = evaluator.jacobians(q).reshape(len(q), len(evaluator.robot.effectors), 2, 3, -1)
+    J = evaluator.jacobians(q)
     J[:, :, 0] /= farthest(evaluator)
-    if not evaluator.robot.oriented:  # the effectors' rotations do not count
+    if not evaluator.robot.oriented:
         J = J[:, :, :1]
-    values = np.linalg.svd(J.reshape(len(q), -1, J.shape[-1]), compute_uv=False)
-    return np.asarray(values[:, -1], dtype=float)
+    singular_values = np.linalg.svd(J.reshape(len(q), -1, J.shape[-1]), compute_uv=False)
+    return np.asarray(singular_values[:, -1], dtype=float)
 
 
 def _extreme(rng: np.random.Generator, measure: FloatArray, count: int) -> FloatArray:
-    least = np.argsort(measure, kind="stable")[: max(count, int(_EXTREME * len(measure)))]
-    return rng.choice(least, count, replace=False)
+    order = np.argsort(measure, kind="stable")[: max(count, int(_EXTREME * len(measure)))]
+    return rng.choice(order, count, replace=False)
 
 
 def spread(rng: np.random.Generator, effectors: FloatArray, count: int) -> FloatArray:
-    """Return the numbers of poses whose first effector is spread over all cells that one is in.
+    """Return the numbers of poses whose first effector is spread over all occupied cells.
 
     A cell is drawn first, then one of the poses within.
     """
@@ -123,38 +130,22 @@ def spread(rng: np.random.Generator, effectors: FloatArray, count: int) -> Float
 
 
 def _at_a_limit(rng: np.random.Generator, evaluator: Evaluator, count: int) -> FloatArray:
-    q = evaluator.robot.draw(rng, count)
-    limited = np.flatnonzero(np.isfinite(evaluator.robot.lower))
-    joint = rng.choice(limited, count)
-    robot, is_low = evaluator.robot, rng.random(count) < 0.5
+    robot, q = evaluator.robot, evaluator.robot.draw(rng, count)
+    joint = rng.choice(np.flatnonzero(np.isfinite(robot.lower)), count)
+    is_low = rng.random(count) < 0.5
     q[np.arange(count), joint] = np.where(is_low, robot.lower[joint], robot.upper[joint])
     return q
 
 
-def _unreachable(
-    rng: np.random.Generator, evaluator: Evaluator, count: int
-) -> tuple[FloatArray, FloatArray]:
-    effectors = len(evaluator.robot.effectors)
-    distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (count, effectors, 1))
-    positions = root(evaluator) + distance * unit(rng.standard_normal((count, effectors, 3)))
-    w, x, y, z = np.moveaxis(random_rotations(rng, count, effectors), -1, 0)
-    rotations = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return positions, np.moveaxis(np.array(rotations), (0, 1), (-2, -1))
-
-
 def root(evaluator: Evaluator) -> FloatArray:
-    """Return where the first joint is: nothing before it moves [m], (3,)."""
+    """Return the position of the first joint: nothing before it moves [m], (3,)."""
     if evaluator.robot.is_chain:
         return links(evaluator.robot)[0].transform[:3, 3]
     return np.array(evaluator.model.body(evaluator.model.jnt_bodyid[0]).pos)
 
 
 def farthest(evaluator: Evaluator) -> float:
-    """Return a distance from the first joint that no effector exceeds [m]: its links in a row."""
+    """Return the sum of link lengths, which bounds the reach from the first joint [m]."""
     lengths = []
     for effector in evaluator.robot.effectors:
         body, length = evaluator.model.body(effector).id, 0.0

@@ -1,1 +1,1 @@
-"""From records to tables, figures and one page; nothing is measured here."""
+"""From records to tables, figures and a page, without measuring anything."""

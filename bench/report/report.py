@@ -1,4 +1,4 @@
-"""The report: tables in three formats, figures, and one page that needs nothing but itself."""
+"""Write the report: tables in three formats, figures, and a page that needs no other file."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,26 +10,27 @@ from ..harness.record import FINISHED, Record, check_regular
 from ..tables.latex import latex
 from ..tables.layout import Figure
 from ..tables.results import Results, listed, results_of
-from ..tables.table import Table, comma_separated, markdown
+from ..tables.table import Table
+from ..tables.writers import comma_separated, markdown
 from ..text import shortened, visible
-from .headlines import Answers, absent, answers, not_asked
-from .page.page import Shown, render
+from .headlines import Overview, absent, not_asked, overview
+from .page.page import Contents, render
 from .sections import MOTIONS, SECTIONS
 
-# The forms that a table is written in, by the suffix of the file.
+# The formats of a table, by the suffix of the file.
 FORMATS = {"md": markdown, "tex": latex, "csv": comma_separated}
 
 
-class Written(NamedTuple):
-    """What a report came to: its page, its tables, what is missing, and who leads."""
+class Report(NamedTuple):
+    """A written report: its page and tables, sentences on missing parts, the first screen."""
 
     page: Path
     tables: list[Table]
     missing: list[str]
-    answers: Answers
+    answers: Overview
 
 
-def write(folder: Path) -> Written:
+def write(folder: Path) -> Report:
     """Write the report of a folder's records into it.
 
     Raises:
@@ -40,43 +41,37 @@ def write(folder: Path) -> Written:
     tables = {layout: layout(results) for section in SECTIONS for layout in section.layouts}
     drawings, not_drawn = _drawings(results, folder / "figures")
     scenes = {section: scene for section, make in MOTIONS.items() if (scene := make(results))}
-    shown = Shown(tables, drawings, answers(results), scenes)
+    contents = Contents(tables, drawings, overview(results), scenes)
     newest = max(results.every, key=lambda record: record.when)
-    missing = [one for one in (warning, *not_drawn, *_missing(results, newest)) if one]
+    missing = list(filter(None, (warning, *not_drawn, *_missing(results, newest))))
+    for table in tables.values():
+        for suffix, form in FORMATS.items():
+            _write(folder / "tables" / f"{table.name}.{suffix}", form(table))
+    for drawing in drawings.values():
+        _write(folder / "figures" / f"{drawing.name}.svg", drawing.svg)
+        _write(folder / "figures" / f"{drawing.name}.pdf", drawing.pdf)
     page = folder / "index.html"
-    for path, content in _files(shown):
-        _write(folder / path, content)
-    _write(page, render(shown, newest, missing))
-    return Written(page, list(tables.values()), missing, shown.answers)
+    _write(page, render(contents, newest, missing))
+    return Report(page, list(tables.values()), missing, contents.answers)
 
 
 def _drawings(results: Results, folder: Path) -> tuple[dict[Figure, Drawing], list[str]]:
-    """Draw figures, but for those in the folder; return sentences on those that cannot be drawn."""
+    """Return the figures, unchanged figures from the folder, and sentences on failures."""
     drawings: dict[Figure, Drawing] = {}
     sentences: list[str] = []
     for figure in all_figures():
         if sketch := figure(results):
             try:
                 drawings[figure] = drawn(sketch, folder)
-            except (ValueError, ArithmeticError) as error:  # numbers that no axis can hold
-                why = shortened(visible(f"{type(error).__name__}: {error}"), 100)
-                sentences.append(f"The figure {sketch.name} cannot be drawn ({why}).")
+            except (ValueError, ArithmeticError) as error:  # numbers beyond any axis
+                reason = shortened(visible(f"{type(error).__name__}: {error}"), 100)
+                sentences.append(f"The figure {sketch.name} cannot be drawn ({reason}).")
     return drawings, sentences
 
 
 def all_figures() -> list[Figure]:
-    """Return the figures of all sections, in order."""
+    """Return the figures of all chapters, in order."""
     return [draw for section in SECTIONS for layout in section.layouts for draw in layout.figures]
-
-
-def _files(shown: Shown) -> Iterator[tuple[str, str | bytes]]:
-    """Yield the files of tables and figures, and what they hold."""
-    for table in shown.tables.values():
-        for suffix, form in FORMATS.items():
-            yield f"tables/{table.name}.{suffix}", form(table)
-    for drawing in shown.drawings.values():
-        yield f"figures/{drawing.name}.svg", drawing.svg
-        yield f"figures/{drawing.name}.pdf", drawing.pdf
 
 
 def _write(path: Path, content: str | bytes) -> None:
@@ -86,8 +81,14 @@ def _write(path: Path, content: str | bytes) -> None:
 
 
 def _missing(results: Results, newest: Record) -> Iterator[str]:
-    """Yield a sentence for everything that the reader might look for in vain."""
-    yield from _suites_missing(results, newest)
+    """Yield a sentence on each part that a reader may miss."""
+    ended = {r.problem for r in results.all(FINISHED) if r.stamp == newest.stamp}
+    started = {record.suite for record in results.every}
+    for suite in SUITES:
+        if suite in started - ended:
+            yield f"The suite “{suite}” is not complete: `plumbob bench {suite}` continues it."
+    if never := [suite for suite in SUITES if suite not in started | ended]:
+        yield f"Not run: {', '.join(never)}. `plumbob bench {' '.join(never)}` measures them."
     for record in results.failed:
         yield f"{record.problem}, {record.solver} could not be measured: {record.failed}"
     for package, version in newest.stamp.get("versions", {}).items():
@@ -100,22 +101,8 @@ def _missing(results: Results, newest: Record) -> Iterator[str]:
         )
     if names := not_asked(results):
         yield f"Not asked: {listed(names)}. `plumbob bench ik cloth` asks all."
-    if others := sum(record.stamp != newest.stamp for record in results.every):
+    if count := sum(record.stamp != newest.stamp for record in results.every):
         yield (
-            f"{others} of {len(results.every)} records are from other sources, versions or another "
-            "machine than the head of this page says; `plumbob bench` measures again what it runs."
+            f"{count} of {len(results.every)} records are from other sources, versions or another "
+            "machine than the head of this page says; `plumbob bench` measures them again."
         )
-
-
-def _suites_missing(results: Results, newest: Record) -> Iterator[str]:
-    """Yield a sentence on each suite that was begun only, and one on those that were not."""
-    ended = {r.problem for r in results.all(FINISHED) if r.stamp == newest.stamp}
-    begun = {record.suite for record in results.every}
-    for suite in SUITES:
-        if suite in begun - ended:
-            yield (
-                f"The suite “{suite}” was not run to its end: `plumbob bench {suite}` takes it up "
-                "again."
-            )
-    if never := [suite for suite in SUITES if suite not in begun | ended]:
-        yield f"Not run: {', '.join(never)}. `plumbob bench {' '.join(never)}` measures them."

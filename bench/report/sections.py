@@ -1,12 +1,14 @@
-"""The chapters of the report, in order: each is made of what some experiments offer."""
+"""The chapters of the report and their tables, which experiments offer."""
 
 import importlib
 import importlib.util
+import tomllib
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
-from ..experiments.pictures.readings import arm_motion, cloth_motion
+from ..experiments.pictures.figures import arm_motion, cloth_motion
 from ..harness.experiment import Experiment
 from ..motion.motion import Scene
 from ..tables.layout import Layout
@@ -18,12 +20,12 @@ class Section(NamedTuple):
     """A chapter of the report.
 
     Attributes:
-        name: what experiments and addresses within the page call it.
-        short: what links to it say.
-        title: its heading.
-        about: what it is about.
-        main: the name of its main table, shown unfolded; "" if it has none.
-        figure: the name of the figure beside it.
+        name: in experiments, and in addresses within the page.
+        short: text of links.
+        title: heading.
+        about: introduction.
+        main: name of its unfolded table; "" if it has none.
+        figure: name of the figure beside it.
     """
 
     name: str
@@ -35,61 +37,18 @@ class Section(NamedTuple):
 
     @property
     def experiments(self) -> list[Experiment]:
-        """The experiments that it shows, in order."""
+        """Its experiments, in order."""
         return [experiment for experiment in EXPERIMENTS if experiment.chapter == self.name]
 
     @property
     def layouts(self) -> tuple[Layout, ...]:
-        """The questions of all its experiments."""
-        return tuple(layout for made in self.experiments for layout in offered(made))
-
-    @property
-    def suites(self) -> set[str]:
-        """The suites that it is made from."""
-        return {experiment.suite for experiment in self.experiments}
+        """The tables of its experiments, in order."""
+        return tuple(layout for experiment in self.experiments for layout in offered(experiment))
 
 
-SECTIONS = (
-    Section(
-        "right",
-        "Right?",
-        "Is it right?",
-        "Nothing below counts unless the reference itself is right. Each claim computes one "
-        "quantity twice: by Plumbob, and by a physics engine that shares no code with it, or by a "
-        "closed form or an invariant where the table says so.",
-    ),
-    Section(
-        "kinematics",
-        "Kinematics",
-        "Inverse kinematics",
-        "Real arms and a character with two hands to place: the same targets, starts and "
-        "evaluation for every solver. The lab’s arm of five joints draws curves, and a chain of "
-        "ten ball joints reaches for targets near, far, at the edge of its reach and beyond it.",
-        "robots_overall",
-        "budget_one_start",
-    ),
-    Section(
-        "cloth",
-        "Cloth",
-        "Cloth by implicit Euler",
-        "A cloth falls from rest and swings from two corners, as it is and stiffer. A step "
-        "minimises the objective g of Liu et al. (2013).",
-        "cloth_peers_step",
-        "work_precision_step",
-    ),
-    Section(
-        "speed",
-        "Speed",
-        "Speed",
-        "The same work by the compiled and the plain source, and by both engines, in one run, on "
-        "one core unless all are named.",
-        "timing_kinematics",
-        "timing_kinematics",
-    ),
-)
-
-
-# What moves in a chapter.
+_CHAPTERS = tomllib.loads(Path(__file__).with_name("chapters.toml").read_text(encoding="utf-8"))
+SECTIONS = tuple(Section(**chapter) for chapter in _CHAPTERS["chapter"])
+# The motions of chapters.
 MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
     "kinematics": arm_motion,
     "cloth": cloth_motion,
@@ -97,19 +56,19 @@ MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
 
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:
-    """Return the tables of an experiment, imported only now; none where another shows it."""
+    """Return the tables of an experiment, imported only now; empty if it has none."""
     name = f"{experiment.package}.tables"
-    layouts: tuple[Layout, ...] = ()
-    if importlib.util.find_spec(name) is not None:
-        layouts = importlib.import_module(name).LAYOUTS
+    if importlib.util.find_spec(name) is None:
+        return ()
+    layouts: tuple[Layout, ...] = importlib.import_module(name).LAYOUTS
     return layouts
 
 
 def tables(results: Results, suites: Iterable[str] | None = None) -> list[Table]:
-    """Return the tables made from any of these suites, or all, in the order of the report."""
+    """Return the tables of the chapters that show one of these suites, or all, in order."""
     return [
         layout(results)
         for section in SECTIONS
-        if suites is None or set(suites) & section.suites
+        if suites is None or any(e.suite in set(suites) for e in section.experiments)
         for layout in section.layouts
     ]

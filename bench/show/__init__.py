@@ -1,1 +1,1 @@
-"""Scenes in motion: by our solvers or by yours, as animations, pictures, pages and BVH."""
+"""Animations, pictures and pages of the named scenes, by Plumbob's solvers and the user's."""

@@ -21,25 +21,25 @@ from ..figures.style import COLOURS, written
 from ..figures.view import seen
 from ..motion.motion import Moving, Scene, decades, length
 
-# A picture shows so many moments beside each other.
+# Moments of a picture.
 MOMENTS = 4
 MARGIN = 0.1
 RATE = 20
-_WHITE: dict[Any, Any] = {"savefig.facecolor": "white", "figure.facecolor": "white"}
-Told = Callable[[int, int], None]
+_STYLE: dict[Any, Any] = {**STYLE, "savefig.facecolor": "white", "figure.facecolor": "white"}
+Progress = Callable[[int, int], None]
 
 
-def animate(scene: Scene, path: Path, progress: Told) -> None:
-    """Write a GIF: the solvers beside each other and, if there are several, a scale of colours."""
-    with mpl.rc_context({**STYLE, **_WHITE}):
+def animate(scene: Scene, path: Path, progress: Progress) -> None:
+    """Write a GIF: the solvers beside each other and, if there are several, a colour bar."""
+    with mpl.rc_context(_STYLE):
         count = len(scene.motions)
         figure = Figure(figsize=(4.8 * count, 4.8 if count == 1 else 5.4), dpi=96)
         base, top = (0.0, 1.0) if count == 1 else (0.18, 0.94)
         lefts = [(i + 0.02) / count for i in range(count)]
         axes = [figure.add_axes((left, base, 0.96 / count, top - base)) for left in lefts]
         if count > 1:
-            _bar(scene, figure, figure.add_axes((0.3, 0.08, 0.4, 0.02)))
-        update = partial(_frame, axes, scene)
+            _colour_bar(scene, figure, cax=figure.add_axes((0.3, 0.08, 0.4, 0.02)))
+        update = partial(_draw_frame, axes, scene)
         frames = len(scene.motions[0].positions)
         animation = FuncAnimation(figure, update, frames=frames, init_func=lambda: ())
         with tempfile.TemporaryDirectory() as folder:  # interrupted, Pillow writes what it has
@@ -48,47 +48,45 @@ def animate(scene: Scene, path: Path, progress: Told) -> None:
             path.write_bytes(whole.read_bytes())
 
 
-def picture(scene: Scene, path: Path, progress: Told) -> None:
-    """Write an SVG: for each solver what an arm has drawn, or a row of moments of a cloth."""
-    with mpl.rc_context({**STYLE, **_WHITE}):
+def picture(scene: Scene, path: Path, progress: Progress) -> None:
+    """Write an SVG: the curve that an arm has drawn, or moments of a cloth, for each solver."""
+    with mpl.rc_context(_STYLE):
         count, is_arm = len(scene.motions), scene.curve is not None
         rows, columns, size = (1, count, 4.8) if is_arm else (count, MOMENTS, 2.4)
         figure = Figure(figsize=(size * columns, size * rows + 0.6), layout="constrained")
         panels = figure.subplots(rows, columns, squeeze=False).reshape(count, -1)
         last = len(scene.motions[0].positions) - 1
         moments = np.linspace(0, last, MOMENTS).round().astype(int).tolist()
-        for done, i in enumerate(moments[-panels.shape[1] :], 1):
-            _frame(list(panels[:, done - 1]), scene, i, done == 1, moments if is_arm else ())
-            progress(done, panels.shape[1])
+        for k, i in enumerate(moments[-panels.shape[1] :]):
+            _draw_frame(list(panels[:, k]), scene, i, k == 0, moments if is_arm else ())
+            progress(k + 1, panels.shape[1])
         if count > 1:
-            _bar(scene, figure, None, panels.ravel().tolist())
+            _colour_bar(scene, figure, ax=panels.ravel().tolist(), shrink=0.5, aspect=40)
         figure.savefig(path, metadata={"Date": None}, bbox_inches="tight")
 
 
-def _bar(scene: Scene, figure: Figure, where: Axes | None, beside: Sequence[Axes] = ()) -> None:
-    """Draw what the colours mean."""
+def _colour_bar(scene: Scene, figure: Figure, **place: Any) -> None:
     low, high = decades(scene)
     colours = ScalarMappable(LogNorm(10.0**low, 10.0**high), COLOUR_MAP)
-    more: dict[str, Any] = {"cax": where} if where else {"ax": beside, "shrink": 0.5, "aspect": 40}
-    bar = figure.colorbar(colours, orientation="horizontal", **more)
+    bar = figure.colorbar(colours, orientation="horizontal", **place)
     bar.ax.xaxis.set_major_formatter(lambda metres, _: length(metres))
     bar.ax.minorticks_off()
     bar.set_label(scene.measure)
 
 
-def _frame(
+def _draw_frame(
     axes: Sequence[Axes], scene: Scene, i: int, title: bool = True, poses: Sequence[int] = ()
 ) -> tuple[()]:
-    every = [one.positions.reshape(-1, 3) for one in scene.motions]
-    every += [] if scene.curve is None else [scene.curve]
-    x, y, _ = seen(np.concatenate(every), scene.view)
-    for ax, one in zip(axes, scene.motions, strict=True):
+    """Draw frame i of each motion, and faintly the poses of other frames."""
+    x, y, _ = seen(scene.points(), scene.view)
+    draw = _draw_cloth if scene.curve is None else _draw_arm
+    for ax, motion in zip(axes, scene.motions, strict=True):
         ax.clear()
         for k in poses:
-            draw_arm(ax, one.positions[k], alpha=0.15)
-        (_arm if scene.curve is not None else _cloth)(ax, scene, one, i)
+            draw_arm(ax, motion.positions[k], alpha=0.15)
+        draw(ax, scene, motion, i)
         if len(scene.motions) > 1:
-            _say(ax, one, i, title)
+            _write_error(ax, motion, i, title)
         ax.set_xlim(np.nanmin(x) - MARGIN, np.nanmax(x) + MARGIN)
         ax.set_ylim(np.nanmin(y) - MARGIN, np.nanmax(y) + MARGIN)
         ax.set_aspect("equal")
@@ -96,42 +94,43 @@ def _frame(
     return ()
 
 
-def _say(ax: Axes, one: Moving, i: int, title: bool) -> None:
-    """Write whose motion this is, and its error in this frame and up to it."""
-    ax.set_title(written(one.label) if title else "", fontweight="bold", loc="left")
-    error, largest = (length(value) for value in (one.errors[i], np.max(one.errors[: i + 1])))
-    error = f"error {error}, largest {largest}" if np.isfinite(one.errors[i]) else "diverged"
-    ax.text(0.0, -0.02, error, transform=ax.transAxes, va="top", color=COLOURS["faint"])
+def _write_error(ax: Axes, motion: Moving, i: int, title: bool) -> None:
+    """Write the solver, and its error in this frame and up to it."""
+    ax.set_title(written(motion.label) if title else "", fontweight="bold", loc="left")
+    error, largest = length(motion.errors[i]), length(np.max(motion.errors[: i + 1]))
+    text = f"error {error}, largest {largest}" if np.isfinite(motion.errors[i]) else "diverged"
+    ax.text(0.0, -0.02, text, transform=ax.transAxes, va="top", color=COLOURS["faint"])
 
 
-def _arm(ax: Axes, scene: Scene, one: Moving, i: int) -> None:
+def _draw_arm(ax: Axes, scene: Scene, motion: Moving, i: int) -> None:
+    """Draw the curve, the part that the arm has drawn, and the arm."""
     assert scene.curve is not None
+    is_single = len(scene.motions) == 1
     x, y, _ = seen(scene.curve, scene.view)
-    ax.plot(x, y, color=COLOURS["rule"], linewidth=1 if len(scene.motions) == 1 else 3, zorder=2)
-    x, y, _ = seen(one.positions[: i + 1, -1], scene.view)
-    if len(scene.motions) == 1:
+    ax.plot(x, y, color=COLOURS["rule"], linewidth=1 if is_single else 3, zorder=2)
+    x, y, _ = seen(motion.positions[: i + 1, -1], scene.view)
+    if is_single:
         ax.plot(x, y, color=COLOURS["orange"], linewidth=1.8, zorder=5)
     else:
         ends = np.stack([x, y], axis=-1)
         segments = list(np.stack([ends[:-1], ends[1:]], axis=1))
         lines = LineCollection(segments, linewidths=2.4, zorder=5)
-        lines.set_color(
-            list(COLOUR_MAP(np.nan_to_num(_share(scene, one.errors[1 : i + 1]), nan=1)))
-        )
+        shades = np.nan_to_num(_on_scale(scene, motion.errors[1 : i + 1]), nan=1)
+        lines.set_color(list(COLOUR_MAP(shades)))
         ax.add_collection(lines)
-    draw_arm(ax, one.positions[i])
+    draw_arm(ax, motion.positions[i])
 
 
-def _cloth(ax: Axes, scene: Scene, one: Moving, i: int) -> None:
-    if not np.isfinite(one.positions[i]).all():
-        return
-    shares = None
-    if len(scene.motions) > 1 and one.distances is not None:
-        shares = _share(scene, one.distances[i])
-    draw_cloth(ax, one.positions[i], scene.marked, shares)
+def _draw_cloth(ax: Axes, scene: Scene, motion: Moving, i: int) -> None:
+    if np.isfinite(motion.positions[i]).all():
+        shades = None
+        if len(scene.motions) > 1 and motion.distances is not None:
+            shades = _on_scale(scene, motion.distances[i])
+        draw_cloth(ax, motion.positions[i], scene.marked, shades)
 
 
-def _share(scene: Scene, errors: Any) -> Any:
+def _on_scale(scene: Scene, errors: Any) -> Any:
+    """Return errors on the colour scale, from 0 to 1."""
     low, high = decades(scene)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.clip((np.log10(errors) - low) / (high - low), 0.0, 1.0)

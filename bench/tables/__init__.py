@@ -1,1 +1,1 @@
-"""Tables as values: their columns and layout, and the forms they are written in."""
+"""Tables as values: columns and layout, and the formats in which they are written."""

@@ -1,4 +1,4 @@
-"""A table as lines of a terminal: columns are dropped before a digit or a part of a name is."""
+"""A table as lines of a terminal: columns are left out before a number or a name is cut."""
 
 import functools
 from collections.abc import Sequence
@@ -9,24 +9,20 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text
 
-from plumbob.reference.arguments import name_list
-
-from .fitting import assigned
-from .table import Table, best_cells, naming, without_empty, words
+from .table import Table, best_cells, column_widths, naming, without_empty, words
 
 GAP = 2
-# Longer words may be broken, into pieces of the next length where columns do not fit otherwise.
-_PIECES = (24, 10, 5)
-_BEST, _MISSED = "bold", "bold red"
+# Longer words may be broken, into parts of the next length where columns do not fit otherwise.
+_PARTS = (24, 10, 5)
 
 
-class Aligned(NamedTuple):
-    """A table as lines, and the headings of the columns that had no place in them.
+class AlignedTable(NamedTuple):
+    """A table as styled lines.
 
     Attributes:
-        lines: the lines, styled.
-        widths: how wide each column is, with `GAP` between them.
-        left_out: the headings of the columns that had no place.
+        lines: of text.
+        widths: of the columns, with `GAP` between them.
+        left_out: the headings of the columns that did not fit.
     """
 
     lines: list[Text]
@@ -34,72 +30,67 @@ class Aligned(NamedTuple):
     left_out: list[str]
 
 
-def aligned(table: Table, width: int) -> Aligned:
-    """Return a table in lines of at most so many letters, as long as its names and numbers are."""
+def aligned(table: Table, width: int) -> AlignedTable:
+    """Return a table in lines of at most this width, unless its names and numbers are longer."""
     table = without_empty(table)
-    columns, least = _fitting(table, width)
-    natural = [max(low, _natural(table, j)) for j, low in zip(columns, least, strict=True)]
-    room = width - GAP * (len(columns) - 1)
-    widths = [int(wide + 1e-9) for wide in assigned(least, natural, room)]
-    if (
-        sum(whole := [max(w, _heading(table, j)) for j, w in zip(columns, natural, strict=True)])
-        <= room
-    ):
-        widths = [int(wide) for wide in whole]
+    columns, lowest = _fitting(table, width)
+    natural = [max(low, _natural_width(table, j)) for j, low in zip(columns, lowest, strict=True)]
+    headings = [cell_len(table.columns[j].heading) for j in columns]
+    full = list(map(max, natural, headings))
+    space = width - GAP * (len(columns) - 1)
+    if sum(full) > space:
+        full = [wide + 1e-9 for wide in column_widths(lowest, natural, space)]
+    widths = list(map(int, full))
     lines = _lines(_grid(table, columns, widths), sum(widths) + GAP * len(columns))
     left_out = [column.heading for j, column in enumerate(table.columns) if j not in columns]
-    return Aligned(lines, widths, left_out)
+    return AlignedTable(lines, widths, left_out)
 
 
 def _fitting(table: Table, width: int) -> tuple[list[int], list[float]]:
-    """Return the columns that are shown, and the least width of each.
+    """Return the columns that fit, and the lowest width of each.
 
-    Those that name a row always are, and one more; folded ones never are. The others are dropped
-    from the right, those in which something is best last.
+    The columns that name a row always stay, and another; folded columns never do. The others are
+    left out from the right, columns with best cells last.
     """
     names = naming(table)
-    for piece in _PIECES:
-        least = {j: _least(table, j, piece) for j in range(len(table.columns))}
-        columns = [j for j in least if j < names or not table.columns[j].folded]
+    for part in _PARTS:
+        lowest = {j: _lowest_width(table, j, part) for j in range(len(table.columns))}
+        columns = [j for j in lowest if j < names or not table.columns[j].folded]
         for j in sorted(columns[names:], key=lambda j: (bool(table.columns[j].best), -j)):
-            if _fits([least[j] for j in columns], width) or len(columns) <= names + 1:
+            if _fits([lowest[j] for j in columns], width) or len(columns) <= names + 1:
                 break
             columns.remove(j)
-        if _fits([least[j] for j in columns], width):
+        if _fits([lowest[j] for j in columns], width):
             break
-    return columns, [least[j] for j in columns]
+    return columns, [lowest[j] for j in columns]
 
 
 def _fits(widths: Sequence[float], width: int) -> bool:
     return sum(widths) + GAP * (len(widths) - 1) <= width
 
 
-def _least(table: Table, j: int, piece: int) -> float:
-    """Return the least width of a column: a number is never broken, a word only if it is long."""
-    cells = [words(row[j]) for row in table.rows]
+def _lowest_width(table: Table, j: int, part: int) -> float:
+    """Return the lowest width of a column: numbers are never broken, words only if long."""
+    texts = [words(row[j]) for row in table.rows]
     tokens = table.columns[j].heading.split()
-    if not table.columns[j].words and piece == _PIECES[0]:
-        return max(map(cell_len, [*cells, *tokens]), default=0)
-    tokens += [token for cell in cells for token in cell.split()]
-    return max((min(cell_len(token), piece) for token in tokens), default=0)
+    if not table.columns[j].words and part == _PARTS[0]:
+        return max(map(cell_len, [*texts, *tokens]), default=0)
+    tokens += [token for text in texts for token in text.split()]
+    return max((min(cell_len(token), part) for token in tokens), default=0)
 
 
-def _natural(table: Table, j: int) -> int:
-    """Return the width of the cells in one line, with a heading over numbers in two."""
-    body = max((cell_len(words(row[j])) for row in table.rows), default=0)
-    if table.columns[j].words:
-        return body
+def _natural_width(table: Table, j: int) -> int:
+    """Return the width of the cells in a line, and of a heading over numbers in two."""
+    widest = max((cell_len(words(row[j])) for row in table.rows), default=0)
     tokens = table.columns[j].heading.split()
-    halves = [(" ".join(tokens[:i]), " ".join(tokens[i:])) for i in range(len(tokens))]
-    return max(body, min((max(map(cell_len, both)) for both in halves), default=0))
-
-
-def _heading(table: Table, j: int) -> int:
-    return cell_len(table.columns[j].heading)
+    if table.columns[j].words or not tokens:
+        return widest
+    halves = ((" ".join(tokens[:i]), " ".join(tokens[i:])) for i in range(len(tokens)))
+    return max(widest, min(max(map(cell_len, lines)) for lines in halves))
 
 
 def _grid(table: Table, columns: Sequence[int], widths: Sequence[int]) -> Grid:
-    grid = Grid(box=None, pad_edge=False, padding=(0, GAP, 0, 0), header_style=_BEST)
+    grid = Grid(box=None, pad_edge=False, padding=(0, GAP, 0, 0), header_style="bold")
     for j, width in zip(columns, widths, strict=True):
         column = table.columns[j]
         grid.add_column(
@@ -110,17 +101,16 @@ def _grid(table: Table, columns: Sequence[int], widths: Sequence[int]) -> Grid:
         )
     best = best_cells(table)
     for i, row in enumerate(table.rows):
-        missed = any(str(cell).startswith("MISSED") for cell in row)
-        styles = [_MISSED if missed else _BEST if (i, j) in best else "" for j in columns]
+        is_missed = any(str(cell).startswith("MISSED") for cell in row)
+        styles = ["bold red" if is_missed else "bold" * ((i, j) in best) for j in columns]
         cells = zip(columns, styles, strict=True)
         grid.add_row(*(Text(words(row[j]), style) for j, style in cells))
     return grid
 
 
 def _lines(grid: Grid, width: int) -> list[Text]:
-    console = _console(width)
     lines = []
-    for segments in console.render_lines(grid, pad=False):
+    for segments in _console(width).render_lines(grid, pad=False):
         line = Text.assemble(*((segment.text, segment.style or "") for segment in segments))
         line.rstrip()
         lines.append(line)
@@ -133,12 +123,6 @@ def _console(width: int) -> Console:
 
 
 def filled(text: str, width: int) -> list[str]:
-    """Return a text in lines that are no wider."""
+    """Return a text in lines of at most this width."""
     plain = Text(" ".join(text.split()))
     return [line.plain.rstrip() for line in plain.wrap(_console(width), width)] or [""]
-
-
-def left_out(table: Table, missing: Sequence[str], shown_by: str) -> str:
-    """Return a sentence on the columns that are left out, and what shows them."""
-    columns = f"{len(missing)} of {len(table.columns)} columns"
-    return f"{columns} left out ({name_list(missing)}); all: {shown_by}"

@@ -1,9 +1,16 @@
-"""Titles and captions of tables: prose in `tables.toml`, beside the module that makes them."""
+"""Titles, captions and columns of tables: prose in `tables.toml`, beside the tables' module."""
 
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from string import Formatter
 from typing import Any
+
+from ..harness.record import Record
+from .columns import lengths_of_steps
+from .layout import records_of
+from .results import settings
+from .table import Column
 
 
 class Captions:
@@ -16,6 +23,7 @@ class Captions:
         """Read the file beside a module, given by its `__file__`."""
         path = Path(module).with_name("tables.toml")
         self._tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        self._columns = self._tables.pop("columns", {}), self._tables.pop("folded", {})
         shared: dict[str, str] = self._tables.pop("shared", {})
         self.shared = {key: _on_one_line(text, constants) for key, text in shared.items()}
         self._constants = {**constants, **self.shared}
@@ -23,21 +31,46 @@ class Captions:
     def of(
         self, name: str, measured: Callable[[Any], Mapping[str, str]] | None = None
     ) -> dict[str, Any]:
-        """Return the name, question, title, shows and measured of a `Layout`.
+        """Return the name, question, title, shows, measured and declared columns of a `Layout`.
 
         `measured` returns, from the subjects of the table, what stands in the braces of the
-        sentence on how they were measured.
+        sentence on how they were measured; other braces hold the settings of their records.
         """
         texts = {**self._tables[name]}
         how = texts.pop("measured")
-        captions = {key: _on_one_line(text, self._constants) for key, text in texts.items()}
-        if measured is None:
+        captions: dict[str, Any] = {
+            key: _on_one_line(text, self._constants) for key, text in texts.items()
+        }
+        if name in self._columns[0]:
+            captions["columns"] = self.columns(name)
+        names = {field for _, field, _, _ in Formatter().parse(how) if field}
+        if measured is None and names <= self._constants.keys():
             return {"name": name, **captions, "measured": _on_one_line(how, self._constants)}
 
         def sentence(subjects: Any) -> str:
-            return _on_one_line(how, {**self._constants, **measured(subjects)})
+            numbers = measured(subjects) if measured else {}
+            missing = names - {*self._constants, *numbers}
+            written = {field: _setting(list(records_of(subjects)), field) for field in missing}
+            return _on_one_line(how, {**self._constants, **written, **numbers})
 
         return {"name": name, **captions, "measured": sentence}
+
+    def columns(self, name: str) -> tuple[Column, ...]:
+        """Return the columns of a table; each shows the cell that a row has under its title."""
+        visible, folded = self._columns
+        looks = [*visible[name], *({**look, "folded": True} for look in folded.get(name, []))]
+        return tuple(_column(title, **look) for look in looks for title in look["titles"])
+
+
+def _column(title: str, titles: list[str], **looks: Any) -> Column:
+    return Column(title, read=lambda row: row.get(title), **looks)
+
+
+def _setting(records: list[Record], name: str) -> str:
+    """Return a setting of some records as words; `h_in_ms` is the length of their steps."""
+    if name == "h_in_ms":
+        return lengths_of_steps([record for record in records if "h" in record.settings])
+    return settings(records, name) or "–"
 
 
 def _on_one_line(text: str, numbers: Mapping[str, str]) -> str:

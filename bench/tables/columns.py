@@ -23,7 +23,7 @@ def text(title: str, read: Callable[[Any], Cell]) -> Column:
 
 
 def titled(title: str) -> Column:
-    """Return the column of what a record's problem is called."""
+    """Return the column of the problem's title."""
     return text(title, lambda record: record.title)
 
 
@@ -41,94 +41,93 @@ def greatest(columns: Iterable[Column]) -> list[Column]:
 
 
 def folded(columns: Iterable[Column]) -> list[Column]:
-    """Return columns that are shown only to those who ask for them."""
+    """Return columns that are shown on demand only."""
     return [replace(column, folded=True) for column in columns]
 
 
 def number(title: str, name: str = "", unit: str = "") -> Column:
-    """Return the column of one number of a record, empty where a record has none."""
+    """Return the column of a number of a record, empty where a record has none."""
     return Column(title, unit, read=lambda record: record.arrays.get(name or title))
 
 
 def share(title: str, hits: Callable[[Any], Any], best: str = "") -> Column:
-    """Return the column of how many of some truth values hold."""
+    """Return the column of the share of true entries."""
     return Column(title, note=INTERVAL, read=lambda record: metrics.share(hits(record)), best=best)
 
 
 def spread(
     title: str, name: str, unit: str = "", of: Sequence[str] = (MEDIAN, LARGEST)
 ) -> list[Column]:
-    """Return the columns of where an array of a record lies: counts as whole numbers."""
+    """Return the columns of quantiles of an array of a record."""
     return places(title, unit, of, partial(spread_of, name=name))
 
 
 def spread_of(record: Record, name: str) -> Sequence[int | float]:
     """Return median, 95th percentile and maximum of an array; of counts, as whole numbers."""
-    values = record.arrays[name]
-    return metrics.whole(values) if values.dtype.kind in "iu" else metrics.spread(values)
+    array = record.arrays[name]
+    return metrics.whole(array) if array.dtype.kind in "iu" else metrics.spread(array)
 
 
 def iterations_said(record: Record) -> metrics.Floats:
-    """Return the iterations of those solves whose solver says them, (solve,)."""
-    values = record.arrays["iterations"]
-    return values[~np.isnan(values)]
+    """Return the iterations of the solves where the solver counts them, (solve,)."""
+    counts = record.arrays["iterations"]
+    return counts[~np.isnan(counts)]
 
 
 def spread_of_iterations(record: Record) -> Sequence[Cell]:
-    """Return median, 95th percentile and maximum of the iterations, None where all are unsaid."""
-    said = iterations_said(record)
-    return [claimed(n, record) for n in metrics.whole(said)] if said.size else (None, None, None)
+    """Return median, 95th percentile and maximum of the iterations, None without any count.
 
-
-def claimed(count: Cell, record: Record) -> Cell:
-    """Return a count with "claimed" behind it if it is an entrant's own: nobody else counts it."""
-    return f"{words(count)} claimed" if record.facts.get("entrant") else count
+    The counts of an entrant are its own claim, and marked so.
+    """
+    counts = iterations_said(record)
+    if not counts.size:
+        return (None, None, None)
+    whole = metrics.whole(counts)
+    return [f"{words(n)} claimed" for n in whole] if record.facts.get("entrant") else whole
 
 
 def allowed() -> Column:
-    """Return the column of the most iterations that a solver may make."""
+    """Return the column of the iteration limit."""
     return Column("iterations allowed", read=lambda record: record.settings.get("max_iterations"))
 
 
 def remark() -> Column:
-    """Return the column of what is to be said of a record."""
+    """Return the column of a record's remark."""
     return text("remark", lambda record: record.notes.get("remark", ""))
 
 
 def iterations(of: Sequence[str] = (MEDIAN, LARGEST)) -> list[Column]:
-    """Return the columns of the iterations of a record's solves, empty where they are unsaid."""
+    """Return the columns of the iterations of a record's solves, empty where not counted."""
     return places("iterations", "", of, spread_of_iterations)
 
 
 def effort(record: Record) -> metrics.Effort:
-    """Return where the seconds of a record's solves lie."""
+    """Return median, 95th percentile and mean of the seconds of a record's solves."""
     return metrics.effort(record.arrays["seconds"])
 
 
 def places(
     title: str, unit: str, of: Sequence[str], read: Callable[[Any], Sequence[Cell]]
 ) -> list[Column]:
-    """Return the columns of some places in a sample, which `read` returns together."""
+    """Return the columns of some quantiles, which `read` returns together."""
     return [
-        Column(f"{title}, {which}", unit, read=at(_PLACES[which], read), group=title)
-        for which in of
+        Column(f"{title}, {name}", unit, read=at(_PLACES[name], read), group=title) for name in of
     ]
 
 
 def at(i: int, read: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return what reads one of several cells that are read together."""
+    """Return a reader of one of several cells that are read together."""
     return lambda subject: read(subject)[i]
 
 
 def words_in(value: float, unit: str) -> str:
-    """Return a value in SI units as words in another unit, with that: "1.20 ms"."""
+    """Return a value in SI units as words in another unit: "1.20 ms"."""
     if math.isinf(value):
         return words(value)
-    separator = "" if unit == "°" else " "
-    return f"{words(in_unit(value, unit))}{separator}{unit}"
+    return f"{words(in_unit(value, unit))}{'' if unit == '°' else ' '}{unit}"
 
 
 def lengths_of_steps(records: Sequence[Record]) -> str:
-    """Return the steps of records as words, shortest first [ms]."""
+    """Return the step lengths of records, shortest first [ms]."""
     lengths = sorted({record.settings["h"] for record in records})
     return " or ".join(words(in_unit(h, "ms")) for h in lengths) or "–"

@@ -1,37 +1,43 @@
-"""A table as data: the question it answers, what its rows are about, its columns and figures."""
+"""The layout of a table: its question, subjects, columns and figures; and its provenance."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..harness.record import Record
-from .provenance import provenance
-from .results import Results
+from ..peers import registry
+from .results import Results, settings
 from .table import NO_SUMMARY, Column, Source, Summary, Table, cells
 
-# Makes a sketch of results, None of what is not on record.
+# Returns the sketch of a figure, None if its records are missing.
 Figure = Callable[[Results], Any]
-# How the numbers of a table came about that has none.
 NOT_MEASURED = "Nothing of this is on record yet."
+# The package of an engine, by its name in the registry.
+_PACKAGES = {
+    registry.PINOCCHIO: "pin",
+    registry.MUJOCO: "mujoco",
+    registry.NEWTON: "newton",
+    "CHOLMOD": "cholespy",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A table before it has rows, called with results to fill it.
+    """A table without rows, called with results to fill it.
 
     Attributes:
-        question: what it answers, in the report.
+        question: that the table answers, in the report.
         name: the stem of its files.
-        title: what it is called.
-        subjects: what the rows are about, one each, such as records.
-        columns: how the cells are read from a subject, or what makes the columns from all.
-        shows: one sentence on what can be read off, or what makes it from all subjects.
-        measured: one sentence on how the numbers came about, likewise.
-        summary: what the numbers say, asked for only where there are subjects.
-        figures: what stands beside it.
-        compared: rows whose first so many cells agree are compared with one another; 0: all are.
+        title: its heading.
+        subjects: of the rows, such as records.
+        columns: of the table, or a function that makes them from all subjects.
+        shows: a sentence on the contents, or a function of all subjects.
+        measured: a sentence on how the numbers were measured, or a function of all subjects.
+        summary: of the numbers, called with all subjects if there are any.
+        figures: beside the table.
+        compared: rows with so many equal first cells are compared; 0: all are.
         ranked: whether a subject may be best in its group.
-        optional: whether nothing is missing where it is empty.
+        optional: whether an empty table is no omission.
     """
 
     question: str
@@ -65,27 +71,75 @@ class Layout:
             self.compared,
             frozenset(i for i, subject in enumerate(subjects) if not self.ranked(subject)),
             tuple(map(source, subjects)),
-            provenance(list(dict.fromkeys(_records(subjects)))),
+            provenance(list(dict.fromkeys(records_of(subjects)))),
         )
 
 
 def source(subject: Any) -> Source:
-    """Return what was measured for the row that is about this subject."""
-    records = [record for record in _records(subject) if record.arrays]
+    """Return the measurements behind the row of this subject."""
+    records = [record for record in records_of(subject) if record.arrays]
     if not records:
         return Source()
     problems, solvers = ({r.problem: 0 for r in records}, {r.solver: 0 for r in records})
     return Source(records[0].suite, tuple(problems), tuple(solvers))
 
 
-def _records(subject: Any) -> Iterator[Record]:
-    """Yield the records in a subject; where it has one of its own, only that."""
+def records_of(subject: Any) -> Iterator[Record]:
+    """Yield the records in a subject; only its attribute `record` if it has one."""
     if isinstance(subject, Record):
         yield subject
     elif isinstance(getattr(subject, "record", None), Record):
         yield subject.record
     elif isinstance(subject, Mapping):
-        yield from _records(tuple(subject.values()))
+        yield from records_of(tuple(subject.values()))
     elif isinstance(subject, tuple | list):
         for part in subject:
-            yield from _records(part)
+            yield from records_of(part)
+
+
+def provenance(records: Sequence[Record]) -> str:
+    """Return samples, tolerance, machine, versions and dates of records; "" if there are none."""
+    tolerance = settings(records, "tolerance")
+    newest = {r.solver: r for r in sorted(records, key=lambda record: record.when)}
+    days = sorted({record.when[:10] for record in records if record.when})
+    parts = [
+        _samples(records),
+        tolerance and f"tolerance {tolerance}",
+        _distinct(_machine(record.stamp.get("machine", {})) for record in records),
+        _distinct(_plumbob_and_python(record.stamp.get("versions", {})) for record in records),
+        _distinct(map(_engine_version, newest.values())),
+        " to ".join(dict.fromkeys([*days[:1], *days[-1:]])),
+    ]
+    return "; ".join(filter(None, parts))
+
+
+def _distinct(texts: Iterable[str]) -> str:
+    return ", ".join(filter(None, dict.fromkeys(texts)))
+
+
+def _samples(records: Sequence[Record]) -> str:
+    """Return the number of targets or rounds of a record: "n = 20 to 200"."""
+    arrays = [r.arrays[n] for r in records for n in ("solved", "seconds", "residual")
+              if n in r.arrays]  # fmt: skip
+    counts = sorted({array.size for array in arrays if array.size > 1})
+    if not counts:
+        return ""
+    return f"n = {counts[0]:,}" + (f" to {counts[-1]:,}" if counts[1:] else "")
+
+
+def _machine(machine: Mapping[str, Any]) -> str:
+    cores = machine.get("cores")
+    return f"{machine.get('processor', '')}{f' ({cores} cores)' if cores else ''}"
+
+
+def _plumbob_and_python(versions: Mapping[str, Any]) -> str:
+    titles = ("Plumbob", "Python")
+    return ", ".join(f"{t} {versions[t.lower()]}" for t in titles if versions.get(t.lower()))
+
+
+def _engine_version(record: Record) -> str:
+    """Return the package and version of a record's solver, "" if it is ours or unknown."""
+    engine = registry.find(record.solver).engine
+    package = _PACKAGES.get(engine, engine) or record.solver
+    version = record.settings.get("version") or record.stamp.get("versions", {}).get(package)
+    return f"{package} {version}" if version and package.lower() != "plumbob" else ""

@@ -1,4 +1,4 @@
-"""The records of a report, and how problems and solvers are written."""
+"""The records of a report, and the words for problems, solvers and counts."""
 
 import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
@@ -12,9 +12,9 @@ from ..peers import registry
 from ..text import all_visible
 from .table import words
 
-# So much may a time that is shown be off, in relative terms, by the drift of its machine.
+# The relative precision of a displayed time, given the drift of its machine.
 PRECISION = 0.05
-# Of more solvers that tie with the first a sentence gives only the number.
+# If more solvers tie with the first, a sentence gives only their number.
 NAMED_TIES = 3
 
 Subject = TypeVar("Subject")
@@ -22,13 +22,16 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 class Results:
-    """The records that hold numbers, in the order of the file, to be asked for by what they are.
+    """The current records that hold numbers, with printable words, in the order of the file.
 
-    Whatever their words are, they can be shown anywhere.
+    Attributes:
+        every: all records.
+        records: records with numbers.
+        failed: records that could not be measured.
     """
 
     def __init__(self, records: Iterable[Record]) -> None:
-        """Leave out those that say why there are none, and those under settings of before."""
+        """Leave out superseded records."""
         self.every = [printable(record) for record in records if not record.superseded]
         self.records = [record for record in self.every if not record.failed]
         self.failed = [record for record in self.every if record.failed]
@@ -38,30 +41,30 @@ class Results:
         """The solvers that a user has entered."""
         return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
 
-    def all(self, suite: str, failed: bool = False, **wanted: Any) -> list[Record]:
-        """Return a suite's records with these facts and settings; failed ones only on demand."""
+    def all(self, suite: str, failed: bool = False, **facts: Any) -> list[Record]:
+        """Return a suite's records with these facts or settings; failed records only on demand."""
         records = [*self.records, *self.failed] if failed else self.records
-        return [record for record in records if record.suite == suite and _has(record, wanted)]
+        return [record for record in records if record.suite == suite and _has(record, facts)]
 
-    def one(self, suite: str, problem: str, solver: str, **wanted: Any) -> Record | None:
-        """Return the record of exactly this problem and solver, or None."""
-        found = self.all(suite, **wanted)
-        return next((r for r in found if (r.problem, r.solver) == (problem, solver)), None)
+    def one(self, suite: str, problem: str, solver: str, **facts: Any) -> Record | None:
+        """Return the record of this problem and solver, or None."""
+        records = self.all(suite, **facts)
+        return next((r for r in records if (r.problem, r.solver) == (problem, solver)), None)
 
 
-def _has(record: Record, wanted: dict[str, Any]) -> bool:
-    known = {**record.settings, **record.facts}
-    return all(known.get(name) == value for name, value in wanted.items())
+def _has(record: Record, facts: dict[str, Any]) -> bool:
+    properties = {**record.settings, **record.facts}
+    return all(properties.get(name) == fact for name, fact in facts.items())
 
 
 def printable(record: Record) -> Record:
-    """Return a record whose words can be shown anywhere."""
+    """Return a record with words that are safe to print anywhere."""
     names = ("suite", "problem", "solver", "settings", "notes", "stamp", "facts")
     return replace(record, **{name: all_visible(getattr(record, name)) for name in names})
 
 
 def results_of(folder: Path) -> tuple[Results, str]:
-    """Return what a folder has on record to be shown, and a sentence on what cannot be, or "".
+    """Return the results in a folder, and a warning on lines that cannot be read, or "".
 
     Raises:
         ValueError: if there are no records, or they cannot be read.
@@ -74,7 +77,7 @@ def results_of(folder: Path) -> tuple[Results, str]:
 
 
 def label(solver: str) -> str:
-    """Return how a solver is written."""
+    """Return a solver's name in tables and figures."""
     return registry.find(solver).label
 
 
@@ -92,19 +95,19 @@ def by_problem(records: Iterable[Record]) -> dict[str, list[Record]]:
 
 
 def problems(records: Iterable[Record]) -> list[str]:
-    """Return the names of the problems, each once, in the order of the records."""
+    """Return the distinct problems in the order of the records."""
     return list(dict.fromkeys(record.problem for record in records))
 
 
 def solvers(records: Iterable[Record]) -> list[str]:
-    """Return the names of the solvers, each once, in the order of the records."""
+    """Return the distinct solvers in the order of the records."""
     return list(dict.fromkeys(record.solver for record in records))
 
 
 def settings(records: Iterable[Record], name: str) -> str:
-    """Return the values of a setting as words, smallest first: "100 or 1,000"."""
-    values = sorted({r.settings[name] for r in records if name in r.settings})
-    return listed([words(value) for value in values], "or")
+    """Return the distinct values of a setting, smallest first: "100 or 1,000"."""
+    distinct = sorted({r.settings[name] for r in records if name in r.settings})
+    return listed([words(setting) for setting in distinct], "or")
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:
@@ -113,27 +116,27 @@ def listed(names: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join(filter(None, [comma.join(names[:-1]), *names[-1:]]))
 
 
-def counted(count: int, name: str) -> str:
-    """Return a count of things: "1 iteration", "2 iterations"."""
-    return f"{words(count)} {name}{'' if count == 1 else 's'}"
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun: "1 iteration", "2 iterations"."""
+    return f"{words(count)} {noun}{'' if count == 1 else 's'}"
 
 
 def leaders(ranking: Ranking) -> str:
-    """Return who is first, and who is not told from that one: "a, in a tie with b and c"."""
-    first, *tied = ranking.first
-    others = listed(tied) if len(tied) <= NAMED_TIES else f"{len(tied)} others"
-    return f"{first}, in a tie with {others}" if tied else first
+    """Return the first of a ranking and its ties: "a, in a tie with b and c"."""
+    first, *ties = ranking.first
+    names = listed(ties) if len(ties) <= NAMED_TIES else f"{len(ties)} others"
+    return f"{first}, in a tie with {names}" if ties else first
 
 
 def steadiness(noise: float) -> str:
-    """Return whether a machine was steady enough for the precision that is stated, "" if unknown.
+    """Return a sentence on whether the machine was steady enough for `PRECISION`, "" if unknown.
 
     `noise` is half the width of the middle eight tenths of a fixed loop's times, over their median.
     """
     if math.isnan(noise):
         return ""
-    said = f"a fixed loop timed meanwhile varied by ± {round(100 * noise, 1):g} %"
-    stated = f"{100 * PRECISION:g} %"
+    variation = f"a fixed loop timed meanwhile varied by ± {round(100 * noise, 1):g} %"
+    aim = f"{100 * PRECISION:g} % that are aimed at"
     if noise > PRECISION:
-        return f"The machine was too noisy for the {stated} that are aimed at: {said}."
-    return f"The machine was steady within the {stated} that are aimed at: {said}."
+        return f"The machine was too noisy for the {aim}: {variation}."
+    return f"The machine was steady within the {aim}: {variation}."

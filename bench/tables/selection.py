@@ -1,11 +1,10 @@
-"""Columns and rows of a table, chosen by what a user calls them, and an order of the rows."""
+"""Select columns and rows of a table by the names that a user gives, and order the rows."""
 
 import difflib
 import operator
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 from plumbob.reference.arguments import name_list
 
@@ -20,127 +19,119 @@ _COMPARE: dict[str, Callable[[float, float], bool]] = {
 }
 _FILTER = re.compile(r"(.*?)(!=|!~|<=|>=|=|~|<|>)(.*)", re.DOTALL)
 _NUMBERS = re.compile(r"\d+(-\d+)?(\s*,\s*\d+(-\d+)?)*")
+# The most values of a column that a message lists.
+_MAX_LISTED = 12
 
 
 def selected(
     table: Table, columns: Sequence[str] = (), rows: Sequence[str] = (), order: str = ""
 ) -> Table:
-    """Return a table with only some columns and rows, in the order of one of its columns.
+    """Return a table with some columns and rows, in the order of a column.
 
-    The best are the best of the rows that are left, by all columns that the table had. The summary
-    is of all rows, and so left out where one is.
+    The best cells are the best of the remaining rows, by all columns of the table. The summary is
+    of all rows, and so left out if a row is.
 
     Raises:
-        ValueError: if there is no such column, a filter is none, or no row is left.
+        ValueError: if there is no such column, a filter is malformed, or no row passes.
     """
-    left = filtered(table, rows)
-    ordered = list(_ordered(left, order)) if order else list(range(len(left.rows)))
-    chosen = [i for text in columns for i in column_numbers(table, text)] or range(
-        len(left.columns)
-    )
-    chosen = list(dict.fromkeys(chosen))
-    best = best_cells(left)
-    asked = (lambda column: replace(column, folded=False)) if columns else (lambda column: column)
+    part = filtered(table, rows)
+    places = _ordered(part, order) if order else list(range(len(part.rows)))
+    numbers = [j for text in columns for j in column_numbers(table, text)]
+    numbers = list(dict.fromkeys(numbers)) or list(range(len(table.columns)))
+    best = best_cells(part)
+    if columns:
+        part = replace(part, columns=tuple(replace(c, folded=False) for c in part.columns))
     return replace(
-        left,
-        columns=tuple(asked(left.columns[j]) for j in chosen),
-        rows=tuple(tuple(left.rows[i][j] for j in chosen) for i in ordered),
-        sources=tuple(left.sources[i] for i in ordered) if left.sources else (),
-        summary=table.summary if len(left.rows) == len(table.rows) else NO_SUMMARY,
-        best=frozenset(
-            (row, column)
-            for row, i in enumerate(ordered)
-            for column, j in enumerate(chosen)
-            if (i, j) in best
-        ),
+        part,
+        columns=tuple(part.columns[j] for j in numbers),
+        rows=tuple(tuple(part.rows[i][j] for j in numbers) for i in places),
+        sources=tuple(part.sources[i] for i in places) if part.sources else (),
+        summary=table.summary if len(part.rows) == len(table.rows) else NO_SUMMARY,
+        best=frozenset((places.index(i), numbers.index(j)) for i, j in best if j in numbers),
     )
 
 
 def filtered(table: Table, rows: Sequence[str]) -> Table:
-    """Return a table with the rows that pass: one filter of each column that has any.
+    """Return a table with the rows that pass one filter of each column that has any.
 
     Raises:
-        ValueError: if a filter is none, or no row passes.
+        ValueError: if a filter is malformed, or no row passes.
     """
     tests: dict[int, list[Callable[[Cell], bool]]] = {}
     for text in rows:
         column, test = _test(table, text)
         tests.setdefault(column, []).append(test)
-    left = [
+    places = [
         i
         for i, row in enumerate(table.rows)
-        if all(any(test(row[j]) for test in those) for j, those in tests.items())
+        if all(any(test(row[j]) for test in group) for j, group in tests.items())
     ]
-    if table.rows and not left:
-        known = (f"{table.columns[j].title} is {_listed(table, j)}" for j in tests)
-        raise ValueError(f"--rows: no row of {table.name} passes; {'; '.join(known)}")
+    if table.rows and not places:
+        values = (f"{table.columns[j].title} is {_listed(table, j)}" for j in tests)
+        raise ValueError(f"--rows: no row of {table.name} passes; {'; '.join(values)}")
     return replace(
         table,
-        rows=tuple(table.rows[i] for i in left),
-        unranked=frozenset(new for new, i in enumerate(left) if i in table.unranked),
-        sources=tuple(table.sources[i] for i in left) if table.sources else (),
+        rows=tuple(table.rows[i] for i in places),
+        unranked=frozenset(new for new, i in enumerate(places) if i in table.unranked),
+        sources=tuple(table.sources[i] for i in places) if table.sources else (),
     )
 
 
-def _listed(table: Table, j: int, most: int = 12) -> str:
-    values = list(dict.fromkeys(words(row[j]) for row in table.rows))
-    return " or ".join(map(repr, values[:most])) + (" or another" if values[most:] else "")
+def _listed(table: Table, j: int) -> str:
+    texts = list(dict.fromkeys(words(row[j]) for row in table.rows))
+    more = " or another" if len(texts) > _MAX_LISTED else ""
+    return " or ".join(map(repr, texts[:_MAX_LISTED])) + more
 
 
 def _test(table: Table, text: str) -> tuple[int, Callable[[Cell], bool]]:
-    """Return the number of a column and what its cell has to fulfil."""
-    found = _FILTER.fullmatch(text)
-    if not found:
+    """Return the number of a column and the condition on its cells."""
+    match = _FILTER.fullmatch(text)
+    if not match:
         raise ValueError(
             "--rows: expected COLUMN and one of = != ~ !~ < > <= >= and a value, such as "
             f"solver=Newton, got {text!r}"
         )
-    name, sign, value = (part.strip() for part in found.groups())
+    name, sign, target = (part.strip() for part in match.groups())
     (column,) = column_numbers(table, name, "--rows", several=False)
-    if sign in _COMPARE:
-        number = _number(value)
-        if number is None:
-            raise ValueError(f"--rows: expected a number behind {name}{sign}, got {value!r}")
-        return column, lambda cell: _holds(_COMPARE[sign], _number(cell), number)
-    wanted, is_part, negated = _plain(value), "~" in sign, sign.startswith("!")
-
-    def passes(cell: Cell) -> bool:
-        text = _plain(words(cell))
-        return ((wanted in text) if is_part else wanted == text) != negated
-
-    return column, passes
+    if sign not in _COMPARE:
+        return column, lambda cell: _matches(words(cell), sign, target)
+    bound, compare = _number(target), _COMPARE[sign]
+    if bound is None:
+        raise ValueError(f"--rows: expected a number behind {name}{sign}, got {target!r}")
+    return column, lambda cell: (x := _number(cell)) is not None and compare(x, bound)
 
 
-def _holds(compare: Callable[[float, float], bool], a: float | None, b: float) -> bool:
-    return a is not None and compare(a, b)
+def _matches(text: str, sign: str, target: str) -> bool:
+    """Return whether a text equals the target or, with a tilde, contains it; "!" negates."""
+    text, target = _plain(text), _plain(target)
+    return (target in text if "~" in sign else target == text) != sign.startswith("!")
 
 
 def _plain(text: str) -> str:
-    """Return a text for comparison: case and the signs between words do not count."""
+    """Return a text for comparison, without case and signs between words."""
     return re.sub(r"[\s_/-]+", " ", text).strip().casefold()
 
 
-def _number(value: Cell) -> float | None:
-    """Return a cell as a number in the unit of its column; a share in percent."""
-    if isinstance(value, Share):
-        return 100.0 * value.hits / value.total if value.total else None
+def _number(cell: Cell) -> float | None:
+    """Return a cell as a number in the unit of its column, a share in percent."""
+    if isinstance(cell, Share):
+        return 100.0 * cell.hits / cell.total if cell.total else None
     try:
-        return None if value is None else float(str(value).replace(",", ""))
+        return None if cell is None else float(str(cell).replace(",", ""))
     except ValueError:
         return None
 
 
-def _ordered(table: Table, order: str) -> Iterator[int]:
-    """Yield the numbers of the rows, the best or least first, those without a value last."""
+def _ordered(table: Table, order: str) -> list[int]:
+    """Return the numbers of the rows, the best or least first, empty cells last."""
     (j,) = column_numbers(table, order, "--sort", several=False)
     sign = -1.0 if table.columns[j].best == "greatest" else 1.0
 
     def rank(i: int) -> tuple[bool, float, str]:
         cell = table.rows[i][j]
-        number = _number(cell)
-        return cell is None, 0.0 if number is None else sign * number, words(cell)
+        return cell is None, sign * (_number(cell) or 0.0), words(cell)
 
-    yield from sorted(range(len(table.rows)), key=rank)
+    return sorted(range(len(table.rows)), key=rank)
 
 
 def column_numbers(
@@ -151,38 +142,33 @@ def column_numbers(
     Raises:
         ValueError: if there is no such column; the message offers the nearest.
     """
-    if _NUMBERS.fullmatch(text.strip()) and not _named(table, text):
+    if _NUMBERS.fullmatch(text.strip()) and _column_of(table, text) is None:
         return _by_number(table, text, option)
-    pieces = text.split(",")
-    found: list[int] = []
-    while pieces:
-        taken, exact = _longest(table, pieces)
-        if exact is None or (found and not several):
-            raise ValueError(_unknown(table, ",".join(pieces).strip(), option))
-        found.append(exact)
-        pieces = pieces[taken:]
-    return found
+    parts = text.split(",")
+    numbers: list[int] = []
+    while parts:
+        for count in range(len(parts), 0, -1):  # a heading may contain commas: the longest counts
+            number = _column_of(table, ",".join(parts[:count]))
+            if number is not None:
+                break
+        if number is None or (numbers and not several):
+            raise ValueError(_unknown(table, ",".join(parts).strip(), option))
+        numbers.append(number)
+        parts = parts[count:]
+    return numbers
 
 
-def _longest(table: Table, pieces: Sequence[str]) -> tuple[int, int | None]:
-    """Return how many pieces make the longest name of a column, and which that is."""
-    for count in range(len(pieces), 0, -1):
-        if found := _named(table, ",".join(pieces[:count])):
-            return count, found[0]
-    return 0, None
-
-
-def _named(table: Table, name: str) -> list[int]:
-    """Return the columns of this heading, or else of this title."""
-    for read in (lambda c: c.heading, lambda c: c.titled, lambda c: c.title):
-        found = [j for j, c in enumerate(table.columns) if _plain(read(c)) == _plain(name)]
-        if len(found) == 1:
-            return found
-    return []
+def _column_of(table: Table, name: str) -> int | None:
+    """Return the only column of this heading, or else of this title."""
+    for attribute in ("heading", "titled", "title"):
+        texts = [_plain(getattr(column, attribute)) for column in table.columns]
+        if texts.count(_plain(name)) == 1:
+            return texts.index(_plain(name))
+    return None
 
 
 def _by_number(table: Table, text: str, option: str) -> list[int]:
-    found: list[int] = []
+    numbers: list[int] = []
     for part in text.split(","):
         first, _, last = part.strip().partition("-")
         low, high = int(first), int(last or first)
@@ -190,14 +176,15 @@ def _by_number(table: Table, text: str, option: str) -> list[int]:
             raise ValueError(
                 f"{option}: expected numbers from 1 to {len(table.columns)}, got {part.strip()}"
             )
-        found += range(low - 1, high)
-    return found
+        numbers += range(low - 1, high)
+    return numbers
 
 
 def _unknown(table: Table, name: str, option: str) -> str:
-    headings = [column.heading for column in table.columns]
-    known = {_plain(word): c.heading for c in table.columns for word in (c.heading, c.title)}
-    known = {word[: len(_plain(name))]: heading for word, heading in known.items()} | known
-    near: list[Any] = difflib.get_close_matches(_plain(name), known, n=1)
-    hint = f"did you mean {known[near[0]]!r}?" if near else f"expected one of {name_list(headings)}"
+    """Return a message that offers the nearest heading, or lists all."""
+    headings = {_plain(text): c.heading for c in table.columns for text in (c.heading, c.title)}
+    headings = {text[: len(_plain(name))]: h for text, h in headings.items()} | headings
+    near = difflib.get_close_matches(_plain(name), list(headings), n=1)
+    listed = name_list([column.heading for column in table.columns])
+    hint = f"did you mean {headings[near[0]]!r}?" if near else f"expected one of {listed}"
     return f"{option}: {table.name} has no column {name!r}: {hint}"

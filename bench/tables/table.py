@@ -1,13 +1,7 @@
-"""A table as a value, and its forms Markdown and CSV.
+"""A table as a value: columns, rows, best cells, and the text of a cell."""
 
-Tables compute nothing: the cells arrive as numbers and leave as text.
-"""
-
-import csv
-import io
 import itertools
 import math
-import re
 import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,7 +13,7 @@ Cell = str | int | float | bool | Share | None
 
 
 class Summary(NamedTuple):
-    """What a table says: a sentence, and points below it; empty where it says nothing."""
+    """The message of a table: a sentence, and points below it; empty if there is none."""
 
     sentence: str = ""
     points: tuple[str, ...] = ()
@@ -27,12 +21,14 @@ class Summary(NamedTuple):
 
 NO_SUMMARY = Summary()
 
-# How a share is written: with the interval that holds the true rate.
+# The note of a column of shares.
 INTERVAL = "95 % interval"
-# How an infinite number is written: as far from the target as one without an answer.
+# How an infinite number is written: as far from the target as a solver without an answer.
 NO_ANSWER = "no answer"
-# What one metre, second, radian, byte or whole is in other units.
+# One metre, second, radian, byte or whole in other units.
 UNITS = {"ms": 1e3, "µs": 1e6, "ns": 1e9, "°": 180.0 / math.pi, "%": 100.0, "GiB": 2.0**-30}
+# The most problems or solvers that a command names, and the most columns that name a row.
+MAX_OPTIONS, _MAX_NAMES = 3, 3
 
 
 def in_unit(value: float, unit: str) -> float:
@@ -40,34 +36,38 @@ def in_unit(value: float, unit: str) -> float:
     return UNITS.get(unit.partition("/")[0], 1.0) * value
 
 
-def _itself(subject: Any) -> Cell:
-    cell: Cell = subject
-    return cell
+def _identity(subject: Any) -> Any:
+    return subject
 
 
 @dataclass(frozen=True)
 class Column:
-    """A heading with its unit, such as `Column("median", "µs")`; words are set to the left.
+    """A column: its heading, and how a cell is read from the subject of a row.
 
-    The note says how a cell is written, such as `INTERVAL`; it is left out where parts of the cell
-    have columns of their own. `read` takes the cell from what a row is about, in SI units or as a
-    share of one; `cell` converts it to the column's unit, or multiplies it by `factor`. `best` says
-    whether the "least" or the "greatest" is best, "" where neither is; neighbours of one `group`
-    stand under a heading in common; a `folded` column is shown only to those who ask for it.
+    Attributes:
+        title: of the column.
+        unit: of its numbers.
+        words: whether the cells are text, aligned left.
+        note: format of a cell, such as `INTERVAL`; left out where its parts have own columns.
+        read: returns the cell of a subject, in SI units or as a share of one.
+        factor: of the cell, if not that of the unit.
+        best: "least" or "greatest", "" if no cell is best.
+        group: common heading of neighbouring columns.
+        folded: whether the column is shown on demand only.
     """
 
     title: str
     unit: str = ""
     words: bool = False
     note: str = ""
-    read: Callable[[Any], Any] = field(default=_itself, compare=False)
+    read: Callable[[Any], Any] = field(default=_identity, compare=False)
     factor: float | None = None
     best: str = ""
     group: str = ""
     folded: bool = False
 
     def cell(self, subject: Any) -> Cell:
-        """Return the cell of the row that is about this subject."""
+        """Return the cell of the row of this subject, in the column's unit."""
         value = self.read(subject)
         plain: Cell = value.item() if hasattr(value, "item") else value
         if not isinstance(plain, float):
@@ -76,22 +76,22 @@ class Column:
 
     @property
     def below(self) -> str:
-        """The title as it stands under the heading of its group: "median" under "residual"."""
+        """The title below the heading of its group: "median" below "residual"."""
         return self.title.removeprefix(self.group).lstrip(",: ") or self.title
 
     @property
     def titled(self) -> str:
-        """Title and note in one."""
+        """Title and note."""
         return f"{self.title} ({self.note})" if self.note else self.title
 
     @property
     def heading(self) -> str:
-        """Title, note and unit in one."""
+        """Title, note and unit."""
         return f"{self.titled} [{self.unit}]" if self.unit else self.titled
 
 
 class Source(NamedTuple):
-    """The measurements behind a row: their suite, and the problems and solvers in it."""
+    """The measurements behind a row: their suite, problems and solvers."""
 
     suite: str = ""
     problems: tuple[str, ...] = ()
@@ -99,24 +99,19 @@ class Source(NamedTuple):
 
     @property
     def command(self) -> str:
-        """The command that measures the row again, "" where nothing was measured.
+        """The command that measures the row again, "" without measurements.
 
-        Where a row is about many problems or solvers, it measures all of the suite.
+        It measures the whole suite where a row has many problems or solvers.
         """
-        named = (("--solver", self.solvers), ("--problem", self.problems))
-        options = [
-            (option, name) for option, names in named if len(names) <= MOST for name in names
-        ]
-        told = (word for option in options for word in option)
-        return shlex.join(["plumbob", "bench", self.suite, *told]) if self.suite else ""
-
-
-# A command names so many problems or solvers at most.
-MOST = 3
+        options = []
+        for option, names in (("--solver", self.solvers), ("--problem", self.problems)):
+            if len(names) <= MAX_OPTIONS:
+                options += [word for name in names for word in (option, name)]
+        return shlex.join(["plumbob", "bench", self.suite, *options]) if self.suite else ""
 
 
 def cells(columns: Sequence[Column], subjects: Iterable[Any]) -> tuple[tuple[Cell, ...], ...]:
-    """Return a row for each subject, with a cell under each column as that reads it."""
+    """Return a row of cells for each subject."""
     return tuple(tuple(column.cell(subject) for column in columns) for subject in subjects)
 
 
@@ -126,17 +121,17 @@ class Table:
 
     Attributes:
         name: the stem of its files.
-        title: what it is called.
-        columns: one heading a column; the first names the row.
-        rows: the cells; None where nothing was measured.
-        shows: one sentence on what can be read off.
-        measured: one sentence on how the numbers came about.
-        summary: what the numbers say, generated from them.
-        compared: rows whose first so many cells agree are compared with one another; 0: all are.
-        unranked: the numbers of rows that are never best, such as those of a solver cut short.
-        sources: what is behind each row; empty where no row says it.
-        provenance: how many samples, on which machine, with which versions.
-        best: row and column of the cells that are best, where not the columns say it.
+        title: its heading.
+        columns: with distinct headings; the first names the row.
+        rows: the cells; None without measurements.
+        shows: a sentence on the contents.
+        measured: a sentence on how the numbers were measured.
+        summary: generated from the numbers.
+        compared: rows with so many equal first cells are compared; 0: all are.
+        unranked: numbers of rows that are never best, such as those of a solver cut short.
+        sources: the measurements behind each row; empty if unknown.
+        provenance: number of samples, machine and versions.
+        best: row and column of the best cells, if not by the columns.
     """
 
     name: str
@@ -153,7 +148,7 @@ class Table:
     best: frozenset[tuple[int, int]] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse ragged rows, headings that stand twice, and sources of some rows only."""
+        """Check that headings are distinct, and rows and sources complete."""
         if len({column.heading for column in self.columns}) < len(self.columns):
             raise ValueError(f"columns: expected distinct headings in table {self.name}")
         if len(self.sources) not in (0, len(self.rows)):
@@ -166,44 +161,46 @@ class Table:
 
 
 def is_blank(table: Table) -> bool:
-    """Return whether a table has no rows, or is to hold numbers and holds none."""
+    """Return whether a table has no rows, or has columns of numbers without any number."""
     numbers = [j for j, column in enumerate(table.columns) if not column.words]
-    cells = [row[j] for row in table.rows for j in numbers]
-    return not table.rows or (bool(cells) and all(cell is None for cell in cells))
+    return not table.rows or (
+        bool(numbers) and all(row[j] is None for row in table.rows for j in numbers)
+    )
 
 
 def best_cells(table: Table) -> set[tuple[int, int]]:
     """Return row and column of each cell that is best among the rows it is compared with.
 
     Ties are all best: shares whose intervals overlap with that of the best, numbers that are
-    written alike. A cell that nothing is compared with is not best.
+    written alike. A cell without rivals is not best.
     """
     if table.best is not None:
         return set(table.best)
     groups: dict[tuple[Cell, ...], list[int]] = {}
     for i, row in enumerate(table.rows):
-        groups.setdefault(row[: table.compared], []).append(i)
+        if i not in table.unranked:
+            groups.setdefault(row[: table.compared], []).append(i)
     return {
         (i, j)
         for members in groups.values()
         for j, column in enumerate(table.columns)
         if column.best
-        for i in _best(table, [i for i in members if i not in table.unranked], j, column.best)
+        for i in _best_rows(table, members, j)
     }
 
 
-def _best(table: Table, members: list[int], j: int, which: str) -> list[int]:
-    """Return those of some rows whose cell in column j is best, ties included."""
-    sign = 1.0 if which == "least" else -1.0
-    values = {i: sign * _rank(table.rows[i][j]) for i in members}
-    known = {i: value for i, value in values.items() if not math.isnan(value)}
-    if len(known) < 2:
+def _best_rows(table: Table, members: list[int], j: int) -> list[int]:
+    """Return the rows of a group that are best in column j."""
+    sign = 1.0 if table.columns[j].best == "least" else -1.0
+    numbers = {i: sign * _number_of(table.rows[i][j]) for i in members}
+    ranked = {i: number for i, number in numbers.items() if not math.isnan(number)}
+    if len(ranked) < 2:
         return []
-    first = table.rows[min(known, key=lambda i: known[i])][j]
-    return [i for i in known if _ties(table.rows[i][j], first)]
+    best = table.rows[min(ranked, key=lambda i: ranked[i])][j]
+    return [i for i in ranked if _ties(table.rows[i][j], best)]
 
 
-def _rank(cell: Cell) -> float:
+def _number_of(cell: Cell) -> float:
     if isinstance(cell, Share):
         return cell.hits / cell.total if cell.total else math.nan
     return math.nan if cell is None or isinstance(cell, str) else float(cell)
@@ -216,36 +213,47 @@ def _ties(cell: Cell, best: Cell) -> bool:
 
 
 def without_empty(table: Table) -> Table:
-    """Return a table without columns in which nothing stands, such as remarks that nobody made."""
-    filled = [j for j in range(len(table.columns)) if any(words(row[j]) for row in table.rows)]
-    kept = filled or list(range(len(table.columns)))
-    best = {(i, kept.index(j)) for i, j in best_cells(table) if j in kept}
+    """Return a table without empty columns."""
+    count = len(table.columns)
+    filled = [j for j in range(count) if any(words(row[j]) for row in table.rows)]
+    filled = filled or list(range(count))
+    best = {(i, filled.index(j)) for i, j in best_cells(table) if j in filled}
     return replace(
         table,
-        columns=tuple(table.columns[j] for j in kept),
-        rows=tuple(tuple(row[j] for j in kept) for row in table.rows),
+        columns=tuple(table.columns[j] for j in filled),
+        rows=tuple(tuple(row[j] for j in filled) for row in table.rows),
         best=frozenset(best),
     )
 
 
-# So many columns at most name a row.
-_MOST_NAMES = 3
-
-
 def naming(table: Table) -> int:
-    """Return how many of the first columns name a row: as few as tell all rows apart, or so."""
+    """Return how many of the first columns name a row: as few as distinguish all rows."""
     last = len(table.columns) - 1
-    for count in range(1, min(_MOST_NAMES, last) + 1):
+    for count in range(1, min(_MAX_NAMES, last) + 1):
         if len({row[:count] for row in table.rows}) == len(table.rows):
             return count
-    in_words = itertools.takewhile(lambda column: column.words, table.columns[:last])
-    return max(1, min(_MOST_NAMES, len(list(in_words))))
+    texts = itertools.takewhile(lambda column: column.words, table.columns[:last])
+    return max(1, min(_MAX_NAMES, len(list(texts))))
+
+
+def column_widths(lowest: Sequence[float], natural: Sequence[float], space: float) -> list[float]:
+    """Return a width for each column, between its lowest and natural width, that fill a space.
+
+    Columns that need little more get all of it; the others share the remaining space evenly.
+    """
+    widths, spare = list(lowest), space - sum(lowest)
+    needs = [max(0.0, wide - narrow) for narrow, wide in zip(lowest, natural, strict=True)]
+    for place, j in enumerate(sorted(range(len(widths)), key=lambda j: needs[j])):
+        share = max(0.0, min(needs[j], spare / (len(widths) - place)))
+        widths[j] += share
+        spare -= share
+    return widths
 
 
 def listing(sentence: str, points: Iterable[str]) -> Summary:
-    """Return a sentence with points below it, or nothing where there are no points."""
-    made = tuple(points)
-    return Summary(sentence, made) if made else NO_SUMMARY
+    """Return a summary of a sentence and points, empty without points."""
+    listed = tuple(points)
+    return Summary(sentence, listed) if listed else NO_SUMMARY
 
 
 def words(cell: Cell) -> str:
@@ -261,96 +269,23 @@ def words(cell: Cell) -> str:
     return f"{cell:,}" if isinstance(cell, int) else _number(float(cell))
 
 
-def markdown(table: Table) -> str:
-    """Return the table in GitHub's Markdown, titled and explained, the best cells bold."""
-    head = [_markdown(column.heading) for column in table.columns]
-    rule = ["---" if column.words else "---:" for column in table.columns]
-    best = best_cells(table)
-    body = [
-        [_bold(_markdown(words(cell)), (i, j) in best) for j, cell in enumerate(row)]
-        for i, row in enumerate(table.rows)
-    ]
-    lines = ["| " + " | ".join(row) + " |" for row in (head, rule, *body)]
-    points = "\n".join(f"- {_markdown(point)}" for point in table.summary.points)
-    about = [_markdown(text) for text in (table.shows, table.measured)]
-    parts = [f"# {_markdown(table.title)}", _markdown(table.summary.sentence), points, *about]
-    return "\n\n".join([*filter(None, parts), "\n".join(lines)]) + "\n"
-
-
-def comma_separated(table: Table) -> str:
-    """Return the table as CSV, all digits kept; a share becomes hits, total and interval.
-
-    A text that a spreadsheet would compute stands behind an apostrophe.
-    """
-    spread_out = [
-        any(isinstance(row[i], Share) for row in table.rows) for i in range(len(table.columns))
-    ]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_csv_head(table, spread_out))
-    for row in table.rows:
-        writer.writerow([part for i, cell in enumerate(row) for part in _csv(cell, spread_out[i])])
-    return text.getvalue()
-
-
-def _number(value: float) -> str:
-    if not math.isfinite(value):
-        return "not a number" if math.isnan(value) else NO_ANSWER
-    if value == 0:
+def _number(number: float) -> str:
+    if not math.isfinite(number):
+        return "not a number" if math.isnan(number) else NO_ANSWER
+    if number == 0:
         return "0"
-    power = int(f"{value:.2e}".split("e")[1])
+    power = int(f"{number:.2e}".split("e")[1])
     if power < -3 or power > 6:
-        mantissa, exponent = f"{value:.1e}".split("e")
+        mantissa, exponent = f"{number:.1e}".split("e")
         return f"{mantissa}e{int(exponent)}"
-    return f"{float(f'{value:.3g}'):,.{max(0, 2 - power)}f}"
+    return f"{float(f'{number:.3g}'):,.{max(0, 2 - power)}f}"
 
 
 def _share(share: Share) -> str:
     if share.total == 0:
         return "–"
+    digits = max(1, len(str(share.total - 1)) - 2)  # so that one miss shows
     rates = (share.hits / share.total, share.low, share.high)
-    digits = max(1, len(str(share.total - 1)) - 2)  # one missed of all is seen
-    percent, low, high = (_trimmed(f"{100 * rate:.{digits}f}") for rate in rates)
+    texts = (f"{100 * rate:.{digits}f}".rstrip("0").rstrip(".") for rate in rates)
+    percent, low, high = texts
     return f"{share.hits}/{share.total} = {percent} % ({low}–{high})"
-
-
-def _trimmed(digits: str) -> str:
-    return digits.rstrip("0").rstrip(".")
-
-
-# An apostrophe, or what a spreadsheet takes for a formula; not a number, nor a sign alone.
-_FORMULA = re.compile(r"'|[=@＝＠]|[-+－＋](?![\d.]*$|[\d.]+e[-+]?\d+$)", re.IGNORECASE)
-# Marks anywhere, and what begins a list, a rule or a heading; a number is none of these.
-_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=](?=[-+=\s]|$)|(?<=^\d)[.)](?=\s|$))")
-
-
-def _bold(text: str, bold: bool) -> str:
-    return f"**{text}**" if bold else text
-
-
-def _markdown(text: str) -> str:
-    return _MARKDOWN.sub(r"\\\1", " ".join(text.split()))
-
-
-POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?!\w)")
-
-
-def _csv_head(table: Table, spread_out: list[bool]) -> list[str]:
-    parts = ("hits", "total", "95 % low", "95 % high")
-    head: list[str] = []
-    for column, several in zip(table.columns, spread_out, strict=True):
-        head += [f"{column.title}, {part}" for part in parts] if several else [column.heading]
-    return [_csv_text(words(heading)) for heading in head]
-
-
-def _csv(cell: Cell, spread_out: bool) -> list[Any]:
-    if spread_out:
-        return list(cell) if isinstance(cell, Share) else ["", "", "", ""]
-    if cell is None:
-        return [""]
-    return [_csv_text(words(cell))] if isinstance(cell, bool | str) else [repr(cell)]
-
-
-def _csv_text(text: str) -> str:
-    """Return a text as a cell that no spreadsheet computes; one apostrophe less is the text."""
-    return f"'{text}" if _FORMULA.match(text) else text

@@ -20,8 +20,7 @@ XML = (".xml", ".mjcf")
 def xml_root(path: Path) -> ElementTree.Element:
     """Return the root element of an XML file; white space before the declaration is allowed.
 
-    Raises:
-        ValueError: if it cannot be opened, or is not well-formed.
+    Raise a ValueError if it cannot be opened, or is not well-formed.
     """
     try:
         return ElementTree.fromstring(read_bytes(path).lstrip())
@@ -33,10 +32,7 @@ def file_kind(path: Path) -> str:
     """Return URDF, MJCF, BVH or FRAGMENT, or "" for other formats.
 
     An MJCF file without <worldbody> and <include> is a fragment; a <robot> without a <link> is
-    another format.
-
-    Raises:
-        ValueError: if it cannot be read.
+    another format. Raise a ValueError if it cannot be read.
     """
     suffix = path.suffix.lower()
     if suffix in BY_SUFFIX or suffix not in XML:

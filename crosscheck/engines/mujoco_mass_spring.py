@@ -58,10 +58,8 @@ class MujocoMassSpring:
     ) -> None:
         """Build the model, with h [s], an integrator of `INTEGRATORS`, and conjugate gradients.
 
-        MuJoCo's default of 100 iterations of "discrete" does not suffice for larger systems.
-
-        Raises:
-            ValueError: if the integrator is unknown.
+        MuJoCo's default of 100 iterations of "discrete" does not suffice for larger systems. Raise
+        a ValueError if the integrator is unknown.
         """
         self.model = self._build(system)
         self.model.opt.timestep = h
@@ -98,8 +96,7 @@ class MujocoMassSpring:
     def set_integrator(self, integrator: str) -> None:
         """Set the integrator of the following steps.
 
-        Raises:
-            ValueError: if the integrator is unknown.
+        Raise a ValueError if the integrator is unknown.
         """
         self.model.opt.integrator = INTEGRATORS[choice("integrator", integrator, INTEGRATORS)]
 
@@ -186,10 +183,8 @@ class MujocoFlex(MujocoMassSpring):
 
         MuJoCo computes the rest lengths of edges from the initial positions and does not accept
         zero: the bodies start at distinct positions, which are then reset to the origin while the
-        rest lengths are overwritten. MuJoCo sorts the edges.
-
-        Raises:
-            ValueError: if the springs differ in stiffness or in damping, or there are none.
+        rest lengths are overwritten. MuJoCo sorts the edges. Raise a ValueError if the springs
+        differ in stiffness or in damping, or there are none.
         """
         spec = particles_spec(system)
         for i in range(system.particle_count):

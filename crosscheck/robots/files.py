@@ -76,8 +76,7 @@ class FileSelection(NamedTuple):
 def find(paths: Iterable[str | Path]) -> FileSelection:
     """Return the URDF, MJCF and BVH files at some paths and in folders below them, in order.
 
-    Raises:
-        ValueError: if a path does not exist, or there are no such files.
+    Raise a ValueError if a path does not exist, or there are no such files.
     """
     files: dict[Path, ModelFile] = {}
     ignored, roots = 0, list(map(Path, paths))

@@ -49,11 +49,7 @@ class RobotFile(NamedTuple):
     root: Path | None = None  # the folder that must contain all included files; None: the file's
 
     def read(self, *, mimic: bool = True) -> Robot:
-        """Read the file with the reference.
-
-        Raises:
-            ValueError: if the file is invalid.
-        """
+        """Read the file with the reference; raise a ValueError if the file is invalid."""
         if file_kind(self.path) == URDF:
             return urdf.read(self.path, mimic=mimic)
         return mjcf.read(self.path, root=self.root)

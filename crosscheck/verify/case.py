@@ -1,4 +1,4 @@
-"""A request that a solver is judged by."""
+"""A request on which a solver is judged."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,12 +20,12 @@ class Case:
     name: str  # unique among the cases of a task, the same in every run: "chain of 7 2"
     task: str  # a key of TASKS
     inputs: Mapping[str, Any]
-    family: str  # what it is a case of: "one joint", "beyond reach", "h changed"
-    about: Sentence  # what it tries, for the reader of a failure
+    family: str  # its kind: "one joint", "beyond reach", "h changed"
+    about: Sentence  # its purpose, for the reader of a failure
     follows: str = ""  # the case that must be asked just before it, if any
-    facts: Mapping[str, Any] = field(default_factory=dict)  # what its laws need besides the inputs
+    facts: Mapping[str, Any] = field(default_factory=dict)  # for its laws, besides the inputs
 
     @property
     def size(self) -> int:
-        """How many numbers the request holds."""
+        """The number of numbers in the request."""
         return sum(int(np.size(value)) for value in self.inputs.values())

@@ -1,8 +1,7 @@
 """Renew the gettext catalogues from the sources: `make messages`.
 
 A catalogue is a .po file, which people edit, and the .mo file that gettext reads. Renewing keeps
-every translation that is still used, adds what has none yet with an empty one, and writes the .mo
-file anew.
+the translations that are still used and adds new templates without translation.
 """
 
 import ast
@@ -18,35 +17,32 @@ from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
 
 from .language import DOMAIN, LANGUAGES, LOCALES
-from .task import TASKS
 
 ROOT = Path(__file__).resolve().parents[2]
-# Where sentences stand.
+# The folders and files that call `sentence`.
 SOURCES = ("crosscheck/verify", "plumbob/commands/verify.py")
 _UNIT = re.compile(r"\[[^\]]*\]")
 
 
 def templates() -> dict[str, str]:
-    """Return every template that can be shown, and the file in which it stands first."""
-    found: dict[str, str] = {}
+    """Return every template that can be shown, and the first file that has it."""
+    templates: dict[str, str] = {}
     for folder in SOURCES:
         for path in sorted((ROOT / folder).rglob("*.py")) or [ROOT / folder]:
             place = path.relative_to(ROOT).as_posix()
             for template in literal_templates(path.read_text(encoding="utf-8"), place):
-                found.setdefault(template, place)
+                templates.setdefault(template, place)
     for path in sorted((ROOT / SOURCES[0]).rglob("*.toml")):
         for template in table_templates(tomllib.loads(path.read_text(encoding="utf-8"))):
-            found.setdefault(template, path.relative_to(ROOT).as_posix())
-    for text in _of_tasks():
-        found.setdefault(text, "crosscheck/verify/task.py")
-    return {text: place for text, place in found.items() if has_words(text)}
+            templates.setdefault(template, path.relative_to(ROOT).as_posix())
+    return {template: place for template, place in templates.items() if has_words(template)}
 
 
 def literal_templates(source: str, place: str) -> Iterator[str]:
     """Yield the first argument of every call of `sentence` in a source, both if it chooses one.
 
     Raises:
-        ValueError: if one is no literal, so that nobody could translate it.
+        ValueError: if a template is no literal, so that nobody could translate it.
     """
     calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
     for node in sorted(calls, key=lambda node: (node.lineno, node.col_offset)):
@@ -58,26 +54,21 @@ def literal_templates(source: str, place: str) -> Iterator[str]:
             yield literal.value
 
 
-def table_templates(entry: object) -> Iterator[str]:
-    """Yield the text of every key `sentence` in the content of a TOML file."""
-    if isinstance(entry, dict) and isinstance(entry.get("sentence"), str):
-        yield entry["sentence"]
-    for inner in entry.values() if isinstance(entry, dict) else ():
-        yield from table_templates(inner)
-    for inner in entry if isinstance(entry, list) else ():
-        yield from table_templates(inner)
-
-
 def _choices(node: ast.expr | None) -> list[ast.expr | None]:
     if isinstance(node, ast.IfExp):
         return [*_choices(node.body), *_choices(node.orelse)]
     return [node]
 
 
-def _of_tasks() -> Iterator[str]:
-    for task in TASKS.values():
-        yield task.about
-        yield from (field.about for field in (*task.inputs, *task.outputs))
+def table_templates(entry: object) -> Iterator[str]:
+    """Yield the texts of the keys `sentence` and `about` in the content of a TOML file."""
+    if isinstance(entry, dict):
+        texts = (entry.get("sentence"), entry.get("about"))
+        yield from (text for text in texts if isinstance(text, str))
+    for inner in entry.values() if isinstance(entry, dict) else ():
+        yield from table_templates(inner)
+    for inner in entry if isinstance(entry, list) else ():
+        yield from table_templates(inner)
 
 
 def has_words(template: str) -> bool:
@@ -89,14 +80,14 @@ def has_words(template: str) -> bool:
 def fields(template: str) -> list[tuple[str, str, str]]:
     """Return the name, format and conversion of every field, sorted."""
     return sorted(
-        (name, form or "", how or "")
-        for _, name, form, how in string.Formatter().parse(template)
+        (name, spec or "", conversion or "")
+        for _, name, spec, conversion in string.Formatter().parse(template)
         if name is not None
     )
 
 
 def path_of(language: str, suffix: str) -> Path:
-    """Return where a language's catalogue stands, suffix ".po" or ".mo"."""
+    """Return the path of a language's catalogue, suffix ".po" or ".mo"."""
     return LOCALES / LANGUAGES[language] / "LC_MESSAGES" / f"{DOMAIN}{suffix}"
 
 
@@ -107,7 +98,7 @@ def read(path: Path) -> Catalog:
 
 
 def renewed(catalogue: Catalog, places: Mapping[str, str]) -> Catalog:
-    """Return a catalogue of templates in order, with the translations of the one before."""
+    """Return a catalogue of templates in order, with the previous translations."""
     template = Catalog(creation_date=catalogue.creation_date)
     for text, place in places.items():
         template.add(text, locations=[(place, 0)])
@@ -116,7 +107,7 @@ def renewed(catalogue: Catalog, places: Mapping[str, str]) -> Catalog:
     return catalogue
 
 
-def written(catalogue: Catalog) -> bytes:
+def to_po(catalogue: Catalog) -> bytes:
     """Return the .po file of a catalogue."""
     file = io.BytesIO()
     write_po(file, catalogue, width=0, include_lineno=False)
@@ -124,11 +115,11 @@ def written(catalogue: Catalog) -> bytes:
 
 
 def renew() -> None:
-    """Write both files of each language anew, and say what has no translation yet."""
+    """Write both files of each language, and print the templates without translation."""
     for language in filter(LANGUAGES.get, LANGUAGES):
         source = path_of(language, ".po")
         catalogue = renewed(read(source), templates())
-        source.write_bytes(written(catalogue))
+        source.write_bytes(to_po(catalogue))
         with path_of(language, ".mo").open("wb") as file:
             write_mo(file, catalogue)
         missing = [message.id for message in catalogue if message.id and not message.string]

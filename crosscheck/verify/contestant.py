@@ -1,4 +1,4 @@
-"""A solver under judgement, whatever door it came through, and what it answers."""
+"""A solver under judgement, and its answers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,22 +12,22 @@ from .sentence import Sentence
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a solver answered.
+    """An answer of a solver.
 
     The values are float64 arrays, numbers and booleans of the task's shapes, by the names of its
-    outputs; NaN where it gave none.
+    outputs; NaN where a number is missing.
     """
 
     values: Mapping[str, Any]
     seconds: float  # the solver's own time; if `untimed`, of the round trip, or 0 of a file [s]
-    remarks: tuple[Sentence, ...] = ()  # what was odd without voiding it: prints, changed inputs
+    remarks: tuple[Sentence, ...] = ()  # oddities that do not void it: prints, changed inputs
     untimed: Sentence | None = None  # why the seconds are not its own time, None if they are
 
 
 class FailureKind(StrEnum):
     """Why there is no answer."""
 
-    REFUSED = "refused"  # it says that it cannot
+    REFUSED = "refused"  # the solver declines
     RAISED = "raised"
     CRASHED = "crashed"
     HUNG = "hung"
@@ -38,14 +38,14 @@ class FailureKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Failure:
-    """Why there is no answer, with a sentence for people."""
+    """Why there is no answer, with a sentence."""
 
     kind: FailureKind
     sentence: Sentence
 
 
 class NoGreetingError(ValueError):
-    """A solver did not say what it is, so that nothing can be asked; `failure` says why."""
+    """A solver sent no greeting, for the reason in `failure`."""
 
     def __init__(self, failure: Failure) -> None:
         super().__init__(f"solver: expected one that can be started: {failure.sentence}")
@@ -54,7 +54,7 @@ class NoGreetingError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """A case, and what was answered the first and the second time."""
+    """A case with the first and the second answer."""
 
     case: Case
     answer: Answer | Failure
@@ -62,26 +62,26 @@ class Exchange:
 
 
 class Contestant(Protocol):
-    """Anyone's solver, behind one of the doors."""
+    """Anyone's solver: a function, a program or a folder of answers."""
 
     @property
     def greeting(self) -> Greeting:
-        """What it says of itself.
+        """Its declaration.
 
         Raises:
-            NoGreetingError: if it cannot be had.
+            NoGreetingError: if it sends none.
         """
 
     @property
     def remarks(self) -> tuple[Sentence, ...]:
-        """What was odd apart from its answers; complete when it is closed."""
+        """Oddities apart from its answers; complete when it is closed."""
 
     def answer(self, case: Case) -> Answer | Failure:
         """Ask it; start it again if it was lost."""
 
     def close(self) -> None:
-        """End it, and whatever it has started; the next case starts it anew."""
+        """End it with its child processes; the next case starts it again."""
 
 
-# A solver of ours or of an engine: a function for each task, by the names of its inputs.
+# A function for each task; its arguments are the task's inputs.
 Functions = Mapping[str, Callable[..., Any]]

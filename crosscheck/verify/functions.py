@@ -1,4 +1,4 @@
-"""Functions of Python as a contestant, and what they may return."""
+"""Functions of Python as a contestant, and the values that they may return."""
 
 import contextlib
 import inspect
@@ -17,28 +17,20 @@ from .greeting import Greeting
 from .sentence import Sentence, did_you_mean, sentence
 from .task import TASKS, Field, Task
 
-# The most points of an answer whose number the request leaves open: no case needs a tenth of them,
-# and the judge looks at each.
+# The limit of points where a request leaves their number open: no case needs a tenth of them, and
+# the judge looks at each.
 MOST_POINTS = 1000
 _TYPES: Mapping[str, type] = {"number": np.float64, "integer": np.int64, "boolean": np.bool_}
 
 
 class FunctionContestant:
-    """Functions called in this process: ours, an engine's, a fault's.
-
-    Each has the name of a task, or of a method of inverse kinematics.
-    """
+    """Functions called in this process, by the names of tasks or methods of inverse kinematics."""
 
     remarks: tuple[Sentence, ...] = ()
 
     def __init__(self, functions: Functions, greeting: Greeting) -> None:
         self._functions = functions
-        self._greeting = greeting
-
-    @property
-    def greeting(self) -> Greeting:
-        """What is said of them."""
-        return self._greeting
+        self.greeting = greeting
 
     def answer(self, case: Case) -> Answer | Failure:
         """Call the function of the case's method if there is one, else that of its task."""
@@ -50,32 +42,38 @@ class FunctionContestant:
 
 
 def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) -> Answer | Failure:
-    """Call a function with those inputs that it takes, as copies, and understand what it returns.
+    """Call a function with copies of the inputs that it takes, and check its outputs.
 
-    What it raises is a failure; what it changes is a remark.
+    An exception becomes a failure, a changed argument a remark.
     """
-    if why := _missing_input(function, task, inputs):
-        return Failure(FailureKind.GARBAGE, sentence("{why}", why=why))
-    given = {
+    if reason := _missing_input(function, task, inputs):
+        return Failure(FailureKind.GARBAGE, sentence("{why}", why=reason))
+    arguments = {
         name: np.array(value) if isinstance(value, np.ndarray) else value
         for name, value in inputs.items()
         if takes(function, name)
     }
     start = perf_counter()
     try:
-        returned = function(**given)
+        returned = function(**arguments)
     except (Exception, SystemExit) as error:
-        return describe_exception(error, _file(function))
+        code = getattr(inspect.unwrap(function), "__code__", None)
+        return describe_exception(error, getattr(code, "co_filename", ""))
     seconds = perf_counter() - start
     try:
-        values = understand(task, inputs, returned)
+        outputs = understand(task, inputs, returned)
     except ValueError as error:
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=str(error)))
-    return Answer(values, seconds, _changed(inputs, given))
+    remarks = tuple(
+        sentence("It changed its argument {name}.", name=name)
+        for name, array in arguments.items()
+        if isinstance(array, np.ndarray) and not np.array_equal(array, inputs[name], equal_nan=True)
+    )
+    return Answer(outputs, seconds, remarks)
 
 
 def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter] | None:
-    """Return the parameters of a function, None of compiled code that does not say them."""
+    """Return the parameters of a function, None of compiled code that does not list them."""
     try:
         return list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):
@@ -83,20 +81,23 @@ def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter] | None:
 
 
 def takes(function: Callable[..., Any], name: str) -> bool:
-    """Return whether a function takes an argument, as those that do not say so are taken to do."""
+    """Return whether a function takes an argument, True if it does not list its parameters."""
     parameters = _parameters(function)
     return parameters is None or any(
-        one.name == name or one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters
+        parameter.name == name or parameter.kind is inspect.Parameter.VAR_KEYWORD
+        for parameter in parameters
     )
 
 
 def _missing_input(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) -> str:
-    """Return what is wrong with arguments that a function needs and no input has the name of."""
+    """Return an error if a function needs an argument that the inputs lack, else ""."""
     variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     missing = [
-        one.name
-        for one in _parameters(function) or ()
-        if one.kind not in variadic and one.default is one.empty and one.name not in inputs
+        parameter.name
+        for parameter in _parameters(function) or ()
+        if parameter.kind not in variadic
+        and parameter.default is parameter.empty
+        and parameter.name not in inputs
     ]
     optional = [name for name in missing if name in {field.name for field in task.inputs}]
     if optional:
@@ -107,90 +108,78 @@ def _missing_input(function: Callable[..., Any], task: Task, inputs: Mapping[str
     return f"no input is called {', '.join(missing)}{hint or ':'} There are {', '.join(inputs)}"
 
 
-def _file(function: Callable[..., Any]) -> str:
-    return getattr(getattr(inspect.unwrap(function), "__code__", None), "co_filename", "")
-
-
 def describe_exception(error: BaseException, file: str) -> Failure:
     """Return the failure of code that raised, with the last line in the folder of its file."""
-    why = " ".join(str(error).split())[:200]
+    reason = " ".join(str(error).split())[:200]
     kind = type(error).__name__
     if isinstance(error, SyntaxError) and error.filename:
         return raised(kind, error.msg, Path(error.filename).name, error.lineno or 0)
     for frame in reversed(traceback.extract_tb(error.__traceback__) if file else []):
         if frame.filename == file or is_beside(Path(frame.filename), Path(file)):
-            return raised(kind, why, Path(frame.filename).name, frame.lineno or 0)
-    return raised(kind, why)
+            return raised(kind, reason, Path(frame.filename).name, frame.lineno or 0)
+    return raised(kind, reason)
 
 
 def is_beside(path: Path, file: Path) -> bool:
-    """Return whether a file is of the same folder as another, and not ours or a library's."""
-    ours = Path(__file__).parent in path.parents
-    return file.parent in path.parents and not ours and "site-packages" not in path.parts
+    """Return whether a path is in the folder of a file, and not ours or a library's."""
+    is_ours = Path(__file__).parent in path.parents
+    return file.parent in path.parents and not is_ours and "site-packages" not in path.parts
 
 
 def raised(kind: str, why: str, file: str = "", line: int = 0) -> Failure:
-    """Return the failure of code that raised an exception, in a line of a file if that is known."""
-    words = sentence(
+    """Return the failure of code that raised an exception, in a line of a file if it is known."""
+    message = sentence(
         "It raised {kind} in line {line} of {file}: {why}"
         if file and line
         else "It raised {kind}: {why}",
         kind=kind, line=line, file=file, why=why,
     )  # fmt: skip
-    return Failure(FailureKind.RAISED, words)
-
-
-def _changed(inputs: Mapping[str, Any], given: Mapping[str, Any]) -> tuple[Sentence, ...]:
-    return tuple(
-        sentence("It changed its argument {name}.", name=name)
-        for name, value in given.items()
-        if isinstance(value, np.ndarray) and not np.array_equal(value, inputs[name], equal_nan=True)
-    )
+    return Failure(FailureKind.RAISED, message)
 
 
 def understand(task: Task, inputs: Mapping[str, Any], returned: object) -> dict[str, Any]:
     """Return the outputs by name.
 
-    A dict is read by its keys, and those that are no outputs are left aside; a tuple by the order
-    of the task's outputs, each value going to the next one of its shape; anything else as a tuple
-    of one. Extents that the request does not fix may be up to `MOST_POINTS`.
+    The keys of a dict name outputs; other keys are ignored. The parts of a tuple go, in order, to
+    the next output of their shape. Any other value is a tuple of one part. Extents that the request
+    leaves open may be up to `MOST_POINTS`.
 
     Raises:
-        ValueError: if nothing is understood, an output has another shape or is no number, or there
+        ValueError: if there is no output, an output has another shape or is no number, or there
             are more iterations than the request allows.
     """
     counts = task.counts(inputs)
     if isinstance(returned, Mapping):
         fields = [field for field in task.outputs if returned.get(field.name) is not None]
-        values = {one.name: checked(one, counts, returned[one.name]) for one in fields}
-        came = f"the keys {', '.join(map(str, returned))}" if returned else "an empty dict"
+        outputs = {field.name: checked(field, counts, returned[field.name]) for field in fields}
+        summary = f"the keys {', '.join(map(str, returned))}" if returned else "an empty dict"
     else:
         parts = list(returned) if isinstance(returned, tuple) else [returned]
-        values = {} if returned is None else _by_shape(task, counts, parts)
-        came = "; ".join(map(_describe, parts))
-    if not values:
-        names = ", ".join(f"{one.name} {_shape(one.shape)}" for one in task.outputs)
-        raise ValueError(f"{task.name}: expected some of {names}, got {came}")
+        outputs = {} if returned is None else _by_shape(task, counts, parts)
+        summary = "; ".join(map(_describe, parts))
+    if not outputs:
+        names = ", ".join(f"{field.name} {_shape(field.shape)}" for field in task.outputs)
+        raise ValueError(f"{task.name}: expected some of {names}, got {summary}")
     for field in task.outputs:
         is_open = any(isinstance(n, str) and n not in counts for n in field.shape)
-        if is_open and field.name in values and (size := len(values[field.name])) > MOST_POINTS:
+        if is_open and field.name in outputs and (size := len(outputs[field.name])) > MOST_POINTS:
             raise ValueError(f"{field.name}: expected at most {MOST_POINTS} rows, got {size}")
-    count, limit = values.get("iterations", 0), inputs.get("max_iterations", np.inf)
+    count, limit = outputs.get("iterations", 0), inputs.get("max_iterations", np.inf)
     if not 0 <= count <= limit:
         raise ValueError(f"iterations: expected 0 to {limit}, the max_iterations sent, got {count}")
-    return values
+    return outputs
 
 
 def _by_shape(task: Task, counts: Mapping[str, int], parts: list[object]) -> dict[str, Any]:
     """Return each part as the next output of its shape."""
-    values: dict[str, Any] = {}
+    outputs: dict[str, Any] = {}
     fields = iter(task.outputs)
     for part in parts:
         for field in fields:
             with contextlib.suppress(ValueError):
-                values[field.name] = checked(field, counts, part)
+                outputs[field.name] = checked(field, counts, part)
                 break
-    return values
+    return outputs
 
 
 def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
@@ -205,7 +194,7 @@ def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
         raise ValueError(f"{field.name}: expected a text, got {_describe(value)}")
     array = _array(field, value)
     shape = tuple(counts.get(n, n) if isinstance(n, str) else n for n in field.shape)
-    if array.size == 0 and array.ndim < len(shape):  # nested lists do not say what they lack
+    if array.size == 0 and array.ndim < len(shape):  # empty nested lists do not show their depth
         array = array.reshape([0, *(n if isinstance(n, int) else 0 for n in shape[1:])])
     if len(shape) != array.ndim or any(
         isinstance(n, int) and n != m for n, m in zip(shape, array.shape, strict=True)
@@ -215,22 +204,21 @@ def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
 
 
 def _array(field: Field, value: object) -> Any:
-    kind = _TYPES[field.kind]
     try:
-        if _holds_text(value):  # of which NumPy makes an array as wide as the longest one
+        if _holds_text(value):  # NumPy would make an array as wide as the longest text
             raise ValueError
         array = np.asarray(value)
         if array.dtype == object:  # None among the numbers
             array = np.asarray(value, dtype=np.float64)
         if array.dtype.kind not in "biuf" or (field.kind != "number" and not _whole(array)):
             raise ValueError
-        return np.array(array, dtype=kind)
+        return np.array(array, dtype=_TYPES[field.kind])
     except (TypeError, ValueError, OverflowError, RecursionError):
         shape = f"{field.kind}s of shape {_shape(field.shape)}"
         expected = shape if field.shape else f"one {field.kind}"
-        got = f"{value.dtype} values of shape " if isinstance(value, np.ndarray) else ""
+        kind = f"{value.dtype} values of shape " if isinstance(value, np.ndarray) else ""
         raise ValueError(
-            f"{field.name}: expected {expected}, got {got}{_describe(value)}"
+            f"{field.name}: expected {expected}, got {kind}{_describe(value)}"
         ) from None
 
 

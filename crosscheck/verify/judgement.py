@@ -1,8 +1,9 @@
-"""What is found about answers: laws that hold or not, verdicts, and their sum over a task."""
+"""Findings about answers, their verdicts, and the reports on tasks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from typing import Any
 
 from .case import Case
@@ -10,7 +11,7 @@ from .contestant import Answer, Failure
 from .greeting import Greeting
 from .sentence import Sentence, sentence
 
-# The least share of the answers that a fault must reproduce to be told as what is wrong.
+# The least share of the answers that a likely fault reproduces.
 LEAST_SHARE = 0.5
 
 
@@ -19,34 +20,34 @@ class Verdict(IntEnum):
 
     RIGHT = 0
     RIGHT_BUT = 1  # another honest model, stalls, slow, not unit, prints
-    UNDECIDED = 2  # below what rounding lets one tell
+    UNDECIDED = 2  # too small for the rounding
     WRONG = 3
     BROKEN = 4  # a crash, a hang, garbage, NaN where numbers exist
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """A law, and how an answer stands to it."""
+    """Whether an answer keeps a law."""
 
     law: str  # its name, the same for all cases: "link lengths"
     verdict: Verdict
-    error: float  # how far the answer is off
-    tolerance: float  # what rounding or the solver's own promise allows
+    error: float  # of the answer
+    tolerance: float  # allowed by rounding or the solver's own promise
     unit: str  # of both: "m", "rad", "" for a ratio
-    sentence: Sentence  # what was seen; for a law that holds, what was tried
-    index: int | None = None  # joint, spring or particle that is worst, if one is
+    sentence: Sentence  # the observation
+    index: int | None = None  # of the worst joint, spring or particle, if there is one
 
 
 @dataclass(frozen=True, eq=False)
 class CaseJudgement:
-    """A case, what was answered, and what was found."""
+    """The findings about the answer to a case."""
 
     case: Case
     answer: Answer | Failure
     findings: tuple[Finding, ...]
     expected: Mapping[str, Any]  # the reference's answer by output, {} if many answers are right
-    digits: float | None = None  # correct significant digits, None where that says nothing
-    reference_seconds: float | None = None  # what the reference takes for it [s]
+    digits: float | None = None  # correct significant digits, None if they cannot be counted
+    reference_seconds: float | None = None  # time of the reference [s]
 
     @property
     def verdict(self) -> Verdict:
@@ -55,18 +56,26 @@ class CaseJudgement:
             return Verdict.BROKEN
         return max((finding.verdict for finding in self.findings), default=Verdict.UNDECIDED)
 
+    @property
+    def complaints(self) -> list[Sentence]:
+        """The sentences about a failure, or about laws that are not kept, the worst first."""
+        if isinstance(self.answer, Failure):
+            return [self.answer.sentence]
+        broken = [finding for finding in self.findings if finding.verdict is not Verdict.RIGHT]
+        return [finding.sentence for finding in sorted(broken, key=lambda f: -f.verdict)]
+
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
     """A fault, or several at once, that reproduces wrong answers.
 
     An entry of `faults` is one key, or several joined by " + " in the order of the computation;
-    there is more than one entry where no answer tells them apart.
+    there are several entries if no answer tells them apart.
     """
 
     faults: tuple[str, ...]
-    sentence: Sentence  # what is wrong in the solver, and what it should be
-    share: float  # of the answers that were compared, how many it reproduces, 0 to 1
+    sentence: Sentence  # the mistake in the solver, and its correction
+    share: float  # of the compared answers that it reproduces, 0 to 1
     distance: float  # the largest relative difference from the answers that it reproduces
 
 
@@ -74,87 +83,87 @@ class Explanation:
 class Diagnosis:
     """Why answers are wrong."""
 
-    explanations: tuple[Explanation, ...] = ()  # nearest first; () if nothing reproduces answers
-    behaviour: Sentence | None = None  # what the solver is like, where it did not declare it
+    explanations: tuple[Explanation, ...] = ()  # nearest first
+    behaviour: Sentence | None = None  # the inferred model, if it is not declared
     first_broken: Sentence | None = None  # the first law along the computation, if unexplained
-    hints: tuple[Sentence, ...] = ()  # what no variant explains: state left over
+    hints: tuple[Sentence, ...] = ()  # at mistakes that no variant has
     variant_count: int = 0  # number of variants that were compared
 
     @property
     def explained(self) -> bool:
         """Whether a fault is likely."""
-        return any(one.share >= LEAST_SHARE for one in self.explanations)
+        return any(explanation.share >= LEAST_SHARE for explanation in self.explanations)
 
 
 def smallest_failure(judgements: Sequence[CaseJudgement], explained: bool) -> CaseJudgement | None:
     """Return the failing case with the fewest numbers, or None.
 
-    Where no fault explains wrong answers, it is one of those with the worst verdict.
+    Where no fault explains wrong answers, only cases with the worst verdict count.
     """
-    failing = [one for one in judgements if one.verdict >= Verdict.WRONG]
+    failing = [judgement for judgement in judgements if judgement.verdict >= Verdict.WRONG]
     if failing and not explained:
-        worst = max(one.verdict for one in failing)
-        failing = [one for one in failing if one.verdict == worst]
-    return min(failing, key=lambda one: one.case.size, default=None)
+        worst = max(judgement.verdict for judgement in failing)
+        failing = [judgement for judgement in failing if judgement.verdict == worst]
+    return min(failing, key=lambda judgement: judgement.case.size, default=None)
 
 
 @dataclass(frozen=True, eq=False)
 class TaskReport:
-    """All about one task, or one method of inverse kinematics."""
+    """The judgements of a task, or of one method of inverse kinematics."""
 
     task: str
     method: str  # of inverse kinematics and tracking, else ""
-    judgements: Sequence[CaseJudgement]  # one a case
+    judgements: Sequence[CaseJudgement]
     diagnosis: Diagnosis
     precision: Sentence | None = None  # why it is judged by another than the greeting's
 
     @property
     def smallest_failure(self) -> CaseJudgement | None:
-        """As of the function `smallest_failure`."""
+        """The result of the function `smallest_failure`."""
         return smallest_failure(self.judgements, self.diagnosis.explained)
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of all cases, with a reservation where the precision is another."""
-        worst = max((one.verdict for one in self.judgements), default=Verdict.UNDECIDED)
+        """The worst of all cases, with a reservation if the precision is another."""
+        verdicts = (judgement.verdict for judgement in self.judgements)
+        worst = max(verdicts, default=Verdict.UNDECIDED)
         return max(worst, Verdict.RIGHT_BUT) if self.precision else worst
 
     @property
     def digits(self) -> float | None:
         """Correct digits in the worst case where they can be counted."""
-        known = [one.digits for one in self.judgements if one.digits is not None]
-        return min(known, default=None)
+        digits = [judgement.digits for judgement in self.judgements]
+        return min((count for count in digits if count is not None), default=None)
+
+    @cached_property
+    def _times(self) -> list[tuple[Answer, float]]:
+        """The answers to cases that the reference is timed at, and its times [s]."""
+        return [
+            (judgement.answer, judgement.reference_seconds)
+            for judgement in self.judgements
+            if isinstance(judgement.answer, Answer) and judgement.reference_seconds
+        ]
 
     @property
     def untimed(self) -> Sentence | None:
-        """Why its time cannot stand beside the reference's, None if it can or that is unknown."""
-        answers = [answer for answer, _ in self._timed]
-        reasons = [answer.untimed for answer in answers if answer.untimed]
-        if answers and not reasons and not any(answer.seconds for answer in answers):
+        """Why its time cannot be compared with the reference's, None if it can or is unknown."""
+        reasons = [answer.untimed for answer, _ in self._times if answer.untimed]
+        if self._times and not reasons and not any(answer.seconds for answer, _ in self._times):
             return sentence('Not timed: "seconds" is 0 in all answers. Use a finer clock.')
         return reasons[0] if reasons else None
 
     @property
     def slowdown(self) -> float | None:
-        """Its time for all cases over the reference's, None if one of them is unknown."""
-        if self.untimed or not self._timed:
+        """Its time for all cases over the reference's, None if a time is unknown."""
+        if self.untimed or not self._times:
             return None
-        own = sum(answer.seconds for answer, _ in self._timed)
-        return own / sum(seconds for _, seconds in self._timed)
-
-    @property
-    def _timed(self) -> list[tuple[Answer, float]]:
-        """The answers to cases that the reference is timed at, and its times [s]."""
-        return [
-            (one.answer, one.reference_seconds)
-            for one in self.judgements
-            if isinstance(one.answer, Answer) and one.reference_seconds
-        ]
+        own = sum(answer.seconds for answer, _ in self._times)
+        return own / sum(seconds for _, seconds in self._times)
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What `verify` found: a report for each task, and what concerns them all."""
+    """The reports on all tasks of a solver, with remarks on the whole."""
 
     greeting: Greeting
     tasks: Sequence[TaskReport]

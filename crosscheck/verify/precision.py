@@ -1,6 +1,6 @@
-"""What the numbers of answers show of a solver's precision, whatever its greeting says.
+"""Infer a solver's precision from the numbers of its answers, whatever its greeting declares.
 
-Programs compute in single precision, or print few digits, and do not say so: judged as double
+Programs compute in single precision, or print few digits, without declaring it: judged as double
 precision all their answers would be wrong, and no fault would explain it.
 """
 
@@ -16,28 +16,28 @@ from .greeting import Greeting
 from .judgement import TaskReport
 from .sentence import Sentence, sentence
 
-# So many numbers of an output decide, since 99 % of doubles have 15 digits or more; requests of
-# which no larger share has as many are left out.
-LEAST, FULL = 6, 0.25
-# With fewer digits than these answers are compared as they are; with more they are whole doubles.
-FEWEST, MOST = 4, 14
-# How many digits single precision is printed with, and leaves correct in most cases.
-SINGLE, LEFT = (8, 9), (5.0, 9.0)
+# The numbers of an output that suffice, since 99 % of doubles have 15 digits or more; requests with
+# no larger share of such numbers are left out.
+MIN_NUMBERS, MIN_SHARE = 6, 0.25
+# Answers with fewer digits are compared as they are; answers with more are whole doubles.
+MIN_DIGITS, MAX_DIGITS = 4, 14
+# The digits that single precision is printed with, and those that it leaves correct in most cases.
+SINGLE, CORRECT = (8, 9), (5.0, 9.0)
 AS_SINGLE = sentence(
     "The answers are single-precision numbers and are judged as such. Declare it: "
     '"precision": "single" in the greeting (of a Python file, in PLUMBOB).'
 )
-OFF = sentence(
+INEXACT = sentence(
     "The answers are as inexact as in single precision and are judged as such. Look for a float or "
     'a constant of few digits; if it is meant, declare "precision": "single" in the greeting (of a '
     "Python file, in PLUMBOB)."
 )
 
 
-class Rounded(Greeting, frozen=True):
-    """A greeting as if it declared that answers have so many significant digits."""
+class RoundedGreeting(Greeting, frozen=True):
+    """A greeting with a number of significant digits that answers have."""
 
-    digits: int = MOST
+    digits: int = MAX_DIGITS
 
     @property
     def epsilon(self) -> float:
@@ -46,10 +46,10 @@ class Rounded(Greeting, frozen=True):
 
 
 def judging_greeting(
-    asked: Sequence[Exchange], greeting: Greeting
+    exchanges: Sequence[Exchange], greeting: Greeting
 ) -> tuple[Greeting, Sentence | None]:
-    """Return the greeting that answers are judged by, and why it is another than was sent."""
-    outputs = [numbers for numbers in _outputs(asked).values() if len(numbers) >= LEAST]
+    """Return the greeting by which to judge answers, and why it differs from the solver's."""
+    outputs = [numbers for numbers in _outputs(exchanges).values() if len(numbers) >= MIN_NUMBERS]
     greetings = [_greeting_of(numbers, greeting) for numbers in outputs]
     return max(greetings, key=lambda pair: pair[0].epsilon, default=(greeting, None))
 
@@ -58,7 +58,7 @@ def _greeting_of(numbers: np.ndarray, greeting: Greeting) -> tuple[Greeting, Sen
     digits, reason = _digits(numbers), AS_SINGLE
     if digits in SINGLE or (numbers.astype(np.float32) == numbers).all():
         digits = SINGLE[1]
-    elif FEWEST <= digits <= MOST:
+    elif MIN_DIGITS <= digits <= MAX_DIGITS:
         reason = sentence(
             "The answers have only {digits} significant digits (cout, %g and to_string print 6) "
             "and are judged by those. Print 17, or 9 and declare "
@@ -69,50 +69,50 @@ def _greeting_of(numbers: np.ndarray, greeting: Greeting) -> tuple[Greeting, Sen
         return greeting, None
     precision = "single" if digits <= SINGLE[1] else greeting.precision
     fields = msgspec.structs.asdict(greeting) | {"precision": precision, "digits": digits}
-    coarse = Rounded(**fields)
-    return (coarse, reason) if coarse.epsilon > greeting.epsilon else (greeting, None)
+    rounded = RoundedGreeting(**fields)
+    return (rounded, reason) if rounded.epsilon > greeting.epsilon else (greeting, None)
 
 
 def _digits(numbers: np.ndarray) -> int:
-    """Return to how many significant digits numbers are rounded, or decimal places if to those."""
+    """Return the significant digits of rounded numbers, or their decimal places if those fit."""
     decimals = _decimals(numbers)
     digits = [len(decimal.digits) for decimal in decimals]
     places = [-int(decimal.exponent) for decimal in decimals]
     is_fixed = places.count(max(places)) > max(digits.count(max(digits)), len(digits) / 2)
-    return max(places) if is_fixed and max(digits) <= MOST else max(digits)
+    return max(places) if is_fixed and max(digits) <= MAX_DIGITS else max(digits)
 
 
 def _decimals(numbers: np.ndarray) -> list[DecimalTuple]:
-    """Return the fewest digits that tell each number from other doubles."""
+    """Return the fewest digits that distinguish each number from other doubles."""
     return [Decimal(repr(x)).normalize().as_tuple() for x in numbers.tolist()]
 
 
-def _outputs(asked: Sequence[Exchange]) -> dict[str, np.ndarray]:
-    """Return the numbers of each output that are not from the request, where that is not short.
+def _outputs(exchanges: Sequence[Exchange]) -> dict[str, np.ndarray]:
+    """Return the numbers of each output that do not come from the request.
 
-    Of a request in short decimals a double may answer so. A residual is a claim, not an answer.
+    Requests in short decimals are left out: a double may answer in such. A residual is a claim.
     """
     outputs: dict[str, np.ndarray] = {}
-    for question in asked:
-        inputs = _long_numbers(question.case.inputs.values())
-        count = sum(len(decimal.digits) > MOST for decimal in _decimals(inputs))
-        if isinstance(question.answer, Answer) and count > FULL * len(inputs):
-            for name, value in question.answer.values.items():
+    for exchange in exchanges:
+        inputs = _long_numbers(exchange.case.inputs.values())
+        count = sum(len(decimal.digits) > MAX_DIGITS for decimal in _decimals(inputs))
+        if isinstance(exchange.answer, Answer) and count > MIN_SHARE * len(inputs):
+            for name, output in exchange.answer.values.items():
                 if name != "residual":
-                    numbers = np.setdiff1d(_long_numbers([value]), inputs)
+                    numbers = np.setdiff1d(_long_numbers([output]), inputs)
                     outputs[name] = np.union1d(outputs.get(name, ()), numbers)
     return outputs
 
 
-def _long_numbers(values: Iterable[Any]) -> np.ndarray:
+def _long_numbers(arrays: Iterable[Any]) -> np.ndarray:
     """Return those finite numbers that need more than 12 bits: not 0, 1 or a half."""
-    numbers = np.concatenate([np.ravel(value) for value in values if not isinstance(value, str)])
+    numbers = np.concatenate([np.ravel(array) for array in arrays if not isinstance(array, str)])
     numbers = numbers[np.isfinite(numbers)].astype(float)
     return numbers[2.0**12 * np.frexp(numbers)[0] % 1.0 != 0.0]
 
 
 def is_off_by_single(report: TaskReport) -> bool:
-    """Return whether answers are off by what single precision loses, in most cases."""
+    """Return whether the errors of most answers are those of single precision."""
     counts = (judgement.digits for judgement in report.judgements)
     digits = [count for count in counts if count is not None] or [0.0]
-    return min(digits) >= LEFT[0] and float(np.median(digits)) <= LEFT[1]
+    return min(digits) >= CORRECT[0] and float(np.median(digits)) <= CORRECT[1]

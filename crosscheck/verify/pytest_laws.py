@@ -1,4 +1,4 @@
-"""Laws of a Python solver as one parametrised test for pytest."""
+"""Laws of a Python solver as a parametrised test for pytest."""
 
 from collections.abc import Callable
 from functools import cache
@@ -6,11 +6,9 @@ from typing import Any
 
 import pytest
 
-from .contestant import Failure
 from .functions import FunctionContestant
-from .judgement import LEAST_SHARE, CaseJudgement, TaskReport, Verdict
+from .judgement import LEAST_SHARE, TaskReport, Verdict
 from .message import decode_greeting
-from .sentence import Sentence
 from .solvers.host import PythonSolver
 from .verify import DISCIPLINES, judge_cases, trials
 
@@ -26,8 +24,8 @@ def laws(
     """Return a test function, parametrised over every case that is asked of a solver.
 
     Bind it to a name that pytest collects: `test_my_solver = laws(my_module)`, or
-    `test_fk = laws(forward_kinematics=my_fk, ccd=my_ccd)`. A test fails with the sentence that says
-    what is wrong, and with the mistake that explains it; one below the rounding floor is skipped.
+    `test_fk = laws(forward_kinematics=my_fk, ccd=my_ccd)`. A test fails with the sentence about
+    the error and with the mistake that explains it; a case below the rounding floor is skipped.
 
     Args:
         solver: a module or an object with functions by the tasks' names.
@@ -36,14 +34,13 @@ def laws(
         functions: by the names of the tasks, or `ccd` and `fabrik`; a dict PLUMBOB declares.
 
     Raises:
-        ValueError: if nothing of that is a solver.
+        ValueError: if there is no solver, or both a module and functions.
     """
     if (solver is None) == (not functions):
         raise ValueError("laws: expected a module or functions by name, got both or neither")
-    found = functions if solver is None else solver
-    name = getattr(solver, "__name__", "") or "solver"
     declared = functions.get("PLUMBOB") or getattr(solver, "PLUMBOB", None) or {}
-    offered = PythonSolver(found, name, declared)
+    name = getattr(solver, "__name__", "") or "solver"
+    offered = PythonSolver(functions if solver is None else solver, name, declared)
     contestant = FunctionContestant(offered.functions, decode_greeting(offered.greeting))
     groups = {
         (task, method): DISCIPLINES[task].cases(contestant.greeting, method, seed, thorough)
@@ -51,7 +48,7 @@ def laws(
     }
 
     @cache
-    def judged(task: str, method: str) -> TaskReport:
+    def report(task: str, method: str) -> TaskReport:
         return judge_cases(contestant, task, method, groups[task, method])
 
     @pytest.mark.parametrize(("task", "method", "case"), [
@@ -60,26 +57,19 @@ def laws(
         for case in cases
     ])  # fmt: skip
     def test_law(task: str, method: str, case: str) -> None:
-        _check(judged(task, method), case)
+        _check(report(task, method), case)
 
     return test_law
 
 
 def _check(report: TaskReport, name: str) -> None:
-    """Fail if a case is not right; skip it if nobody can tell."""
-    one = next((one for one in report.judgements if one.case.name == name), None)
-    if one is None:
-        words = "it was not asked, since too many answers before were waited for"
-        pytest.fail(words, pytrace=False)
-    if one.verdict is Verdict.UNDECIDED:
-        pytest.skip("; ".join(map(str, _words(one))) or "nobody can tell")
-    if one.verdict > Verdict.UNDECIDED:
-        why = [one.sentence for one in report.diagnosis.explanations if one.share >= LEAST_SHARE]
-        pytest.fail("\n".join(map(str, [*_words(one), *why])), pytrace=False)
-
-
-def _words(one: CaseJudgement) -> list[Sentence]:
-    if isinstance(one.answer, Failure):
-        return [one.answer.sentence]
-    found = [finding for finding in one.findings if finding.verdict is not Verdict.RIGHT]
-    return [finding.sentence for finding in sorted(found, key=lambda one: -one.verdict)]
+    """Fail if a case is not right; skip it if it is undecided."""
+    judgement = next((j for j in report.judgements if j.case.name == name), None)
+    if judgement is None:
+        reason = "it was not asked, since too many answers before were waited for"
+        pytest.fail(reason, pytrace=False)
+    if judgement.verdict is Verdict.UNDECIDED:
+        pytest.skip("; ".join(map(str, judgement.complaints)) or "nobody can tell")
+    if judgement.verdict > Verdict.UNDECIDED:
+        likely = [e.sentence for e in report.diagnosis.explanations if e.share >= LEAST_SHARE]
+        pytest.fail("\n".join(map(str, [*judgement.complaints, *likely])), pytrace=False)

@@ -22,11 +22,12 @@ from .case import Case
 from .functions import FunctionContestant
 from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
 from .judgement import Verdict
-from .kinematics.faults import FAULTS, Switches, switches
+from .kinematics.faults import FAULTS, switches
 from .kinematics.predictions import predict_forward, predict_track, solve
 from .kinematics.robot_inverse_kinematics import FAULTS as ROBOT_FAULTS
 from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
 from .kinematics.robot_solver import solve_by_reference, solve_wrongly
+from .kinematics.textbook import Switches
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
 from .mass_spring.model import Integrator, StepModel, simulate
 from .mass_spring.problem import all_forces, problem_of, state_of, system_of

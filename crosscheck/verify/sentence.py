@@ -1,8 +1,7 @@
-"""Sentences that are told to people, in English or translated.
+"""Sentences that are printed in English or translated.
 
-A sentence is a literal template and its values; it is put into words only where it is shown. Every
-template stands literally in a call of `sentence`, where the tests look for those without a
-translation.
+A sentence is a template and its fields, which are joined where it is printed. Every template is a
+literal in a call of `sentence`, or in a catalogue of faults or tasks: `catalogue.py` collects them.
 """
 
 import difflib
@@ -38,7 +37,7 @@ def sentence(template: str, /, **values: object) -> Sentence:
 
 def did_you_mean(value: object, options: Iterable[str]) -> str:
     """Return a question after the nearest option, or "" if none is near."""
-    simple = {one.replace("_", "").lower(): one for one in options}
+    simple = {option.replace("_", "").lower(): option for option in options}
     word = str(value)[:_LONGEST_NAME].replace("_", "").replace("-", "").lower()
     near = difflib.get_close_matches(word, simple, n=1, cutoff=0.6)
     return f"; did you mean {simple[near[0]]}?" if near else ""

@@ -1,4 +1,4 @@
-"""Ask a solver every case of its tasks, judge its answers, and say why they are wrong."""
+"""Ask a solver every case of its tasks, judge its answers, and explain wrong answers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -23,20 +23,21 @@ from .mass_spring import energy, forces
 from .mass_spring.stepping import Stepping
 from .timing import with_lesser_time
 
-# After so many answers of a task were waited for in vain, the rest of the task is not asked.
-MOST_HANGS = 2
+# After so many timeouts in a task its other cases are not asked.
+MAX_HANGS = 2
 # Tasks that are tried once for every method that the greeting names.
 WITH_METHODS = ("inverse_kinematics", "track")
+Notify = Callable[[str, int, int], None]
 
 
 class Discipline(Protocol):
-    """How one task is tried; a module with these functions."""
+    """A module that tries one task."""
 
     def cases(self, greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
         """Return cases that suit the solver, from trivial to hostile, the smallest first."""
 
-    def judge(self, asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-        """Hold the answers against laws, the reference, and what was declared; name the faults."""
+    def judge(self, exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+        """Judge answers by laws, the reference and the declaration; name the faults."""
 
 
 DISCIPLINES: Mapping[str, Discipline] = {
@@ -52,18 +53,22 @@ DISCIPLINES: Mapping[str, Discipline] = {
 }
 
 
+def _silent(task: str, done: int, total: int) -> None:
+    pass
+
+
 def verify(
     contestant: Contestant,
     tasks: Sequence[str] | None = None,
     seed: int = 0,
     thorough: bool = False,
-    notify: Callable[[str, int, int], None] = lambda task, done, of: None,
+    notify: Notify = _silent,
 ) -> Report:
-    """Try a solver at its tasks and return what was found.
+    """Try a solver at its tasks and return the report.
 
     Args:
-        contestant: the solver, behind its door.
-        tasks: only these of those that it offers.
+        contestant: the solver.
+        tasks: a choice of the tasks that it offers, None for all.
         seed: of the random cases.
         thorough: whether to ask the long list of cases.
         notify: called before each case with the task, the number of cases done, and of all.
@@ -84,19 +89,19 @@ def judge_cases(
     task: str,
     method: str,
     cases: Sequence[Case],
-    notify: Callable[[str, int, int], None] = lambda task, done, of: None,
+    notify: Notify = _silent,
 ) -> TaskReport:
     """Ask a solver some cases of a task and judge its answers; arguments as of `verify`."""
-    asked = list(_ask(contestant, cases, partial(notify, task)))
+    exchanges = list(_ask(contestant, cases, partial(notify, task)))
     judge = DISCIPLINES[task].judge
-    greeting, reason = precision.judging_greeting(asked, contestant.greeting)
-    report = judge(asked, greeting, method)
+    greeting, reason = precision.judging_greeting(exchanges, contestant.greeting)
+    report = judge(exchanges, greeting, method)
     unexplained = report.verdict is Verdict.WRONG and not report.diagnosis.explained
     if unexplained and greeting.precision == "double":
-        single = judge(asked, msgspec.structs.replace(greeting, precision="single"), method)
+        single = judge(exchanges, msgspec.structs.replace(greeting, precision="single"), method)
         is_right = single.verdict <= Verdict.RIGHT_BUT and precision.is_off_by_single(report)
         if is_right or single.diagnosis.explained:
-            report, reason = single, precision.OFF
+            report, reason = single, precision.INEXACT
     return replace(report, precision=reason)
 
 
@@ -119,16 +124,15 @@ def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple
 def _ask(
     contestant: Contestant, cases: Sequence[Case], notify: Callable[[int, int], None]
 ) -> Iterator[Exchange]:
-    """Ask each case, and each that has an answer once more after all the others."""
-    first = []
-    hangs = 0
+    """Ask each case, then each answered case a second time."""
+    answers, hangs = [], 0
     for i, case in enumerate(cases):
         notify(i, 2 * len(cases))
-        first.append(contestant.answer(case))
-        hangs += isinstance(first[-1], Failure) and first[-1].kind is FailureKind.HUNG
-        if hangs == MOST_HANGS:
+        answers.append(contestant.answer(case))
+        hangs += isinstance(answers[-1], Failure) and answers[-1].kind is FailureKind.HUNG
+        if hangs == MAX_HANGS:
             break
-    for i, (case, answer) in enumerate(zip(cases, first, strict=False)):
+    for i, (case, answer) in enumerate(zip(cases, answers, strict=False)):
         notify(len(cases) + i, 2 * len(cases))
-        again = answer if isinstance(answer, Failure) else contestant.answer(case)
-        yield Exchange(case, with_lesser_time(answer, again), again)
+        repeat = answer if isinstance(answer, Failure) else contestant.answer(case)
+        yield Exchange(case, with_lesser_time(answer, repeat), repeat)

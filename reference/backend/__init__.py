@@ -1,1 +1,1 @@
-"""How kernels are run: one source compiled, on all cores, in vector registers; no mathematics."""
+"""Run kernels: compile them from their source, on all cores and in vector registers."""

@@ -1,6 +1,6 @@
-"""Who is to know that a kernel is being compiled: the first call of a kernel takes seconds.
+"""Notify listeners of the compilation of kernels, for which the first call takes seconds.
 
-This library prints nothing; a command line or a front door subscribes and says what it likes.
+This library prints nothing; the command line and the public package subscribe.
 """
 
 import contextlib
@@ -9,11 +9,11 @@ import gc
 from collections.abc import Callable, Iterator
 from typing import Any
 
-# Called with what is compiled, in the user's words, and True as that begins, False as it ends.
+# Called with the label of a kernel, and True as its compilation begins, False as it ends.
 Listener = Callable[[str, bool], None]
 
 _listeners: list[Listener] = []
-_collecting = True
+_collecting = True  # before the compilation; numba compiles one kernel at a time
 
 
 @contextlib.contextmanager
@@ -22,8 +22,7 @@ def on_compile(listener: Listener) -> Iterator[None]:
 
         with on_compile(lambda label, begins: ...):
 
-    The listener is called in the thread that compiles. What is read from the cache on disk is not
-    compiled.
+    The listener is called in the thread that compiles, and not for kernels from the disk cache.
     """
     _listeners.append(listener)
     try:
@@ -35,13 +34,14 @@ def on_compile(listener: Listener) -> Iterator[None]:
 def numba_settings() -> Any:
     """Return numba's settings, which come from environment variables.
 
-    Raises:
-        ValueError: if numba refuses its number of threads.
+    Raise a ValueError if numba refuses its number of threads.
     """
     try:
         import numba
     except ValueError as error:
-        raise ValueError(f"NUMBA_NUM_THREADS: expected what numba takes: {error}") from None
+        raise ValueError(
+            f"NUMBA_NUM_THREADS: expected a number that numba takes: {error}"
+        ) from None
     return numba.config
 
 
@@ -63,11 +63,7 @@ def watch_numba() -> None:
 
 
 def _begin(label: str) -> None:
-    """Tell the listeners, and let the garbage collector rest.
-
-    It would look again and again at all that the compiler makes, an eighth of the time. Numba
-    compiles one kernel at a time.
-    """
+    """Call the listeners and pause the garbage collector, which takes an eighth of the time."""
     global _collecting
     _collecting = gc.isenabled()
     gc.disable()

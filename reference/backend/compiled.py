@@ -3,11 +3,10 @@
 A kernel is written as a plain Python function on floats, arrays and tuples of them. `Kernel(plain)`
 runs it compiled; inside `with set_backend("python"):` the interpreter runs the very same source.
 
-The compiled version is *rebuilt* from the plain one with every kernel it calls replaced by that
-kernel's own compiled version, so the plain functions never reach compiled code and can serve as
-the oracle. The on-disk cache of numba looks at one function at a time: edited callees and
-constants in other files would go unnoticed. The rebuilt function therefore carries in its name a
-digest of everything it is made from.
+The compiled version is *rebuilt* from the plain one with every callee replaced by its own compiled
+version, so that the plain functions stay as they are and can serve as the oracle. Numba's disk
+cache compares the file of a function only: it would miss changes of callees and constants in other
+files. The rebuilt function therefore has a digest of all its sources in its name.
 """
 
 import contextlib
@@ -27,11 +26,11 @@ from . import compilation
 from .digest import PythonKernel, callees, code_objects, digest, kernels_in, named_globals
 
 BACKENDS = ("numba", "python")
-# What a relaxed kernel's compiler may do; infinities and NaN keep their meaning.
+# Optimisations allowed for relaxed kernels; infinities and NaN keep their meaning.
 RELAXATIONS = {"reassoc", "contract", "nsz"}
-# What a kernel mentions if it makes arrays.
+# Names in kernels that make arrays.
 ALLOCATING = {"np", "copy"}
-# Instructions of the interpreter from which on a callee has no more than one inlined copy.
+# Callees of more instructions of the interpreter are inlined only once.
 LARGE = 5000
 # The interpreter's instructions that read a global.
 GLOBAL_LOADS = {"LOAD_GLOBAL", "LOAD_NAME"}
@@ -59,7 +58,7 @@ class Kernel:
     """A kernel that runs on the backend in force; compiled at its first call.
 
     `relaxed` lets the compiler reorder sums and fuse products with them: the backends then agree
-    only to rounding, and dense loops run up to four times faster. `label` is what a user calls it.
+    only to rounding, and dense loops run up to four times faster. `label` is its name for users.
     """
 
     def __init__(self, plain: PythonKernel, *, relaxed: bool = False, label: str | None = None):
@@ -89,18 +88,17 @@ def compile_kernel(
     Division by zero gives infinity or NaN, as in NumPy. Unless it is relaxed, floating point is
     strict: no reordering and no fused operations, so that both backends round alike.
 
-    Callees are inlined: a call would hand over every number of every array in its tuples, a hundred
-    and more, and cost more than most kernels do. The exception is a LARGE one that its caller
-    calls in several places, as copies of it would take seconds to compile.
+    Callees are inlined: a call would pass every number of every array in its tuples, more than a
+    hundred, and take longer than most kernels. Exceptions are LARGE callees that are called in
+    several places, as copies of them would take seconds to compile.
     """
     return _entry(kernel, relaxed, label)
 
 
 def bind(kernel: PythonKernel, **bound: Any) -> PythonKernel:
-    """Return a kernel whose globals of these names have other values, such as other callees.
+    """Return a kernel with some of its globals replaced, for instance its callees.
 
-    Raises:
-        ValueError: if the kernel names one of them nowhere, or has a closure.
+    Raise a ValueError if the kernel does not use a name, or has a closure.
     """
     for name in bound:
         if name not in kernel.__code__.co_names:
@@ -111,8 +109,7 @@ def bind(kernel: PythonKernel, **bound: Any) -> PythonKernel:
 def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
     """Return a decorator: the compiled version is the function of that name in another module.
 
-    It is for what no plain source can say, such as vector instructions. The module is imported
-    when a caller is compiled.
+    It is for vector instructions. The module is imported when a caller is compiled.
     """
 
     def mark(plain: PythonKernel) -> PythonKernel:
@@ -124,7 +121,7 @@ def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
 
 @functools.cache
 def _entry(kernel: PythonKernel, relaxed: bool, label: str | None) -> PythonKernel:
-    """Compile what Python calls; cached on disk together with all that it calls.
+    """Compile a kernel for calls from Python, cached on disk together with its callees.
 
     Where NUMBA_DISABLE_JIT turns numba's compiler off, the interpreter runs the kernel.
     """
@@ -142,7 +139,7 @@ def _entry(kernel: PythonKernel, relaxed: bool, label: str | None) -> PythonKern
 
 @functools.cache
 def _callee(kernel: PythonKernel, relaxed: bool, inline: bool) -> PythonKernel:
-    """Compile what another kernel calls: a part of that one's code, with no door for Python."""
+    """Compile a callee of another kernel, without an entry point for Python."""
     module = getattr(kernel, "compiled_in", None)
     if module is not None:
         return getattr(importlib.import_module(module), kernel.__name__)
@@ -181,8 +178,8 @@ def _compiled_global(value: Any, relaxed: bool, inline: bool) -> Any:
 
 def _calls(kernel: PythonKernel) -> Counter[str]:
     """Return how many times a kernel mentions each of its globals."""
-    found = (dis.get_instructions(code) for code in code_objects(kernel.__code__))
-    return Counter(i.argval for code in found for i in code if i.opname in GLOBAL_LOADS)
+    codes = map(dis.get_instructions, code_objects(kernel.__code__))
+    return Counter(i.argval for code in codes for i in code if i.opname in GLOBAL_LOADS)
 
 
 @functools.cache
@@ -195,10 +192,10 @@ def _inlined_size(kernel: PythonKernel) -> int:
 
 @functools.cache
 def allocates(kernel: PythonKernel) -> bool:
-    """Return whether a kernel, or one that it calls, may make arrays.
+    """Return whether a kernel or its callees may make arrays.
 
-    One that makes none is compiled without counting references to its arguments, which is half of
-    the work where a tuple holds many arrays. numba would refuse to compile an error.
+    Otherwise it is compiled without counting references to its arguments, which takes half of the
+    time where a tuple holds many arrays; numba would report a wrong answer as an error.
     """
     names = {name for code in code_objects(kernel.__code__) for name in code.co_names}
     return bool(ALLOCATING & names) or any(

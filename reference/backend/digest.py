@@ -17,7 +17,7 @@ PythonKernel = Any
 def digest(kernel: PythonKernel) -> str:
     """Return 16 hex digits of the code, constants and globals of a kernel and all its callees."""
     parts: list[bytes] = []
-    _collect(kernel, parts, seen=set())
+    _collect(kernel, parts, visited=set())
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
 
 
@@ -28,7 +28,7 @@ def named_globals(kernel: PythonKernel) -> list[tuple[str, Any]]:
 
 
 def kernels_in(value: Any) -> tuple[PythonKernel, ...]:
-    """Return a kernel, or those of a NamedTuple of kernels; none of any other value."""
+    """Return a kernel, or the kernels in a NamedTuple; none for any other value."""
     kernels = value if isinstance(value, tuple) else (value,)
     return tuple(kernel for kernel in kernels if isinstance(kernel, types.FunctionType))
 
@@ -44,17 +44,17 @@ def callees(kernel: PythonKernel) -> list[tuple[str, PythonKernel]]:
 
 
 def code_objects(code: types.CodeType) -> Iterator[types.CodeType]:
-    """Yield a code object and those nested in it, such as comprehensions."""
+    """Yield a code object and the code objects nested in it, like comprehensions."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             yield from code_objects(constant)
 
 
-def _collect(kernel: PythonKernel, parts: list[bytes], seen: set[Any]) -> None:
-    if kernel in seen:
+def _collect(kernel: PythonKernel, parts: list[bytes], visited: set[Any]) -> None:
+    if kernel in visited:
         return
-    seen.add(kernel)
+    visited.add(kernel)
     _collect_code(kernel.__code__, parts)
     parts.append(repr(kernel.__defaults__).encode())
     if hasattr(kernel, "compiled_in"):
@@ -62,7 +62,7 @@ def _collect(kernel: PythonKernel, parts: list[bytes], seen: set[Any]) -> None:
     for name, value in named_globals(kernel):
         parts.append(name.encode())
         for callee in kernels_in(value):
-            _collect(callee, parts, seen)
+            _collect(callee, parts, visited)
         if not kernels_in(value):
             parts.append(_fingerprint(value))
 
@@ -75,7 +75,7 @@ def _collect_code(whole: types.CodeType, parts: list[bytes]) -> None:
 
 @functools.cache
 def _module_fingerprint(name: str) -> bytes:
-    """Return all of a module: what it registers with numba is reached by no function's name."""
+    """Return the whole code of a module, as no function refers to its registrations with numba."""
     module = importlib.import_module(name)
     loader: Any = module.__loader__
     parts: list[bytes] = []

@@ -1,8 +1,8 @@
-"""Compiled kernels on disk, as numba keeps them, but for files that cannot be used.
+"""Numba's cache of compiled kernels on disk, without errors for invalid files.
 
-Numba's files are pickles of types, machine code and their signatures. One that is cut off, was
-changed, or names a class that has since moved would raise an error in a user's call. Here such a
-file counts as absent: the kernel is compiled again and the file replaced.
+Numba's files are pickles of types, machine code and their signatures. A file that is truncated or
+changed, or names a class that has since moved, would raise an error in a user's call. Here it
+counts as absent: the kernel is compiled again and the file replaced.
 """
 
 import hashlib
@@ -43,7 +43,7 @@ class DiskCache(FunctionCache):
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled version for a signature, None if there is none that can be used."""
+        """Return the compiled version for a signature, None if there is no valid file."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # whatever a pickle of unknown content may raise

@@ -1,10 +1,9 @@
-"""How numba compiles kernels: each callee by itself, all linked into the kernel that Python calls.
+"""Compile each callee of a kernel once and link all of them into the kernel that Python calls.
 
-By itself numba optimises each function it compiles together with all that the function calls, and
-makes machine code of it. In a nest of inlined callees every level would repeat the work of the
-levels below, half of the time of a large kernel, and only the outermost result is used. The classes
-replace methods that numba does not document: with another series of numba than those they are
-tested with, numba compiles as ever.
+Numba alone optimises each function together with all its callees and makes machine code of it. In a
+nest of inlined callees every level would repeat the work of the levels below, half of the time of a
+large kernel, and only the outermost result is used. The classes replace methods that numba does not
+document: with an untested series of numba, numba compiles as usual.
 """
 
 from typing import Any
@@ -25,7 +24,7 @@ class LinkedLibrary(JITCodeLibrary):
     """
 
     def _optimize_functions(self, module: Any) -> None:
-        """Simplify what the module defines, not what it declares: both cost the same."""
+        """Simplify the definitions of the module but not its declarations."""
         module.data_layout = self._codegen._data_layout
         for function in module.functions:
             if not function.is_declaration:
@@ -48,19 +47,19 @@ class LinkedLibrary(JITCodeLibrary):
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Do nothing: without machine code no environment is read."""
+        """Do nothing, as no environment is read without machine code."""
 
 
 class KernelLibrary(JITCodeLibrary):
     """The code of a kernel, with that of its callees and of theirs linked into it, each once."""
 
     def add_linking_library(self, library: Any) -> None:
-        """Add a library and those that it would have linked."""
+        """Add a library and the libraries that it would have linked."""
         super().add_linking_library(library)
         if isinstance(library, LinkedLibrary):
-            for one in library._linking_libraries:
-                if one not in self._linking_libraries:
-                    self.add_linking_library(one)
+            for linked in library._linking_libraries:
+                if linked not in self._linking_libraries:
+                    self.add_linking_library(linked)
 
 
 class LinkedCompiler(Compiler):
@@ -83,16 +82,15 @@ class KernelCompiler(Compiler):
 
 
 def is_supported() -> bool:
-    """Return whether numba is of a series whose internals these classes are tested with."""
+    """Return whether these classes are tested with this series of numba."""
     series = tuple(map(int, numba.__version__.split(".")[:2]))
     return OLDEST <= series <= NEWEST
 
 
 def compile_directly(dispatcher: Any) -> Any:
-    """Let a callee be compiled once for integers, not again for each that a call spells out.
+    """Compile a callee once for all integers, and not again for each literal in a call.
 
-    Inlined code knows the numbers anyway. Timers are left out, of which there would be two for each
-    caller above it.
+    Inlined code contains the numbers anyway. Numba's timers, two for each caller, are left out.
     """
     resolve = dispatcher.get_call_template
 

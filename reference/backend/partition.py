@@ -1,9 +1,9 @@
 """Divide a large system into regions of particles, so that threads can sum its springs.
 
-A region is a run of particles by number, and has the springs whose two ends both lie in it. What is
-summed over one touches no other. Springs between regions come last, one after the other: they are
-few where neighbours have numbers near each other, as in cloths and lattices. The regions depend on
-the system only, so that results are the same bits on any number of cores.
+A region is a run of particles by number with the springs between them, so that threads can sum over
+regions independently. Springs between regions come last, in one thread: they are few where
+neighbours have numbers near each other, as in cloths and lattices. The regions depend on the system
+only, so that results are the same bits on any number of cores.
 """
 
 from typing import NamedTuple
@@ -22,9 +22,9 @@ class Regions(NamedTuple):
 
     Attributes:
         particles: the first particle of each, and the number of particles, (region + 1,).
-        order: the springs, region after region, those between regions last, (spring,).
+        order: the springs, region after region, then the springs between regions, (spring,).
         springs: the two particles of each in that order, (spring, 2).
-        starts: where the springs of each begin in `order`, and then those between, (region + 1,).
+        starts: where the springs of each, then the springs between, begin, (region + 1,).
     """
 
     particles: IndexArray
@@ -34,7 +34,7 @@ class Regions(NamedTuple):
 
 
 def cut(springs: IndexArray, particles: int, count: int = REGIONS) -> Regions:
-    """Return so many regions of a system whose springs, (spring, 2), join these particles."""
+    """Divide a system with springs (spring, 2) into regions."""
     bounds = np.arange(count + 1) * particles // count
     first, second = np.searchsorted(bounds, springs, side="right").T - 1
     region = np.where(first == second, first, count)

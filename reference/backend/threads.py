@@ -14,7 +14,7 @@ from typing import Any
 from .. import arguments
 from .compilation import numba_settings
 
-# More slices than cores, so that a core that is done early can take another slice.
+# More slices than cores, so that a core that finishes early can take another slice.
 SLICES_PER_CORE = 4
 # How often a waiting thread looks for an interrupt [s].
 POLL = 0.1
@@ -26,7 +26,7 @@ _num_threads: ContextVar[int | None] = ContextVar("num_threads", default=None)
 
 @contextlib.contextmanager
 def set_num_threads(count: int | None) -> Iterator[None]:
-    """Compute batches, inside the block, in so many threads; None, the default: one for each core.
+    """Set the number of threads for batches inside the block; None, the default: all cores.
 
         with set_num_threads(1):
 
@@ -49,11 +49,11 @@ def in_slices(
     *,
     least: int,
 ) -> list[Any]:
-    """Call a kernel on slices of a batch, side by side; return what it returns, slice by slice.
+    """Call a kernel on slices of a batch in parallel; return its results, slice by slice.
 
-    A batch of less than two slices of `least` is one call in the caller's thread. The first error
-    is raised, and slices not yet begun are dropped, as at an interrupt. Calls of this function
-    within a slice do not divide it again.
+    A batch of less than two slices of `least` is a single call in the caller's thread. At an error
+    or an interrupt, slices not yet begun are dropped. Calls of this function within a slice do not
+    divide it again.
 
         in_slices(kernel, len(x), lambda part: (model, x[part], result[part]), least=100)
 
@@ -61,7 +61,7 @@ def in_slices(
         kernel: fills its part of the results, most often a Kernel.
         count: the length of the batch.
         arguments_of: returns the kernel's arguments for a slice.
-        least: items in a slice; fewer would not be worth a thread.
+        least: the smallest slice that is worth a thread.
     """
     threads = (_num_threads.get() or _all_cores()) if count >= 2 * least else 1
     if threads == 1:
@@ -88,12 +88,12 @@ def _result(part: Future[Any]) -> Any:
 
 
 def _all_cores() -> int:
-    """Return how many cores the process may use, as numba counts them."""
+    """Return the number of cores that the process may use, as numba counts them."""
     return numba_settings().NUMBA_NUM_THREADS
 
 
 def _pool(size: int) -> ThreadPoolExecutor:
-    """Return a pool of threads, a new one where a fork has left none of its threads alive."""
+    """Return a pool of threads, a new pool after a fork, which leaves no thread alive."""
     pool, threads = _pools.get(size, (None, []))
     if pool is None or not all(thread.is_alive() for thread in threads):
         threads = []

@@ -47,12 +47,9 @@ def parse_obj(text: str, *, name: str = "text") -> Mesh:
     Polygons become fans of triangles about their first corner. A weight or colour after the third
     coordinate of a vertex is ignored. A backslash at the end of a line, before any comment,
     continues it. Positive indices may refer to later vertices; negative ones count back from the
-    last vertex so far.
-
-    Raises:
-        ValueError: if a statement is not of the format, a coordinate is not a finite number, a face
-            has fewer than three corners, repeats a vertex or refers to one that does not exist, or
-            there are no faces; names the text and the line.
+    last vertex so far. Raise a ValueError if a statement is not of the format, a coordinate is not
+    a finite number, a face has fewer than three corners, repeats a vertex or refers to one that
+    does not exist, or there are no faces; names the text and the line.
     """
     arguments.text("text", text)
     arguments.text("name", name)
@@ -62,10 +59,13 @@ def parse_obj(text: str, *, name: str = "text") -> Mesh:
     for line, words in _statements(text):
         try:
             if words[0] == "v":
-                vertices += _vertex(words[1:])
+                if len(words) < 4:
+                    raise ValueError(f"expected three coordinates, got {len(words) - 1}")
+                vertices += map(_coordinate, words[1:4])
             elif words[0] == "f":
                 corners = _face(words[1:], len(vertices) // 3)
-                triangles += _fan(corners)
+                fan = itertools.pairwise(corners[1:])
+                triangles += [corner for side in fan for corner in (corners[0], *side)]
                 highest = max(highest, (max(corners), line))
             elif words[0] not in IGNORED:
                 raise ValueError(f"expected a statement of the format, got {words[0]!r:.40}")
@@ -88,12 +88,6 @@ def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
             words = []
     if words:
         yield start, words
-
-
-def _vertex(words: list[str]) -> list[float]:
-    if len(words) < 3:
-        raise ValueError(f"expected three coordinates, got {len(words)}")
-    return [_coordinate(word) for word in words[:3]]
 
 
 def _coordinate(word: str) -> float:
@@ -123,15 +117,6 @@ def _corner(word: str, vertex_count: int) -> int:
     if index == 0 or index < -vertex_count:
         raise ValueError(f"expected 1 or more, or -{vertex_count} to -1, got {index}")
     return vertex_count + index
-
-
-def _fan(corners: list[int]) -> list[int]:
-    """Return the corners of the triangles of a polygon, concatenated."""
-    return [
-        corner
-        for one, other in itertools.pairwise(corners[1:])
-        for corner in (corners[0], one, other)
-    ]
 
 
 def _mesh(name: str, vertices: list[float], triangles: list[int], highest: int, line: int) -> Mesh:

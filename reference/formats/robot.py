@@ -28,7 +28,7 @@ class Robot(NamedTuple):
 
 
 class Link(NamedTuple):
-    """One joint of an articulation, as read from a file; see `Articulation` for the fields.
+    """A joint of an articulation, as read from a file; see `Articulation` for the fields.
 
     Its offset [m] and frame are in the frame of its parent, an index among the links, -1 of the
     root.
@@ -61,7 +61,7 @@ def assemble(
 ) -> Robot:
     """Return the robot of these links, with zero coordinates as its home.
 
-    More than MOST_JOINTS links, or an invalid one, are a ValueError that names the origin.
+    Too many or invalid links are a ValueError that names the origin.
     """
     if len(links) > MOST_JOINTS:
         raise ValueError(f"{origin}: expected at most {MOST_JOINTS:,} joints, got {len(links):,}")

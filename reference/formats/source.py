@@ -24,32 +24,31 @@ def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:
     Raises:
         ValueError: as for `read_bytes`, or if it contains a NUL byte or is not UTF-8.
     """
-    data = read_bytes(path, largest=largest)
-    if b"\0" in data:
-        raise ValueError(f"{path}: expected text, got a NUL byte at offset {data.index(0)}")
+    content = read_bytes(path, largest=largest)
+    if b"\0" in content:
+        raise ValueError(f"{path}: expected text, got a NUL byte at offset {content.index(0)}")
     try:
-        text = data.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(
-            f"{path}: expected UTF-8, got byte {data[error.start]:#04x} at offset {error.start}"
+            f"{path}: expected UTF-8, got byte {content[error.start]:#04x} at offset {error.start}"
         ) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def checked_path(path: str | os.PathLike[str]) -> str:
     """Return the path of a file as a string; a ValueError if it is none, empty or has a NUL."""
-    given = os.fspath(path) if isinstance(path, str | os.PathLike) else None
-    if not isinstance(given, str) or not given or "\0" in given:
+    text = os.fspath(path) if isinstance(path, str | os.PathLike) else None
+    if not isinstance(text, str) or not text or "\0" in text:
         raise ValueError(f"path: expected a path, got {shown(path)}")
-    return given
+    return text
 
 
 def read_bytes(path: str | os.PathLike[str], *, largest: int = LARGEST) -> bytes:
     """Return the content of a file; read at most `largest` + 1 bytes of it.
 
-    Raises:
-        ValueError: if the file does not exist, is not regular, cannot be read, or is larger than
-            `largest` bytes.
+    Raise a ValueError if the file does not exist, is not regular, cannot be read, or is larger than
+    `largest` bytes.
     """
     path = checked_path(path)
     try:
@@ -58,9 +57,9 @@ def read_bytes(path: str | os.PathLike[str], *, largest: int = LARGEST) -> bytes
         if not Path(path).is_file():  # a pipe or a device might never end
             raise ValueError(f"{path}: expected a regular file")
         with open(path, "rb") as file:
-            data = file.read(largest + 1)
+            content = file.read(largest + 1)
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from None
-    if len(data) > largest:
+    if len(content) > largest:
         raise ValueError(f"{path}: expected at most {largest} bytes, got more")
-    return data
+    return content

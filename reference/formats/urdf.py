@@ -1,6 +1,6 @@
 """The kinematic part of a URDF file.
 
-Every link becomes a joint of the articulation, the one that moves the link, with the link's name.
+Every link becomes the joint of the articulation that moves it, with the link's name.
 The root link is fixed to the world; a file with a moving base has a floating joint. Links precede
 their descendants, and siblings keep the order of the file. A planar joint becomes two slides, named
 after the joint with " x" and " y" added, and a hinge. Masses, shapes, transmissions and safety
@@ -69,8 +69,14 @@ def parse(text: str, *, mimic: bool = True, crossed_limits: str = "unlimited") -
 def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robot:
     if root.tag != "robot":
         raise root.error("expected a <robot>")
-    _check_expanded(root)
-    joints = _distinct([_joint(element) for element in root.named("joint")])
+    for element in root.walk():
+        if any(name.startswith("xacro:") for name in (element.tag, *element.attributes)):
+            raise element.error("expected a URDF file, got xacro: run xacro first")
+    joints: dict[str, _Joint] = {}
+    for joint in map(_joint, root.named("joint")):
+        if joint.name in joints:
+            raise joint.element.error("expected a joint's name once, got it twice")
+        joints[joint.name] = joint
     below = _joints_below(root, joints)
     base = _base(root, joints, below)
     follows = arguments.boolean("mimic", mimic)
@@ -87,13 +93,6 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
     return assemble(origin, links, joint_index, _mimics(joints, joint_index) if follows else {})
 
 
-def _check_expanded(root: Element) -> None:
-    """Raise a ValueError if an element or attribute belongs to xacro."""
-    for element in root.walk():
-        if any(name.startswith("xacro:") for name in (element.tag, *element.attributes)):
-            raise element.error("expected a URDF file, got xacro: run xacro first")
-
-
 def _joint(element: Element) -> _Joint:
     kind = element.word("type")
     if kind not in KINDS:
@@ -107,15 +106,6 @@ def _link_of(joint: Element, tag: str) -> str:
     if end is None:
         raise joint.error(f"expected a <{tag}>, got none")
     return end.word("link")
-
-
-def _distinct(joints: list[_Joint]) -> dict[str, _Joint]:
-    named: dict[str, _Joint] = {}
-    for joint in joints:
-        if joint.name in named:
-            raise joint.element.error("expected a joint's name once, got it twice")
-        named[joint.name] = joint
-    return named
 
 
 def _joints_below(root: Element, joints: Mapping[str, _Joint]) -> dict[str, list[_Joint]]:
@@ -206,9 +196,9 @@ def _mimics(joints: Mapping[str, _Joint], index: Mapping[str, int]) -> dict[int 
         if tag is None or joint.type == "fixed":
             continue
         leader = joints.get(tag.word("joint"))
-        for one, name in ((joint, joint.name), (leader, tag.word("joint"))):
-            if one is None or one.type not in SCALAR_TYPES:
-                got = one.type if one else "none of that name"
+        for role, name in ((joint, joint.name), (leader, tag.word("joint"))):
+            if role is None or role.type not in SCALAR_TYPES:
+                got = role.type if role else "none of that name"
                 raise joint.element.error(
                     f"expected a mimic and its leader to be one of "
                     f"{', '.join(SCALAR_TYPES)}, got {got} for {name!r:.80}"

@@ -47,10 +47,10 @@ class Element(NamedTuple):
 
     def single(self, tag: str) -> "Element | None":
         """Return the only child of that name, None if there is none."""
-        found = self.named(tag)
-        if len(found) > 1:
-            raise self.error(f"expected at most one <{tag}>, got {len(found)}")
-        return found[0] if found else None
+        matches = self.named(tag)
+        if len(matches) > 1:
+            raise self.error(f"expected at most one <{tag}>, got {len(matches)}")
+        return matches[0] if matches else None
 
     def word(self, name: str, default: str | None = None) -> str:
         """Return an attribute, or the default where it is missing."""
@@ -102,16 +102,13 @@ def read(path: str | Path) -> Element:
 def parse(text: str, origin: str) -> Element:
     """Return the root element of a text; origin names it in errors.
 
-    White space before <?xml ...?> gets a warning.
-
-    Raises:
-        ValueError: if it is not well-formed, has a document type, more than MOST_ELEMENTS
-            elements, or some nested deeper than MOST_DEPTH.
+    White space before <?xml ...?> gets a warning. Raise a ValueError if it is not well-formed, has
+    a document type, more than MOST_ELEMENTS elements, or some nested deeper than MOST_DEPTH.
     """
     builder, text = _Builder(origin), arguments.text("text", text)
-    if found := MISPLACED_DECLARATION.match(text):
+    if match := MISPLACED_DECLARATION.match(text):
         warn(f"{origin}, line 1: expected <?xml ...?> first, got white space before it")
-        text = found[1] + text[found.end() :]
+        text = match[1] + text[match.end() :]
     try:
         builder.parser.Parse(text.encode(errors="replace"), True)
     except expat.ExpatError as error:

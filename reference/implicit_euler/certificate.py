@@ -21,6 +21,7 @@ the rounding errors of x_n + h v_n, the effective springs, the gradient, the Hes
 factor (Rump 2006, "Verification of Positive Definiteness") and the linear solve.
 """
 
+import contextlib
 import math
 from dataclasses import dataclass
 from enum import IntEnum
@@ -127,8 +128,11 @@ class Certificate:
         """Do what `shares_minimiser` does, of a distance that is not checked."""
         if not (self.covered and other.covered):
             return None
-        one, two = apart * SLACK + other.distance, apart * SLACK + self.distance
-        if one <= self.unique_within or two <= other.unique_within:
+        reach = apart * SLACK
+        if (
+            reach + other.distance <= self.unique_within
+            or reach + self.distance <= other.unique_within
+        ):
             return True
         return False if apart > (self.distance + other.distance) * SLACK else None
 
@@ -142,10 +146,10 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     """
     system = instance("objective", objective, Objective).system
     x = coordinates("positions", positions, system.particle_count, 3)
-    here = objective.iterate_at(x)
-    if not (here.finite and objective.inertial.finite):
+    iterate = objective.iterate_at(x)
+    if not (iterate.finite and objective.inertial.finite):
         return Certificate(math.inf, Coverage.OVERFLOWN)
-    residual = objective.residual(here)
+    residual = objective.residual(iterate)
     if not np.array_equal(x[system.pinned], objective.y[system.pinned]):
         return Certificate(residual, Coverage.PINS_ASTRAY)
     if not system.free.any():
@@ -153,7 +157,7 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     smooth, _ = hessian_change(objective, x, 0.0)
     if smooth != Coverage.COVERED:
         return Certificate(residual, smooth)
-    return _certify_smooth(objective, x, here.gradient, residual)
+    return _certify_smooth(objective, x, iterate.gradient, residual)
 
 
 def _certify_smooth(
@@ -194,7 +198,8 @@ def least_curvature(H: Any, error: float) -> tuple[float, Factor | None]:
         factor = factorize(H)
         shift = FIRST_SHIFT * _estimate_smallest_eigenvalue(factor, n)
         while shift > allowance:
-            if _is_definite(factor, H - shift * scipy.sparse.eye_array(n, format="csc")):
+            with contextlib.suppress(NotPositiveDefiniteError):
+                factor.refactorize(H - shift * scipy.sparse.eye_array(n, format="csc"))
                 return shift - allowance, factor
             shift /= 2.0
     except NotPositiveDefiniteError:
@@ -301,14 +306,6 @@ def _estimate_smallest_eigenvalue(factor: Factor, n: int) -> float:
         inverse, k=1, which="LA", v0=start, tol=ESTIMATE_TOLERANCE, return_eigenvectors=False
     )
     return 1.0 / float(largest)
-
-
-def _is_definite(factor: Factor, matrix: Any) -> bool:
-    try:
-        factor.refactorize(matrix)
-    except NotPositiveDefiniteError:
-        return False
-    return True
 
 
 def _sum_over_springs(

@@ -1,4 +1,4 @@
-"""Newton's method on g with its exact Hessian.
+"""Newton's method on g with its exact Hessian, and Gauss-Newton.
 
 Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
 until it is positive definite, a Levenberg shift in the metric of M.
@@ -6,6 +6,17 @@ until it is positive definite, a Levenberg shift in the metric of M.
 Such steps leave a saddle point where the gradient shows a way out, but not at a squeezed straight
 rod. An end is therefore accepted only without a negative eigenvalue: the Hessian is factorised once
 more, unless it was positive definite at both iterates before, as in ordinary steps.
+
+Gauss-Newton linearises the springs at the start of the step. At x_n the dampers of E are at rest
+length, grad g(x_n) = -h (M v_n + h f), and with their Hessian without geometric terms the step
+h (v_n + dv) = -(M + h C + h² J' k J)^-1 grad g(x_n) is
+
+    (M + h C + h² J' k J) dv = h (f - h J' k J v_n),
+
+J here being the Jacobian of the lengths and f all forces with the dampers' -C v_n: one step of
+Baraff and Witkin 1998, "Large Steps in Cloth Simulation", without geometric stiffness, and the
+integrator that MuJoCo calls `discrete`. Springs are linearised at x_n for pins that move, too: the
+displacement of the pins adds h² J' k J (x_pins - x_n) to the gradient at the free particles.
 """
 
 from collections.abc import Iterator
@@ -72,3 +83,33 @@ class Newton:
                 return self._analysed.refactorize(hessian), shift
             except NotPositiveDefiniteError:
                 shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
+
+
+class GaussNewton:
+    """Gauss-Newton iterations from x_n, by default one."""
+
+    default_iterations = 1
+
+    def __init__(self, system: MassSpring, h: float) -> None:
+        """Analyse the sparsity pattern that the matrices of all steps share."""
+        self._analysed = hessian_factor(system)
+
+    def iterates(self, objective: Objective) -> Iterator[Iterate]:
+        """Yield x_n with the pins at their targets, then the iterate after each iteration.
+
+        Where the matrix is singular to rounding, yield the last iterate again.
+        """
+        x = objective.x_n
+        iterate = objective.iterate_at(x)
+        gradient = iterate.gradient + objective.pin_gradient_at(x, geometric=False)
+        if np.any(objective.y[objective.system.pinned] != x[objective.system.pinned]):
+            iterate = objective.iterate_at(np.where(objective.system.free[:, None], x, objective.y))
+        while True:
+            yield iterate
+            try:
+                factor = self._analysed.refactorize(objective.hessian_at(x, geometric=False))
+            except NotPositiveDefiniteError:  # the masses vanish beside h² k
+                continue
+            correction = factor.solve(gradient.ravel()).reshape(-1, 3)
+            iterate = objective.iterate_at(iterate.positions - correction)
+            x, gradient = iterate.positions, iterate.gradient

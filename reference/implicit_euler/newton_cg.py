@@ -24,7 +24,7 @@ from .objective import Iterate, Objective
 
 LARGEST_TOLERANCE = 0.1  # of the error of a step, relative to the step
 TOLERANCE_FACTOR = 0.3  # times the square root of the relative gradient
-MOST_CG_ITERATIONS = 500
+CG_ITERATION_LIMIT = 500
 
 
 class NewtonCG(GlobalMatrixSolver):
@@ -47,8 +47,8 @@ class NewtonCG(GlobalMatrixSolver):
         K = objective.h**2 * blocks(iterate.positions, arrays, True)
         p = self._factor.solve(r)
         s, size = np.zeros_like(r), float(np.sum(r * p))
-        enough = tolerance * tolerance * size
-        for k in range(MOST_CG_ITERATIONS):
+        limit = tolerance * tolerance * size
+        for k in range(CG_ITERATION_LIMIT):
             Hp = _product(K, p, arrays.masses, arrays.springs, arrays.pinned)
             curvature = float(np.sum(p * Hp))
             if not curvature > 0:
@@ -57,7 +57,7 @@ class NewtonCG(GlobalMatrixSolver):
             r = r - (size / curvature) * Hp
             z = self._factor.solve(r)
             before, size = size, float(np.sum(r * z))
-            if size <= enough:
+            if size <= limit:
                 break
             p = z + (size / before) * p
         return s

@@ -110,9 +110,9 @@ def _finite_result(method: Callable[..., Any]) -> Callable[..., Any]:
     """Let a method of an Objective raise a FloatingPointError where its result overflows."""
 
     @functools.wraps(method)
-    def checked(*given: Any, **options: Any) -> Any:
+    def checked(*arguments: Any, **options: Any) -> Any:
         with np.errstate(all="ignore"):
-            result = method(*given, **options)
+            result = method(*arguments, **options)
         if not np.isfinite(result.data if scipy.sparse.issparse(result) else result).all():
             raise FloatingPointError(f"{method.__name__}: a number left the finite ones")
         return result
@@ -148,10 +148,9 @@ class Objective:
     ) -> None:
         """Set up the step of length h from a state; `start` is the first iterate, "y" or "x_n".
 
-        Raises:
-            ValueError: if h is not positive, the state has another number of particles, or the
-                external forces [N], shape (particle, 3), or the pins' positions at the end of the
-                step [m], shape (pinned, 3), have another shape or are not finite.
+        Raise a ValueError if h is not positive, the state has another number of particles, or the
+        external forces [N], shape (particle, 3), or the pins' positions at the end of the step [m],
+        shape (pinned, 3), have another shape or are not finite.
         """
         self.system = system
         self.h = h = number("h", h, above=0)
@@ -190,10 +189,10 @@ class Objective:
         """Return g and its gradient at positions that are not checked and not copied."""
         regions = self.system.with_separate_dampers.regions
         if regions is None:
-            found = _evaluate(positions, *self._arguments)
+            terms = _evaluate(positions, *self._arguments)
         else:
-            found = _evaluate_in_parallel(positions, self._arguments, regions)
-        gradient, value, norm, reach = found
+            terms = _evaluate_in_parallel(positions, self._arguments, regions)
+        gradient, value, norm, reach = terms
         a, b = self._floor_coefficients
         return Iterate(positions, gradient, value, norm, a + b * reach, self._rounding)
 

@@ -101,10 +101,10 @@ def add_particles(x, y, external, hh, masses, first, last, gradient):
     value, largest = 0.0, 0.0
     for i in range(first, last):
         x_i, f = load_vector(x, i), scale(hh, load_vector(external, i))
-        away = subtract(x_i, load_vector(y, i))
-        inertia = scale(masses[i], away)
+        displacement = subtract(x_i, load_vector(y, i))
+        inertia = scale(masses[i], displacement)
         store_vector(gradient, i, subtract(inertia, f))
-        value += 0.5 * dot(inertia, away) - dot(f, x_i)
+        value += 0.5 * dot(inertia, displacement) - dot(f, x_i)
         largest = max(largest, dot(x_i, x_i))
     return value, largest
 
@@ -140,10 +140,10 @@ def rounding_bounds(
             load_vector(y, i),
             h * h * norm(load_vector(external, i)),
         )
-        away = subtract(x_i, y_i)
+        displacement = subtract(x_i, y_i)
         reach[i] = norm(x_i)
         size[i] = masses[i] * (reach[i] + norm(y_i)) + pull
-        value_size += 0.5 * masses[i] * dot(away, away) + pull * reach[i]
+        value_size += 0.5 * masses[i] * dot(displacement, displacement) + pull * reach[i]
     for s in range(len(springs)):
         i, j = springs[s, 0], springs[s, 1]
         length, _ = spring_frame(x, i, j)

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, IndexArray, boolean, count, number, sequence
-from ..mass_spring import MassSpring, State
-from .rest import at_rest
+from ..mass_spring import MassSpring, State, lengths
 
 # Offsets in rows and columns from a particle of the cloth to those it is joined to by springs.
 NEIGHBOURS = [(1, 0), (0, 1)]
@@ -95,13 +94,17 @@ def grid_cloth(
         (NEXT_BUT_ONE, _stiffness("bending_stiffness", bending_stiffness, stiffness)),
         (DIAGONALS, _stiffness("shear_stiffness", shear_stiffness, stiffness)),
     ]
-    kept = [(steps, k) for steps, k in parts if k > 0 or steps is NEIGHBOURS]
-    springs = [_springs((rows, columns), steps) for steps, _ in kept]
+    springs_of = [(steps, k) for steps, k in parts if k > 0 or steps is NEIGHBOURS]
+    springs = [_springs((rows, columns), steps) for steps, _ in springs_of]
+    spacing, positions = number("spacing", spacing, above=0), np.empty((rows, columns, 3))
+    positions[..., 0] = spacing * np.arange(rows)[:, None]
+    positions[..., 1] = number("height", height)
+    positions[..., 2] = spacing * (np.arange(columns) - (columns - 1) / 2)
     return at_rest(
-        _level(rows, columns, number("spacing", spacing, above=0), number("height", height)),
+        positions.reshape(-1, 3),
         np.concatenate(springs),
         masses=np.full(rows * columns, number("mass", mass, above=0)),
-        stiffnesses=np.repeat([k for _, k in kept], [len(ends) for ends in springs]),
+        stiffnesses=np.repeat([k for _, k in springs_of], [len(ends) for ends in springs]),
         damping=damping,
         pinned=[0, columns - 1] if pinned is None else pinned,
         gravity=gravity,
@@ -210,17 +213,34 @@ def hanging_rope(
     )
 
 
+def at_rest(
+    positions: FloatArray,
+    springs: IndexArray,
+    *,
+    masses: FloatArray,
+    stiffnesses: ArrayLike,
+    damping: float,
+    pinned: ArrayLike,
+    gravity: float,
+    tension_only: ArrayLike = False,
+) -> tuple[MassSpring, State]:
+    """Return a system whose rest lengths equal the lengths of its springs exactly."""
+    system = MassSpring(
+        masses=masses,
+        springs=springs,
+        rest_lengths=0.0,
+        stiffnesses=stiffnesses,
+        dampings=number("damping", damping, least=0),
+        pinned=pinned,
+        gravity=(0.0, -number("gravity", gravity), 0.0),
+        tension_only=tension_only,
+    )
+    state = State(positions, np.zeros_like(positions))
+    return system.replaced(rest_lengths=lengths(system, positions)), state
+
+
 def _stiffness(name: str, value: float | None, default: float) -> float:
     return default if value is None else number(name, value, least=0)
-
-
-def _level(rows: int, columns: int, spacing: float, height: float) -> FloatArray:
-    """Return the positions of a horizontal grid, shape (rows columns, 3)."""
-    positions = np.empty((rows, columns, 3))
-    positions[..., 0] = spacing * np.arange(rows)[:, None]
-    positions[..., 1] = height
-    positions[..., 2] = spacing * (np.arange(columns) - (columns - 1) / 2)
-    return positions.reshape(-1, 3)
 
 
 def _shape(rows: int, columns: int) -> tuple[int, int]:

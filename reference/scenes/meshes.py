@@ -5,9 +5,9 @@ from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, IndexArray, array, boolean, indices, number
 from ..mass_spring import MassSpring, State
-from .rest import at_rest
+from .grids import at_rest
 
-MOST_AT_AN_EDGE = 16  # triangles; k of them need k (k - 1) / 2 bending springs
+LARGEST_EDGE_DEGREE = 16  # triangles; k of them need k (k - 1) / 2 bending springs
 
 
 def cloth_from_mesh(
@@ -74,12 +74,12 @@ def mesh_springs(
 def _facing_pairs(keys: IndexArray, facing: IndexArray) -> IndexArray:
     """Return all pairs of vertices opposite to the same edge, (pair, 2); the keys are sorted."""
     pairs = [np.empty((0, 2), dtype=np.int64)]
-    for apart in range(1, MOST_AT_AN_EDGE + 1):
-        same = np.flatnonzero(keys[apart:] == keys[:-apart])
+    for offset in range(1, LARGEST_EDGE_DEGREE + 1):
+        same = np.flatnonzero(keys[offset:] == keys[:-offset])
         if len(same) == 0:
             return np.concatenate(pairs)
-        pairs.append(np.stack([facing[same], facing[same + apart]], axis=1))
-    raise ValueError(f"triangles: expected at most {MOST_AT_AN_EDGE} at an edge, got more")
+        pairs.append(np.stack([facing[same], facing[same + offset]], axis=1))
+    raise ValueError(f"triangles: expected at most {LARGEST_EDGE_DEGREE} at an edge, got more")
 
 
 def _keys(ends: IndexArray, vertex_count: int) -> IndexArray:
@@ -106,10 +106,10 @@ def _triangles(triangles: ArrayLike, vertex_count: int) -> IndexArray:
         raise ValueError(f"triangles: expected three different vertices, got {got}")
     rows = np.sort(corners, axis=1)
     order = np.lexsort(rows.T)
-    again = np.flatnonzero((rows[order[1:]] == rows[order[:-1]]).all(axis=1))
-    if len(again):
-        one, other = order[again[0]], order[again[0] + 1]
-        raise ValueError(f"triangles: expected each once, got the same at indices {one}, {other}")
+    repeated = np.flatnonzero((rows[order[1:]] == rows[order[:-1]]).all(axis=1))
+    if len(repeated):
+        i, j = order[repeated[0] : repeated[0] + 2]
+        raise ValueError(f"triangles: expected each once, got the same at indices {i}, {j}")
     return corners
 
 

@@ -47,6 +47,6 @@ def _connected(rng: np.random.Generator, n: int) -> IndexArray:
     """Return a spanning tree and about as many other springs, with shuffled ends, (spring, 2)."""
     later = np.arange(1, n)
     tree = np.stack([rng.integers(0, later), later], axis=1)
-    others = rng.integers(0, n, (n, 2))
-    pairs = np.sort(np.concatenate([tree, others[others[:, 0] != others[:, 1]]]), axis=1)
+    chords = rng.integers(0, n, (n, 2))
+    pairs = np.sort(np.concatenate([tree, chords[chords[:, 0] != chords[:, 1]]]), axis=1)
     return rng.permuted(np.unique(pairs, axis=0), axis=1)

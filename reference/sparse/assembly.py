@@ -15,8 +15,8 @@ from ..backend.compiled import Kernel
 class BlockSum:
     """Sums of (A_i A_i') x B_i over the springs, for any symmetric 3 x 3 blocks B_i.
 
-    All sums have one pattern: every pair of particles that a spring joins, and the whole diagonal,
-    whether their entries are zero or not. The analysis of one thus serves for all.
+    All sums have the same pattern, whose analysis serves for all: every pair of particles that a
+    spring joins, and the whole diagonal, even where entries are zero.
     """
 
     def __init__(self, A: Any) -> None:
@@ -86,7 +86,7 @@ def join_ends(ends, count):
 
 
 def push_row(rows, ends, column, row):
-    """Append a row to a column, whose end is ends[column + 1]."""
+    """Append a row to the column that ends at ends[column + 1]."""
     rows[ends[column + 1]] = row
     ends[column + 1] += 1
 
@@ -127,7 +127,7 @@ def block_places(ends, starts, rows):
 
 
 def find(rows, first, last, row):
-    """Return the place of a row among the sorted ones from `first` to `last`."""
+    """Return the place of a row among the sorted rows from `first` to `last`."""
     while last - first > 1:
         middle = (first + last) // 2
         if rows[middle] <= row:

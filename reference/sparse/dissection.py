@@ -3,7 +3,7 @@
 A separator is eliminated after both halves that it parts, and so on inside of the halves (George
 1973, "Nested Dissection of a Regular Finite Element Mesh"). Here separators are level sets of a
 few coordinates, which breadth-first searches find: with a and b far apart, dist(v, a) - dist(v, b)
-grows evenly from a to b, and its level sets run straight across, where those of one distance bend.
+grows evenly from a to b, and its level sets are straight, while level sets of a distance bend.
 Whatever the threshold t of a coordinate f, the vertices with f >= t that have a neighbour with
 f < t are a separator, and one sweep over the edges counts them for every t.
 
@@ -29,17 +29,17 @@ REMOVED = 2**30  # the coordinates of a vertex in a separator
 
 
 class Graph(NamedTuple):
-    """The neighbours of vertex v are indices[indptr[v]:indptr[v + 1]]; v itself may be one."""
+    """The neighbours of vertex v are indices[indptr[v]:indptr[v + 1]]; v itself may be included."""
 
     indptr: np.ndarray
     indices: np.ndarray
 
 
 class Search(NamedTuple):
-    """What the searches write and the splits read.
+    """The results of the searches, which the splits read.
 
     Attributes:
-        region: the piece that a vertex belongs to; each search moves what it reaches one further.
+        region: the piece of each vertex; a search adds one for the vertices that it reaches.
         axes: the coordinates, shape (axis, vertex).
         queue: the vertices in the order reached.
         lowest: the least coordinate among a vertex and its neighbours.
@@ -90,7 +90,7 @@ def nested_dissection(graph, order):
 
 
 def push(pieces, waiting, first, last, measured):
-    """Put a piece on the stack, if it has vertices; return the stack's height."""
+    """Push a piece, if it has vertices; return the stack's height."""
     if first == last:
         return waiting
     pieces[waiting, 0], pieces[waiting, 1], pieces[waiting, 2] = first, last, measured
@@ -114,7 +114,7 @@ def postpone_hubs(graph, search, order):
 
 
 def leave(search, v):
-    """Take a vertex out of every piece."""
+    """Remove a vertex from every piece."""
     search.region[v] = -1
     for axis in range(AXES):
         search.axes[axis, v] = REMOVED
@@ -128,9 +128,9 @@ def enter(search, piece, region):
 
 
 def breadth_first(graph, search, region, start, axis, head):
-    """Visit what can be reached from `start` in a region; return the end of the queue.
+    """Visit the vertices connected with `start` in a region; return the end of the queue.
 
-    The queue begins at `head`, distances go to `axis`, and what is reached moves to region + 1.
+    The queue begins at `head`, distances go to `axis`, and visited vertices to region + 1.
     """
     distance, queue, tail = search.axes[axis], search.queue, head + 1
     search.region[start] = region + 1
@@ -149,7 +149,7 @@ def breadth_first(graph, search, region, start, axis, head):
 
 
 def push_components(graph, search, region, piece, first, pieces, waiting):
-    """Put the components of a piece on the stack, small ones together; return its height."""
+    """Push the components of a piece, small components together; return the stack's height."""
     begin, end = 0, 0
     for v in piece:
         if search.region[v] == region:
@@ -187,7 +187,7 @@ def measure(graph, search, region, piece):
 
 
 def farthest(graph, axes, piece, axis):
-    """Return a vertex far from where earlier searches started, of the least degree among such.
+    """Return the vertex of least degree among the farthest from the starts of earlier searches.
 
     Gibbs, Poole, Stockmeyer 1976, "An Algorithm for Reducing the Bandwidth and Profile of a Sparse
     Matrix". Axis 0 holds the distances from any vertex at first. The second pair is far from both
@@ -283,7 +283,7 @@ def divide(search, axis, t, piece):
 def minimum_degree(graph, piece, local):
     """Reorder the vertices of a piece in place; `local` is -1 everywhere, before and after.
 
-    Of several vertices of least degree, the one goes first that has not changed for longest: so
+    Of several vertices of least degree, the longest unchanged goes first: so
     elimination moves about, as it does where many are eliminated at once (Liu 1985, "Modification
     of the Minimum-Degree Algorithm by Multiple Elimination").
     """
@@ -306,7 +306,7 @@ def minimum_degree(graph, piece, local):
 
 
 def adjacency(graph, piece, local):
-    """Return which vertex of the piece neighbours which of piece and halo, as zeros and ones."""
+    """Return the adjacency of the piece to piece and halo, as 0 and 1."""
     count, entries = len(piece), 0
     for i in range(count):
         local[piece[i]] = i

@@ -24,8 +24,7 @@ class SymbolicFactor:
     def __init__(self, indptr: Any, indices: Any) -> None:
         """Order the columns and find the pattern of L.
 
-        Raises:
-            ValueError: if the pattern is not symmetric.
+        Raise a ValueError if the pattern is not symmetric.
         """
         n = len(indptr) - 1
         pattern = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
@@ -82,18 +81,16 @@ class CholeskyFactor:
         return len(self._values)
 
     def refactorize(self, matrix: Any) -> "CholeskyFactor":
-        """Return the factor of another matrix, with this one's analysis if the pattern is the same.
+        """Return the factor of another matrix, with the same analysis if the pattern is the same.
 
-        Raises:
-            NotPositiveDefiniteError: if the matrix is not positive definite.
+        Raise a NotPositiveDefiniteError if the matrix is not positive definite.
         """
         return CholeskyFactor(matrix, self.pattern)
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side).
 
-        Raises:
-            ValueError: if b has another shape or is not numeric.
+        Raise a ValueError if b has another shape or is not numeric.
         """
         n, pattern = len(self.pattern.order), self.pattern
         if type(b) is not np.ndarray or b.dtype != FLOAT64 or not b.flags.carray:
@@ -128,11 +125,7 @@ class CholeskyFactor:
 
 
 def square(matrix: Any) -> Any:
-    """Return a matrix that is sparse, square and real.
-
-    Raises:
-        ValueError: if it is not.
-    """
+    """Return a matrix that is sparse, square and real; raise a ValueError if it is not."""
     if not scipy.sparse.issparse(matrix):
         raise ValueError(f"matrix: expected a square sparse matrix, got {shown(matrix)}")
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.dtype.kind not in "fiu":
@@ -144,8 +137,7 @@ def square(matrix: Any) -> Any:
 def right_sides(b: ArrayLike, n: int) -> FloatArray:
     """Return right-hand sides, (n,) or (n, right-hand side), as floats.
 
-    Raises:
-        ValueError: if they are no numbers or have another shape.
+    Raise a ValueError if they are no numbers or have another shape.
     """
     columns = floats("b", b, "...")
     if columns.ndim not in (1, 2) or len(columns) != n:

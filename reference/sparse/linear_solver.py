@@ -24,8 +24,7 @@ class Factor(Protocol):
     def refactorize(self, matrix: Any) -> "Factor":
         """Return the factor of another matrix, quicker where its pattern is the same.
 
-        Raises:
-            NotPositiveDefiniteError: if the matrix is not positive definite.
+        Raise a NotPositiveDefiniteError if the matrix is not positive definite.
         """
 
 

@@ -1,7 +1,7 @@
 """Compute L of P A P' = L L' by the multifrontal method, supernode by supernode.
 
-A supernode's columns of A and the updates that its children left are added into one dense front;
-its columns are eliminated there and what remains is the update for its parent (Duff and Reid 1983,
+A supernode's columns of A and the updates that its children left are added into a dense front;
+its columns are eliminated there and the remainder is the update for its parent (Duff and Reid 1983,
 "The Multifrontal Solution of Indefinite Sparse Symmetric Linear Systems"; Liu 1992, "The
 Multifrontal Method for Sparse Matrix Solution: Theory and Practice"). Children come right before
 their parents, so that the pending updates form a stack.
@@ -20,7 +20,7 @@ STRIP = 256  # columns updated together, so that those of a panel stay in a near
 
 
 def factorize(matrix, data, order, place, blocks, family, values):
-    """Fill `values` with L's columns; return the first whose pivot is not positive, or -1."""
+    """Fill `values` with L's columns; return the first without a positive pivot, or -1."""
     work, stack = np.empty(blocks.tallest * blocks.tallest), np.empty(family.highest)
     columns, starts, rows = blocks.columns, blocks.starts, blocks.rows
     local, places = np.empty(len(order), np.int32), np.empty(blocks.tallest, np.int32)
@@ -74,7 +74,7 @@ def add_update(stack, position, places, count, front):
 
 
 def store(front, first, last, target, position):
-    """Copy rows of a front from the diagonal on, one after the other; return where they end."""
+    """Copy rows of a front from the diagonal on into consecutive places; return their end."""
     size = len(front)
     for j in range(first, last):
         for i in range(size - j):
@@ -84,7 +84,7 @@ def store(front, first, last, target, position):
 
 
 def eliminate(front, width):
-    """Eliminate the first rows of a front; return the first whose pivot is not > 0, or -1."""
+    """Eliminate the first rows of a front; return the first without a positive pivot, or -1."""
     size = len(front)
     for first in range(0, width, PANEL):
         last = min(first + PANEL, width)
@@ -104,7 +104,7 @@ def eliminate(front, width):
 
 
 def eliminate_panel(front, first, last):
-    """Eliminate rows from each other; return the first whose pivot is not positive, or -1."""
+    """Eliminate rows from each other; return the first without a positive pivot, or -1."""
     size = len(front)
     for j in range(first, last):
         subtract_from_one(front, first, j, j, j, size)
@@ -138,7 +138,7 @@ def subtract_from_one(front, first, last, k, begin, end):
 
 
 def subtract_from_four(front, first, last, k, begin, end):
-    """Do what `subtract_from_one` does for rows k to k + 3, with a quarter of the loads."""
+    """Do the same as `subtract_from_one` for rows k to k + 3, with a quarter of the loads."""
     k0, k1, k2, k3, j = at(k), at(k + 1), at(k + 2), at(k + 3), first
     while j + 4 <= last:
         A, B, C, D = at(j), at(j + 1), at(j + 2), at(j + 3)

@@ -2,7 +2,7 @@
 
 The elimination tree makes the parent of column j the first row below the diagonal of column j of L
 (Liu 1990, "The Role of Elimination Trees in Sparse Factorization"). Supernodes are runs of columns
-of L with one common pattern below them, stored and used as blocks. Fundamental ones follow from
+of L with a common pattern below them, stored and used as blocks. Fundamental ones follow from
 parents and column counts (Ng and Peyton 1993, "Block Sparse Cholesky Algorithms on Advanced
 Uniprocessor Computers"). Small ones are merged with their parents where that adds few explicit
 zeros (Ashcraft and Grimes 1989, "The Influence of Relaxed Supernode Partitions on the Multifrontal
@@ -41,7 +41,7 @@ class UpdateTree(NamedTuple):
 
     Attributes:
         starts: where each supernode's children begin in `children`; shape (supernode + 1,).
-        children: of each supernode, last one first, as their updates lie on the stack.
+        children: of each supernode, last first, as their updates lie on the stack.
         highest: the height of the stack of updates.
         entries: the number of entries of L.
     """
@@ -71,7 +71,7 @@ def analyse(graph, order):
 
 
 def inverse(order):
-    """Return where each vertex comes in an order."""
+    """Return the place of each vertex in an order."""
     place = np.empty(len(order), np.int32)
     for i in range(len(order)):
         place[order[i]] = i
@@ -144,8 +144,8 @@ def column_counts(graph, order, place, parents):
     """Return the number of entries in each column of L, the diagonal included.
 
     The nodes are in postorder. Row i of L is the subtree of the nodes k with a_ik not zero and
-    their ancestors up to i; adding up over all rows, each leaf of a subtree counts one and each
-    meeting of two paths subtracts one (Gilbert, Ng, Peyton 1994, "An Efficient Algorithm to
+    their ancestors up to i; adding up over all rows, each leaf of a subtree adds 1 and each
+    meeting of two paths subtracts 1 (Gilbert, Ng, Peyton 1994, "An Efficient Algorithm to
     Compute Row and Column Counts for Sparse Cholesky Factorization").
     """
     n = len(order)
@@ -174,7 +174,7 @@ def column_counts(graph, order, place, parents):
 
 
 def first_descendants(parents):
-    """Return the first node of each subtree in postorder, and one for each leaf, else zero."""
+    """Return the first node of each subtree in postorder, and 1 for each leaf, else 0."""
     n = len(parents)
     first, counts = np.arange(n).astype(np.int32), np.ones(n, np.int32)
     for j in range(n):
@@ -294,7 +294,7 @@ def structure(graph, order, place, columns, parents, counts):
 
 
 def row_lists(graph, order, place, member, above, starts):
-    """Return the rows below each supernode, one list after the other.
+    """Return the rows below each supernode, list after list.
 
     Row i of L reaches from the supernodes of its entries in A up to its own; running through the
     rows in order leaves every list sorted.

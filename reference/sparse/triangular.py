@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import uint64 as at
 
-from ..backend.simd.rows import load_row, prefetch, scale_row, store_row, subtract_scaled
+from ..backend.simd.vectors import load_row, prefetch, scale_row, store_row, subtract_scaled
 
 # Right-hand sides solved together, and the doubles of a register that holds one unknown of each.
 RIGHT_HAND_SIDES, REGISTER = 3, 4
@@ -27,7 +27,7 @@ LINE = 8  # entries that come from memory together
 def solve(order, columns, starts, rows, values, b, y, x):
     """Solve A x = b for three right-hand sides: fill x, (n, 3); y is workspace, (n, 4).
 
-    The arguments are those of `Supernodes`, one by one: passing a tuple takes longer than solving a
+    The arguments are the fields of `Supernodes`: passing a tuple takes longer than solving a
     small system.
     """
     p, ahead = starts[0], AHEAD if len(values) > NEAR else 0
@@ -131,7 +131,7 @@ def subtract_four(z, values, p, q, r, s, rows):
 
 
 def eliminate_four(values, p, size, j, last, below, y):
-    """Do what `eliminate` does for columns j to j + 3; return where they end."""
+    """Do the same as `eliminate` for columns j to j + 3; return where they end."""
     p, q, r, s = four_columns(p, size)
     a = scale_row(1.0 / values[at(p)], load_row(y, at(j)))
     b = subtract_scaled(load_row(y, at(j + 1)), values[at(p + 1)], a)
@@ -160,7 +160,7 @@ def eliminate_four(values, p, size, j, last, below, y):
 
 
 def substitute_four(values, p, size, j, last, below, y):
-    """Do what `substitute` does for columns j to j + 3."""
+    """Do the same as `substitute` for columns j to j + 3."""
     p, q, r, s = four_columns(p, size)
     a, b = load_row(y, at(j)), load_row(y, at(j + 1))
     c, d = load_row(y, at(j + 2)), load_row(y, at(j + 3))

@@ -10,7 +10,7 @@ from plumbob.bench.comparison.rows import Pair, row_key
 from plumbob.bench.experiments.check import tables as check
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.kinematics import inverse_kinematics, laws, resample
-from plumbob.crosscheck.verify.kinematics.polylines import Line
+from plumbob.crosscheck.verify.kinematics.polylines import Polyline
 from plumbob.crosscheck.verify.output import comparison
 from plumbob.reference import Skeleton, arguments
 from plumbob.reference.articulation import Articulation
@@ -47,9 +47,9 @@ def claimed_residual():
 def spaced(gap, spacing):
     points = np.array([[0.0, 0, 0], [gap, 0, 0], [1.0, 0, 0]])
     case = Case("", "", {"curve": points, "spacing": spacing, "closed": False}, "", laws.HOLDS,
-                facts={"line": Line(points, (0,), False)})  # fmt: skip
+                facts={"line": Polyline(points, (0,), False)})  # fmt: skip
     gaps = np.array([gap])
-    return resample._widest([gaps, gaps, gaps], case, 0.0).sentence
+    return resample._gaps_by_spacing([gaps, gaps, gaps], case, 0.0).sentence
 
 
 def sizes(make):
@@ -61,7 +61,7 @@ def sizes(make):
 def missed_claim(make):
     record = make.claim(held=False)
     record.arrays.update(difference=np.array(1e-10 * CLOSE), tolerance=np.array(1e-10))
-    return check._verdict(record)
+    return check._row(record)["verdict"]
 
 
 SENTENCES = {

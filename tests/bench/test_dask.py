@@ -21,7 +21,7 @@ import pytest
 from plumbob import cli
 from plumbob.bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
 from plumbob.bench.harness import run, values
-from plumbob.bench.harness.choice import Choice
+from plumbob.bench.harness.block import Choice
 from plumbob.bench.harness.executors import dask, executor_at, work
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import block_key, measure
@@ -32,7 +32,7 @@ from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
-from plumbob.bench.tables.table import markdown
+from plumbob.bench.tables.writers import markdown
 
 TINY = Scale(targets=3, seconds=0.001)
 ROOT = Path(__file__).parents[2]
@@ -451,7 +451,7 @@ import os, sys, signal
 from plumbob.bench.experiments import SCALES, Scale
 from plumbob.bench.harness.executors import executor_at
 from plumbob.bench.harness import run
-from plumbob.bench.harness.choice import Choice
+from plumbob.bench.harness.block import Choice
 from pathlib import Path
 SCALES["quick"] = Scale(targets=3, seconds=0.001)
 done = 0

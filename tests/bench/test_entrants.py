@@ -242,7 +242,7 @@ def test_a_request_that_a_solver_counts_no_time_of_takes_its_round_trip(
 
 def test_a_budget_ends_though_a_solver_counts_almost_nothing(pass_by):
     budget = stopwatch.Budget(1.0)
-    for _ in range(int(stopwatch.MOST_AT_DOORS)):
+    for _ in range(int(stopwatch.MAXIMUM_EXTENSION)):
         assert not budget.is_spent
         pass_by(1.0)
         budget.excuse(1.0 - 1e-12)
@@ -293,7 +293,7 @@ def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
 
 
 def entrants(*words):
-    return opening.opened(opening.named(words), ["ik"])
+    return opening.opened(opening.addresses(words), ["ik"])
 
 
 @pytest.mark.parametrize("name", ["CCD", "mink", "TRAC-IK, 5 ms"])
@@ -457,13 +457,13 @@ def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
 
 
 def dry(folder, *words):
-    from plumbob.commands import outlook
-    from plumbob.commands.bench import Asked, _choice
+    from plumbob.commands import plan
+    from plumbob.commands.selection import Request, choose
 
     given = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--problem"]
     entered = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--with"]
-    choice = _choice(["ik"], "quick", Asked(entered, problems=given))
-    return "\n".join(outlook.dry_run(["ik"], choice, folder / "out"))
+    choice = choose(["ik"], "quick", Request(entered, problems=given))
+    return "\n".join(plan.dry_run(["ik"], choice, folder / "out"))
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 
 from plumbob.bench.figures import drawing
 from plumbob.bench.figures import sketch as figures
-from plumbob.bench.figures.chart import LOOKS, MOST, Axis, Chart, Panel, looks, series
+from plumbob.bench.figures.chart import LOOKS, MAX_LABELLED, Axis, Chart, Panel, looks, series
 from plumbob.bench.figures.sketch import chart_sketch, drawn
 from plumbob.bench.report import report
 from plumbob.bench.report.page import page
@@ -57,10 +57,10 @@ def test_at_most_six_curves_are_labelled_and_every_other_can_be_named(records, c
     for chart in made:
         names = chart.labelled
         assert len(names) <= 6
-        assert set(names) | set(chart.others) == set(chart.solvers)
-        assert bool(chart.others) == (len(chart.solvers) > MOST)
-        if chart.others:
-            assert all(label(name) in chart.caption for name in chart.others)
+        assert set(names) | set(chart.unlabelled) == set(chart.solvers)
+        assert bool(chart.unlabelled) == (len(chart.solvers) > MAX_LABELLED)
+        if chart.unlabelled:
+            assert all(label(name) in chart.caption for name in chart.unlabelled)
 
 
 OURS = ("ccd", "fabrik", "levenberg_marquardt", "newton", "lbfgs", "chebyshev", "local_global")
@@ -92,13 +92,13 @@ def test_the_best_by_the_measure_of_the_figure_are_those_labelled():
     assert "s3" in replace(chart, entrants=frozenset({"s3"})).labelled
 
 
-@pytest.mark.parametrize("count", range(1, MOST + 1))
+@pytest.mark.parametrize("count", range(1, MAX_LABELLED + 1))
 def test_labelled_curves_differ_in_colour_line_and_marker(count):
     for names in combinations(["ccd", "fabrik", ENTRANT, "x", "yy", "Pinocchio", "lbfgs"], count):
         made = list(looks(names).values())
         for part in zip(*made, strict=True):
             assert len(set(part)) == count
-    assert len({look.colour for look in LOOKS}) == MOST
+    assert len({look.colour for look in LOOKS}) == MAX_LABELLED
 
 
 def boxes(figure):
@@ -169,7 +169,7 @@ def test_a_legend_on_the_data_and_crowded_texts_would_be_found(records):
 
 
 def test_text_on_the_page_is_never_below_seven_points(records):
-    css = (page._HERE / "page.css").read_text()
+    css = (page._FOLDER / "page.css").read_text()
     narrowest = min(
         float(rem) for rem in re.findall(r"figure svg \{[^}]*min-width: ([\d.]+)rem", css)
     )
@@ -194,13 +194,13 @@ def test_a_figure_is_drawn_again_only_if_it_shows_something_else(tmp_path, recor
     first = drawn(sketch)
     (tmp_path / f"{sketch.name}.svg").write_text(first.svg, encoding="utf-8")
     (tmp_path / f"{sketch.name}.pdf").write_bytes(first.pdf)
-    monkeypatch.setattr(figures, "_drawn", type(figures._drawn)())
-    monkeypatch.setattr(figures, "_files", lambda *_: ("drawn anew", b"%PDF"))
+    monkeypatch.setattr(figures, "_cache", type(figures._cache)())
+    monkeypatch.setattr(figures, "_draw", lambda *_: ("drawn anew", b"%PDF"))
     assert drawn(sketch, tmp_path) == first
     other = replace(sketch.data, title="another title")
     assert drawn(chart_sketch(other), tmp_path).svg == "drawn anew"
     (tmp_path / f"{sketch.name}.pdf").unlink()
-    monkeypatch.setattr(figures, "_drawn", type(figures._drawn)())
+    monkeypatch.setattr(figures, "_cache", type(figures._cache)())
     assert drawn(sketch, tmp_path).svg == "drawn anew"
 
 
@@ -257,7 +257,7 @@ def test_a_drawing_from_a_folder_brings_no_script_and_no_address_into_the_page(f
     file = tmp_path / "n.svg"
     file.write_text(clean.svg.replace("</svg>", f"{foreign}</svg>"), encoding="utf-8")
     (tmp_path / "n.pdf").write_bytes(clean.pdf)
-    figures._drawn.clear()
+    figures._cache.clear()
     assert drawn(sketch, tmp_path).svg == clean.svg
 
 

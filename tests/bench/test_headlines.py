@@ -25,7 +25,7 @@ def raced(make, solver, solved, seconds=1e-5, **more):
 
 def asked(records, question, chapter="kinematics"):
     (found,) = [h for h in headlines.headlines(Results(records))
-                if (h.asked, h.chapter) == (question, chapter)]  # fmt: skip
+                if (h.question, h.chapter) == (question, chapter)]  # fmt: skip
     return found
 
 
@@ -191,7 +191,7 @@ def test_the_verdict_names_the_claim_with_the_narrowest_margin(make):
     wide, narrow = make.claim("wide"), make.claim("narrow")
     narrow.arrays["difference"] = np.array(9e-13)
     found = headlines.verdict(Results([wide, narrow, make.claim("broken", held=False)]))
-    assert found == headlines.Verdict(2, 3, "narrow", pytest.approx(0.9))
+    assert found == headlines.ClaimCount(2, 3, "narrow", pytest.approx(0.9))
     assert headlines.verdict(Results([])) is None
 
 
@@ -222,7 +222,7 @@ def test_the_scale_says_how_many_targets(make):
 
 
 def test_nothing_measured_gives_no_headline():
-    assert headlines.answers(Results([])) == (None, [], "", [], [])
+    assert headlines.overview(Results([])) == (None, [], "", [], [])
 
 
 def test_a_paired_ratio_holds_the_factor_and_a_single_pair_leaves_it_open():

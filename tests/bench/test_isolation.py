@@ -12,17 +12,17 @@ from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots.tables import outcomes
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
-from plumbob.bench.harness.job import AGAIN, Job
+from plumbob.bench.harness.job import REPEATS, Job
 from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
+from plumbob.bench.harness.worker import Finished, Ready, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
-from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robots import robot
 from plumbob.bench.tables.results import Results
-from plumbob.bench.tables.table import markdown
+from plumbob.bench.tables.writers import markdown
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -41,7 +41,8 @@ def prepare(robot, tolerance, manner="perfect", at=2):
         import an_engine_that_nobody_has
     asked = [-2]  # the first is for the warm-up
 
-    def ask(positions, rotations, start):
+    def ask(request):
+        start = request.start
         asked[0] += 1
         number = asked[0]
 
@@ -173,7 +174,7 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
     messages(targets, "slow", at=1)
     setup, warm, *each = counts
     assert (setup, warm) == (0, 0)
-    assert each == [1, 1 + AGAIN, 1, 1 + AGAIN]
+    assert each == [1, 1 + REPEATS, 1, 1 + REPEATS]
 
 
 @pytest.mark.parametrize("again", [1, 7])
@@ -185,7 +186,7 @@ def test_the_answers_are_the_same_however_often_a_quick_solve_is_made_again(
 
     def answers(quick, again):
         monkeypatch.setattr("plumbob.bench.harness.job.QUICK", quick)
-        monkeypatch.setattr("plumbob.bench.harness.job.AGAIN", again)
+        monkeypatch.setattr("plumbob.bench.harness.job.REPEATS", again)
         said = messages(targets, manner, restarts=restarts)
         return np.array([one.q for one in said if isinstance(one, Solved)])
 
@@ -208,7 +209,7 @@ def messages(targets, manner, **more):
 
 def test_the_worker_says_when_it_is_ready_each_target_and_the_end(targets):
     said = messages(targets, "perfect")
-    assert [type(message) for message in said] == [Ready, *[Solved] * COUNT, Done]
+    assert [type(message) for message in said] == [Ready, *[Solved] * COUNT, Finished]
 
 
 def test_one_that_raises_loses_one_target_and_says_why(targets):
@@ -224,8 +225,8 @@ def test_one_that_raises_loses_one_target_and_says_why(targets):
 )
 def test_one_that_cannot_be_set_up_says_why(targets, manner, why):
     (said,) = messages(targets, manner)
-    assert isinstance(said, Unfit)
-    assert said.why.startswith(why)
+    assert isinstance(said, Finished)
+    assert said.trouble.startswith(why)
 
 
 @pytest.mark.parametrize(
@@ -249,7 +250,7 @@ def test_an_answer_of_another_shape_is_none(targets):
 
 def test_a_solver_without_time_left_begins_no_further_target(targets):
     said = messages(targets, "slow", at=0, budget=0.2)
-    assert [type(message) for message in said] == [Ready, Solved, Done]
+    assert [type(message) for message in said] == [Ready, Solved, Finished]
 
 
 class Attempts:
@@ -261,7 +262,8 @@ class Attempts:
     def __init__(self, *answers):
         self.answers, self.asked, self.starts = list(answers), [], []
 
-    def __call__(self, positions, rotations, start):
+    def __call__(self, request):
+        start = request.start
         self.asked.append(start)
 
         def solve():
@@ -294,7 +296,7 @@ NOTHING, LATER = SolverOutput(None, False), SolverOutput(np.ones(7), True)
 def test_restarts_end_with_the_first_claim_within_the_limits(answers, count, q, claimed, error):
     """Targets are converted for every restart before the clock runs, each from its own start."""
     attempts = Attempts(*answers)
-    solve = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))
+    solve = restarted(attempts, robot("iiwa14"), 3)(PoseRequest(None, None, np.full(7, 0.5)))
     assert len(attempts.asked) == 4
     assert not attempts.starts
     answer = solve()

@@ -81,7 +81,7 @@ def document(tables, width):
     return (
         r"\pdfcompresslevel=0 \pdfobjcompresslevel=0 \documentclass{article}"
         r"\usepackage[T1]{fontenc}\usepackage{lmodern,booktabs,xltabular,siunitx}"
-        rf"\usepackage[textwidth={latex.paper(width).width:.1f}pt,textheight=640pt]{{geometry}}"
+        rf"\usepackage[textwidth={latex.paper(width)[0]:.1f}pt,textheight=640pt]{{geometry}}"
         rf"\begin{{document}}{body}\end{{document}}"
     )
 

@@ -157,13 +157,13 @@ def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder, mo
     assert headings[: len(SUITES)] == list(SUITES)
     assert len(lines) <= 5 * len(SUITES) + 1
     assert max(map(len, lines)) <= 100
-    assert lines[-1] == "All problems and solvers of one: plumbob bench SUITE --list"
+    assert lines[-1] == "All problems and solvers of a suite: plumbob bench SUITE --list"
     assert "joint positions, Pinocchio; " in "\n".join(lines)
     assert "joint positions, Pinocchio joint" not in "\n".join(lines)
 
 
 def test_entrants_may_make_as_many_iterations_as_ours(folder, records, made):
-    entrants = opening.opened(opening.named(["my_ik.py"]), ["ik"])
+    entrants = opening.opened(opening.addresses(["my_ik.py"]), ["ik"])
     scale = selection.scale_of("quick", 2, entrants, [])
     asked: dict[str, dict[str, object]] = {}
     for block in blocks("ik", scale):

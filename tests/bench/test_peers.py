@@ -13,7 +13,7 @@ from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.protocol import OwnTime
 from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, RESTARTS
-from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
 from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, is_installed, robot
 
@@ -158,10 +158,10 @@ def measuring(seconds):
     """A solver that claims its third attempt, and says how long each of them took."""
     attempts = []
 
-    def ask(positions, rotations, start):
+    def ask(request):
         def solve():
-            attempts.append(start)
-            return SolverOutput(start, len(attempts) == 3, seconds and OwnTime(seconds))
+            attempts.append(request)
+            return SolverOutput(request.start, len(attempts) == 3, seconds and OwnTime(seconds))
 
         return solve
 
@@ -172,7 +172,7 @@ def measuring(seconds):
 def test_times_that_a_solver_measures_are_added_over_its_restarts(each, together):
     arm = robot("iiwa14")
     nowhere = np.zeros((1, 3)), np.eye(3)[None], arm.draw(np.random.default_rng(0), 1)[0]
-    answer = restarted(measuring(each), arm, 5)(*nowhere)()
+    answer = restarted(measuring(each), arm, 5)(PoseRequest(*nowhere))()
     assert answer.claim
     assert answer.time == (together and OwnTime(together))
 
@@ -190,6 +190,6 @@ def test_the_choice_among_its_solutions_is_not_charged_to_eaik():
 
     targets = robot_targets("ur5", 2)
     ask = eaik.prepare(robot("ur5"), TOLERANCE)
-    for x, R, start in zip(targets.positions, targets.rotations, targets.starts, strict=True):
-        answer, whole = stopwatch.time_call(ask(x, R, start))
+    for i in range(len(targets.starts)):
+        answer, whole = stopwatch.time_call(ask(targets.request(i)))
         assert 0 < answer.time.seconds < whole

@@ -163,7 +163,7 @@ def test_what_is_missing_is_said(tmp_path, records):
     older = replace(others[1], stamp={"source": "other"}, when="1999-01-01T00:00:00+00:00")
     result, page = written(tmp_path, [failed, others[0], older, *others[2:]])
     for words in (
-        "“cloth” was not run to its end",
+        "“cloth” is not complete",
         "gone, MuJoCo could not be measured: OSError: no engine",
         "cholespy is not installed",
         "1 of ",
@@ -305,7 +305,7 @@ def test_a_fault_of_a_table_is_an_error_and_no_fault_of_a_record(tmp_path, recor
     def fails(_):
         raise KeyError("a fault of ours")
 
-    monkeypatch.setattr(report, "answers", fails)
+    monkeypatch.setattr(report, "overview", fails)
     with pytest.raises(KeyError, match="a fault of ours"):
         written(tmp_path, records)
     assert len(RecordFile(tmp_path).read().records) == len(records)

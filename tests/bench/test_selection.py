@@ -14,19 +14,10 @@ from plumbob import cli
 from plumbob.bench.harness.metrics import Share, share
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.report import sections
-from plumbob.bench.tables.fragment import fragment
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.selection import column_numbers, selected
-from plumbob.bench.tables.table import (
-    NO_SUMMARY,
-    Column,
-    Summary,
-    Table,
-    best_cells,
-    comma_separated,
-    markdown,
-    words,
-)
+from plumbob.bench.tables.table import NO_SUMMARY, Column, Summary, Table, best_cells, words
+from plumbob.bench.tables.writers import comma_separated, html_fragment, markdown
 
 COLUMNS = (
     Column("robot", words=True),
@@ -170,7 +161,7 @@ class Cells(html.parser.HTMLParser):
 
 
 def test_all_forms_say_the_same_and_csv_keeps_all_digits():
-    page, text = Cells(fragment(TABLE)), markdown(TABLE)
+    page, text = Cells(html_fragment(TABLE)), markdown(TABLE)
     assert page.open == []
     assert not page.tags & {"script", "link", "style", "img"}
     bold = re.findall(r"\*\*(.*?)\*\*", text)
@@ -183,7 +174,7 @@ def test_all_forms_say_the_same_and_csv_keeps_all_digits():
 
 def test_html_is_data_whatever_a_name_is():
     nasty = '<img src=x onerror="alert(1)">&'
-    page = Cells(fragment(Table("t", nasty, (Column(nasty),), ((nasty,),), nasty, nasty)))
+    page = Cells(html_fragment(Table("t", nasty, (Column(nasty),), ((nasty,),), nasty, nasty)))
     assert "img" not in page.tags
     assert page.rows == [[nasty], [nasty]]
 

@@ -11,8 +11,9 @@ from PIL import Image
 
 from plumbob import cli
 from plumbob.bench.motion import motion
-from plumbob.bench.show import film, ours
-from plumbob.bench.show.yours import Yours
+from plumbob.bench.show import film
+from plumbob.bench.show import scenes as shows
+from plumbob.bench.show.your_solver import YourSolver
 from plumbob.reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
 
 IK = """
@@ -49,9 +50,9 @@ DOT = """
 def short(monkeypatch, tmp_path):
     """Curves of few points and a short swing, in a folder of their own."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(ours, "FRAMES", 6)
-    monkeypatch.setattr(ours, "MIN_SPACING", 0.3)
-    monkeypatch.setattr(ours, "MAX_SPACING", 0.6)
+    monkeypatch.setattr(shows, "FRAMES", 6)
+    monkeypatch.setattr(shows, "MIN_SPACING", 0.3)
+    monkeypatch.setattr(shows, "MAX_SPACING", 0.6)
 
 
 def file(tmp_path, name, text):
@@ -85,10 +86,10 @@ def test_your_arm_stands_beside_ours_with_its_error(capsys, tmp_path):
 
 
 def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tmp_path):
-    mine = Yours([file(tmp_path, "my_ik.py", IK.format(""))])
-    found = ours.drawn("circle", "ccd", coherent=False)
+    mine = YourSolver([file(tmp_path, "my_ik.py", IK.format(""))])
+    found = shows.arm_motion("circle", "ccd", coherent=False)
     told = []
-    positions = mine.draws(found, lambda done, total: told.append((done, total)))
+    positions = mine.follow_curve(*found[:3], lambda done, total: told.append((done, total)))
     mine.close()
     np.testing.assert_allclose(positions, found.motion.positions, atol=1e-9)
     assert told[-1] == (len(found.curve), len(found.curve))
@@ -97,11 +98,11 @@ def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tm
 
 
 def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
-    yours = Yours([file(tmp_path, "tracks.py", DOT)])
-    found = ours.drawn("heart", "fabrik", coherent=False)
-    positions = yours.draws(found, lambda *_: None)
+    yours = YourSolver([file(tmp_path, "tracks.py", DOT)])
+    found = shows.arm_motion("heart", "fabrik", coherent=False)
+    positions = yours.follow_curve(*found[:3], lambda *_: None)
     yours.close()
-    scene = ours.arm_scene("heart", found, "ours", ("yours", positions))
+    scene = shows.arm_scene("heart", found, "ours", ("yours", positions))
     assert [one.label for one in scene.motions] == ["yours", "ours"]
     assert scene.motions[0].errors.max() == 0.0
 
@@ -109,15 +110,15 @@ def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
 def test_the_cloth_by_your_steps_is_as_far_off_as_it_is(tmp_path):
     system, start = scenes.lab_cloth()
     for change, least in (("", 0.0), (" + 1e-3", 1e-3)):
-        yours = Yours([file(tmp_path, "my_cloth.py", STEP.format(change))])
-        found = ours.fallen("newton")
-        positions = yours.falls(found, lambda *_: None)
+        yours = YourSolver([file(tmp_path, "my_cloth.py", STEP.format(change))])
+        found = shows.cloth_motion("newton")
+        positions = yours.step_cloth(*found[:2], len(found.positions) - 1, lambda *_: None)
         yours.close()
-        scene = ours.cloth_scene(found, "newton", ("yours", positions))
+        scene = shows.cloth_scene(found, "newton", ("yours", positions))
         assert scene.motions[1].errors.max() == 0.0
         assert least <= scene.motions[0].errors.max() < 1e-6 + 100 * least
     state = State(start.positions, start.velocities)
-    first = ImplicitEuler(system, h=ours.H).step(state).state.positions
+    first = ImplicitEuler(system, h=shows.H).step(state).state.positions
     np.testing.assert_allclose(found.positions[1], first, atol=0)
 
 
@@ -130,13 +131,13 @@ def test_a_cloth_that_blows_up_is_shown_until_it_does(tmp_path):
             return {"positions": positions * 1e200, "velocities": velocities}
         """,
     )
-    yours = Yours([mine])
-    found = ours.fallen("newton")
-    positions = yours.falls(found, lambda *_: None)
+    yours = YourSolver([mine])
+    found = shows.cloth_motion("newton")
+    positions = yours.step_cloth(*found[:2], len(found.positions) - 1, lambda *_: None)
     yours.close()
     assert np.isfinite(positions[1]).all()
     assert np.isnan(positions[-1]).all()
-    text = motion.page(ours.cloth_scene(found, "newton", ("yours", positions)))
+    text = motion.page(shows.cloth_scene(found, "newton", ("yours", positions)))
     assert "NaN" not in text
     assert "Infinity" not in text
 
@@ -172,7 +173,7 @@ def extent(path):
 
 @pytest.mark.parametrize("name", ["heart.svg", "star.svg", "circle.svg", "circle.gif"])
 def test_a_curve_in_a_plane_is_seen_upright_and_almost_face_on(capsys, tmp_path, monkeypatch, name):
-    monkeypatch.setattr(ours, "FRAMES", 20)
+    monkeypatch.setattr(shows, "FRAMES", 20)
     assert show(capsys, name[:-4], "-o", tmp_path / name)[0] == 0
     points = resample(curves[name[:-4]](), min_spacing=0.3, max_spacing=0.6)
     wide, high = extent(tmp_path / name) / np.ptp(points[:, [0, 2]], axis=0)
@@ -195,7 +196,7 @@ def test_an_animation_that_is_interrupted_leaves_no_file(capsys, tmp_path, monke
         if frame == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(film, "_frame", interrupted)
+    monkeypatch.setattr(film, "_draw_frame", interrupted)
     assert show(capsys, "circle", "-o", "c.gif")[0] == 130
     assert not (tmp_path / "c.gif").exists()
 

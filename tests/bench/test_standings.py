@@ -16,7 +16,7 @@ from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening
 from plumbob.bench.report import outcome, report
 from plumbob.bench.report.sections import tables
-from plumbob.bench.report.standings import CLOTHS, standings
+from plumbob.bench.report.standings import MAX_CLOTHS, standings
 from plumbob.bench.tables.results import Results
 from plumbob.cli import run_command
 
@@ -36,7 +36,7 @@ def test_rank_share_and_times_are_those_of_the_records(make):
         make.solving("Plumbob LM", 195, seconds=2e-3),
     ]
     standing = only([*others, mine])
-    assert standing.asked == "Mine, robots, one start"
+    assert standing.question == "Mine, robots, one start"
     assert standing.answer == "rank 3 of 3 solvers"
     share = metrics.share(np.arange(N) < 150)
     low, high = (round(100 * x, 1) for x in (share.low, share.high))
@@ -93,7 +93,7 @@ def test_on_chains_ours_are_called_so_and_what_is_beyond_reach_does_not_count(ma
         chained(make, "Mine", missed, 1e-3, "beyond", mine=True),
     ]
     standing = only(records)
-    assert standing.asked == "Mine, chain of balls"
+    assert standing.question == "Mine, chain of balls"
     assert standing.answer == "rank 3 of 3 solvers"
     assert standing.detail.startswith("25 % of 20 targets solved")
     assert "times slower than Plumbob FABRIK (" in standing.detail
@@ -107,7 +107,7 @@ def test_on_cloths_a_rank_is_by_the_error_and_a_time_beside_who_comes_as_near(ma
         make.entered(make.worked("Mine", error=(0.5, 0.2), seconds=(1e-3, 4e-3))),
     ]
     standing = only(records)
-    assert (standing.asked, standing.answer) == ("Mine, step of 1 cloth", "rank 2 of 3")
+    assert (standing.question, standing.answer) == ("Mine, step of 1 cloth", "rank 2 of 3")
     assert standing.detail == (
         "20 × 20, 1,000 N/m: error 0.200 in 4.00 ms, 2.00 times slower than MuJoCo Euler and "
         "1.25 times faster than Plumbob Newton"
@@ -121,7 +121,7 @@ def test_motions_are_ranked_by_the_distance_from_the_truth(make):
     """Of settings that got to the end: others are nearer, but diverged or were cut short."""
     records = [make.fell("Plumbob Newton"), make.entered(make.fell("Mine", true=[0.0, 1e-2, 0.0]))]
     standing = only(records)
-    assert (standing.asked, standing.answer) == ("Mine, motion of 1 cloth", "rank 1 of 2")
+    assert (standing.question, standing.answer) == ("Mine, motion of 1 cloth", "rank 1 of 2")
     assert "0.0100 m from the truth in 1.00 ms" in standing.detail
 
 
@@ -130,9 +130,9 @@ def test_many_cloths_have_few_sentences_and_the_rank_on_all(make):
     records = [make.worked("MuJoCo Euler", k, error=(0.1, 0.01)) for k in stiffnesses]
     records += [make.entered(make.worked("Mine", k, error=(0.1, 0.02))) for k in stiffnesses]
     standing = only(records)
-    assert standing.asked == "Mine, step of 5 cloths"
+    assert standing.question == "Mine, step of 5 cloths"
     assert standing.answer == "rank 2 of 2"
-    assert standing.detail.count("N/m: ") == CLOTHS
+    assert standing.detail.count("N/m: ") == MAX_CLOTHS
 
 
 RAISED = "It raised ValueError in line 3 of mine.py: no, on 4 of 200 targets"
@@ -145,7 +145,7 @@ def test_what_a_solver_raised_stands_below_its_ranks_with_how_often(make):
     )
     rank, trouble, unranked = standings(Results([bad, good]))
     assert rank.answer == "rank 1 of 1 solver"
-    assert (trouble.asked, trouble.answer) == ("Mine, suite ik", "trouble on 1 of 2 problems")
+    assert (trouble.question, trouble.answer) == ("Mine, suite ik", "trouble on 1 of 2 problems")
     assert trouble.detail == f"robots/arm: {RAISED}"
     assert unranked.answer == "not ranked, solves nothing"
 
@@ -177,7 +177,7 @@ def test_the_first_screen_of_the_page_begins_with_the_solver_of_the_user(make, t
     assert heading == "Mine, robots, one start: rank 3 of 3 solvers"
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
         assert f'<a href="#{standing.table}">{standing.answer}</a>' in screen
-        assert standing.asked in screen
+        assert standing.question in screen
     assert screen.index("Your solver") < screen.index("Not checked yet")
     assert RAISED in screen
 
@@ -193,9 +193,9 @@ def test_a_bench_ends_with_the_solver_of_the_user_and_who_leads(
     assert max(map(len, lines)) <= width
     said = " ".join(lines)
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
-        assert f"{standing.asked}: {standing.answer}; {standing.detail}." in said
+        assert f"{standing.question}: {standing.answer}; {standing.detail}." in said
     assert lines[0].startswith("Mine, robots, one start: rank 3 of 3 solvers; ")
-    assert said.index("trouble on 1 of 2 problems") < said.index("kinematics, most accurate")
+    assert said.index("trouble on 1 of 2 problems") < said.index("Kinematics, most accurate")
 
 
 def test_a_report_ends_with_the_solver_of_the_user_first(make, tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from plumbob.bench.experiments import SUITES, Scale, blocks
 from plumbob.bench.experiments.cloth import ONE_STEP
 from plumbob.bench.experiments.cloth import measurement as cloth
-from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.cloth.tables import convergence
 from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.machine import stamp
@@ -17,7 +17,7 @@ from plumbob.bench.harness.measure import measure
 from plumbob.bench.harness.record import Record, decode, encode, key
 from plumbob.bench.harness.run import now
 from plumbob.bench.tables.results import Results
-from plumbob.bench.tables.table import markdown
+from plumbob.bench.tables.writers import markdown
 from plumbob.reference import ImplicitEuler
 
 TINY = Scale(targets=3, seconds=0.001)

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plumbob.bench.harness.metrics import Share, share
-from plumbob.bench.tables import table as tables
+from plumbob.bench.tables import writers
 from plumbob.bench.tables.table import Column, Summary, Table, best_cells, words
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
@@ -78,7 +78,7 @@ def test_headings_that_stand_twice_are_refused():
 
 
 def test_markdown_cells_cannot_end_a_cell_or_a_row():
-    lines = tables.markdown(table((HOSTILE, 1.0))).splitlines()
+    lines = writers.markdown(table((HOSTILE, 1.0))).splitlines()
     row = lines[-1]
     assert len(re.findall(r"(?<!\\)\|", row)) == 3
     assert not re.search(r"(?<!\\)[`*_\[\]<>]", row)
@@ -86,20 +86,20 @@ def test_markdown_cells_cannot_end_a_cell_or_a_row():
 
 @pytest.mark.parametrize("number", ["2.7e-15", "-3.0", "+1", "0.5"])
 def test_a_number_in_markdown_stays_as_it_is(number):
-    assert f"| {number} |" in tables.markdown(table((number, 1.0)))
+    assert f"| {number} |" in writers.markdown(table((number, 1.0)))
 
 
 @pytest.mark.parametrize("name", ["- x", "+ x", "1. x", "1) x", "= x", "$x$"])
 def test_a_point_in_markdown_begins_no_list_or_formula(name):
     answered = Table("t", "T", (Column("a"),), ((1,),), summary=Summary(name, (name,)))
-    lines = tables.markdown(answered).splitlines()
+    lines = writers.markdown(answered).splitlines()
     assert not any(re.match(r"(- )?([-+=$]|\d[.)]) ?x", line) for line in lines)
 
 
 def test_csv_keeps_all_digits_and_any_text():
     third = 1 / 3
     columns = (Column("name", words=True), Column("value", "m"), Column("hits", note="95 %"))
-    text = tables.comma_separated(
+    text = writers.comma_separated(
         table((HOSTILE, third, share(np.array([True]))), ("-", None, None), columns=columns)
     )
     rows = list(csv.reader(io.StringIO(text)))
@@ -117,7 +117,7 @@ FORMULAS += ["＝1", "'", "'=1", "''a", "--", "=5", '=HYPERLINK("http://x","y")'
 @pytest.mark.parametrize("name", FORMULAS)
 def test_a_text_in_csv_is_no_formula_and_less_one_apostrophe_the_text(name):
     columns = (Column("name", words=True), Column(name, words=True))
-    text = tables.comma_separated(table((name, name), columns=columns))
+    text = writers.comma_separated(table((name, name), columns=columns))
     for row in csv.reader(io.StringIO(text)):
         assert row[1][0] == "'"
         assert row[1].removeprefix("'") in (name, " ".join(name.split()))
@@ -125,13 +125,13 @@ def test_a_text_in_csv_is_no_formula_and_less_one_apostrophe_the_text(name):
 
 @pytest.mark.parametrize("cell", [-1, -1.5, -1e-300, -math.inf, "-5", "-1.2e-5", "+.5", "-", "–"])
 def test_a_number_in_csv_and_the_mark_of_none_stand_as_they_are(cell):
-    text = tables.comma_separated(table((cell, cell)))
+    text = writers.comma_separated(table((cell, cell)))
     assert list(csv.reader(io.StringIO(text)))[1] == [str(cell), str(cell)]
 
 
 def test_an_answer_stands_in_markdown_with_its_points():
     answered = Table("t", "T", (Column("a"),), ((1,),), summary=Summary("Thus:", ("x", "y")))
-    assert "Thus:\n\n- x\n- y\n" in tables.markdown(answered)
+    assert "Thus:\n\n- x\n- y\n" in writers.markdown(answered)
 
 
 @pytest.mark.parametrize("total", [2, 10, 999, 1000, 1001, 10_000, 123_456])

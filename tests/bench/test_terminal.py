@@ -12,7 +12,7 @@ from rich.console import Console
 from plumbob import cli, terminal
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.report import outcome, report, sections
-from plumbob.bench.report.headlines import Answers, Headline, Verdict
+from plumbob.bench.report.headlines import ClaimCount, Headline, Overview
 from plumbob.bench.tables import aligned
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Table, naming, without_empty, words
@@ -188,13 +188,15 @@ def test_the_time_left_goes_by_what_took_time(done, kept, text):
 
 
 def an_outcome(folder, tables=(), **more):
-    verdict = Verdict(52, 52, "spring forces", 0.462)
+    verdict = ClaimCount(52, 52, "spring forces", 0.462)
     headline = Headline("kinematics", "Fastest", "A", "2.00 × B (1.90–2.10), 400 poses", "robots")
     cloth = headline._replace(chapter="cloth")
-    answers = Answers(verdict, [headline, headline, cloth, headline], "Quick run", ["pink", "mink"])
+    answers = Overview(
+        verdict, [headline, headline, cloth, headline], "Quick run", ["pink", "mink"]
+    )
     answers = answers._replace(**more)
     missing = ["a"] + ["A sentence on what is missing, which is rather long. " * 3] * 20
-    return report.Written(folder / "index.html", list(tables), missing, answers)
+    return report.Report(folder / "index.html", list(tables), missing, answers)
 
 
 @pytest.mark.parametrize("width", [80, 120, 240])
@@ -227,7 +229,7 @@ def test_who_is_absent_is_said_once(tmp_path):
 
 
 def test_a_missed_claim_is_said_first(tmp_path):
-    written = an_outcome(tmp_path, verdict=Verdict(51, 52, "spring forces", 3.0))
+    written = an_outcome(tmp_path, verdict=ClaimCount(51, 52, "spring forces", 3.0))
     assert outcome.outcome(written, 80)[0] == "WRONG: 1 of 52 claims are missed."
     written = an_outcome(tmp_path, verdict=None)
     assert "bench check" in outcome.outcome(written, 80)[0]

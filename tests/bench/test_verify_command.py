@@ -229,11 +229,11 @@ def test_a_failing_case_is_saved_and_asked_again(capsys, folder):
 def test_a_case_is_asked_again_after_those_that_it_follows():
     cases = SMALL["forward_kinematics"].cases(None, "", 0, False)
     like = Case("like", "energy", {}, "", sentence(""), facts={"like": cases[3].name, "n": 1})
-    one = saved.Saved("energy", "", 0, False, "like")
+    one = saved.SavedCase("energy", "", 0, False, "like")
     wanted = saved.cases_of(one, [*cases, like])
     assert [case.name for case in wanted] == [cases[0].name, cases[3].name, "like"]
     with pytest.raises(ValueError, match="'gone' of energy is not asked of this solver any more"):
-        saved.cases_of(saved.Saved("energy", "", 0, False, "gone"), cases)
+        saved.cases_of(saved.SavedCase("energy", "", 0, False, "gone"), cases)
 
 
 def test_all_files_are_written(capsys, folder):

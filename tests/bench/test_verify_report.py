@@ -30,7 +30,6 @@ from plumbob.crosscheck.verify.language import translator
 from plumbob.crosscheck.verify.output import (
     comparison,
     drawing,
-    geometry,
     json_file,
     junit,
     page,
@@ -39,7 +38,6 @@ from plumbob.crosscheck.verify.output import (
 from plumbob.crosscheck.verify.output.words import (
     GOOD,
     Presentation,
-    complaints,
     explanations,
     speaker,
 )
@@ -101,7 +99,7 @@ def every_sentence(report):
     for task in report.tasks:
         yield from explanations(task)
         for one in task.judgements:
-            yield from complaints(one)
+            yield from one.complaints
             yield one.case.about
 
 
@@ -156,7 +154,7 @@ def test_the_screen_says_what_is_wrong_where_and_what_next(wrong):
     for told in explanations(task):
         assert normal(str(told)) in text
     assert "(explains 100% of the answers compared)" in text
-    assert normal(str(complaints(task.smallest_failure)[0])) in text
+    assert normal(str(task.smallest_failure.complaints[0])) in text
     assert "plumbob verify --rerun plumbob_failures/forward_kinematics.json my_ik.py" in text
     assert "forward_kinematics WRONG" in text
     assert "inverse_kinematics ccd BROKEN" in text
@@ -166,7 +164,7 @@ def test_the_screen_says_what_is_wrong_where_and_what_next(wrong):
 def test_the_screen_shows_their_numbers_beside_ours(wrong):
     text = "\n".join(terminal.lines(wrong, shown(files=FILES)))
     row = comparison.rows(wrong.tasks[0].smallest_failure)[0]
-    for side in comparison.written(row):
+    for side in comparison.texts(row):
         assert side in text
     assert "yours" in text
     assert "expected" in text
@@ -179,7 +177,7 @@ def test_nothing_is_cut_in_a_pipe(wrong, capsys):
     told = normal(text)
     for task in wrong.tasks:
         assert normal(f"{terminal.title(task)}:") in told
-        for words in (*explanations(task), complaints(task.smallest_failure)[0]):
+        for words in (*explanations(task), task.smallest_failure.complaints[0]):
             assert normal(speaker("en")(words)) in told
 
 
@@ -214,7 +212,7 @@ def test_numbers_side_by_side_are_whole():
         one = answered("forward_kinematics", {}, {"rotations": theirs}, {"rotations": ours})
         text = "\n".join(terminal._numbers(one, speaker("en"), 6))
         row = comparison.rows(one)[0]
-        assert all(number in text for side in comparison.written(row) for number in side.split())
+        assert all(number in text for side in comparison.texts(row) for number in side.split())
         assert apart < 1e-10 or max(map(len, text.split("\n"))) <= terminal.WIDTH
 
 
@@ -480,13 +478,13 @@ def test_quaternions_of_opposite_sign_do_not_part():
 
 @pytest.mark.parametrize("apart", [1.0, 1e-6, 1e-14])
 def test_numbers_have_digits_enough_to_differ(apart):
-    theirs, ours = comparison.written(comparison.Row("x", [1.0, 2.0], [1.0, 2.0 + apart]))
+    theirs, ours = comparison.texts(comparison.NumberRow("x", [1.0, 2.0], [1.0, 2.0 + apart]))
     assert theirs != ours
 
 
 def test_answers_of_other_shapes_are_counted():
     one = answered("resample", {}, {"points": np.zeros((4, 3))}, {"points": np.zeros((5, 3))})
-    assert comparison.rows(one) == [comparison.Row("len(points)", [4.0], [5.0])]
+    assert comparison.rows(one) == [comparison.NumberRow("len(points)", [4.0], [5.0])]
 
 
 ARM = {"parents": np.array([-1, 0]), "offsets": np.eye(3)[:2]}
@@ -504,7 +502,7 @@ DRAWN = {
 @pytest.mark.parametrize("theirs", DRAWN.values(), ids=DRAWN)
 def test_any_answer_is_drawn_without_a_number_that_svg_does_not_have(theirs):
     one = answered("forward_kinematics", ARM, theirs, {"positions": np.eye(3)[:2]})
-    drawn = drawing.svg(geometry.scene(one), "an <arm>")
+    drawn = drawing.svg(comparison.drawing_of(one), "an <arm>")
     assert not re.search(r"\b(nan|inf)|\de\+", str(drawn), re.IGNORECASE)
     assert ET.fromstring(drawn).find("{*}title").text == "an <arm>"
 
@@ -512,11 +510,10 @@ def test_any_answer_is_drawn_without_a_number_that_svg_does_not_have(theirs):
 def test_a_small_difference_is_drawn_larger():
     ours = {"positions": np.eye(3)[:2]}
     theirs = {"positions": np.eye(3)[:2] + 1e-9}
-    seen = geometry.scene(answered("forward_kinematics", ARM, theirs, ours))
+    seen = comparison.drawing_of(answered("forward_kinematics", ARM, theirs, ours))
     larger, factor = drawing.magnified(seen)
     assert factor == pytest.approx(0.2 / (3**0.5 * 1e-9), rel=0.5)
-    assert drawing.apart(larger) == pytest.approx(0.2, rel=0.5)
+    assert drawing.distance(larger) == pytest.approx(0.2, rel=0.5)
     theirs["positions"][:] += 1.0
-    assert (
-        drawing.magnified(geometry.scene(answered("forward_kinematics", ARM, theirs, ours)))[1] == 1
-    )
+    drawn = comparison.drawing_of(answered("forward_kinematics", ARM, theirs, ours))
+    assert drawing.magnified(drawn)[1] == 1

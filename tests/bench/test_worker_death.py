@@ -24,7 +24,7 @@ JOBS = """
 import ctypes, gc, os, pickle, signal, struct, subprocess, sys, time
 from multiprocessing.connection import Connection
 import numpy as np
-from plumbob.bench.harness.worker import Done, Ready, Solved
+from plumbob.bench.harness.worker import Finished, Ready, Solved
 
 def descriptor():
     (own,) = [o for o in gc.get_objects() if isinstance(o, Connection) and o.writable]
@@ -55,7 +55,7 @@ class Dying:
             os.write(descriptor(), struct.pack("!i", 1000) + b"cut")
             self.die(self.moment)
         yield Solved(np.ones(2), 1, 0.1, "")
-        yield Done()
+        yield Finished()
         self.die("after the last")
 
 class WithChild:
@@ -110,7 +110,7 @@ def worker(jobs):
 
 
 def pid(worker):
-    return worker._worker.pid
+    return worker._child.pid
 
 
 def is_gone(process):

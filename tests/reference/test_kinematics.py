@@ -10,7 +10,7 @@ from plumbob.reference import (
     set_num_threads,
 )
 from plumbob.reference.backend import compiled
-from plumbob.reference.backend.simd.lanes import LANES
+from plumbob.reference.backend.simd.vectors import LANES
 
 # Six joints: a dozen products and sums of numbers of order one.
 ROUNDING = 1e-14

@@ -1,6 +1,7 @@
 """Success and residuals within reach, on the arm's curves and the chain's targets."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,47 +10,43 @@ from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.columns import (
-    LARGEST,
-    MEDIAN,
-    P95,
-    SOLVER,
-    allowed,
-    effort,
-    folded,
-    iterations,
-    remark,
-    share,
-    spread,
-    text,
-    titled,
-)
+from ...tables.columns import effort, spread_of
 from ...tables.layout import Layout
-from ...tables.results import Results, by_problem, grouped, label, leaders, settings
-from ...tables.table import Column, Summary, words
+from ...tables.results import Results, by_problem, grouped, leaders
+from ...tables.table import Summary, words
 from ..chain import BEYOND, CHAIN
-from ..chain.tables import histories, within_tolerance
+from ..chain.tables import histories, quantile_cells, solves_row, within_tolerance
 from . import CURVE
 
 STARTS = {None: "random", False: "rest", True: "last solution"}
+# The cells of a row by the titles of their columns, and its record.
+Row = dict[str, Any]
 
 
-def _within_reach(results: Results) -> list[Record]:
-    """Return the records of targets within reach, problem by problem."""
+def _rows(results: Results) -> list[Row]:
+    """Return a row for each solver on targets within reach, problem by problem."""
     records = results.all("arm", task=CURVE, warm=False)
     records += results.all("arm", task=CURVE, warm=True)
     records += [r for r in results.all("ik", task=CHAIN) if r.details.stratum != BEYOND]
-    return [record for group in by_problem(records).values() for record in group]
+    return [_row(record) for group in by_problem(records).values() for record in group]
 
 
-def _start(record: Record) -> str:
-    return STARTS[record.details.warm]
+def _row(record: Record) -> Row:
+    hits = within_tolerance(record)
+    return {
+        **solves_row(record),
+        "start": STARTS[record.details.warm],
+        "hits": hits,
+        "within tolerance": metrics.share(hits),
+        **quantile_cells("residual", spread_of(record, "residual")),
+        "time, median": effort(record).median if "seconds" in record.arrays else None,
+    }
 
 
-def _summary(records: Sequence[Record]) -> Summary:
+def _summary(rows: Sequence[Row]) -> Summary:
     hits = {
-        solver: {(r.problem, _start(r)): within_tolerance(r) for r in members}
-        for solver, members in grouped(records, lambda record: label(record.solver)).items()
+        solver: {(row["record"].problem, row["start"]): row["hits"] for row in members}
+        for solver, members in grouped(rows, lambda row: str(row["solver"])).items()
     }
     ranking = _ranking(hits)
     first = f"; first: {leaders(ranking)}" if ranking else ""
@@ -100,29 +97,9 @@ def _residuals(record: Record) -> Series:
     return series(record.solver, np.arange(1, len(median)), median[1:], (low[1:], high[1:]))
 
 
-def _measured(records: Iterable[Record]) -> dict[str, str]:
-    return {name: settings(records, name) for name in ("tolerance", "max_iterations")}
-
-
 accuracy = Layout(
-    **Captions(__file__).of("accuracy", _measured),
-    subjects=_within_reach,
-    columns=(
-        titled("problem"),
-        text("start", _start),
-        SOLVER,
-        share("within tolerance", within_tolerance, best="greatest"),
-        *spread("residual", "residual", "m", (LARGEST,)),
-        Column(
-            "time, median",
-            "µs",
-            read=lambda record: effort(record).median if "seconds" in record.arrays else None,
-        ),
-        *iterations((MEDIAN,)),
-        allowed(),
-        remark(),
-        *folded([*spread("residual", "residual", "m", (MEDIAN, P95)), *iterations((P95, LARGEST))]),
-    ),
+    **Captions(__file__).of("accuracy"),
+    subjects=_rows,
     summary=_summary,
     figures=(residuals_chart,),
     compared=2,

@@ -1,6 +1,7 @@
 """Targets beyond reach, and the iterations of CCD and FABRIK: two of the lab's questions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,37 +10,39 @@ from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.columns import (
-    LARGEST,
-    MEDIAN,
-    P95,
-    SOLVER,
-    allowed,
-    folded,
-    iterations,
-    iterations_said,
-    places,
-    remark,
-    spread,
-    spread_of,
-    text,
-    titled,
-    words_in,
-)
+from ...tables.columns import iterations_said, spread_of, spread_of_iterations, words_in
 from ...tables.layout import Layout
-from ...tables.results import Results, by_problem, grouped, label, settings
-from ...tables.table import Column, Summary, words
+from ...tables.results import Results, by_problem, grouped, label
+from ...tables.table import Cell, Summary, words
 from .. import arm
 from . import BEYOND, CHAIN
+from .values import ChainSolves
 
 # A chain counts as straight if no joint is off the line by more than this share of the reach.
 STRAIGHT = 0.01
-RIVALS = ("ccd", "fabrik")
 # Iterations at which targets are counted.
 COUNTED = np.unique(np.logspace(0, 3, 61).round())
 _CAPTIONS = Captions(__file__)
-# The records of both rivals on one problem.
-Pair = tuple[Record, Record]
+# The cells of a row by the titles of their columns, and its records.
+Row = dict[str, Any]
+
+
+def solves_row(record: Record) -> Row:
+    """Return the cells that every table of solves has."""
+    return {
+        "record": record,
+        "problem": record.title,
+        "solver": label(record.solver),
+        **quantile_cells("iterations", spread_of_iterations(record)),
+        "iterations allowed": record.settings.get("max_iterations"),
+        "remark": record.notes.get("remark", ""),
+    }
+
+
+def quantile_cells(title: str, quantiles: Iterable[Cell]) -> Row:
+    """Return the cells of a median, a 95th percentile and a maximum."""
+    names = ("median", "95 %", "largest")
+    return {f"{title}, {name}": cell for name, cell in zip(names, quantiles, strict=True)}
 
 
 def within_tolerance(record: Record) -> np.ndarray:
@@ -50,19 +53,28 @@ def within_tolerance(record: Record) -> np.ndarray:
 # Beyond reach.
 
 
-def _beyond_reach(results: Results) -> list[Record]:
+def _beyond_rows(results: Results) -> list[Row]:
     chains = [r for r in results.all("ik", task=CHAIN, stratum=BEYOND) if r.values]
-    return results.all("arm", task=arm.BEYOND) + chains
+    return [*map(_beyond_row, results.all("arm", task=arm.BEYOND) + chains)]
 
 
-def _is_straight(records: Sequence[Record]) -> np.ndarray:
-    return np.concatenate([r.values.bend <= STRAIGHT * r.values.reach for r in records])
+def _beyond_row(record: Record) -> Row:
+    solves: ChainSolves = record.values
+    return {
+        **solves_row(record),
+        **quantile_cells("off the line", spread_of(record, "bend")),
+        **quantile_cells("residual above distance − reach", spread_of(record, "excess")),
+        "targets": int(record.size),
+        "targets without a solution": int(np.isinf(solves.bend).sum()),
+        "distances": solves.distance / solves.reach,
+        "straight": solves.bend <= STRAIGHT * solves.reach,
+    }
 
 
-def _beyond_summary(records: Sequence[Record]) -> Summary:
+def _beyond_summary(rows: Sequence[Row]) -> Summary:
     shares = {
-        solver: metrics.share(_is_straight(members))
-        for solver, members in grouped(records, lambda record: label(record.solver)).items()
+        solver: metrics.share(np.concatenate([row["straight"] for row in members]))
+        for solver, members in grouped(rows, lambda row: str(row["solver"])).items()
     }
     return Summary(
         "The best solution is the straight line from root to target. Solutions within "
@@ -71,38 +83,14 @@ def _beyond_summary(records: Sequence[Record]) -> Summary:
     )
 
 
-def _beyond_measured(records: Sequence[Record]) -> dict[str, str]:
-    distances = np.concatenate([r.values.distance / r.values.reach for r in records])
-    return {
-        "distances": " to ".join(map(words, metrics.extent(distances))),
-        "tolerance": settings(records, "tolerance"),
-        "max_iterations": settings(records, "max_iterations"),
-    }
+def _beyond_measured(rows: Sequence[Row]) -> dict[str, str]:
+    distances = np.concatenate([row["distances"] for row in rows])
+    return {"distances": " to ".join(map(words, metrics.extent(distances)))}
 
 
 beyond_reach = Layout(
     **_CAPTIONS.of("q1_beyond_reach", _beyond_measured),
-    subjects=_beyond_reach,
-    columns=(
-        titled("problem"),
-        SOLVER,
-        *spread("off the line", "bend", "m", (LARGEST,)),
-        *spread("residual above distance − reach", "excess", "m", (LARGEST,)),
-        *iterations(),
-        allowed(),
-        remark(),
-        *folded(
-            [
-                Column("targets", read=lambda record: int(record.size)),
-                Column(
-                    "targets without a solution",
-                    read=lambda record: int(np.isinf(record.values.bend).sum()),
-                ),
-                *spread("off the line", "bend", "m", (MEDIAN,)),
-                *spread("residual above distance − reach", "excess", "m", (MEDIAN,)),
-            ]
-        ),
-    ),
+    subjects=_beyond_rows,
     summary=_beyond_summary,
 )
 
@@ -110,34 +98,39 @@ beyond_reach = Layout(
 # CCD and FABRIK.
 
 
-def _rivals(results: Results) -> list[Pair]:
-    """Return the records of CCD and FABRIK on each problem that both solved."""
+def _rival_rows(results: Results) -> list[Row]:
+    """Return a row for each problem that both CCD and FABRIK solved."""
     records = results.all("arm", task=arm.CURVE, warm=True)
     records += results.all("arm", task=arm.BEYOND) + results.all("ik", task=CHAIN)
     groups = [{r.solver: r for r in group} for group in by_problem(records).values()]
-    return [(group["ccd"], group["fabrik"]) for group in groups if group.keys() >= set(RIVALS)]
+    return [
+        _rival_row(group["ccd"], group["fabrik"])
+        for group in groups
+        if "ccd" in group and "fabrik" in group
+    ]
 
 
-def _iterations_ratio(pair: Pair) -> float:
-    ccd, fabrik = (metrics.mean(record.values.iterations) for record in pair)
-    return metrics.ratio(ccd, fabrik)
+def _rival_row(ccd: Record, fabrik: Record) -> Row:
+    a, b = ccd.values.iterations, fabrik.values.iterations
+    return {
+        "records": [ccd, fabrik],
+        "problem": ccd.title,
+        **quantile_cells("CCD", spread_of(ccd, "iterations")),
+        **quantile_cells("FABRIK", spread_of(fabrik, "iterations")),
+        "CCD / FABRIK, means": metrics.ratio(metrics.mean(a), metrics.mean(b)),
+        "solves": a.size,
+        "fewer": metrics.ranking({"CCD": -a, "FABRIK": -b}).first,
+    }
 
 
-def _fewer_iterations(pair: Pair) -> str:
-    """Return who needs fewer iterations on average for the same targets, "" if that is a tie."""
-    scores = zip(RIVALS, (-record.values.iterations for record in pair), strict=True)
-    first = metrics.ranking(dict(scores)).first
-    return first[0] if len(first) == 1 else ""
-
-
-def _rival_summary(pairs: Sequence[Pair]) -> Summary:
-    ratios = [_iterations_ratio(pair) for pair in pairs]
-    winners = [_fewer_iterations(pair) for pair in pairs]
-    ccd, fabrik = (winners.count(name) for name in RIVALS)
-    solves = sum(pair[0].values.iterations.size for pair in pairs)
+def _rival_summary(rows: Sequence[Row]) -> Summary:
+    ratios = [row["CCD / FABRIK, means"] for row in rows]
+    winners = [row["fewer"] for row in rows]
+    ccd, fabrik = (winners.count((name,)) for name in ("CCD", "FABRIK"))
     return Summary(
-        f"FABRIK needs fewer iterations than CCD on {fabrik} of {len(pairs)} problems, more on "
-        f"{ccd}, and on {len(pairs) - fabrik - ccd} they tie (n = {words(solves)} solves); CCD "
+        f"FABRIK needs fewer iterations than CCD on {fabrik} of {len(rows)} problems, more on "
+        f"{ccd}, and on {len(rows) - fabrik - ccd} they tie (n = "
+        f"{words(sum(row['solves'] for row in rows))} solves); CCD "
         f"makes {words(min(ratios))} to {words(max(ratios))} times as many on average "
         f"(median of the problems {words(metrics.spread(np.array(ratios)).median)})."
     )
@@ -173,41 +166,15 @@ def histories(results: Results) -> list[list[Record]]:
 
 def _reached(record: Record) -> Series:
     """Return the share of the targets that is reached within each number of iterations [%]."""
-    reached, made = within_tolerance(record), record.values.iterations
-    shares = [metrics.share(reached & (made <= count)) for count in COUNTED]
-    low, high = (100 * np.array([getattr(s, end) for s in shares]) for end in ("low", "high"))
-    rates = [100 * share.hits / max(1, share.total) for share in shares]
-    return series(record.solver, COUNTED, rates, (low, high))
-
-
-def _counts(i: int, quantiles: Sequence[str]) -> list[Column]:
-    def read(pair: Pair) -> Sequence[int | float]:
-        return spread_of(pair[i], "iterations")
-
-    return places(label(RIVALS[i]), "", quantiles, read)
+    iterations = np.where(within_tolerance(record), record.values.iterations, np.inf)
+    rates = np.mean(iterations[:, None] <= COUNTED, axis=0)
+    low, high = metrics.wilson(rates, iterations.size)
+    return series(record.solver, COUNTED, 100 * rates, (100 * low, 100 * high))
 
 
 rivals = Layout(
-    **_CAPTIONS.of(
-        "q2_iterations",
-        lambda pairs: {
-            "max_iterations": settings((r for pair in pairs for r in pair), "max_iterations")
-        },
-    ),
-    subjects=_rivals,
-    columns=(
-        text("problem", lambda pair: pair[0].title),
-        *_counts(0, (MEDIAN,)),
-        *_counts(1, (MEDIAN,)),
-        Column("CCD / FABRIK, means", read=_iterations_ratio),
-        *folded(
-            [
-                Column("solves", read=lambda pair: pair[0].values.iterations.size),
-                *_counts(0, (P95, LARGEST)),
-                *_counts(1, (P95, LARGEST)),
-            ]
-        ),
-    ),
+    **_CAPTIONS.of("q2_iterations"),
+    subjects=_rival_rows,
     summary=_rival_summary,
     figures=(iterations_chart,),
 )

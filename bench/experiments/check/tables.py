@@ -1,6 +1,7 @@
 """Verdicts on the claims of the cross-check."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from plumbob.reference.arguments import distinct_texts
 
@@ -8,7 +9,6 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers.registry import MUJOCO, PINOCCHIO
 from ...tables.captions import Captions
-from ...tables.columns import folded, number, text
 from ...tables.layout import Layout
 from ...tables.results import listed
 from ...tables.table import Summary, in_unit, words
@@ -17,24 +17,32 @@ from ...tables.table import Summary, in_unit, words
 ENGINES = (PINOCCHIO, MUJOCO)
 
 
-def _verdict(record: Record) -> str:
-    claim = record.values
-    if claim.held:
-        return "held"
+def _row(record: Record) -> dict[str, Any]:
+    claim, details = record.values, record.details
     digits = distinct_texts(claim.difference, claim.tolerance, 2)
     excess = " by {}, more than {}".format(*digits) * (claim.difference > claim.tolerance)
-    return f"MISSED: {record.details.failure}{excess}"
+    return {
+        "record": record,
+        "claim": record.problem,
+        "verdict": "held" if claim.held else f"MISSED: {details.failure}{excess}",
+        "our quantity": details.quantity,
+        "compared with": record.solver,
+        "cases": claim.cases,
+        "largest difference": claim.difference,
+        "tolerance": claim.tolerance,
+    }
 
 
-def _summary(records: Sequence[Record]) -> Summary:
-    failures = [record.problem for record in records if not record.values.held]
-    cases = sum(record.values.cases for record in records)
-    used = max(metrics.ratio(r.values.difference, r.values.tolerance) for r in records)
-    engines = sum(any(e in r.details.quantity + r.solver for e in ENGINES) for r in records)
+def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+    failures = [row["claim"] for row in rows if row["verdict"] != "held"]
+    used = max(metrics.ratio(row["largest difference"], row["tolerance"]) for row in rows)
+    engines = sum(
+        any(e in row["our quantity"] + row["compared with"] for e in ENGINES) for row in rows
+    )
     return Summary(
-        f"{len(records) - len(failures)} of {len(records)} claims held ({engines} against "
-        f"{listed(ENGINES, 'or')}, {len(records) - engines} against closed forms and invariants), "
-        f"over {words(cases)} cases; "
+        f"{len(rows) - len(failures)} of {len(rows)} claims held ({engines} against "
+        f"{listed(ENGINES, 'or')}, {len(rows) - engines} against closed forms and invariants), "
+        f"over {words(sum(row['cases'] for row in rows))} cases; "
         f"the smallest margin used {words(in_unit(used, '%'))} % of its tolerance.",
         tuple(f"Missed: {name}" for name in failures),
     )
@@ -42,16 +50,7 @@ def _summary(records: Sequence[Record]) -> Summary:
 
 verdicts = Layout(
     **Captions(__file__).of("check"),
-    subjects=lambda results: results.all("check"),
-    columns=(
-        text("claim", lambda record: record.problem),
-        text("verdict", _verdict),
-        *folded([text("our quantity", lambda record: record.details.quantity)]),
-        text("compared with", lambda record: record.solver),
-        number("cases"),
-        number("largest difference", "difference"),
-        number("tolerance"),
-    ),
+    subjects=lambda results: map(_row, results.all("check")),
     summary=_summary,
 )
 

@@ -1,8 +1,7 @@
 """How far joints rotate from frame to frame along closed curves: the lab's third question."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,45 +10,29 @@ from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.columns import folded, greatest, least, spread_of, text, words_in
+from ...tables.columns import spread_of, words_in
 from ...tables.layout import Layout
-from ...tables.results import Results, by_problem, grouped, label, settings
-from ...tables.table import Column, Summary, in_unit, words
+from ...tables.results import Results, by_problem, grouped, label
+from ...tables.table import Summary, in_unit, words
 from .. import arm
+from ..arm.values import FollowedMotion
 from ..chain.tables import within_tolerance
 from . import COHERENT, COLD, CURVE, DRIFT, WARM
 
 MODES = (COLD, WARM, COHERENT)
 # The step that closes a curve is as large as the others if it exceeds them by at most this share.
 ALIKE = 0.01
+# Repetitions of the curve that is drawn several times.
+REPETITIONS = (1, 2, 3)
+# The cells of a row by the titles of their columns, and its records by mode.
+Row = dict[str, Any]
 
 
-class CurveMotions(NamedTuple):
-    """The motions of a solver along a curve, by mode, and its drift over repetitions.
-
-    Only the curve that is repeated has drifts.
-    """
-
-    by_mode: Mapping[str, Record]
-    drifts: Mapping[str, Record]
-
-    @property
-    def shared_iterations(self) -> int:
-        """The iterations over all frames at once: the least that any frame has more than warm."""
-        coherent, warm = (self.by_mode[mode].values.iterations for mode in (COHERENT, WARM))
-        return int(metrics.extent(coherent - warm)[0])
-
-    def drift(self, mode: str, repetition: int) -> float | None:
-        """Return the drift after a repetition [rad], None where it was not measured."""
-        record = self.drifts.get(mode)
-        return float(record.values.drift[repetition - 1]) if record else None
-
-
-def _motions(results: Results) -> list[CurveMotions]:
-    """Return the curves that were followed in all modes."""
+def _rows(results: Results) -> list[Row]:
+    """Return a row for each curve that a solver followed in all modes."""
     followed, drifts = (_by_mode(results, task) for task in (CURVE, DRIFT))
     return [
-        CurveMotions(by_mode, drifts.get((problem.replace("arm/", "drift/"), solver), {}))
+        _row(by_mode, drifts.get((problem.replace("arm/", "drift/"), solver), {}))
         for (problem, solver), by_mode in followed.items()
         if by_mode.keys() >= set(MODES)
     ]
@@ -60,20 +43,37 @@ def _by_mode(results: Results, task: str) -> dict[tuple[str, str], dict[str, Rec
     return {key: {r.details.mode: r for r in records} for key, records in groups.items()}
 
 
-def _largest_angle(record: Record) -> float:
-    """Return the largest rotation of a joint between neighbouring frames [rad]."""
-    return metrics.spread(record.values.largest_angle[:-1]).largest
+def _row(by_mode: Mapping[str, Record], drifts: Mapping[str, Record]) -> Row:
+    """Return the cells of a curve; an iteration over all frames counts as one of each frame."""
+    iterations = {mode: record.values.iterations for mode, record in by_mode.items()}
+    row: Row = {
+        "by_mode": by_mode,
+        "drifts": drifts,
+        "curve": by_mode[WARM].title,
+        "solver": label(by_mode[WARM].solver),
+        "iterations over all frames at once": int((iterations[COHERENT] - iterations[WARM]).min()),
+        "frames": by_mode[WARM].values.residual.size,
+    }
+    for mode, record in by_mode.items():
+        motion: FollowedMotion = record.values
+        row |= {
+            f"largest rotation, {mode}": metrics.spread(motion.largest_angle[:-1]).largest,
+            f"closing rotation, {mode}": float(motion.largest_angle[-1]),
+            f"mean rotation, {mode}": metrics.mean(motion.mean_angle[:-1]),
+            f"mean iterations, {mode}": metrics.mean(record.values.iterations),
+            f"within tolerance, {mode}": metrics.share(within_tolerance(record)),
+            f"largest path error, {mode}": spread_of(record, "residual")[2],
+        }
+    for mode, record in drifts.items():
+        for i, angle in enumerate(record.values.drift, start=1):
+            row[f"drift, {mode}, after {i}"] = float(angle)
+    return row
 
 
-def _closing_angle(record: Record) -> float:
-    """Return the largest rotation of a joint from the last frame back to the first [rad]."""
-    return float(record.values.largest_angle[-1])
-
-
-def _summary(rows: Sequence[CurveMotions]) -> Summary:
-    pairs = [(row.by_mode[WARM], row.by_mode[COHERENT]) for row in rows]
-    smoother = sum(_largest_angle(coherent) < _largest_angle(warm) for warm, coherent in pairs)
-    closed = sum(_closing_angle(c) <= (1.0 + ALIKE) * _largest_angle(c) for _, c in pairs)
+def _summary(rows: Sequence[Row]) -> Summary:
+    largest, closing = (f"{quantity} rotation, {COHERENT}" for quantity in ("largest", "closing"))
+    smoother = sum(row[largest] < row[f"largest rotation, {WARM}"] for row in rows)
+    closed = sum(row[closing] <= (1.0 + ALIKE) * row[largest] for row in rows)
     return Summary(
         "A coherent motion solves all frames together, so that the joints rotate as little as they "
         "can from each frame to the next. The largest rotation of a joint is smaller than with "
@@ -84,17 +84,20 @@ def _summary(rows: Sequence[CurveMotions]) -> Summary:
     )
 
 
-def _points(rows: Sequence[CurveMotions]) -> Iterator[str]:
+def _points(rows: Sequence[Row]) -> Iterator[str]:
     for mode in MODES:
-        records = [row.by_mode[mode] for row in rows]
-        worst = max(records, key=_largest_angle)
-        hits = metrics.share(np.concatenate(list(map(within_tolerance, records))))
-        angle = f"{words_in(_largest_angle(worst), '°')} ({worst.title}, {label(worst.solver)})"
-        yield f"{mode}: {angle}; {words(hits.hits)} of {words(hits.total)} frames"
-    counts = [row.shared_iterations for row in rows]
+        worst = max(rows, key=lambda row: float(row[f"largest rotation, {mode}"]))
+        angle = words_in(worst[f"largest rotation, {mode}"], "°")
+        hits, total = np.sum([row[f"within tolerance, {mode}"][:2] for row in rows], axis=0)
+        frames = f"{words(int(hits))} of {words(int(total))} frames"
+        yield f"{mode}: {angle} ({worst['curve']}, {worst['solver']}); {frames}"
+    counts = [row["iterations over all frames at once"] for row in rows]
     yield f"all frames are changed together {words(min(counts))} to {words(max(counts))} times"
-    warm = [drift for row in rows if (drift := row.drift(WARM, 3)) is not None]
-    closed = [row.drift(COHERENT, i) or 0.0 for row in rows if row.drifts for i in (1, 2, 3)]
+    warm = [
+        row[title] for row in rows if (title := f"drift, {WARM}, after {REPETITIONS[-1]}") in row
+    ]
+    titles = [f"drift, {COHERENT}, after {i}" for i in REPETITIONS]
+    closed = [row[title] for row in rows for title in titles if title in row]
     if warm and closed:
         yield (
             f"after three repetitions warm starts leave the arm {words_in(min(warm), '°')} to "
@@ -132,55 +135,9 @@ def jitter_chart(results: Results) -> Sketch | None:
     )
 
 
-def _columns(
-    title: str, read: Callable[[Record], Any], unit: str = "", modes: Sequence[str] = MODES
-) -> list[Column]:
-    """Return a column for each mode."""
-
-    def read_in(mode: str) -> Callable[[CurveMotions], Any]:
-        return lambda row: read(row.by_mode[mode])
-
-    return [Column(f"{title}, {mode}", unit, read=read_in(mode), group=title) for mode in modes]
-
-
-def _drift(mode: str, repetition: int) -> Column:
-    title = f"drift, {mode}"
-    read = partial(CurveMotions.drift, mode=mode, repetition=repetition)
-    return Column(f"{title}, after {repetition}", "°", read=read, best="least", group=title)
-
-
-def _mean_iterations(record: Record) -> float:
-    return metrics.mean(record.values.iterations)
-
-
-def _measured(rows: Sequence[CurveMotions]) -> dict[str, str]:
-    records = [record for row in rows for record in row.by_mode.values()]
-    return {name: settings(records, name) for name in ("tolerance", "max_iterations")}
-
-
 jitter = Layout(
-    **Captions(__file__).of("q3_jitter", _measured),
-    subjects=_motions,
-    columns=(
-        text("curve", lambda row: row.by_mode[WARM].title),
-        text("solver", lambda row: label(row.by_mode[WARM].solver)),
-        *least(_columns("largest rotation", _largest_angle, "°")),
-        *least(_columns("closing rotation", _closing_angle, "°", (WARM, COHERENT))),
-        *_columns("mean iterations", _mean_iterations, modes=(WARM, COHERENT)),
-        *folded(
-            [
-                *_columns("mean iterations", _mean_iterations, modes=(COLD,)),
-                Column("iterations over all frames at once", read=lambda m: m.shared_iterations),
-                *greatest(
-                    _columns("within tolerance", lambda r: metrics.share(within_tolerance(r)))
-                ),
-                *_columns("largest path error", lambda r: spread_of(r, "residual")[2], "m"),
-                *_columns("mean rotation", lambda r: metrics.mean(r.values.mean_angle[:-1]), "°"),
-                *(_drift(mode, i) for mode in (WARM, COHERENT) for i in (1, 2, 3)),
-                Column("frames", read=lambda row: row.by_mode[WARM].values.residual.size),
-            ]
-        ),
-    ),
+    **Captions(__file__).of("q3_jitter"),
+    subjects=_rows,
     summary=_summary,
     figures=(jitter_chart,),
 )

@@ -1,102 +1,101 @@
 """Work-precision diagrams: the error of every solver against its time for a frame."""
 
+from collections.abc import Sequence
+from functools import partial
+
 from ...figures.chart import Axis, Chart, Panel, Series, series
 from ...figures.sketch import Sketch, chart_sketch
-from ...tables.layout import Figure
-from ...tables.results import Results
+from ...tables.results import Results, grouped
 from . import MOTION, ONE_STEP
 from .readings import Point, points
 
-# Errors beyond this are left out: of a motion that blew up.
-MOST_DRAWN = 10.0
+# Larger errors are those of motions that diverged, and are not drawn.
+MAX_ERROR = 10.0
 
 
-def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str]) -> Figure:
-    """Return what shows an error against the time for a frame: a curve for each solver.
+def work_precision(
+    name: str, task: str, error: str, titles: tuple[str, str, str], results: Results
+) -> Sketch | None:
+    """Show an error against the time for a frame: a curve for each solver.
 
-    A column for each stiffness, a row for each size. The titles are those of the figure, of the
-    error's axis, and what it shows.
+    Each stiffness has a column, each size a row. The titles are those of the figure, of the error's
+    axis, and the caption.
     """
-
-    def sketch(results: Results) -> Sketch | None:
-        found = [p for p in points(results, task) if _can_be_drawn(p, error)]
-        if not found:
-            return None
-        ours = [p for p in found if not p.own]
-        stiffnesses = sorted({p.stiffness for p in ours})
-        sizes = sorted({p.particles for p in ours})
-        panels = tuple(
-            Panel(f"{size} × {size}, {stiffness:,.0f} N/m", _curves(here, error))
-            for size in sizes
-            for stiffness in stiffnesses
-            for here in [[p for p in ours if (p.particles, p.stiffness) == (size, stiffness)]]
+    visible = [point for point in points(results, task) if _is_visible(point, error)]
+    if not visible:
+        return None
+    title, label, caption = titles
+    cloths = [point for point in visible if not point.own]
+    stiffnesses = sorted({point.stiffness for point in cloths})
+    panels = [
+        Panel(
+            f"{size} × {size}, {stiffness:,.0f} N/m",
+            _curves([p for p in cloths if (p.particles, p.stiffness) == (size, stiffness)], error),
         )
-        panels += tuple(
-            Panel(name, _curves([p for p in found if p.own == name], error))
-            for name in dict.fromkeys(p.own for p in found if p.own)
+        for size in sorted({point.particles for point in cloths})
+        for stiffness in stiffnesses
+    ]
+    own = grouped((point for point in visible if point.own), lambda point: point.own)
+    panels += [Panel(cloth, _curves(group, error)) for cloth, group in own.items()]
+    return chart_sketch(
+        Chart(
+            name,
+            title,
+            caption,
+            tuple(panels),
+            Axis("time for a frame [ms]", log=True),
+            Axis(label, log=True),
+            columns=len(stiffnesses) or len(panels),
+            entrants=results.entrants,
         )
-        return chart_sketch(
-            Chart(
-                name,
-                titles[0],
-                titles[2],
-                panels,
-                Axis("time for a frame [ms]", log=True),
-                Axis(titles[1], log=True),
-                columns=len(stiffnesses) or len(panels),
-                entrants=results.entrants,
-            )
-        )
-
-    return sketch
-
-
-def _curves(found: list[Point], error: str) -> tuple[Series, ...]:
-    return tuple(
-        series(
-            solver,
-            [1e3 * p.values["seconds"] for p in found if p.solver == solver],
-            [p.values[error] for p in found if p.solver == solver],
-        )
-        for solver in dict.fromkeys(p.solver for p in found)
     )
 
 
-def _can_be_drawn(point: Point, error: str) -> bool:
-    """Return whether a point has got to its end and lies within what anyone wants to see."""
-    whole = "wanted" not in point.values or point.is_whole
-    return whole and point.values["seconds"] > 0 and 0 < point.values[error] < MOST_DRAWN
+def _curves(visible: Sequence[Point], error: str) -> tuple[Series, ...]:
+    return tuple(
+        series(solver, [1e3 * p.seconds for p in group], [p.values[error] for p in group])
+        for solver, group in grouped(visible, lambda point: point.solver).items()
+    )
 
 
-one_step = work_precision(
+def _is_visible(point: Point, error: str) -> bool:
+    """Return whether a point reached its end, with an error that can be drawn."""
+    is_whole = "wanted" not in point.values or point.is_whole
+    return is_whole and point.seconds > 0 and 0 < point.values[error] < MAX_ERROR
+
+
+one_step = partial(
+    work_precision,
     "work_precision_step",
     ONE_STEP,
     "error",
     (
         "Work and precision in one step",
         "error |x − x*| / |y − x*|",
-        "What is left of the error to the converged step of implicit Euler.",
+        "Error to the converged step of implicit Euler.",
     ),
 )
-to_implicit_euler = work_precision(
+to_implicit_euler = partial(
+    work_precision,
     "work_precision_implicit",
     MOTION,
     "implicit",
     (
         "Work and precision, to implicit Euler",
         "rms distance [m]",
-        "Distance to converged implicit Euler after the last frame; motions that diverged or "
-        "ran out of time are left out.",
+        "Distance to converged implicit Euler after the last frame, without motions that diverged "
+        "or ran out of time.",
     ),
 )
-to_the_truth = work_precision(
+to_the_truth = partial(
+    work_precision,
     "work_precision_truth",
     MOTION,
     "true",
     (
         "Work and precision, to the truth",
         "rms distance [m]",
-        "Distance to the motion itself after the last frame; motions that diverged or ran out "
-        "of time are left out.",
+        "Distance to the true motion after the last frame, without motions that diverged or ran "
+        "out of time.",
     ),
 )

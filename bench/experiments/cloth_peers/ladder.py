@@ -1,7 +1,7 @@
-"""The settings that a solver for cloths is tried with, from cheap to dear.
+"""The settings of a solver for cloths, from cheap to expensive.
 
-A rung is a solver with settings: iterations where it iterates, steps a frame where it is explicit.
-Each is a point in a work-precision diagram.
+A rung is a solver with settings: the number of iterations if it iterates, steps a frame if it is
+explicit. Each is a point in a work-precision diagram.
 """
 
 from collections.abc import Mapping
@@ -10,16 +10,16 @@ from typing import Any, NamedTuple
 from ...peers.registry import EXPLICIT, LINEARISED, UNDECLARED, ClothPeer
 from ...problems.falling_cloth import explicit_substeps
 
-# Explicit steps, for those at symplectic Euler's limit of stability.
+# Explicit steps a frame, relative to symplectic Euler's limit of stability.
 MARGINS = (1.1, 2.0, 4.0)
-# Steps a frame of implicit ones.
+# Implicit steps a frame.
 PARTS = (1, 4, 16)
-# To this residual go the steps of solvers that go on until a step is solved.
-ENOUGH, ENOUGH_LABEL = 1e-6, "1e-6"
+# Residual of solvers that converge, in motions.
+RESIDUAL, RESIDUAL_LABEL = 1e-6, "1e-6"
 
 
 class Rung(NamedTuple):
-    """A solver with settings, and how they are written."""
+    """A solver with settings, and their label."""
 
     label: str
     settings: Mapping[str, Any]
@@ -44,10 +44,9 @@ def _rungs(
         return [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps[peer.kind]]
     rungs = [_rung(peer, _counted(n, "iteration"), iterations=n) for n in iterations]
     if peer.converges and len(parts) > 1:
-        rungs += [
-            _rung(peer, f"{_counted(n, 'step')} to {ENOUGH_LABEL}", tolerance=ENOUGH, substeps=n)
-            for n in parts
-        ]
+        for n in parts:
+            label = f"{_counted(n, 'step')} to {RESIDUAL_LABEL}"
+            rungs.append(_rung(peer, label, tolerance=RESIDUAL, substeps=n))
     return rungs
 
 

@@ -57,7 +57,7 @@ def _toolbox() -> Iterator[tuple[Peer, PeerEntry, float | None]]:
     """Yield solvers that search once, with the published share of infeasible targets."""
     plumbob, toolbox = registry.PLUMBOB_LM, registry.TOOLBOX
     entry, iterations = plumbob.entry(ONE_START), {"iterations": published.TOOLBOX.iterations}
-    yield plumbob, entry._replace(settings={**entry.settings, **iterations}), None
+    yield plumbob, replace(entry, settings={**entry.settings, **iterations}), None
     for search in published.TOOLBOX.searches if toolbox.is_installed else ():
         settings = {**search.settings, "searches": 1, "limits": False, **iterations}
         yield toolbox, PeerEntry(ONE_START, settings, note=search.title), search.infeasible

@@ -1,58 +1,53 @@
 """Robots and characters: how closely engines that read the same files agree with the reference."""
 
-from collections.abc import Iterator, Sequence
-from functools import partial
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
-from ...tables.columns import folded, text
 from ...tables.layout import Layout
 from ...tables.results import Results, by_problem, counted, grouped, listed, settings
-from ...tables.table import Cell, Column, Summary, words
+from ...tables.table import Summary, words
 from . import PEERS
 from .values import FileDetails
 
 QUANTITIES = ("positions", "rotations", "jacobians")
+# A file in both engines, or a robot of the bench in the engine of a peer, by the titles of the
+# columns; "valid" are the records whose numbers count.
+Row = dict[str, Any]
 
 
-class ModelComparison(NamedTuple):
-    """A file in both engines, or a robot of the bench in the engine of a peer.
-
-    The numbers are those of the valid records; the remark is on all others.
-    """
-
-    engines: str
-    records: Sequence[Record]
-    valid: Sequence[Record]
-    remark: str
-
-    @property
-    def is_file(self) -> bool:
-        """Whether it is a file of others, and no robot of the bench."""
-        return self.records[0].facts.get("task") != PEERS
-
-    def size(self, name: str) -> Cell:
-        """Return a size by the engine that counts fewest: one that leaves mimics free has more."""
-        if not (self.is_file and self.valid):
-            return None
-        fewest = min(self.valid, key=lambda record: (record.values.freedoms, record.solver))
-        size: int = getattr(fewest.values, name)
-        return size
-
-
-def _comparisons(results: Results) -> list[ModelComparison]:
+def _rows(results: Results) -> list[Row]:
     """Return files in both engines, and then robots of the bench in those of peers."""
-    records = results.all("robot_models")
-    files = by_problem(r for r in records if r.facts.get("task") != PEERS).values()
-    return [*map(_of_file, files), *map(_of_robot, results.all("robot_models", task=PEERS))]
+    files, robots = _parted(results.all("robot_models"))
+    return [*map(_of_file, by_problem(files).values()), *map(_of_robot, robots)]
 
 
-def _of_file(records: Sequence[Record]) -> ModelComparison:
+def _parted(records: Iterable[Record]) -> tuple[list[Record], list[Record]]:
+    """Return the records of files of others, and those of the bench's own robots."""
+    parts = grouped(records, lambda record: record.facts.get("task") == PEERS)
+    return parts.get(False, []), parts.get(True, [])
+
+
+def _of_file(records: Sequence[Record]) -> Row:
+    """Return the row of a file; an engine that leaves mimics free has too many freedoms."""
     valid = [record for record in records if record.values and not record.details.cause]
-    engines = listed([record.solver for record in valid]) or "none"
-    return ModelComparison(engines, records, valid, "; ".join(filter(None, map(_remark, records))))
+    row: Row = {"records": records, "valid": valid, "robot": records[0].title}
+    row |= {"engines": listed([record.solver for record in valid]) or "none"}
+    row |= {"remark": "; ".join(filter(None, map(_remark, records)))}
+    if not valid:
+        return row
+    size = min(valid, key=lambda record: (record.values.freedoms, record.solver)).values
+    positions, rotations, jacobians = (_largest(quantity, valid) for quantity in QUANTITIES)
+    return row | {
+        "freedoms": size.freedoms,
+        "positions, of the extent": positions,
+        "rotations": rotations,
+        "Jacobians": jacobians,
+        "links": size.links,
+        "moving joints": size.joints,
+    }
 
 
 def _remark(record: Record) -> str:
@@ -66,48 +61,53 @@ def _remark(record: Record) -> str:
     return mimics if details.free_mimics else ""
 
 
-def _of_robot(record: Record) -> ModelComparison:
-    remark = record.details.remark or registry.SINGLE_PRECISION.get(record.solver, "")
-    engine = f"{record.solver} {record.details.version}"
-    return ModelComparison(engine, [record], [record], remark)
+def _of_robot(record: Record) -> Row:
+    return {
+        "records": [record],
+        "valid": [],
+        "robot": record.title,
+        "engines": f"{record.solver} {record.details.version}",
+        "positions": record.values and record.values.positions,
+        "rotations": record.values and record.values.rotations,
+        "remark": record.details.remark or registry.SINGLE_PRECISION.get(record.solver, ""),
+    }
 
 
 def _largest(quantity: str, records: Sequence[Record]) -> float | None:
     """Return the largest difference in records, None if they have none."""
-    values = (getattr(record.values, quantity, None) for record in records)
-    return max((value for value in values if value is not None), default=None)
+    return max((getattr(record.values, quantity) for record in records), default=None)
 
 
-def _measured(rows: Sequence[ModelComparison]) -> dict[str, str]:
-    files, robots = (
-        settings((r for row in rows if row.is_file == of for r in row.records), "configurations")
-        for of in (True, False)
-    )
+def _records(rows: Sequence[Row]) -> tuple[list[Record], list[Record]]:
+    return _parted(record for row in rows for record in row["records"])
+
+
+def _measured(rows: Sequence[Row]) -> dict[str, str]:
+    files, robots = (settings(records, "configurations") for records in _records(rows))
     return {"files": files or "No", "robots": robots or "none"}
 
 
-def _summary(rows: Sequence[ModelComparison]) -> Summary:
-    files = [row for row in rows if row.is_file]
-    valid = [record for file in files for record in file.valid]
+def _summary(rows: Sequence[Row]) -> Summary:
+    files = [row["valid"] for row in rows if row["valid"]]
+    valid = [record for records in files for record in records]
     positions, rotations, jacobians = (words(_largest(q, valid)) for q in QUANTITIES)
     sentence = (
-        f"Over {counted(sum(bool(f.valid) for f in files), 'file')} positions differ by at most "
+        f"Over {counted(len(files), 'file')} positions differ by at most "
         f"{positions} of the extent, rotations by {rotations}, Jacobians by {jacobians}:"
     )
-    return Summary(sentence * bool(valid), tuple(_points(rows)))
+    return Summary(sentence * bool(valid), tuple(_points(*_records(rows))))
 
 
-def _points(rows: Sequence[ModelComparison]) -> Iterator[str]:
+def _points(files: Sequence[Record], robots: Sequence[Record]) -> Iterator[str]:
     """Yield how many files each engine reads, and how closely engines of peers place robots."""
-    files = [record for row in rows if row.is_file for record in row.records]
     for engine, records in grouped(files, lambda record: record.solver).items():
         read = [record for record in records if record.values]
         different = sum(bool(record.details.cause) for record in read)
         deviation = f", {words(different)} of them otherwise than MuJoCo's documentation says"
         count = f"{words(len(read))} of {counted(len(records), 'file')} read"
         yield f"{engine}: {count}{deviation * bool(different)}"
-    robots = (r for row in rows if not row.is_file for r in row.records if r.values)
-    for engine, records in grouped(robots, lambda record: record.solver).items():
+    placed = (record for record in robots if record.values)
+    for engine, records in grouped(placed, lambda record: record.solver).items():
         positions, rotations = (words(_largest(quantity, records)) for quantity in QUANTITIES[:2])
         yield (
             f"{engine} on the bench’s robots: effectors within {positions} m and {rotations} in a "
@@ -115,35 +115,6 @@ def _points(rows: Sequence[ModelComparison]) -> Iterator[str]:
         )
 
 
-def _difference(quantity: str, row: ModelComparison, of_files: bool | None = None) -> Cell:
-    return _largest(quantity, row.valid) if of_files in (None, row.is_file) else None
-
-
-def _column(title: str, unit: str, quantity: str, of_files: bool | None = None) -> Column:
-    read = partial(_difference, quantity, of_files=of_files)
-    return Column(title, unit, group="largest difference", read=read)
-
-
-readers = Layout(
-    **Captions(__file__).of("readers", _measured),
-    subjects=_comparisons,
-    columns=(
-        text("robot", lambda row: row.records[0].title),
-        text("engines", lambda row: row.engines),
-        Column("freedoms", read=lambda row: row.size("freedoms")),
-        _column("positions, of the extent", "", "positions", of_files=True),
-        _column("positions", "m", "positions", of_files=False),
-        _column("rotations", "", "rotations"),
-        _column("Jacobians", "", "jacobians"),
-        text("remark", lambda row: row.remark),
-        *folded(
-            [
-                Column("links", read=lambda row: row.size("links")),
-                Column("moving joints", read=lambda row: row.size("joints")),
-            ]
-        ),
-    ),
-    summary=_summary,
-)
+readers = Layout(**Captions(__file__).of("readers", _measured), subjects=_rows, summary=_summary)
 
 LAYOUTS = (readers,)

@@ -2,11 +2,8 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
-from operator import attrgetter
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +13,11 @@ from ...peers import registry
 from ...peers.registry import Peer, PeerEntry
 from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.captions import Captions
-from ...tables.columns import folded, text, words_in
+from ...tables.columns import words_in
 from ...tables.entered import entered
 from ...tables.layout import Layout
-from ...tables.results import Results, counted, grouped, leaders, listed, settings, steadiness
-from ...tables.table import INTERVAL, Cell, Column, Summary, in_unit, listing, words
+from ...tables.results import Results, counted, grouped, leaders, listed, steadiness
+from ...tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from . import REACHABLE, readings
 from .figures import FIGURES
 from .readings import OUTCOMES, STARTS, Score, title_of
@@ -35,55 +32,24 @@ _CAPTIONS = Captions(
 )
 # The rule for solvers that a budget of time cut short.
 RULE = _CAPTIONS.shared["rule"]
+# The cells of a row by the titles of their columns, and the score or the records behind them.
+Row = dict[str, Any]
 
 
 # Participants.
 
 
-class Participant(NamedTuple):
-    """A solver that was asked, its records on robots, and one record of each robot of all."""
-
-    peer: Peer
-    records: tuple[Record, ...]
-    robots: dict[str, Record]
-
-    @property
-    def version(self) -> str:
-        """Its version, "" if it is not installed."""
-        return str(self.records[0].details.version)
-
-    @property
-    def entries(self) -> str:
-        """The starts and settings with which it takes part."""
-        return listed([f"{e.kind} ({e.note})" if e.note else e.kind for e in self.peer.entries])
-
-    @property
-    def measured_robots(self) -> str:
-        """The robots that it was measured on, "" for none."""
-        names = {record.title for record in self.records if "solved" in record.arrays}
-        remaining = [robot for robot in self.robots if robot not in names]
-        return title_of([robot for robot in self.robots if robot in names], remaining)
-
-    @property
-    def remark(self) -> str:
-        """Why it was not measured on a robot, "" where it is not installed."""
-        records = [r for r in self.records if r.details.remark and self.version]
-        reasons = grouped(records, lambda record: record.details.remark)
-        titles = {reason: dict.fromkeys(r.title for r in rs) for reason, rs in reasons.items()}
-        return "; ".join(f"{listed(list(names))}: {reason}" for reason, names in titles.items())
-
-
-def _participants(results: Results) -> list[Participant]:
+def _participants(results: Results) -> list[Row]:
     """Return the peers that have records, and the solvers that users entered."""
     records = [r for start in STARTS for r in results.all("ik", task=REACHABLE, kind=start)]
     robots = {record.title: record for record in records if "solved" in record.arrays}
     users = {r.solver: _as_peer(r) for r in records if r.facts.get("entrant") is True}
-    participants = [
-        Participant(peer, tuple(r for r in records if r.solver in names), robots)
-        for peer in (*registry.PEERS, *users.values())
-        for names in [set(map(peer.label_of, peer.entries))]
-    ]
-    return [participant for participant in participants if participant.records]
+    rows = []
+    for peer in (*registry.PEERS, *users.values()):
+        names = set(map(peer.label_of, peer.entries))
+        if own := [record for record in records if record.solver in names]:
+            rows.append(_participant(peer, own, robots))
+    return rows
 
 
 def _as_peer(record: Record) -> Peer:
@@ -92,16 +58,39 @@ def _as_peer(record: Record) -> Peer:
     return Peer(record.solver, "", door, "", "", (PeerEntry(record.details.kind),))
 
 
-def _participant_summary(rows: Sequence[Participant]) -> Summary:
-    titles = {row.peer.title for row in rows}
+def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Record]) -> Row:
+    """Return the row of a solver; `robots` has one record of each robot of all."""
+    version = str(records[0].details.version)
+    names = {record.title for record in records if "solved" in record.arrays}
+    robot_names = [
+        [robot for robot in robots if (robot in names) == is_in] for is_in in (True, False)
+    ]
+    remarks = {r.title: r.details.remark for r in records if r.details.remark and version}
+    reasons = grouped(remarks, remarks.__getitem__)
+    return {
+        "records": records,
+        "robot_records": robots,
+        "solver": peer.title,
+        "package": peer.package,
+        "version": version or "not installed",
+        "license": peer.license,
+        "robots": title_of(*robot_names),
+        "solves": peer.can,
+        "entries": listed([f"{e.kind} ({e.note})" if e.note else e.kind for e in peer.entries]),
+        "remark": "; ".join(f"{listed(names)}: {reason}" for reason, names in reasons.items()),
+    }
+
+
+def _participant_summary(rows: Sequence[Row]) -> Summary:
+    titles = {row["solver"] for row in rows}
     missing = [peer.title for peer in registry.PEERS if peer.title not in titles]
     not_asked = f"; not asked: {', '.join(missing)}" if missing else ""
-    count = sum(bool(row.version) for row in rows)
-    robots = rows[0].robots
+    count = sum(row["version"] != "not installed" for row in rows)
+    robots = rows[0]["robot_records"].values()
     return Summary(
         f"{count} of {len(rows)} that were asked took part{not_asked}; "
         f"{counted(len(robots), 'robot')}:",
-        tuple(map(_robot, robots.values())),
+        tuple(map(_robot, robots)),
     )
 
 
@@ -114,177 +103,129 @@ def _robot(record: Record) -> str:
 
 
 participants = Layout(
-    **_CAPTIONS.of("participants"),
-    subjects=_participants,
-    columns=(
-        text("solver", attrgetter("peer.title")),
-        text("package", attrgetter("peer.package")),
-        text("version", lambda row: row.version or "not installed"),
-        text("license", attrgetter("peer.license")),
-        text("robots", attrgetter("measured_robots")),
-        text("solves", attrgetter("peer.can")),
-        text("entries", attrgetter("entries")),
-        text("remark", attrgetter("remark")),
-    ),
-    summary=_participant_summary,
+    **_CAPTIONS.of("participants"), subjects=_participants, summary=_participant_summary
 )
 
 
 # Scores.
 
 
-def _measured(scores: Sequence[Score]) -> dict[str, str]:
-    """Return the tolerances, and whether the machine was steady."""
-    records = [record for score in scores for record in score.records]
+def _row(score: Score) -> Row:
+    """Return the cells that all tables of scores have."""
+    seconds = score.begun("seconds")
+    return {
+        "score": score,
+        "robots": score.robots,
+        "starts": score.start,
+        "solver": score.solver,
+        "targets": score.total,
+        "false successes": score.false_successes.hits if score.claims else None,
+        "mark": "; ".join(filter(None, (score.limits, score.leads, score.trouble))),
+        **_interval("time, median", metrics.median_interval(seconds)),
+        "time, 95 %": _known(metrics.effort(seconds).p95),
+        "time, mean": _known(metrics.mean(seconds)),
+        **{name: score.outcomes[name] for name in OUTCOMES},
+    }
+
+
+def _reachable_row(score: Score) -> Row:
+    reached = score.begun("solved")
+    return {
+        **_row(score),
+        "solved": score.share,
+        **_interval("time, geometric mean", score.mean_time_interval),
+        "time relative to fastest": _known(score.relative_time),
+        **_spread("position residual", score.begun("position")[reached]),
+        **_spread("rotation residual", score.begun("rotation")[reached]),
+        "set-up": score.records[0].values.setup,
+    }
+
+
+def _unreachable_row(score: Score) -> Row:
+    distances = score.distances
+    bounds = np.hstack([record.arrays.get("bound", np.nan) for record in score.records])
+    return {
+        **_row(score),
+        "mark": "; ".join(filter(None, (score.limits, score.trouble))),
+        **_spread("distance above best", distances - score.best_distances[: distances.size]),
+        **_spread("distance above lower bound", distances - bounds),
+        **_spread("distance to target", score.begun("position")),
+        "answers within limits": int(np.isfinite(distances).sum()),
+    }
+
+
+def _known(number: float) -> float | None:
+    return None if math.isnan(number) else number
+
+
+def _interval(title: str, interval: metrics.Interval) -> Row:
+    titles = (title, f"{title}, 95 % low", f"{title}, 95 % high")
+    return dict(zip(titles, map(_known, interval), strict=True))
+
+
+def _spread(title: str, numbers: metrics.Floats) -> Row:
+    """Return the cells of the median and the largest of the finite numbers."""
+    spread = metrics.spread(numbers[np.isfinite(numbers)])
+    return {f"{title}, median": _known(spread.median), f"{title}, largest": _known(spread.largest)}
+
+
+def _measured(rows: Sequence[Row]) -> dict[str, str]:
+    """Return whether the machine was steady."""
+    records = (record for row in rows for record in row["score"].records)
     paces = [float(r.conditions["pace"]) for r in records if r.conditions.get("pace")]
     noise = metrics.relative_spread(np.array(paces)) if len(paces) > 1 else math.nan
-    tolerances = {name: settings(records, name) for name in ("tolerance", "tolerance_rotation")}
-    return {**tolerances, "steadiness": steadiness(noise)}
+    return {"steadiness": steadiness(noise)}
 
 
-def _number(
-    title: str, read: str | Callable[[Score], Cell], unit: str = "", best: str = ""
-) -> Column:
-    """Return a column of numbers, empty where a score has none."""
-    number = attrgetter(read) if isinstance(read, str) else read
-
-    def cell(score: Score) -> Cell:
-        value: Cell = number(score)
-        return None if isinstance(value, float) and math.isnan(value) else value
-
-    return Column(title, unit, read=cell, best=best)
-
-
-def _spread(title: str, unit: str, read: Callable[[Score], metrics.Floats]) -> list[Column]:
-    """Return the columns of the median and the largest of some finite numbers."""
-
-    def spread(score: Score) -> metrics.Spread:
-        numbers = read(score)
-        return metrics.spread(numbers[np.isfinite(numbers)])
-
-    return [
-        _number(f"{title}, median", lambda score: spread(score).median, unit),
-        _number(f"{title}, largest", lambda score: spread(score).largest, unit),
-    ]
-
-
-def _residuals(quantity: str, unit: str) -> list[Column]:
-    def read(score: Score) -> metrics.Floats:
-        return score.begun(quantity)[score.begun("solved")]
-
-    return _spread(f"{quantity} residual", unit, read)
-
-
-def _counts(names: Sequence[str]) -> list[Column]:
-    def count(name: str, score: Score) -> int:
-        return score.outcomes[name]
-
-    return [Column(name, read=partial(count, name)) for name in names]
-
-
-def _mark(score: Score) -> str:
-    return "; ".join(filter(None, (score.limits, score.leads, score.trouble)))
-
-
-NAMES = (
-    text("robots", attrgetter("robots")),
-    text("starts", attrgetter("start")),
-    text("solver", attrgetter("solver")),
-)
-SOLVED = replace(_number("solved", "share", best="greatest"), note=INTERVAL)
-FALSE_SUCCESSES = _number("false successes", lambda s: s.false_successes.hits if s.claims else None)
-_MEAN = "time, geometric mean"
-MEAN_TIME = _number(_MEAN, "mean_time", "µs", best="least")
-MEAN_TIME_INTERVAL = (
-    _number(f"{_MEAN}, 95 % low", "mean_time_interval.low", "µs"),
-    _number(f"{_MEAN}, 95 % high", "mean_time_interval.high", "µs"),
-)
-MEDIAN_TIME = _number("time, median", "median_time.value", "µs")
-OTHER_TIMES = (
-    _number("time, 95 %", lambda score: metrics.effort(score.begun("seconds")).p95, "µs"),
-    _number("time, mean", lambda score: metrics.mean(score.begun("seconds")), "µs"),
-)
-
-
-def _layout(name: str, **fields: object) -> Layout:
+def _layout(
+    name: str,
+    scores: Callable[[Results], Iterable[Score]],
+    row: Callable[[Score], Row],
+    **fields: Any,
+) -> Layout:
     """Return a table of scores; solvers with the same robots and starts are compared."""
-    captions = {**_CAPTIONS.of(name, _measured), **fields}
-    return Layout(**captions, compared=2, ranked=attrgetter("is_ranked"))
+    return Layout(
+        **{**_CAPTIONS.of(name, _measured), **fields},
+        subjects=lambda results: map(row, scores(results)),
+        compared=2,
+        ranked=lambda row: row["score"].is_ranked,
+    )
 
 
-def _points(scores: Sequence[Score]) -> Iterator[str]:
+def _points(rows: Sequence[Row]) -> Iterator[str]:
     """Yield who solves the most and who takes the least time, field by field."""
-    for (robots, start), field in grouped(scores, lambda s: (s.robots, s.start)).items():
-        success, time = field[0].success, field[0].time
+    for (robots, start), field in _fields(rows).items():
+        success, time = field[0]["score"].success, field[0]["score"].time
         if success.order:
-            solvers = {score.solver: score for score in field}
-            best, fastest = solvers[success.order[0]], solvers[time.order[0]]
-            mean, low, high = fastest.mean_time_interval
+            solvers = {row["solver"]: row for row in field}
+            fastest = solvers[time.order[0]]
+            mean, low, high = fastest["score"].mean_time_interval
             yield (
-                f"{robots}, {start}: {leaders(success)}, {words(best.share)}; least time "
+                f"{robots}, {start}: {leaders(success)}, "
+                f"{words(solvers[success.order[0]]['solved'])}; least time "
                 f"{leaders(time)}, {words_in(mean, 'µs')} ({words(in_unit(low, 'µs'))}–"
-                f"{words(in_unit(high, 'µs'))}, n = {words(fastest.share.total)})"
+                f"{words(in_unit(high, 'µs'))}, n = {words(fastest['targets'])})"
             )
 
 
-def _summary(scores: Sequence[Score]) -> Summary:
+def _fields(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
+    return grouped(rows, lambda row: (str(row["robots"]), str(row["starts"])))
+
+
+def _summary(rows: Sequence[Row]) -> Summary:
     sentence = "Who solves the most targets within reach, and who takes the least time for them:"
-    return listing(sentence, _points(scores))
+    return listing(sentence, _points(rows))
 
 
-over_all = _layout(
-    "robots_overall",
-    subjects=readings.overall,
-    columns=(
-        *NAMES,
-        SOLVED,
-        FALSE_SUCCESSES,
-        MEAN_TIME,
-        text("mark", _mark),
-        *folded([*MEAN_TIME_INTERVAL, *_counts(OUTCOMES[1:])]),
-    ),
-    summary=_summary,
-)
-
+over_all = _layout("robots_overall", readings.overall, _reachable_row, summary=_summary)
 robot_by_robot = _layout(
-    "robots_by_robot",
-    subjects=readings.scores,
-    columns=(
-        *NAMES,
-        SOLVED,
-        FALSE_SUCCESSES,
-        MEDIAN_TIME,
-        _number("time relative to fastest", "relative_time", best="least"),
-        text("mark", _mark),
-        *folded(
-            [
-                _number("time, median, 95 % low", "median_time.low", "µs"),
-                _number("time, median, 95 % high", "median_time.high", "µs"),
-                *OTHER_TIMES,
-                MEAN_TIME,
-                *MEAN_TIME_INTERVAL,
-                *_residuals("position", "m"),
-                *_residuals("rotation", "rad"),
-                Column("set-up", "ms", read=lambda score: score.records[0].values.setup),
-            ]
-        ),
-    ),
-    summary=_summary,
-    figures=FIGURES,
+    "robots_by_robot", readings.scores, _reachable_row, summary=_summary, figures=FIGURES
 )
 
 
-def _outcome_columns(scores: Sequence[Score]) -> list[Column]:
-    """Return a column for each outcome, folded if it never occurs, and one for each stratum."""
-    counts = [
-        replace(column, folded=not any(map(column.read, scores))) for column in _counts(OUTCOMES)
-    ]
-    names = scores[0].records[0].details.strata if scores else ()
-    strata = [
-        Column(f"solved, {name}", note=INTERVAL, read=partial(_stratum, i), best="greatest")
-        for i, name in enumerate(names)
-    ]
-    return [*NAMES, *counts, _number("targets", "total"), *folded(strata)]
+def _outcome_row(score: Score) -> Row:
+    strata = enumerate(score.records[0].details.strata)
+    return {**_row(score), **{f"solved, {name}": _stratum(i, score) for i, name in strata}}
 
 
 def _stratum(stratum: int, *scores: Score) -> metrics.Share:
@@ -292,16 +233,31 @@ def _stratum(stratum: int, *scores: Score) -> metrics.Share:
     return metrics.share(np.concatenate([s.solved_in_stratum(stratum) for s in scores]))
 
 
-def _outcome_summary(scores: Sequence[Score]) -> Summary:
+def _outcome_columns(rows: Sequence[Row]) -> list[Column]:
+    """Return a column for each outcome, folded if it never occurs, and one for each stratum."""
+
+    def column(title: str, **looks: Any) -> Column:
+        return Column(title, read=lambda row: row[title], **looks)
+
+    strata = [title for title in (rows[0] if rows else ()) if title.startswith("solved, ")]
+    return [
+        *_CAPTIONS.columns("robots_outcomes"),
+        *(column(name, folded=not any(row[name] for row in rows)) for name in OUTCOMES),
+        column("targets"),
+        *(column(title, note=INTERVAL, best="greatest", folded=True) for title in strata),
+    ]
+
+
+def _outcome_summary(rows: Sequence[Row]) -> Summary:
     """Return the outcomes of targets that were not solved, and the hardest strata."""
     points = []
-    for solver, group in grouped(scores, lambda score: score.solver).items():
-        counts = sum((score.outcomes for score in group), Counter())
+    for solver, group in grouped(rows, lambda row: str(row["solver"])).items():
+        counts: Counter[str] = sum((row["score"].outcomes for row in group), Counter())
         failures = [f"{words(counts[name])} {name}" for name in OUTCOMES[1:] if counts[name]]
         if failures:
             points.append(f"{solver}: {listed(failures)}, of {words(counts.total())}")
-    for start, group in grouped(scores, lambda score: score.start).items():
-        ranked = [score for score in group if score.is_ranked]
+    for start, group in grouped(rows, lambda row: str(row["starts"])).items():
+        ranked = [row["score"] for row in group if row["score"].is_ranked]
         names = ranked[0].records[0].details.strata if ranked else []
         shares = {name: _stratum(i, *ranked) for i, name in enumerate(names)}
         hardest = sorted(shares, key=lambda name: metrics.ratio(*shares[name][:2]))
@@ -312,57 +268,28 @@ def _outcome_summary(scores: Sequence[Score]) -> Summary:
 
 
 outcomes = _layout(
-    "robots_outcomes", subjects=readings.scores, columns=_outcome_columns, summary=_outcome_summary
+    "robots_outcomes",
+    readings.scores,
+    _outcome_row,
+    columns=_outcome_columns,
+    summary=_outcome_summary,
 )
 
 
-def _unreachable_summary(scores: Sequence[Score]) -> Summary:
-    liars = [score for score in scores if score.false_successes.hits]
+def _unreachable_summary(rows: Sequence[Row]) -> Summary:
+    liars = [row["score"] for row in rows if row["false successes"]]
     if liars:
         points = (f"{s.robots}, {s.solver}: {words(s.false_successes)}" for s in liars)
         return listing("Claimed as solved though out of reach:", points)
-    count = sum(score.claims for score in scores)
-    silent = list(dict.fromkeys(s.solver for s in scores if not s.claims))
+    count = sum(row["score"].claims for row in rows)
+    silent = list(dict.fromkeys(row["solver"] for row in rows if row["false successes"] is None))
     without_claims = f" These make no claims: {listed(silent)}." if silent else ""
     sentence = "No solver that makes claims claims a target that is out of reach"
     return Summary(f"{sentence} (n = {words(count)}).{without_claims}")
 
 
-def _over_best(score: Score) -> metrics.Floats:
-    """Return by how much the distances exceed the best ones [m]."""
-    return score.distances - score.best_distances[: score.distances.size]
-
-
-def _over_bound(score: Score) -> metrics.Floats:
-    """Return by how much the distances exceed the least that geometry allows [m]."""
-    bounds = [record.arrays.get("bound", np.nan) for record in score.records]
-    return score.distances - np.hstack(bounds)
-
-
-median_over_best, largest_over_best = _spread("distance above best", "m", _over_best)
-
 unreachable = _layout(
-    "robots_unreachable",
-    subjects=readings.out_of_reach,
-    columns=(
-        *NAMES,
-        FALSE_SUCCESSES,
-        replace(median_over_best, best="least"),
-        MEDIAN_TIME,
-        text("mark", lambda score: "; ".join(filter(None, (score.limits, score.trouble)))),
-        *folded(
-            [
-                largest_over_best,
-                _spread("distance above lower bound", "m", _over_bound)[0],
-                *_spread("distance to target", "m", lambda score: score.begun("position")),
-                _number("targets", "total"),
-                _number("answers within limits", lambda s: int(np.isfinite(s.distances).sum())),
-                *_counts(OUTCOMES[4:]),
-                *OTHER_TIMES,
-            ]
-        ),
-    ),
-    summary=_unreachable_summary,
+    "robots_unreachable", readings.out_of_reach, _unreachable_row, summary=_unreachable_summary
 )
 
 LAYOUTS = (participants, over_all, robot_by_robot, outcomes, unreachable, entered)

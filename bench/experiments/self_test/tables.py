@@ -1,48 +1,54 @@
 """Which planted faults `plumbob verify` catches and names, and which honest solvers it accuses."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.columns import text, titled
 from ...tables.layout import Layout
 from ...tables.results import grouped, listed
-from ...tables.table import Column, Summary
+from ...tables.table import Summary
 
 
-def _is_accused(record: Record) -> bool | None:
-    """Return whether an honest solver is accused, None of a faulty one."""
-    return None if record.details.faulty else not record.values.passed
+def _row(record: Record) -> dict[str, Any]:
+    """Return a row; an honest solver has no fault, and a faulty one is not accused."""
+    trial, details = record.values, record.details
+    return {
+        "record": record,
+        "solvers": details.family,
+        "fault or honest solver": record.title,
+        "caught": trial.caught if details.faulty else None,
+        "named": trial.named if details.faulty else None,
+        "accused": None if details.faulty else not trial.passed,
+        "violated laws": listed(details.laws),
+    }
 
 
-def _summary(records: Sequence[Record]) -> Summary:
-    families = grouped(records, lambda record: record.details.family)
-    failures = [f"{r.details.family}: {r.title}" for r in records if not r.values.passed]
+def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+    families = grouped(rows, lambda row: str(row["solvers"]))
+    failures = [
+        f"{row['solvers']}: {row['fault or honest solver']}"
+        for row in rows
+        if not row["record"].values.passed
+    ]
     points = (f"{family}: {_counts(members)}" for family, members in families.items())
-    return Summary(f"{_counts(records)}:", (*failures, *points))
+    return Summary(f"{_counts(rows)}:", (*failures, *points))
 
 
-def _counts(records: Sequence[Record]) -> str:
+def _counts(rows: Sequence[dict[str, Any]]) -> str:
     """Return how many faults are caught and named, and how many honest solvers are accused."""
-    faults = [record.values for record in records if record.details.faulty]
-    caught, named = sum(f.caught for f in faults), sum(f.named for f in faults)
-    accused = sum(bool(_is_accused(record)) for record in records)
+    faults = [row for row in rows if row["record"].details.faulty]
+    caught, named, accused = (
+        sum(bool(row[title]) for row in rows) for title in ("caught", "named", "accused")
+    )
     planted = f"{caught} of {len(faults)} planted faults caught, {named} named"
-    honest = f"{accused} of {len(records) - len(faults)} honest solvers accused"
-    return "; ".join([planted] * bool(faults) + [honest] * (len(faults) < len(records)))
+    honest = f"{accused} of {len(rows) - len(faults)} honest solvers accused"
+    return "; ".join([planted] * bool(faults) + [honest] * (len(faults) < len(rows)))
 
 
 self_test = Layout(
     **Captions(__file__).of("self_test"),
-    subjects=lambda results: results.all("self_test"),
-    columns=(
-        text("solvers", lambda record: record.details.family),
-        titled("fault or honest solver"),
-        Column("caught", read=lambda r: r.values.caught if r.details.faulty else None),
-        Column("named", read=lambda r: r.values.named if r.details.faulty else None),
-        Column("accused", read=_is_accused),
-        text("violated laws", lambda record: listed(record.details.laws)),
-    ),
+    subjects=lambda results: map(_row, results.all("self_test")),
     summary=_summary,
 )
 

@@ -6,11 +6,11 @@ LOCAL, DASK = "local", "dask://"
 
 
 def executor_at(address: str, mix_machines: bool = False) -> Executor:
-    """Return the executor of an address; see `.dask` for what it may cost.
+    """Return the executor of an address.
 
     Raises:
-        ValueError: if there is no such executor, it needs what is not installed, or it does not
-            answer.
+        ValueError: if there is no such executor, it needs a package that is not installed, or it
+            does not answer.
     """
     if address == LOCAL:
         return THIS_PROCESS

@@ -1,8 +1,8 @@
-"""The workers of a Dask cluster: what takes no times spreads over them, what does is pinned.
+"""The workers of a Dask cluster: blocks without times spread over them, timed ones are pinned.
 
-Dask finds a worker for each block that takes no times, and another one if that is lost. Blocks that
-take times are given out here: those of a suite to one host, one after the other, and hosts of one
-machine only, unless machines may be mixed.
+Dask finds a worker for each block without times, and another one if that is lost. Timed blocks are
+placed here: those of a suite on one host, one after the other, and on hosts of one machine only,
+unless machines may be mixed.
 """
 
 import asyncio
@@ -10,11 +10,11 @@ import contextlib
 import json
 import logging
 import pickle
-import queue
 import uuid
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 from ..block import Block, Scale
@@ -27,9 +27,9 @@ from ..stopwatch import Budget
 from . import DASK
 from .work import Reply, Task, perform, place, unlike
 
-# So long [s] is waited for the scheduler, and for workers, at first and when all are lost.
+# How long [s] to wait for the scheduler, and for workers, at first and when all are lost.
 ANSWER, WORKERS = 10.0, 120.0
-# So often [s] it is asked which workers are still there.
+# How often [s] to look which workers are there.
 _LOOK = 1.0
 _NO_EXTRA = (
     "--executor: expected the package distributed, which is not installed: "
@@ -38,38 +38,28 @@ _NO_EXTRA = (
 
 
 class Place(NamedTuple):
-    """A worker.
+    """The host and the machine of a worker, the machine as JSON."""
 
-    Attributes:
-        address: where Dask finds it.
-        host: the name of its host.
-        stamp: machine, versions and sources.
-    """
-
-    address: str
     host: str
-    stamp: Mapping[str, Any]
-
-    @property
-    def machine(self) -> str:
-        """The kind of machine, as records know it."""
-        return _machine(self.stamp)
+    machine: str
 
 
 @dataclass(eq=False)
-class _Line:
-    """Blocks that one host measures one after the other.
+class _Queue:
+    """Blocks to be measured one after the other, pinned to a host if they take times.
 
     Attributes:
         blocks: those that are not done.
-        told: whether the first was said to be begun; it may be begun again elsewhere.
+        is_pinned: whether they stay on one host.
+        is_begun: whether the first was reported as begun; another worker may begin it again.
         host: the host that they are bound to, while there is one.
         address: the worker that has the first block.
-        future: what will come of it, None if no worker has it.
+        future: the result of the first block, None if no worker has it.
     """
 
     blocks: deque[Block]
-    told: bool = False
+    is_pinned: bool
+    is_begun: bool = False
     host: str = ""
     address: str = ""
     future: Any = None
@@ -92,18 +82,20 @@ class DaskExecutor(Executor):
         answer: float = ANSWER,
         workers: float = WORKERS,
     ) -> None:
-        """Connect to a scheduler, and see who works there.
+        """Connect to a scheduler and wait for its first worker.
 
         Raises:
             ValueError: if Dask is not installed, the scheduler does not answer in time [s], there
                 is no worker in time [s], or one has other versions or sources.
         """
         self.address, self.mix_machines, self._patience = address, mix_machines, workers
-        self._client, self._done = _connected(address, answer), queue.SimpleQueue[Any]()
+        self._client, self._results = _connected(address, answer), SimpleQueue[Any]()
         self._topic = f"plumbob-{uuid.uuid4().hex}"
-        self._client.subscribe_topic(self._topic, self._heard)
+        self._client.subscribe_topic(
+            self._topic, lambda event: self._results.put(Progress(*event[1]))
+        )
         self._places: dict[str, Place] = {}
-        self._machine, self._timed = "", list[Record]()
+        self._machine, self._records = "", list[Record]()
         try:
             self._wait_for_workers()
         except BaseException:
@@ -111,22 +103,18 @@ class DaskExecutor(Executor):
             raise
 
     def close(self) -> None:
-        """Leave the cluster; what is still to be measured for us is given up."""
+        """Leave the cluster; cancel our remaining measurements."""
         self._client.close(timeout=ANSWER)
 
-    def look_at(self, timed: Iterable[Record | None]) -> None:
+    def note_records(self, records: Iterable[Record | None]) -> None:
         """Choose the machine that times are taken on: of those here, that of the most records."""
-        self._timed = [
-            record
-            for record in timed
-            if record and record.arrays and not unlike(record.stamp, stamp())
-        ]
-        records = Counter(_machine(record.stamp) for record in self._timed)
-        workers = Counter(one.machine for one in self._places.values())
-        self._machine = max(sorted(workers), key=lambda name: (records[name], workers[name]))
+        self._records = [r for r in records if r and r.arrays and not unlike(r.stamp, stamp())]
+        recorded = Counter(_machine(record.stamp) for record in self._records)
+        workers = Counter(place.machine for place in self._places.values())
+        self._machine = max(sorted(workers), key=lambda name: (recorded[name], workers[name]))
 
     def difference(self, block: Block, record: Record) -> str:
-        """Return in what a record was made otherwise; what machine matters for times only."""
+        """Return how a record was made differently; the machine matters for times only."""
         if block.times and not self.mix_machines and _machine(record.stamp) != self._machine:
             return f"times are taken on another machine ({_in_words(self._machine)})"
         return unlike(record.stamp, stamp())
@@ -136,138 +124,123 @@ class DaskExecutor(Executor):
         return {**stamp(), "machine": json.loads(self._machine)}
 
     def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
-        """Yield each block as it is given out, and what came of it, as it comes."""
-        yield from self._spread([block for block in blocks if not block.times], scale)
-        timed = [block for block in blocks if block.times]
-        mixed = self._would_be_mixed(timed)
-        yield from (NotMeasured(b, mixed[b.suite]) for b in timed if b.suite in mixed)
-        yield from self._pin([block for block in timed if block.suite not in mixed], scale)
+        """Yield each block when it is submitted, and its record when it arrives."""
+        untimed = [_Queue(deque([block]), False) for block in blocks if not block.times]
+        yield from self._measure(untimed, scale)
+        timed_blocks = [block for block in blocks if block.times]
+        mixed = self._mixed_suites(timed_blocks)
+        yield from (NotMeasured(b, mixed[b.suite]) for b in timed_blocks if b.suite in mixed)
+        queues: dict[Any, _Queue] = {}
+        for i, block in enumerate(timed_blocks):
+            if block.suite not in mixed:
+                name = i if self.mix_machines else block.suite
+                queues.setdefault(name, _Queue(deque(), True)).blocks.append(block)
+        yield from self._measure(list(queues.values()), scale)
 
-    def _would_be_mixed(self, blocks: Sequence[Block]) -> dict[str, str]:
-        """Return the suites of which rows that stay are of another machine, and why that is bad."""
-        again, here = {block_key(block) for block in blocks}, _in_words(self._machine)
+    def _mixed_suites(self, blocks: Sequence[Block]) -> dict[str, str]:
+        """Return the suites whose remaining rows are of another machine, and why that is bad."""
+        keys, machine = {block_key(block) for block in blocks}, _in_words(self._machine)
         return {
             record.suite: f"others of {record.suite} are timed on another machine than is here "
-            f"({_in_words(_machine(record.stamp))}; here {here}): ask for the whole suite, or "
+            f"({_in_words(_machine(record.stamp))}; here {machine}): ask for the whole suite, or "
             "--mix-machines"
-            for record in self._timed
-            if not (self.mix_machines or record.key in again)
+            for record in self._records
+            if not (self.mix_machines or record.key in keys)
             and _machine(record.stamp) != self._machine
         }
 
-    def _spread(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
-        """Let Dask choose the workers."""
-        given = {}
-        for block in blocks:
-            yield block
-            future = self._submit(block, scale)
-            given[future.key] = block, future
+    def _measure(self, queues: list[_Queue], scale: Scale) -> Iterator[Step]:
+        """Measure the blocks of all queues, each queue in order."""
         patience = Budget(self._patience)
-        while given:
-            future = self._next()
-            if self._here():
+        while queues := [queue for queue in queues if queue.blocks]:
+            yield from self._submit_first_blocks(queues, scale)
+            future, addresses = self._next(), self._addresses()
+            self._release_lost_workers(queues, addresses)
+            if addresses and any(queue.future for queue in queues):
                 patience = Budget(self._patience)
             elif patience.is_spent:
-                raise ValueError(self._says(f"no worker is left for {self._patience:g} s"))
-            if future is not None and future.key in given:
-                found = self._outcome(given[future.key][0], future)
-                if found is not None:
-                    del given[future.key]
-                    yield found
-
-    def _pin(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
-        """Give each host a line of blocks, one block after the other."""
-        lines, patience = self._lines(blocks), Budget(self._patience)
-        while lines := [line for line in lines if line.blocks]:
-            yield from self._give_out(lines, scale)
-            if any(line.future for line in lines):
-                patience = Budget(self._patience)
-            elif patience.is_spent:
+                if not queues[0].is_pinned:
+                    raise self._error(f"no worker is left for {self._patience:g} s")
                 why = f"no worker on the machine that takes times ({_in_words(self._machine)})"
-                yield from (NotMeasured(b, why) for line in lines for b in line.blocks)
+                yield from (NotMeasured(b, why) for queue in queues for b in queue.blocks)
                 return
-            future = self._next()
-            self._leave_lost_workers(lines)
-            line = next((line for line in lines if line.future and line.future is future), None)
-            if line and (found := self._outcome(line.blocks[0], future)) is not None:
-                line.blocks.popleft()
-                line.future, line.told = None, False
-                yield found
+            queue = next((q for q in queues if future and q.future is future), None)
+            if queue and (record := self._record(queue.blocks[0], future)) is not None:
+                queue.blocks.popleft()
+                queue.future, queue.is_begun = None, False
+                yield record
 
-    def _lines(self, blocks: Sequence[Block]) -> list[_Line]:
-        """Return the blocks, those that have to stay on one host in one line."""
-        if self.mix_machines:
-            return [_Line(deque([block])) for block in blocks]
-        suites = dict.fromkeys(block.suite for block in blocks)
-        return [_Line(deque(b for b in blocks if b.suite == suite)) for suite in suites]
+    def _submit_first_blocks(self, queues: Sequence[_Queue], scale: Scale) -> Iterator[Block]:
+        """Submit the first block of each queue, a pinned one to a host without another queue."""
+        for queue in queues:
+            if queue.future:
+                continue
+            workers: dict[str, Any] = {}
+            if queue.is_pinned:
+                occupied = {other.host for other in queues if other is not queue}
+                address = self._free_worker(queue.host, occupied)
+                if not address:
+                    continue
+                queue.host, queue.address = self._places[address].host, address
+                workers = {"workers": [address]}
+            if not queue.is_begun:
+                yield queue.blocks[0]
+            queue.is_begun, queue.future = True, self._submit(queue.blocks[0], scale, **workers)
 
-    def _give_out(self, lines: Sequence[_Line], scale: Scale) -> Iterator[Block]:
-        """Give the first block of every line to a host that has no other."""
-        for line in lines:
-            taken = {other.host for other in lines if other is not line}
-            at = None if line.future else self._free(line.host, taken)
-            if at:
-                if not line.told:
-                    yield line.blocks[0]
-                line.told, line.host, line.address = True, at.host, at.address
-                line.future = self._submit(line.blocks[0], scale, workers=[at.address])
+    def _free_worker(self, host: str, occupied: set[str]) -> str:
+        """Return a worker of this host; if it is "", of one that is not occupied; "" if none."""
+        for address in self._addresses():
+            place = self._places[address]
+            is_allowed = self.mix_machines or place.machine == self._machine
+            if is_allowed and (place.host == host if host else place.host not in occupied):
+                return address
+        return ""
 
-    def _free(self, host: str, taken: set[str]) -> Place | None:
-        """Return a worker of this host; if it is "", of one that is not taken."""
-        for address in self._here():
-            one = self._places[address]
-            allowed = self.mix_machines or one.machine == self._machine
-            if allowed and (one.host == host if host else one.host not in taken):
-                return one
-        return None
+    def _release_lost_workers(self, queues: Sequence[_Queue], addresses: Sequence[str]) -> None:
+        """Take back the block of a lost worker, and unbind its queue from a host that is gone."""
+        hosts = {self._places[address].host for address in addresses}
+        for queue in queues:
+            if queue.is_pinned and queue.future and queue.address not in addresses:
+                queue.future.cancel()
+                queue.future = None
+            if queue.host not in hosts:
+                queue.host = ""
 
-    def _leave_lost_workers(self, lines: Sequence[_Line]) -> None:
-        """Take back what a lost worker had, and bind its line to no host that is gone."""
-        here = self._here()
-        hosts = {self._places[address].host for address in here}
-        for line in lines:
-            if line.future and line.address not in here:
-                line.future.cancel()
-                line.future = None
-            if line.host not in hosts:
-                line.host = ""
-
-    def _submit(self, block: Block, scale: Scale, **where: Any) -> Any:
-        known = block.suite, pickle.dumps(scale), block_key(block)
-        task = Task(*known, block.times, stamp(), self._topic)
-        future = self._client.submit(perform, task, key=f"plumbob-{uuid.uuid4().hex}", **where)
-        future.add_done_callback(self._done.put)
+    def _submit(self, block: Block, scale: Scale, **workers: Any) -> Any:
+        task = Task(
+            *(block.suite, pickle.dumps(scale), block_key(block)),
+            *(block.times, stamp(), self._topic),
+        )
+        future = self._client.submit(perform, task, key=f"plumbob-{uuid.uuid4().hex}", **workers)
+        future.add_done_callback(self._results.put)
         return future
-
-    def _heard(self, event: tuple[Any, Sequence[str]]) -> None:
-        self._done.put(Progress(*event[1]))
 
     def _next(self) -> Any:
         """Return a future that is done, None if there is none for a while; pass on progress."""
-        with contextlib.suppress(queue.Empty):
-            found = self._done.get(timeout=_LOOK)
-            if not isinstance(found, Progress):
-                return found
-            announce(*found)
+        with contextlib.suppress(Empty):
+            result = self._results.get(timeout=_LOOK)
+            if not isinstance(result, Progress):
+                return result
+            announce(*result)
         return None
 
-    def _outcome(self, block: Block, future: Any) -> Step | None:
-        """Return what came of a block, None if its worker was lost with it."""
+    def _record(self, block: Block, future: Any) -> Record | None:
+        """Return the record of a block, None if its worker was lost with it."""
         from distributed import KilledWorker
 
         try:
             reply: Reply = future.result(timeout=ANSWER)
         except TimeoutError:
-            self._done.put(future)
+            self._results.put(future)
             return None
         except KilledWorker:
             reply = Reply(failed="every worker that tried it was lost")
         except asyncio.CancelledError:
-            raise ValueError(self._says("the scheduler is gone")) from None
+            raise self._error("the scheduler is gone") from None
         except Exception as error:
-            raise ValueError(self._says(f"{type(error).__name__}: {error}")) from None
+            raise self._error(f"{type(error).__name__}: {error}") from None
         if reply.refused:
-            raise ValueError(self._says(reply.refused))
+            raise self._error(reply.refused)
         if reply.failed:
             return replace(record_of(block, failure(reply.failed), 0.0), stamp=self.stamp())
         return decode(reply.line)
@@ -277,12 +250,12 @@ class DaskExecutor(Executor):
             self._client.wait_for_workers(1, timeout=self._patience)
         except TimeoutError:
             why = f"expected a worker, got none within {self._patience:g} s"
-            raise ValueError(self._says(why)) from None
-        while not self._here():
+            raise self._error(why) from None
+        while not self._addresses():
             pass
 
-    def _here(self) -> list[str]:
-        """Return the addresses of the workers that are there, in order, and get to know new ones.
+    def _addresses(self) -> list[str]:
+        """Return the addresses of the workers that are there, in order; inspect new ones.
 
         Raises:
             ValueError: if one has other versions or sources.
@@ -291,22 +264,24 @@ class DaskExecutor(Executor):
             addresses = sorted(self._client.nthreads())
             if new := [address for address in addresses if address not in self._places]:
                 replies = self._client.run(place, workers=new, on_error="return")
-                self._places |= {at: self._known(at, reply) for at, reply in replies.items()}
+                self._places |= {at: _place(at, reply) for at, reply in replies.items()}
         except (OSError, RuntimeError, TimeoutError):
-            raise ValueError(self._says("the scheduler is gone")) from None
+            raise self._error("the scheduler is gone") from None
         return [address for address in addresses if address in self._places]
 
-    def _known(self, address: str, reply: Any) -> Place:
-        if isinstance(reply, ImportError):
-            raise ValueError(f"worker {address}: expected Plumbob, got {reply}")
-        if isinstance(reply, Exception):
-            raise reply
-        if why := unlike(stamp(), reply["stamp"]):
-            raise ValueError(f"worker {address}: expected what is installed here, got {why}")
-        return Place(address, **reply)
+    def _error(self, message: str) -> ValueError:
+        return ValueError(f"{DASK}{self.address}: {message}")
 
-    def _says(self, what: str) -> str:
-        return f"{DASK}{self.address}: {what}"
+
+def _place(address: str, reply: Any) -> Place:
+    """Return the place of a worker, which must have our versions and sources."""
+    if isinstance(reply, ImportError):
+        raise ValueError(f"worker {address}: expected Plumbob, got {reply}")
+    if isinstance(reply, Exception):
+        raise reply
+    if why := unlike(stamp(), reply["stamp"]):
+        raise ValueError(f"worker {address}: expected what is installed here, got {why}")
+    return Place(reply["host"], _machine(reply["stamp"]))
 
 
 def _connected(address: str, patience: float) -> Any:
@@ -314,7 +289,7 @@ def _connected(address: str, patience: float) -> Any:
         from distributed import Client
     except ImportError:
         raise ValueError(_NO_EXTRA) from None
-    for name in ("distributed", "distributed.client", "asyncio"):  # what they say is said by us
+    for name in ("distributed", "distributed.client", "asyncio"):  # we report their errors
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         if asyncio.run(asyncio.wait_for(_identity(address), patience)).get("type") != "Scheduler":
@@ -322,13 +297,13 @@ def _connected(address: str, patience: float) -> Any:
         return Client(address, timeout=patience, set_as_default=False, name="plumbob")
     except (OSError, TimeoutError):
         why = f"got no answer within {patience:g} s"
-    except Exception:  # whatever reading the answer of another program raises
+    except Exception:  # reading another program's answer may raise anything
         why = "got an answer of something else"
     raise ValueError(f"{DASK}{address}: expected a Dask scheduler, {why}")
 
 
 async def _identity(address: str) -> Mapping[str, Any]:
-    """Return what a Dask process says of itself; a Client would wait for it without a limit."""
+    """Return the identity of a Dask process; a Client would wait for it without a limit."""
     from distributed.core import rpc
     from distributed.security import Security
 
@@ -337,10 +312,10 @@ async def _identity(address: str) -> Mapping[str, Any]:
         return identity
 
 
-def _machine(of: Mapping[str, Any]) -> str:
-    """Return the machine of a stamp, as what can be compared and counted."""
-    return json.dumps(dict(of.get("machine", {})), sort_keys=True)
+def _machine(stamp: Mapping[str, Any]) -> str:
+    """Return the machine of a stamp as JSON, which can be compared and counted."""
+    return json.dumps(dict(stamp.get("machine", {})), sort_keys=True)
 
 
 def _in_words(machine: str) -> str:
-    return ", ".join(str(value) for value in json.loads(machine).values())
+    return ", ".join(str(part) for part in json.loads(machine).values())

@@ -1,14 +1,12 @@
 """A user's solver for cloths: a frame is one request or several, one a step."""
 
-from typing import Any
-
 import numpy as np
 
 from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 
-from ..contestant import Contestant, opened, remark
+from ..contestant import opened, remark
 from ..entrant import MOTION_TASK, STEP_TASK, Spec
 from ..protocol import OwnTime, total
 from .protocol import Mover
@@ -24,19 +22,25 @@ def prepare(system: MassSpring, frame: float, spec: Spec = "", substeps: int = 1
     Raises:
         ValueError: if its model cannot hold the system.
     """
-    solver = opened(spec)
-    _check_model(system, solver.greeting)
-    return _Requests(solver, system, frame / substeps, substeps)
+    return _Requests(system, frame / substeps, substeps, spec)
 
 
 class _Requests:
     """Steps of which each is a request; there is none after a step that is not finite."""
 
-    def __init__(self, solver: Contestant, system: MassSpring, h: float, substeps: int) -> None:
-        self._solver, self._h, self._substeps = solver, h, substeps
-        self._task = STEP_TASK if STEP_TASK in solver.greeting.tasks else MOTION_TASK
-        self._known = _inputs(system, solver.greeting, self._task) | {"h": h}
-        self._before = solver.greeting.system.state == "previous_positions"
+    def __init__(self, system: MassSpring, h: float, substeps: int, spec: Spec) -> None:
+        self._solver, self._h, self._substeps = opened(spec), h, substeps
+        greeting = self._solver.greeting
+        _check_model(system, greeting)
+        self._task = STEP_TASK if STEP_TASK in greeting.tasks else MOTION_TASK
+        self._inputs = {name: getattr(system, name) for name in _PARTS} | {"h": h}
+        if greeting.system.external_forces:
+            self._inputs["external_forces"] = np.zeros((system.particle_count, 3))
+        if greeting.system.tension_only:
+            self._inputs["tension_only"] = system.tension_only
+        if self._task == MOTION_TASK:
+            self._inputs["steps"] = 1
+        self._has_previous = greeting.system.state == "previous_positions"
 
     def begin(self, state: State) -> None:
         self._x, self._v = state.positions, state.velocities
@@ -49,33 +53,24 @@ class _Requests:
         return self._x
 
     def _step(self) -> OwnTime:
-        inputs = {**self._known, "positions": self._x, "velocities": self._v}
-        if self._before:
+        inputs = {**self._inputs, "positions": self._x, "velocities": self._v}
+        if self._has_previous:
             inputs["previous_positions"] = self._x - self._h * self._v
-        values, time = self._solver.answer(self._task, inputs)
+        answer, time = self._solver.answer(self._task, inputs)
         if self._task == MOTION_TASK:
-            values = {name: value[-1] for name, value in values.items()}
-        x = values.get("positions")
+            answer = {name: frames[-1] for name, frames in answer.items()}
+        x = answer.get("positions")
         if x is None:
-            x = self._x + self._h * values["velocities"]
-        self._x, self._v = x, values.get("velocities", (x - self._x) / self._h)
+            x = self._x + self._h * answer["velocities"]
+        self._x, self._v = x, answer.get("velocities", (x - self._x) / self._h)
         return time
-
-
-def _inputs(system: MassSpring, greeting: Greeting, task: str) -> dict[str, Any]:
-    inputs = {name: getattr(system, name) for name in _PARTS}
-    if greeting.system.external_forces:
-        inputs["external_forces"] = np.zeros((system.particle_count, 3))
-    if greeting.system.tension_only:
-        inputs["tension_only"] = system.tension_only
-    return inputs | ({"steps": 1} if task == MOTION_TASK else {})
 
 
 def _check_model(system: MassSpring, greeting: Greeting) -> None:
     """Make sure that a solver's own model can hold a system.
 
     Raises:
-        ValueError: if it cannot; the message says in what.
+        ValueError: naming what it cannot hold.
     """
     can, gravity = greeting.system, system.gravity
     is_down = not gravity[[0, 2]].any() and bool(gravity[1] <= 0.0)

@@ -1,8 +1,7 @@
 """MuJoCo: point masses on slides, joined by tendons or by the edges of a one-dimensional flex.
 
 "discrete" solves a linear system by conjugate gradients, of which MuJoCo allows 100 iterations to a
-tolerance of 1e-8; more, and a smaller one, are a matter of settings here. All springs of a flex are
-alike.
+tolerance of 1e-8; more, and a smaller one, are settings here. All springs of a flex are alike.
 """
 
 import mujoco
@@ -14,9 +13,9 @@ from plumbob.reference.arguments import FloatArray
 
 from .protocol import Mover
 
-# What a model is built from; stiffness and damping are set anew every time.
+# A model is built from these; stiffness and damping are set anew every time.
 _BUILT_FROM = ("masses", "springs", "rest_lengths", "tension_only", "pinned", "gravity")
-_kept: dict[tuple[bool, int], tuple[MassSpring, MujocoMassSpring]] = {}
+_engines: dict[tuple[bool, int], tuple[MassSpring, MujocoMassSpring]] = {}
 
 
 def prepare(
@@ -38,25 +37,26 @@ def prepare(
         engine.set_integrator(integrator)
         model.tendon_stiffness[:], model.tendon_damping[:] = system.stiffnesses, system.dampings
         option.iterations, option.tolerance = iterations, tolerance
-    option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)  # nobody asks for energies here
+    option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)  # energies are not read here
     option.timestep = frame / substeps
-    mujoco.set_mju_user_warning(_ignore)
+    # MuJoCo would write warnings to a file; a motion that blew up is seen from the positions.
+    mujoco.set_mju_user_warning(lambda warning: None)
     return _Steps(engine, substeps)
 
 
 def _engine(system: MassSpring, flex: bool) -> MujocoMassSpring:
-    """Return the engine made before for a system alike but for stiffness and damping, or a new one.
+    """Return the engine of an equal system but for stiffness and damping, or a new one.
 
-    At most one is kept for each number of particles: to build one takes time cubic in it.
+    One is cached for each number of particles: to build one takes time cubic in it.
     """
     key = flex, system.particle_count
-    if key not in _kept or not _are_alike(_kept[key][0], system):
-        _kept[key] = system, MujocoFlex(system) if flex else MujocoMassSpring(system)
-    return _kept[key][1]
-
-
-def _are_alike(a: MassSpring, b: MassSpring) -> bool:
-    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in _BUILT_FROM)
+    if key in _engines:
+        cached, engine = _engines[key]
+        if all(np.array_equal(getattr(cached, n), getattr(system, n)) for n in _BUILT_FROM):
+            return engine
+    engine = MujocoFlex(system) if flex else MujocoMassSpring(system)
+    _engines[key] = system, engine
+    return engine
 
 
 class _Steps:
@@ -76,7 +76,3 @@ class _Steps:
         positions = engine.model.body_pos[engine.bodies]
         positions[engine.free] = engine.data.qpos[engine.columns]
         return positions
-
-
-def _ignore(warning: str) -> None:
-    """MuJoCo would write it to a file; that a motion blew up is seen from the positions."""

@@ -5,7 +5,7 @@
   the other, each particle takes a Newton step of its own, those of one colour at once; so
   neighbours must differ in colour.
 - XPBD: extended position based dynamics (Macklin, Müller, Chentanez 2016) corrects all springs at
-  once and adds what each wants of a particle, without averaging.
+  once and adds their corrections of a particle, without averaging.
 
 Collisions between particles are left out, as the reference has none. A pinned particle has mass
 zero. A spring's rest length would be taken from the particles' places, and is overwritten.
@@ -57,9 +57,9 @@ class _Steps:
         self._substeps, self._h = substeps, h
 
     def begin(self, state: State) -> None:
-        for mine in (self._now, self._next):
-            mine.particle_q.assign(state.positions.astype(np.float32))
-            mine.particle_qd.assign(state.velocities.astype(np.float32))
+        for buffer in (self._now, self._next):
+            buffer.particle_q.assign(state.positions.astype(np.float32))
+            buffer.particle_qd.assign(state.velocities.astype(np.float32))
 
     def advance(self) -> None:
         for _ in range(self._substeps):
@@ -99,7 +99,7 @@ def colours(springs: IndexArray, particle_count: int) -> list[IndexArray]:
         neighbours[i].append(j)
         neighbours[j].append(i)
     colour = np.full(particle_count, -1)
-    for i, near in enumerate(neighbours):
-        taken = set(colour[near])
-        colour[i] = next(c for c in range(particle_count) if c not in taken)
+    for i, adjacent in enumerate(neighbours):
+        used = set(colour[adjacent])
+        colour[i] = next(c for c in range(particle_count) if c not in used)
     return [np.flatnonzero(colour == c) for c in range(colour.max() + 1)]

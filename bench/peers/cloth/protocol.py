@@ -18,14 +18,14 @@ class Mover(Protocol):
     """A solver that is set up for a system and the length of a frame."""
 
     def begin(self, state: State) -> None:
-        """Put the particles into a state; what the solver remembers of others is forgotten."""
+        """Put the particles into a state; the solver forgets all earlier ones."""
 
     def advance(self) -> OwnTime | None:
-        """Move on by one frame; return the time that it counted, None if the call is timed.
+        """Move on by one frame; return the solver's own time, None if the call is timed.
 
         Raises:
             FloatingPointError: if the motion leaves the finite numbers.
         """
 
     def positions(self) -> FloatArray:
-        """Return where the particles are now [m], (particle, 3), not finite if they blew up."""
+        """Return the positions of the particles [m], (particle, 3), not finite if they blew up."""

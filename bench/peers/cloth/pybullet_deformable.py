@@ -1,10 +1,10 @@
 """PyBullet: a deformable body as masses and springs, by symplectic Euler in double precision.
 
-Its springs are the edges of a mesh of triangles, so it takes square cloths only. Left to itself it
-adds springs of 0.1 N/m between neighbours' neighbours, and none are asked for in vain: their
-stiffness is set to zero. Rest lengths are taken anew from where the particles are at the first
-step, which is taken with the cloth flat. Velocities cannot be written but are kept when positions
-are: a step from where the springs' forces make them gives the particles their first velocities.
+Its springs are the edges of a mesh of triangles, so it takes square cloths only. It adds springs of
+0.1 N/m between neighbours' neighbours, whose stiffness is set to zero. Rest lengths are taken anew
+from where the particles are at the first step, which is taken with the cloth flat. Velocities
+cannot be written but are kept when positions are: one step of chosen forces gives the particles
+their first velocities.
 """
 
 import functools
@@ -20,11 +20,11 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 
 from .protocol import Mover
 
-# The length [s] of the step that makes velocities, how much larger gravity is in it than they ask
-# for, and the steps of implicit Euler, of this length [s], that find where it begins.
+# The length [s] of the step that makes velocities, its gravity in units of the fastest of them, and
+# the length [s] and number of the steps of implicit Euler that find its start.
 _PUSH, _PULL, _RELAX, _RELAXATIONS, _ITERATIONS = 0.1, 4.0, 1e3, 3, 50
-# Larger ones take PyBullet minutes to load.
-MOST = 2500
+# Larger cloths take PyBullet minutes to load.
+MAXIMUM_PARTICLES = 2500
 # A step so short [s] moves nothing.
 _INSTANT = 1e-12
 # Rest lengths are those of the flat cloth up to rounding.
@@ -104,8 +104,8 @@ class _Body:
         pybullet.disconnect(self._client)
 
     def positions(self) -> FloatArray:
-        shown = {"flags": pybullet.MESH_DATA_SIMULATION_MESH, "physicsClientId": self._client}
-        return np.array(pybullet.getMeshData(self._number, -1, **shown)[1])
+        flags = {"flags": pybullet.MESH_DATA_SIMULATION_MESH, "physicsClientId": self._client}
+        return np.array(pybullet.getMeshData(self._number, -1, **flags)[1])
 
     def write(self, positions: FloatArray) -> None:
         """Put the particles elsewhere; they keep their velocities."""
@@ -132,9 +132,9 @@ def _pushed(system: MassSpring, velocities: FloatArray, start: FloatArray) -> Fl
     """
     force = -system.masses[:, None] * velocities / _PUSH
     euler = ImplicitEuler(system, h=_RELAX, tolerance=0.0, max_iterations=_ITERATIONS)
-    still = np.zeros_like(start)
+    rest = np.zeros_like(start)
     for _ in range(_RELAXATIONS):
-        start = euler.step(State(start, still), external_forces=force).state.positions
+        start = euler.step(State(start, rest), external_forces=force).state.positions
     return start
 
 
@@ -144,18 +144,18 @@ def mesh(system: MassSpring) -> tuple[FloatArray, IndexArray]:
     Raises:
         ValueError: if the system is no square cloth of equal masses and undamped springs, or large.
     """
-    if system.particle_count > MOST:
+    if system.particle_count > MAXIMUM_PARTICLES:
         raise ValueError(
-            f"system: expected {MOST:,} particles or fewer, which PyBullet loads in seconds, "
-            f"got {system.particle_count:,}"
+            f"system: expected {MAXIMUM_PARTICLES:,} particles or fewer, which PyBullet loads in "
+            f"seconds, got {system.particle_count:,}"
         )
     size = round(system.particle_count**0.5)
     i, j = np.divmod(np.arange(size**2), size)
     triangles = _triangles(size)
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, ::2]]))
-    ours, theirs = np.unique(np.sort(system.springs), axis=0), np.unique(edges, axis=0)
+    springs, edges = np.unique(np.sort(system.springs), axis=0), np.unique(edges, axis=0)
     alike = [len(np.unique(part)) == 1 for part in (system.masses, system.stiffnesses)]
-    if not (all(alike) and np.array_equal(ours, theirs)) or system.damped:
+    if not (all(alike) and np.array_equal(springs, edges)) or system.damped:
         raise ValueError("system: expected a square cloth, equal masses, equal undamped springs")
     if system.tension_only.any():
         raise ValueError("system: expected springs that also push")
@@ -175,8 +175,8 @@ def _triangles(size: int) -> IndexArray:
     a, b, c, d = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
     groups = [(a, b, c), (a, c, d), (a[:1, :1], b[:1, :1], d[:1, :1])]
     for grid in (at, at.T):
-        beside = np.concatenate([grid[1:-1, 1:], grid[1:-1, -2:-1]], axis=1)
-        groups.append((grid[:-2], beside, grid[2:]))
+        neighbours = np.concatenate([grid[1:-1, 1:], grid[1:-1, -2:-1]], axis=1)
+        groups.append((grid[:-2], neighbours, grid[2:]))
     return np.concatenate([np.stack([x.ravel() for x in g], axis=1) for g in groups])
 
 

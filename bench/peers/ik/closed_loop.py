@@ -9,8 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio
 
-from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 STEP = 0.1
 DAMPING = 1e-12
@@ -22,20 +21,20 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 1000) -> Ask:
     data = model.createData()
     frames = [model.getFrameId(effector) for effector in robot.effectors]
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        targets = [pinocchio.SE3(R, x) for R, x in zip(rotations, positions, strict=True)]
-        q0 = to_pinocchio(robot, start)
+    def ask(request: PoseRequest) -> Solve:
+        targets = [pinocchio.SE3(R, x) for x, R in request.poses]
+        q0 = to_pinocchio(robot, request.start)
 
         def solve() -> SolverOutput:
             q = q0
             for iteration in range(iterations + 1):
                 e, J = _error(model, data, q, frames, targets, robot.oriented)
-                done = bool(np.linalg.norm(e) < tolerance.position)
-                if done or iteration == iterations:
+                is_done = bool(np.linalg.norm(e) < tolerance.position)
+                if is_done or iteration == iterations:
                     break
                 damped = J @ J.T + DAMPING * np.eye(len(e))
                 q = pinocchio.integrate(model, q, -STEP * (J.T @ np.linalg.solve(damped, e)))
-            return SolverOutput(from_pinocchio(robot, q), done)
+            return SolverOutput(from_pinocchio(robot, q), is_done)
 
         return solve
 
@@ -48,19 +47,51 @@ def _error(
     q: FloatArray,
     frames: Sequence[int],
     targets: Sequence[pinocchio.SE3],
-    posed: bool,
+    oriented: bool,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the error of all effectors and its derivative, only of positions unless posed."""
+    """Return the error of all effectors and its derivative; of positions only unless `oriented`."""
     pinocchio.computeJointJacobians(model, data, q)
     pinocchio.updateFramePlacements(model, data)
     errors, slopes = [], []
     for frame, target in zip(frames, targets, strict=True):
         to_target = data.oMf[frame].actInv(target)
         J = pinocchio.getFrameJacobian(model, data, frame, pinocchio.LOCAL)
-        if posed:
+        if oriented:
             errors.append(pinocchio.log(to_target).vector)
             slopes.append(-pinocchio.Jlog6(to_target.inverse()) @ J)
         else:
             errors.append(to_target.translation)
             slopes.append(-J[:3])
     return np.concatenate(errors), np.vstack(slopes)
+
+
+def pinocchio_model(robot: Robot) -> pinocchio.Model:
+    """Return the robot in Pinocchio.
+
+    Raises:
+        ValueError: if Pinocchio orders its joints otherwise.
+    """
+    if robot.is_chain:
+        model = pinocchio.buildModelFromXML(robot.text)
+    else:
+        with robot.file() as file:
+            model = pinocchio.buildModelFromMJCF(file)
+    robot.check_order("Pinocchio", list(model.names)[1:])
+    return model
+
+
+def to_pinocchio(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return coordinates whose quaternions end with w."""
+    return _permuted(robot, q, [1, 2, 3, 0])
+
+
+def from_pinocchio(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return coordinates whose quaternions begin with w."""
+    return _permuted(robot, q, [3, 0, 1, 2])
+
+
+def _permuted(robot: Robot, q: FloatArray, order: list[int]) -> FloatArray:
+    permuted = q.copy()
+    for i in robot.balls:
+        permuted[i : i + 4] = q[i : i + 4][order]
+    return permuted

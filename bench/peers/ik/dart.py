@@ -7,30 +7,29 @@ the joints' limits. DART's own restarts draw from a generator without a seed, so
 import dartpy
 import numpy as np
 
-from .protocol import Ask, FloatArray, Forward, Robot, Solve, SolverOutput, Tolerance, needs_a_chain
+from .protocol import Ask, FloatArray, Forward, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 
 def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 200) -> Ask:
     """Return the solver, set up for a robot."""
-    needs_a_chain(robot)
     skeleton = dart_skeleton(robot)
     ik = skeleton.getBodyNode(robot.effectors[0]).getIK(True)
-    goal = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "target")
-    ik.setTarget(goal)
+    target_frame = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "target")
+    ik.setTarget(target_frame)
     side = np.repeat([tolerance.rotation, tolerance.position], 3) / np.sqrt(3.0)
     ik.getErrorMethod().setBounds(-side, side)
     ik.getSolver().setNumMaxIterations(iterations)
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+    def ask(request: PoseRequest) -> Solve:
         target = dartpy.math.Isometry3()
-        target.set_rotation(rotations[0])
-        target.set_translation(positions[0])
+        target.set_rotation(request.rotations[0])
+        target.set_translation(request.positions[0])
 
         def solve() -> SolverOutput:
-            goal.setTransform(target)
-            skeleton.setPositions(start)
-            done = ik.solveAndApply(True)
-            return SolverOutput(skeleton.getPositions(), bool(done))
+            target_frame.setTransform(target)
+            skeleton.setPositions(request.start)
+            claim = bool(ik.solveAndApply(True))
+            return SolverOutput(skeleton.getPositions(), claim)
 
         return solve
 
@@ -39,7 +38,6 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 200) -> Ask:
 
 def kinematics(robot: Robot) -> Forward:
     """Return DART's forward kinematics of the effector."""
-    needs_a_chain(robot)
     skeleton = dart_skeleton(robot)
     effector = skeleton.getBodyNode(robot.effectors[0])
 
@@ -52,18 +50,18 @@ def kinematics(robot: Robot) -> Forward:
 
 
 def dart_skeleton(robot: Robot) -> dartpy.dynamics.Skeleton:
-    """Return a chain in DART, its root fixed in the world and its joints in the robot's order.
+    """Return a chain in DART, its root fixed in the world.
 
     Raises:
+        UnableError: if the robot is no chain.
         ValueError: if DART does not read it, or orders the joints otherwise.
     """
+    robot.require_chain()
     loader, options = dartpy.utils.DartLoader(), dartpy.utils.DartLoaderOptions()
     options.mDefaultRootJointType = dartpy.utils.DartLoaderRootJointType.FIXED
     loader.setOptions(options)
     skeleton = loader.parseSkeletonString(robot.text, dartpy.common.Uri())
     if skeleton is None:
         raise ValueError("DART does not read the robot")
-    names = tuple(freedom.getName() for freedom in skeleton.getDofs())
-    if names != robot.joints:
-        raise ValueError(f"DART orders the joints as {', '.join(names)}")
+    robot.check_order("DART", [freedom.getName() for freedom in skeleton.getDofs()])
     return skeleton

@@ -1,8 +1,8 @@
 """EAIK: all solutions at once by subproblems, for arms whose axes allow it.
 
-Some of what it returns are least-squares answers to what cannot be solved, marked `is_LS`; those
-are left out, and so are solutions beyond the limits, after whole revolutions are tried. It needs no
-start. Its time is that of `calculate_IK`: which of all solutions to take is for its user to choose.
+Some of its solutions are least-squares answers to insoluble targets, marked `is_LS`; those are left
+out, and so are solutions beyond the limits, after whole revolutions are tried. It needs no start.
+Its time is that of `calculate_IK`: the choice among all solutions is its user's.
 """
 
 from time import perf_counter
@@ -10,22 +10,12 @@ from time import perf_counter
 import numpy as np
 from eaik.pybindings import EAIK
 
-from ...problems.robots import LIMIT_TOLERANCE, links
+from ...problems.robots import LIMIT_TOLERANCE, UnableError, links
 from ..protocol import OwnTime
-from .protocol import (
-    Ask,
-    FloatArray,
-    Robot,
-    Solve,
-    SolverOutput,
-    Tolerance,
-    UnableError,
-    needs_a_chain,
-    pose_matrix,
-)
+from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 REVOLUTION = 2.0 * np.pi
-MOST = 6
+MAXIMUM_HINGES = 6
 
 
 def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
@@ -34,25 +24,24 @@ def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
     Raises:
         UnableError: if it knows no decomposition of this robot.
     """
-    needs_a_chain(robot)
+    robot.require_chain()
     axes, offsets, rotation = axes_at_zero(robot)
-    if len(axes) > MOST:
-        raise UnableError(f"takes {MOST} hinges at the most")
+    if len(axes) > MAXIMUM_HINGES:
+        raise UnableError(f"takes {MAXIMUM_HINGES} hinges at the most")
     engine = EAIK.Robot(axes.T, offsets.T, rotation, [], True)
     if not engine.has_known_decomposition():
         raise UnableError("knows no decomposition of this arm")
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        target = pose_matrix(positions[0], rotations[0])
+    def ask(request: PoseRequest) -> Solve:
+        target = request.matrix
 
         def solve() -> SolverOutput:
             begin = perf_counter()
-            found = engine.calculate_IK(target)
+            solutions = engine.calculate_IK(target)
             time = OwnTime(perf_counter() - begin)
-            exact = [q for q, nearest in zip(found.Q, found.is_LS, strict=True) if not nearest]
-            for q in exact:
+            for q, is_approximate in zip(solutions.Q, solutions.is_LS, strict=True):
                 q = within(robot, np.asarray(q))
-                if ((q >= robot.lower) & (q <= robot.upper)).all():
+                if not is_approximate and ((q >= robot.lower) & (q <= robot.upper)).all():
                     return SolverOutput(q, True, time)
             return SolverOutput(None, False, time)
 

@@ -11,7 +11,7 @@ from ...problems.robots import links
 from ..contestant import opened, remark
 from ..entrant import ROBOT_TASK, Spec
 from ..protocol import NoAnswerError
-from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, UnableError
+from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance, UnableError
 
 __all__ = ["prepare", "remark", "robot_inputs"]
 
@@ -22,22 +22,22 @@ def prepare(robot: Robot, tolerance: Tolerance, spec: Spec = "") -> Ask:
     """Return a user's solver, set up for a robot.
 
     Raises:
-        UnableError: for a robot that the protocol has no words for.
+        UnableError: for a robot that the protocol cannot describe.
     """
     if not robot.is_chain:
         raise UnableError("not asked: the protocol has hinges and one effector, no balls")
-    solver, known = opened(spec), robot_inputs(robot)
-    known |= {"tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation}
+    solver, inputs = opened(spec), robot_inputs(robot)
+    inputs |= {"tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation}
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        target = {"target_position": positions[0]}
-        target["target_rotation"] = rotation.from_matrix(rotations[0])
+    def ask(request: PoseRequest) -> Solve:
+        target = {"target_position": request.positions[0], "start": request.start}
+        target["target_rotation"] = rotation.from_matrix(request.rotations[0])
 
         def solve() -> SolverOutput:
-            values, time = solver.answer(ROBOT_TASK, {**known, **target, "start": start})
-            if "q" not in values:
+            answer, time = solver.answer(ROBOT_TASK, {**inputs, **target})
+            if "q" not in answer:
                 raise NoAnswerError("It answered no q.")
-            return SolverOutput(values["q"], values.get("converged"), time)
+            return SolverOutput(answer["q"], answer.get("converged"), time)
 
         return solve
 
@@ -45,7 +45,7 @@ def prepare(robot: Robot, tolerance: Tolerance, spec: Spec = "") -> Ask:
 
 
 def robot_inputs(robot: Robot) -> dict[str, Any]:
-    """Return what the protocol says of a chain of hinges; its frames hold the fixed joints."""
+    """Return a chain of hinges in the terms of the protocol; its frames hold the fixed joints."""
     transform, frames, axes = np.eye(4), [], []
     for link in links(robot):
         transform = transform @ link.transform

@@ -8,6 +8,7 @@ import numpy as np
 from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.reference.arguments import FloatArray
 
+from ...problems.chains import ChainRequest
 from ..contestant import opened, remark
 from ..entrant import CHAIN_TASK, Spec
 from .protocol import Solve, SolverOutput
@@ -16,31 +17,32 @@ __all__ = ["joint_positions", "prepare", "remark"]
 
 # Positions without rotations count if they keep every link to this share of its length.
 STRETCH = 1e-6
-Ask = Callable[[FloatArray, FloatArray, int], Solve]
 
 
-def prepare(skeleton: Skeleton, tolerance: float, spec: Spec = "", method: str = "") -> Ask:
+def prepare(
+    skeleton: Skeleton, tolerance: float, spec: Spec = "", method: str = ""
+) -> Callable[[ChainRequest], Solve]:
     """Return a user's solver, set up for a skeleton whose last joint is the effector.
 
-    An output holds the iterations, NaN if unsaid, and the joints' positions in a row.
+    An output holds the iterations, NaN if unstated, and the joints' positions in a row.
 
     Raises:
         NoAnswerError: if it gives no answer when one iteration is allowed.
     """
     solver = opened(spec)
-    known = {"parents": skeleton.parents, "offsets": skeleton.offsets, "tolerance": tolerance}
-    known |= {"effector": skeleton.joint_count - 1, "method": method}
+    constants = {"parents": skeleton.parents, "offsets": skeleton.offsets, "tolerance": tolerance}
+    constants |= {"effector": skeleton.joint_count - 1, "method": method}
 
     def inputs(target: FloatArray, start: FloatArray, iterations: int) -> dict[str, Any]:
-        asked = {"local_rotations": start, "target": target, "max_iterations": iterations}
-        return {**known, **asked}
+        variables = {"local_rotations": start, "target": target, "max_iterations": iterations}
+        return {**constants, **variables}
 
-    def ask(target: FloatArray, start: FloatArray, iterations: int) -> Solve:
+    def ask(request: ChainRequest) -> Solve:
         def solve() -> SolverOutput:
-            values, time = solver.answer(CHAIN_TASK, inputs(target, start, iterations))
-            positions = joint_positions(skeleton, values)
-            q = np.append(values.get("iterations", np.nan), positions)
-            return SolverOutput(q, values.get("converged"), time)
+            answer, time = solver.answer(CHAIN_TASK, inputs(*request))
+            positions = joint_positions(skeleton, answer)
+            q = np.append(answer.get("iterations", np.nan), positions)
+            return SolverOutput(q, answer.get("converged"), time)
 
         return solve
 
@@ -50,21 +52,21 @@ def prepare(skeleton: Skeleton, tolerance: float, spec: Spec = "", method: str =
     return ask
 
 
-def joint_positions(skeleton: Skeleton, values: Mapping[str, Any]) -> FloatArray:
+def joint_positions(skeleton: Skeleton, answer: Mapping[str, Any]) -> FloatArray:
     """Return where an answer puts the joints [m], (joint, 3): by its rotations if it has any.
 
     Raises:
         ValueError: if it has neither rotations nor positions, or positions that stretch links.
     """
-    if "local_rotations" in values:
-        return forward_kinematics(skeleton, values["local_rotations"]).positions
-    if "positions" not in values:
+    if "local_rotations" in answer:
+        return forward_kinematics(skeleton, answer["local_rotations"]).positions
+    if "positions" not in answer:
         raise ValueError("answered neither local_rotations nor positions")
-    positions = np.asarray(values["positions"], dtype=float)
-    links, lengths = positions[1:] - positions[skeleton.parents[1:]], skeleton.offsets[1:]
-    wanted = np.linalg.norm(lengths, axis=-1)
-    stretched = np.abs(np.linalg.norm(links, axis=-1) - wanted).max(initial=0.0)
-    rooted = np.linalg.norm(positions[0] - skeleton.offsets[0])
-    if not max(stretched, rooted) <= STRETCH * max(wanted.sum(), 1e-30):
+    positions = np.asarray(answer["positions"], dtype=float)
+    links = positions[1:] - positions[skeleton.parents[1:]]
+    lengths = np.linalg.norm(skeleton.offsets[1:], axis=-1)
+    stretch = np.abs(np.linalg.norm(links, axis=-1) - lengths).max(initial=0.0)
+    shift = np.linalg.norm(positions[0] - skeleton.offsets[0])
+    if not max(stretch, shift) <= STRETCH * max(lengths.sum(), 1e-30):
         raise ValueError("answered positions that do not keep the links' lengths or the root")
     return positions

@@ -9,24 +9,24 @@ import numpy as np
 from mujoco import minimize
 
 from ...problems.evaluate import mujoco_model
-from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, needs_a_chain
+from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 SILENT = minimize.Verbosity.SILENT
 
 
 def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     """Return the solver, set up for a robot."""
-    needs_a_chain(robot)
+    robot.require_chain()
     bounds = [robot.lower[:, None], robot.upper[:, None]]
     reach = _Reach(robot)
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+    def ask(request: PoseRequest) -> Solve:
         def solve() -> SolverOutput:
-            reach.aim(positions[0], rotations[0])
-            asked = (start[:, None], reach.residuals, bounds, reach.jacobian)
-            q, _ = minimize.least_squares(*asked, max_iter=iterations, verbose=SILENT)
-            left = np.linalg.norm(reach.residual(q.ravel()).reshape(2, 3), axis=-1)
-            return SolverOutput(q.ravel(), bool((left <= tolerance).all()))
+            reach.aim(request.positions[0], request.rotations[0])
+            problem = (request.start[:, None], reach.residuals, bounds, reach.jacobian)
+            q, _ = minimize.least_squares(*problem, max_iter=iterations, verbose=SILENT)
+            errors = np.linalg.norm(reach.residual(q.ravel()).reshape(2, 3), axis=-1)
+            return SolverOutput(q.ravel(), bool((errors <= tolerance).all()))
 
         return solve
 
@@ -34,7 +34,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 
 
 class _Reach:
-    """The displacement and rotation vector of the effector from the target last aimed at."""
+    """The displacement and rotation vector of the effector from its current target."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = mujoco_model(robot)
@@ -61,14 +61,13 @@ class _Reach:
         """Return the residual's derivative, (6, coordinate)."""
         self._update_kinematics(q.ravel())
         mujoco.mj_comPos(self._model, self._data)
-        linear, angular = np.empty((3, self._model.nv)), np.empty((3, self._model.nv))
+        linear, angular = np.empty((2, 3, self._model.nv))
         mujoco.mj_jacBody(self._model, self._data, linear, angular, self._effector)
         slope = np.empty((3, 3))
         mujoco.mjd_subQuat(self._rotation, self._data.xquat[self._effector], None, slope)
         # The derivative is by rotation vectors in the effector's frame, J has them in the world's.
-        return np.vstack(
-            [linear, slope @ self._data.xmat[self._effector].reshape(3, 3).T @ angular]
-        )
+        R = self._data.xmat[self._effector].reshape(3, 3)
+        return np.vstack([linear, slope @ R.T @ angular])
 
     def _update_kinematics(self, q: FloatArray) -> None:
         self._data.qpos[:] = q

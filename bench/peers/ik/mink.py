@@ -7,7 +7,7 @@ of the task must not be zero: full steps then jump about.
 import mink
 
 from ...problems.evaluate import mujoco_model
-from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
+from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
 
 
 def prepare(
@@ -28,18 +28,18 @@ def prepare(
     def is_done() -> bool:
         return arrived([task.compute_error(configuration) for task in tasks], robot, tolerance)
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+    def ask(request: PoseRequest) -> Solve:
         targets = [
             mink.SE3.from_rotation_and_translation(mink.SO3.from_matrix(R), x)
-            for R, x in zip(rotations, positions, strict=True)
+            for x, R in request.poses
         ]
 
         def solve() -> SolverOutput:
             for task, target in zip(tasks, targets, strict=True):
                 task.set_target(target)
-            configuration.update(start)
-            done = iterate(step, is_done, iterations)
-            return SolverOutput(configuration.q.copy(), done)
+            configuration.update(request.start)
+            claim = iterate(step, is_done, iterations)
+            return SolverOutput(configuration.q.copy(), claim)
 
         return solve
 

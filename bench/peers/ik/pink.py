@@ -8,24 +8,22 @@ With pink's own damping of 1e-12 the quadratic program is infeasible, and pink r
 
 import pink
 
-from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
+from .closed_loop import from_pinocchio, pinocchio_model, to_pinocchio
+from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
 
 
 def prepare(
     robot: Robot, tolerance: Tolerance, iterations: int = 200, damping: float = 1e-6
 ) -> Ask:
     """Return the solver, set up for a robot."""
-    model = pinocchio_model(robot)
+    model, cost = pinocchio_model(robot), float(robot.oriented)
     data, limits = model.createData(), [pink.limits.ConfigurationLimit(model)]
-    tasks = [pink.FrameTask(effector, 1.0, float(robot.oriented)) for effector in robot.effectors]
+    tasks = [pink.FrameTask(effector, 1.0, cost) for effector in robot.effectors]
     options = {"solver": "daqp", "damping": damping, "limits": limits, "safety_break": False}
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        targets = [
-            pink.configuration.pin.SE3(R, x) for R, x in zip(rotations, positions, strict=True)
-        ]
-        q0 = to_pinocchio(robot, start)
+    def ask(request: PoseRequest) -> Solve:
+        targets = [pink.configuration.pin.SE3(R, x) for x, R in request.poses]
+        q0 = to_pinocchio(robot, request.start)
 
         def solve() -> SolverOutput:
             for task, target in zip(tasks, targets, strict=True):
@@ -40,8 +38,8 @@ def prepare(
                 errors = [task.compute_error(configuration) for task in tasks]
                 return arrived(errors, robot, tolerance)
 
-            done = iterate(step, is_done, iterations)
-            return SolverOutput(from_pinocchio(robot, configuration.q), done)
+            claim = iterate(step, is_done, iterations)
+            return SolverOutput(from_pinocchio(robot, configuration.q), claim)
 
         return solve
 

@@ -1,7 +1,7 @@
 """PlaCo: differential inverse kinematics by quadratic programs, iterated to a target.
 
 Its wheels pin a Pinocchio older than ours, so it works in a process of an environment of its own,
-`placo_program`, which measures its own time: what travels between processes costs it nothing.
+`placo_program`, which measures its own time: the connection costs it nothing.
 """
 
 import json
@@ -12,20 +12,11 @@ import numpy as np
 
 from plumbob.crosscheck.child_process import ChildProcess, LostError
 
+from ...problems.robots import UnableError
 from .. import environments
 from ..protocol import OwnTime
-from .protocol import (
-    Ask,
-    FloatArray,
-    Robot,
-    Solve,
-    SolverOutput,
-    Tolerance,
-    UnableError,
-    needs_a_chain,
-)
+from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
-NAME = "placo"
 PROGRAM = Path(__file__).with_name("placo_program.py")
 
 
@@ -35,8 +26,8 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     Raises:
         UnableError: if the robot is no chain, or the program does not take it.
     """
-    needs_a_chain(robot)
-    program = ChildProcess([environments.python(NAME), "-I", PROGRAM])
+    robot.require_chain()
+    program = ChildProcess([environments.python("placo"), "-I", PROGRAM])
     task = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
     try:
         _answer(program, {**task, "iterations": iterations, "limits": tolerance})
@@ -44,13 +35,12 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
         why = "PlaCo does not read the robot, or orders its joints otherwise"
         raise UnableError(why) from None
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        frame = np.block([[rotations[0], positions[0][:, None]], [0.0, 0.0, 0.0, 1.0]])
-        question = {"target": frame.tolist(), "start": start.tolist()}
+    def ask(request: PoseRequest) -> Solve:
+        question = {"target": request.matrix.tolist(), "start": request.start.tolist()}
 
         def solve() -> SolverOutput:
-            done, seconds, q = _answer(program, question)
-            return SolverOutput(np.array(q), done, OwnTime(float(seconds)))
+            claim, seconds, q = _answer(program, question)
+            return SolverOutput(np.array(q), claim, OwnTime(float(seconds)))
 
         return solve
 
@@ -58,7 +48,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 
 
 def _answer(program: ChildProcess, question: object) -> Any:
-    """Return what the program answers.
+    """Return the program's answer.
 
     Raises:
         ConnectionError: if it has ended.

@@ -1,11 +1,11 @@
-"""Plumbob's own solvers, through their public interface, on what its readers make of the text."""
+"""Plumbob's own solvers, through their public interface, on the model that its readers make."""
 
 from typing import Any
 
 from plumbob.reference import Outcome, Target, rotation, solve_ik
 from plumbob.reference.formats import mjcf, urdf
 
-from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 
 def prepare(
@@ -22,9 +22,10 @@ def prepare(
     settings |= {"max_iterations": iterations, "tolerance": tolerance.position}
     settings |= {"tolerance_rotation": tolerance.rotation}
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        quaternions = rotation.from_matrix(rotations) if robot.oriented else [None] * len(positions)
-        targets = [*map(Target, positions, quaternions, robot.effectors)]
+    def ask(request: PoseRequest) -> Solve:
+        x, R, start = request
+        quaternions = rotation.from_matrix(R) if robot.oriented else [None] * len(x)
+        targets = [*map(Target, x, quaternions, robot.effectors)]
 
         def solve() -> SolverOutput:
             solution = solve_ik(articulation, start, targets, **settings)

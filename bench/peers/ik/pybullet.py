@@ -12,19 +12,8 @@ from typing import Any
 
 import numpy as np
 import pybullet
-from scipy.spatial.transform import Rotation
 
-from .protocol import (
-    Ask,
-    FloatArray,
-    Forward,
-    Robot,
-    Solve,
-    SolverOutput,
-    Tolerance,
-    needs_a_chain,
-    robot_file,
-)
+from .protocol import Ask, FloatArray, Forward, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 # It stops within this part of the tolerance, which bounds a distance; angles come along.
 INSIDE = 0.1
@@ -39,25 +28,27 @@ def prepare(
     check: bool = False,
 ) -> Ask:
     """Return the solver, set up for a robot, with a damping or with limits."""
-    needs_a_chain(robot)
     body = BulletBody(robot)
-    shared = {
+    options: dict[str, Any] = {
         "maxNumIterations": iterations,
         "residualThreshold": INSIDE * tolerance.position,
         "physicsClientId": body.client,
-        **(_limits(robot) if limits else {"jointDamping": [damping] * len(robot.joints)}),
     }
+    if limits:
+        options |= {"lowerLimits": robot.lower.tolist(), "upperLimits": robot.upper.tolist()}
+        options |= {"jointRanges": (robot.upper - robot.lower).tolist()}
+    else:
+        options |= {"jointDamping": [damping] * len(robot.joints)}
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        quaternion = Rotation.from_matrix(rotations[0]).as_quat().tolist()
-        target = body.number, body.effector, positions[0].tolist(), quaternion
-        more = {"currentPositions": start.tolist()}
-        more |= {"restPoses": start.tolist()} if limits else {}
+    def ask(request: PoseRequest) -> Solve:
+        pose = request.positions[0].tolist(), request.quaternion.tolist()
+        start = request.start.tolist()
+        poses = {"currentPositions": start} | ({"restPoses": start} if limits else {})
 
         def solve() -> SolverOutput:
-            q = np.array(pybullet.calculateInverseKinematics(*target, **more, **shared))
-            done = body.is_at(q, positions[0], rotations[0], tolerance) if check else None
-            return SolverOutput(q, done)
+            target = body.number, body.effector, *pose
+            q = np.array(pybullet.calculateInverseKinematics(*target, **poses, **options))
+            return SolverOutput(q, body.is_at(q, request, tolerance) if check else None)
 
         return solve
 
@@ -66,14 +57,7 @@ def prepare(
 
 def kinematics(robot: Robot) -> Forward:
     """Return PyBullet's forward kinematics of the effector."""
-    needs_a_chain(robot)
-    body = BulletBody(robot)
-
-    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        position, rotation = body.forward(q)
-        return position[None], rotation[None]
-
-    return forward
+    return BulletBody(robot).forward
 
 
 class BulletBody:
@@ -87,8 +71,9 @@ class BulletBody:
 
     def __init__(self, robot: Robot) -> None:
         """Load the robot; fixed joints have links of their own."""
+        robot.require_chain()
         self.client = _client()
-        with robot_file(robot) as file:
+        with robot.file() as file:
             self.number = pybullet.loadURDF(file, useFixedBase=True, physicsClientId=self.client)
         joints = range(pybullet.getNumJoints(self.number, physicsClientId=self.client))
         facts = [pybullet.getJointInfo(self.number, joint, self.client) for joint in joints]
@@ -96,30 +81,21 @@ class BulletBody:
         self.effector = next(f[0] for f in facts if f[12].decode() == robot.effectors[0])
 
     def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the effector's position [m], (3,), and rotation, (3, 3)."""
-        for joint, value in zip(self._joints, q, strict=True):
-            pybullet.resetJointState(self.number, joint, value, physicsClientId=self.client)
+        """Return the effector's position [m], (1, 3), and rotation, (1, 3, 3)."""
+        for joint, angle in zip(self._joints, q, strict=True):
+            pybullet.resetJointState(self.number, joint, angle, physicsClientId=self.client)
         state = pybullet.getLinkState(
             self.number, self.effector, computeForwardKinematics=True, physicsClientId=self.client
         )
-        R = np.array(pybullet.getMatrixFromQuaternion(state[5])).reshape(3, 3)
-        return np.array(state[4]), R
+        R = np.array(pybullet.getMatrixFromQuaternion(state[5])).reshape(1, 3, 3)
+        return np.array(state[4])[None], R
 
-    def is_at(self, q: FloatArray, x: FloatArray, R: FloatArray, tolerance: Tolerance) -> bool:
-        """Return whether these coordinates bring the effector to a target."""
+    def is_at(self, q: FloatArray, request: PoseRequest, tolerance: Tolerance) -> bool:
+        """Return whether these coordinates bring the effector to its target."""
         position, rotation = self.forward(q)
-        angle = np.linalg.norm(rotation - R) / np.sqrt(2.0)  # where it is small
-        return bool(
-            np.linalg.norm(position - x) <= tolerance.position and angle <= tolerance.rotation
-        )
-
-
-def _limits(robot: Robot) -> dict[str, Any]:
-    return {
-        "lowerLimits": robot.lower.tolist(),
-        "upperLimits": robot.upper.tolist(),
-        "jointRanges": (robot.upper - robot.lower).tolist(),
-    }
+        distance = np.linalg.norm(position - request.positions)
+        angle = np.linalg.norm(rotation - request.rotations) / np.sqrt(2.0)  # where it is small
+        return bool(distance <= tolerance.position and angle <= tolerance.rotation)
 
 
 @functools.cache

@@ -9,15 +9,14 @@ import numpy as np
 import pytorch_kinematics
 import torch
 
-from .protocol import Ask, FloatArray, Forward, Robot, Solve, SolverOutput, Tolerance, needs_a_chain
+from .protocol import Ask, FloatArray, Forward, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 from .restarts import generator_of
 
 
 def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 50, attempts: int = 1) -> Ask:
     """Return the solver, set up for a robot; attempts beyond the first start anywhere."""
-    needs_a_chain(robot)
-    torch.set_num_threads(1)
     chain = torch_chain(robot)
+    torch.set_num_threads(1)
     solver = pytorch_kinematics.PseudoInverseIK(
         chain,
         pos_tolerance=tolerance.position,
@@ -27,18 +26,17 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 50, attempts: 
         early_stopping_any_converged=True,
     )
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        target = pytorch_kinematics.Transform3d(
-            rot=torch.tensor(rotations[:1]), pos=torch.tensor(positions[:1]), dtype=torch.float64
-        )
-        others = robot.draw(generator_of(positions, rotations, start), attempts - 1)
-        starts = torch.tensor(np.vstack([start, others]))
+    def ask(request: PoseRequest) -> Solve:
+        rotation, position = (torch.tensor(a[:1]) for a in (request.rotations, request.positions))
+        target = pytorch_kinematics.Transform3d(rot=rotation, pos=position, dtype=torch.float64)
+        poses = robot.draw(generator_of(*request), attempts - 1)
+        starts = torch.tensor(np.vstack([request.start, poses]))
 
         def solve() -> SolverOutput:
             solver.initial_config = starts
-            found = solver.solve(target)
-            best = int(found.converged[0].int().argmax())
-            return SolverOutput(found.solutions[0, best].numpy(), bool(found.converged_any[0]))
+            output = solver.solve(target)
+            best = int(output.converged[0].int().argmax())
+            return SolverOutput(output.solutions[0, best].numpy(), bool(output.converged_any[0]))
 
         return solve
 
@@ -47,7 +45,6 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 50, attempts: 
 
 def kinematics(robot: Robot) -> Forward:
     """Return the forward kinematics of the effector."""
-    needs_a_chain(robot)
     chain = torch_chain(robot)
 
     def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -58,15 +55,15 @@ def kinematics(robot: Robot) -> Forward:
 
 
 def torch_chain(robot: Robot) -> pytorch_kinematics.SerialChain:
-    """Return a chain in double precision, its joints in the robot's order.
+    """Return a chain in double precision.
 
     Raises:
-        ValueError: if they are ordered otherwise.
+        UnableError: if the robot is no chain.
+        ValueError: if its joints are ordered otherwise.
     """
+    robot.require_chain()
     chain = pytorch_kinematics.build_serial_chain_from_urdf(
         robot.text.encode(), robot.effectors[0], robot.root
     )
-    names = tuple(chain.get_joint_parameter_names())
-    if names != robot.joints:
-        raise ValueError(f"pytorch_kinematics orders the joints as {', '.join(names)}")
+    robot.check_order("pytorch_kinematics", chain.get_joint_parameter_names())
     return chain.to(dtype=torch.float64)

@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 
 from ..protocol import total
-from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, attempt
+from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, attempt
 
 _SEED = 1986
 
@@ -13,9 +13,9 @@ _SEED = 1986
 def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
     """Return a solver that makes up to `restarts` further attempts from seeded random poses.
 
-    An attempt succeeds if it claims an answer that keeps the limits: not all solvers look at them.
-    One that raises has failed like any other. The poses are those of the target, however often it
-    or any other was solved before; they and the attempts are prepared before the clock runs.
+    An attempt succeeds if it claims an answer within the limits, which not all solvers look at; one
+    that raises has failed. The poses depend on the target only, and all attempts are prepared
+    before the clock runs.
     """
 
     def is_success(output: SolverOutput) -> bool:
@@ -23,9 +23,9 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
             return False
         return bool((output.q >= robot.lower).all() and (output.q <= robot.upper).all())
 
-    def ask_again(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        poses = robot.draw(generator_of(positions, rotations, start), restarts)
-        attempts = [ask(positions, rotations, pose.copy()) for pose in (start, *poses)]
+    def ask_again(request: PoseRequest) -> Solve:
+        poses = robot.draw(generator_of(*request), restarts)
+        attempts = [ask(request._replace(start=q.copy())) for q in (request.start, *poses)]
 
         def solve() -> SolverOutput:
             outputs: list[SolverOutput] = []
@@ -34,9 +34,9 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
                 if is_success(outputs[-1]):
                     break
             last = next((o for o in reversed(outputs) if o.q is not None), outputs[-1])
-            claimed = None if last.claim is None else is_success(last)
+            claim = None if last.claim is None else is_success(last)
             error = next((o.error for o in outputs if o.error), "")
-            return SolverOutput(last.q, claimed, total(o.time for o in outputs), error)
+            return SolverOutput(last.q, claim, total(o.time for o in outputs), error)
 
         return solve
 
@@ -44,7 +44,7 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
 
 
 def generator_of(*target: FloatArray) -> np.random.Generator:
-    """Return a target's own generator, the same whenever it is asked for."""
+    """Return a target's own generator, always with the same seed."""
     digest = 0
     for part in target:
         digest = zlib.crc32(np.ascontiguousarray(part).tobytes(), digest)

@@ -8,24 +8,23 @@ is on two norms of three components each, so eps is that over the square root of
 import math
 
 import pytracik
-from scipy.spatial.transform import Rotation
 
-from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, needs_a_chain
+from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 
 def prepare(robot: Robot, tolerance: Tolerance, seconds: float = 0.005) -> Ask:
     """Return the solver, set up for a robot, with so much time for each target [s]."""
-    needs_a_chain(robot)
+    robot.require_chain()
     eps, speed = min(tolerance) / math.sqrt(3.0), pytracik.SolveType.Speed
-    known = (robot.root, robot.effectors[0], robot.text)
-    engine = pytracik.TRAC_IK(*known, seconds, eps, speed)
+    chain = (robot.root, robot.effectors[0], robot.text)
+    engine = pytracik.TRAC_IK(*chain, seconds, eps, speed)
 
-    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        target = (*positions[0], *Rotation.from_matrix(rotations[0]).as_quat())
+    def ask(request: PoseRequest) -> Solve:
+        target = (*request.positions[0], *request.quaternion)
 
         def solve() -> SolverOutput:
-            found = pytracik.ik(engine, start, *target)
-            return SolverOutput(found[1:], True) if found[0] >= 0 else SolverOutput(None, False)
+            code, *q = pytracik.ik(engine, request.start, *target)
+            return SolverOutput(q, True) if code >= 0 else SolverOutput(None, False)
 
         return solve
 

@@ -1,1 +1,1 @@
-"""The page of the report, from a template that escapes whatever is put into it."""
+"""The page of the report: an HTML file from a template that escapes its texts."""

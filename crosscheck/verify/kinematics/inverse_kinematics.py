@@ -1,6 +1,6 @@
-"""Inverse kinematics: whether targets are reached by honest poses, and by which sweeps."""
+"""Inverse kinematics: whether poses are honest and reach their targets, and by which sweeps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -20,45 +20,48 @@ from ..sentence import Sentence, sentence
 from . import laws, pose_laws, problems, rounding, sweeps
 from .pose_laws import AnsweredPose
 from .predictions import solve
-from .report import diagnosed, report
-from .sweeps import AnsweredCase, SweepComparison
+from .report import diagnosis_of, report
+from .sweeps import PoseTrial, SweepComparison
 
 TASK = "inverse_kinematics"
 cases = problems.cases
 STOPS = "sweeps made"
-# Methods of the textbook whose sweeps are known.
-KNOWN = ("ccd", "fabrik")
-# Beyond reach the textbook's solvers come nearer with every sweep for long: an honest one may be so
-# many times as far from the nearest point as they are.
+# The methods of the textbook.
+METHODS = ("ccd", "fabrik")
+# Beyond reach the textbook's solvers need many sweeps: an honest solver may be so many times as far
+# from the nearest point as they are.
 AS_SLOW = 1.5
 
 
-def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-    """Hold poses against the laws and sweeps against the textbook's; name the faults."""
-    declared = method.lower() if method.lower() in KNOWN else ""
-    trials = [AnsweredCase(one) for one in asked]
-    swept = [trial for trial in trials if trial.is_sweep and trial.posed.finite]
-    known = declared if method else sweeps.seen(swept, greeting)
+def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+    """Judge poses by the laws, and sweeps by the textbook's; name the faults."""
+    declared = method.lower() if method.lower() in METHODS else ""
+    trials = [PoseTrial(exchange) for exchange in exchanges]
+    swept = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
+    textbook = declared if method else sweeps.recognise_method(swept, greeting)
     for trial in trials:
-        trial.judgement = _judged(trial, known, greeting)
-    others_hold = all(trial.judgement.verdict < Verdict.WRONG for trial in trials)
-    comparison = sweeps.compare(swept, known, declared, others_hold, greeting)
+        trial.judgement = _judge(trial, textbook, greeting)
+    others_hold = not any(trial.is_wrong for trial in trials)
+    comparison = sweeps.compare(swept, textbook, declared, others_hold, greeting)
     by_name = {trial.case.name: trial for trial in trials}
     for trial in trials:
         trial.add(comparison.findings.get(trial.case.name, ()))
         if comparison.honest:
-            trial.correct(partial(_forgiven, trial.case))
-        if base := by_name.get(trial.case.facts.get("like", "")):
-            trial.add(_alike(trial, base, "" if comparison.honest else comparison.method, greeting))
+            trial.correct(partial(_forgive, trial.case))
+        base = by_name.get(trial.case.facts.get("like", ""))
+        if base and trial.pose.finite and base.pose.finite:
+            is_wrong = comparison.method and not comparison.honest
+            verdict = Verdict.WRONG if is_wrong else Verdict.RIGHT_BUT
+            trial.add([_equal_worlds(trial, base, verdict, greeting)])
     diagnosis = _diagnosis(trials, comparison, greeting)
     if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
-            trial.correct(_graver)
+            trial.correct(_aggravate)
     return report(TASK, method, [trial.judgement for trial in trials], diagnosis)
 
 
-def _forgiven(case: Case, finding: Finding) -> Finding:
-    """Return the finding of a target that an honest, slower solver misses as a reservation."""
+def _forgive(case: Case, finding: Finding) -> Finding:
+    """Return a reservation where an honest, slower solver misses a target that it approaches."""
     gained = case.facts["before"] - case.facts["least"]
     is_missed = finding.law in ("target reached", "nearest point")
     if not is_missed or finding.verdict is not Verdict.WRONG or finding.error >= gained:
@@ -70,75 +73,68 @@ def _slow(error: float) -> Sentence:
     return sentence("It is slow: {error:.2g} m are left after the iterations allowed.", error=error)
 
 
-def _graver(finding: Finding) -> Finding:
-    """Return the finding of a sweep that is known to be a fault's as a wrong one."""
+def _aggravate(finding: Finding) -> Finding:
+    """Return a forgiven sweep as a wrong one: a fault reproduces it."""
     is_forgiven = finding.law == sweeps.LAW and finding.verdict is Verdict.RIGHT_BUT
     return replace(finding, verdict=Verdict.WRONG) if is_forgiven else finding
 
 
-def _judged(trial: AnsweredCase, method: str, greeting: Greeting) -> CaseJudgement:
-    case, posed, inputs = trial.case, trial.posed, trial.case.inputs
+def _judge(trial: PoseTrial, method: str, greeting: Greeting) -> CaseJudgement:
+    case, pose, inputs = trial.case, trial.pose, trial.case.inputs
 
-    def findings(values: Mapping[str, Any]) -> list[Finding]:
-        findings = pose_laws.all_of(posed, case, greeting)
+    def findings(outputs: Mapping[str, Any]) -> list[Finding]:
+        findings = pose_laws.all_of(pose, case, greeting)
         if any(finding.verdict is Verdict.BROKEN for finding in findings):
             return findings
-        return findings + target_laws(posed, values, case, method, greeting)
+        return findings + target_laws(pose, outputs, case, method, greeting)
 
     reference = partial(
         solve_ik, Skeleton(inputs["parents"], inputs["offsets"]), inputs["local_rotations"],
         inputs["target"], method or "fabrik",
         **{name: inputs[name] for name in ("effector", "tolerance", "max_iterations")},
     )  # fmt: skip
-    expected, digits = _expected(trial, method)
-    return laws.judged(trial.asked, greeting, findings, reference, expected, digits)
-
-
-def _expected(trial: AnsweredCase, method: str) -> tuple[Mapping[str, Any], float | None]:
-    """Return the textbook's answer to a sweep, and how many digits agree with it."""
-    if not method or not trial.is_sweep or not isinstance(trial.asked.answer, Answer):
-        return {}, None
-    local, x, _ = solve(method, trial.case.inputs)
-    digits = None
-    if trial.posed.finite:
-        digits = laws.digits(trial.posed.distance_to(x), trial.case.facts["size"])
-    return {"local_rotations": local, "positions": x}, digits
+    expected, digits = {}, None
+    if method and trial.is_sweep and isinstance(trial.exchange.answer, Answer):
+        local, x, _ = solve(method, inputs)
+        expected = {"local_rotations": local, "positions": x}
+        if pose.finite:
+            digits = laws.digits(pose.distance_to(x), case.facts["size"])
+    return laws.judge_case(trial.exchange, greeting, findings, reference, expected, digits)
 
 
 def target_laws(
-    posed: AnsweredPose, values: Mapping[str, Any], case: Case, method: str, greeting: Greeting
+    pose: AnsweredPose, outputs: Mapping[str, Any], case: Case, method: str, greeting: Greeting
 ) -> list[Finding]:
-    """Return whether the target is reached, or the nearest point, and whether claims are true."""
-    distance, size = posed.distance, case.facts["size"]
-    slack = rounding.positions(greeting.epsilon, len(posed.positions), size, posed.drift)
+    """Return whether the target or the nearest point is reached, and whether claims are true."""
+    distance, size = pose.distance, case.facts["size"]
+    slack = rounding.positions(greeting.epsilon, len(pose.positions), size, pose.drift)
     findings = []
     if "sweeps" not in case.facts:
         findings.append(reached(distance, slack, case, method, greeting))
         if method and case.inputs["tolerance"] == problems.LOOSE:
-            findings += in_time(posed, case, method, greeting)
+            findings += in_time(pose, case, method, greeting)
     elif method:
         findings.append(not_farther(distance, slack, case))
-    return findings + claims(distance, slack, values, case)
+    return [*findings, *claims(distance, slack, outputs, case)]
 
 
 def reached(distance: float, slack: float, case: Case, method: str, greeting: Greeting) -> Finding:
-    """Return how the effector's distance stands to the least one, the tolerance allowed."""
-    least = case.facts["least"]
-    tolerance = case.inputs["tolerance"] + slack
-    excess = distance - least
+    """Return whether the effector is as near as possible, within the tolerance."""
+    least, inputs = case.facts["least"], case.inputs
+    tolerance, excess = inputs["tolerance"] + slack, distance - least
     if method and least > 0.0:
-        _, x, _ = solve(method, case.inputs)
-        closest = float(np.linalg.norm(x[case.inputs["effector"]] - case.inputs["target"]))
+        _, x, _ = solve(method, inputs)
+        closest = float(np.linalg.norm(x[inputs["effector"]] - inputs["target"]))
         tolerance += AS_SLOW * max(0.0, closest - least)
     law = "target reached" if least == 0.0 else "nearest point"
-    if excess <= tolerance:
-        return laws.bounded(law, excess, tolerance, "m", laws.HOLDS)
-    verdict, message = _missed(excess, case, method, greeting)
+    verdict, message = Verdict.RIGHT, laws.HOLDS
+    if excess > tolerance or np.isnan(excess):
+        verdict, message = _missed(excess, case, method, greeting)
     return Finding(law, verdict, excess, tolerance, "m", message)
 
 
 def _missed(excess: float, case: Case, method: str, greeting: Greeting) -> tuple[Verdict, Sentence]:
-    """Return what follows from a target that is missed by an excess [m]."""
+    """Return the verdict on a target that is missed by an excess [m]."""
     least, reach, before = (case.facts[name] for name in ("least", "reach", "before"))
     is_degenerate, is_beyond = case.family in problems.DEGENERATE, least > 0.0
     is_nearer = excess < 0.5 * (before - least)
@@ -169,19 +165,19 @@ def _missed(excess: float, case: Case, method: str, greeting: Greeting) -> tuple
     )
 
 
-def in_time(posed: AnsweredPose, case: Case, method: str, greeting: Greeting) -> list[Finding]:
-    """Return whether a solve made more sweeps than its tolerance asks for, where that shows."""
+def in_time(pose: AnsweredPose, case: Case, method: str, greeting: Greeting) -> list[Finding]:
+    """Return whether a solve ends at its tolerance, if a number of sweeps explains its pose."""
     bound = case.facts["size"] * (1e-7 if greeting.precision == "double" else 1e-3)
-    _, x, sweeps_made = solve(method, case.inputs)
-    if posed.distance_to(x) <= bound:
+    _, x, needed = solve(method, case.inputs)
+    if pose.distance_to(x) <= bound:
         return [Finding(STOPS, Verdict.RIGHT, 0.0, 0.0, "", laws.HOLDS)]
-    for count in range(sweeps_made + 1, case.inputs["max_iterations"] + 1):
+    for count in range(needed + 1, case.inputs["max_iterations"] + 1):
         inputs = {**case.inputs, "tolerance": 0.0, "max_iterations": count}
-        if posed.distance_to(solve(method, inputs)[1]) <= bound:
+        if pose.distance_to(solve(method, inputs)[1]) <= bound:
             message = sentence(
-                "It makes {more} sweeps more than its tolerance asks for.", more=count - sweeps_made
+                "It makes {more} sweeps more than its tolerance asks for.", more=count - needed
             )
-            return [Finding(STOPS, Verdict.RIGHT_BUT, count - sweeps_made, 0.0, "", message)]
+            return [Finding(STOPS, Verdict.RIGHT_BUT, count - needed, 0.0, "", message)]
     return []
 
 
@@ -195,69 +191,66 @@ def not_farther(distance: float, slack: float, case: Case) -> Finding:
     return laws.bounded("distance does not grow", growth, slack, "m", message)
 
 
-def claims(distance: float, slack: float, values: Mapping[str, Any], case: Case) -> list[Finding]:
-    """Return whether what the solver says of its answer is true."""
-    findings = []
+def claims(
+    distance: float, slack: float, outputs: Mapping[str, Any], case: Case
+) -> Iterator[Finding]:
+    """Yield whether `converged` and `residual` are true."""
     tolerance = case.inputs["tolerance"] + slack
-    if values.get("converged"):
+    if outputs.get("converged"):
         message = sentence("It claims to have arrived, but the effector is {error:.2g} m off.")
-        findings.append(laws.bounded("claims", distance, tolerance, "m", message))
-    elif "converged" in values and distance <= case.inputs["tolerance"] - slack:
+        yield laws.bounded("claims", distance, tolerance, "m", message)
+    elif "converged" in outputs and distance <= case.inputs["tolerance"] - slack:
         message = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
-        findings.append(Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", message))
-    if "residual" in values and np.isfinite(values["residual"]):
-        error = abs(values["residual"] - distance)
-        claimed, actual = distinct_texts(values["residual"], distance, 3)
+        yield Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", message)
+    if "residual" in outputs and np.isfinite(outputs["residual"]):
+        error = abs(outputs["residual"] - distance)
+        claimed, actual = distinct_texts(outputs["residual"], distance, 3)
         message = sentence(
             "It reports a residual of {claimed} m; the effector is {distance} m off.",
             claimed=claimed,
             distance=actual,
         )
-        findings.append(laws.bounded("claims", error, slack + 1e-3 * distance, "m", message))
-    return findings
+        yield laws.bounded("claims", error, slack + 1e-3 * distance, "m", message)
 
 
-def _alike(
-    trial: AnsweredCase, base: AnsweredCase, method: str, greeting: Greeting
-) -> list[Finding]:
-    """Return whether an answer in another world is the one that it is like, brought there."""
-    if not (trial.posed.finite and base.posed.finite):
-        return []
+def _equal_worlds(
+    trial: PoseTrial, base: PoseTrial, verdict: Verdict, greeting: Greeting
+) -> Finding:
+    """Return whether an answer is the base's, transformed into another world."""
     Q, scale, shift = trial.case.facts["world"]
-    moved, path = base.posed.positions.copy(), base.posed.path
-    moved[path] = scale * rotation.rotate(Q, moved[path]) + shift
-    error = trial.posed.distance_to(moved)
+    x, path = base.pose.positions.copy(), base.pose.path
+    x[path] = scale * rotation.rotate(Q, x[path]) + shift
     size, amplification = trial.case.facts["size"], trial.case.facts["amplification"]
-    tolerance = 2.0 * rounding.sweep(greeting.epsilon, len(moved), size, amplification)
+    tolerance = 2.0 * rounding.sweep(greeting.epsilon, len(x), size, amplification)
     message = sentence(
         "In another world, rotated, shifted or in other units, the same request has an answer "
         "{error:.2g} m away: something depends on the origin or on an axis."
     )
-    verdict = Verdict.WRONG if method else Verdict.RIGHT_BUT
-    return [laws.bounded("equal worlds", error, tolerance, "m", message, verdict=verdict)]
+    error = trial.pose.distance_to(x)
+    return laws.bounded("equal worlds", error, tolerance, "m", message, verdict=verdict)
 
 
 def _diagnosis(
-    trials: Sequence[AnsweredCase], comparison: SweepComparison, greeting: Greeting
+    trials: Sequence[PoseTrial], comparison: SweepComparison, greeting: Greeting
 ) -> Diagnosis:
-    """Return the faults that reproduce the answers, of the method declared or inferred."""
-    posed = [one for one in trials if one.posed.comparable]
-    all_sweeps = [one for one in posed if one.is_sweep]
-    wrong_sweeps = [one for one in all_sweeps if one.is_wrong or one.case.name in comparison.wrong]
+    """Return the faults of the declared or inferred method that reproduce the answers."""
+    answered = [trial for trial in trials if trial.pose.outputs]
+    swept = [trial for trial in answered if trial.is_sweep]
+    wrong = [trial for trial in swept if trial.is_wrong or trial.case.name in comparison.wrong]
+    if wrong:
+        return sweeps.explained(comparison, swept, wrong, greeting)
     solves = [
-        one.seen
-        for one in posed
-        if not one.is_sweep
-        and one.case.family not in problems.DEGENERATE
-        and (one.is_wrong or _is_late(one))
+        trial.comparable
+        for trial in answered
+        if not trial.is_sweep
+        and trial.case.family not in problems.DEGENERATE
+        and (trial.is_wrong or _is_late(trial))
     ]
-    if wrong_sweeps:
-        return sweeps.explained(comparison, all_sweeps, wrong_sweeps, greeting)
     if solves and comparison.method:
-        likeness = partial(sweeps.likeness, greeting)
-        return diagnosed(comparison.method, solves, solves, likeness, comparison.behaviour)
+        bound = partial(sweeps.prediction_bound, greeting)
+        return diagnosis_of(comparison.method, solves, solves, bound, comparison.behaviour)
     return Diagnosis(behaviour=comparison.behaviour)
 
 
-def _is_late(one: AnsweredCase) -> bool:
-    return any(finding.law == STOPS and finding.verdict for finding in one.judgement.findings)
+def _is_late(trial: PoseTrial) -> bool:
+    return any(finding.law == STOPS and finding.verdict for finding in trial.judgement.findings)

@@ -1,4 +1,4 @@
-"""Findings that several tasks share, and the judgement of an answer from them."""
+"""Findings that several tasks share, and the judgement of a case from them."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -8,6 +8,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray, distinct_texts
 
 from ..contestant import Answer, Exchange
+from ..explain import largest_gap
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Verdict
 from ..sentence import Sentence, sentence
@@ -16,8 +17,8 @@ from ..timing import timed
 HOLDS = sentence("It holds.")
 
 
-def judged(
-    asked: Exchange,
+def judge_case(
+    exchange: Exchange,
     greeting: Greeting,
     laws: Callable[[Mapping[str, Any]], Iterable[Finding]],
     reference: Callable[[], Any] | None = None,
@@ -27,20 +28,20 @@ def judged(
     """Return the judgement of an answer: the laws of its task, then those of every answer.
 
     Args:
-        asked: the case with its answers.
+        exchange: the case with its answers.
         greeting: of the solver.
-        laws: the findings from the answer's values.
-        reference: what is timed beside the solver.
-        expected: what the reference answers, by output.
+        laws: return the findings about the outputs.
+        reference: is timed beside the solver.
+        expected: the reference's outputs.
         digits: correct significant digits.
     """
-    case, answer = asked.case, asked.answer
+    case, answer = exchange.case, exchange.answer
     seconds = timed(reference)[1] if reference else None
-    findings: list[Finding] = []
+    findings: tuple[Finding, ...] = ()
     if isinstance(answer, Answer):
-        repeats = _repeated(answer, asked.repeat, case.facts["size"], greeting)
-        findings = [*laws(answer.values), repeats, *map(_remark, answer.remarks)]
-    return CaseJudgement(case, answer, tuple(findings), expected or {}, digits, seconds)
+        repeats = _equal_answers(answer, exchange.repeat, case.facts["size"], greeting)
+        findings = (*laws(answer.values), repeats, *map(_remark, answer.remarks))
+    return CaseJudgement(case, answer, findings, expected or {}, digits, seconds)
 
 
 def bounded(
@@ -51,16 +52,16 @@ def bounded(
     message: Sentence,
     *,
     verdict: Verdict = Verdict.WRONG,
-    where: int | None = None,
+    index: int | None = None,
 ) -> Finding:
-    """Return the finding that an error is within its tolerance, or the verdict if it is not.
+    """Return RIGHT if an error is within its tolerance, else the verdict.
 
-    The sentence is given the error and the joint where it is, unless it has them.
+    The sentence may name the error and the joint.
     """
     if error <= tolerance:
-        return Finding(law, Verdict.RIGHT, float(error), tolerance, unit, HOLDS, where)
-    words = Sentence(message.template, {"error": error, "joint": where, **message.values})
-    return Finding(law, verdict, float(error), tolerance, unit, words, where)
+        return Finding(law, Verdict.RIGHT, float(error), tolerance, unit, HOLDS, index)
+    filled = Sentence(message.template, {"error": error, "joint": index, **message.values})
+    return Finding(law, verdict, float(error), tolerance, unit, filled, index)
 
 
 def of_joints(
@@ -71,27 +72,27 @@ def of_joints(
     message: Sentence,
     verdict: Verdict = Verdict.WRONG,
 ) -> Finding:
-    """Return the finding of the worst joint, at the first that is off: there the fault begins."""
+    """Return the finding about the worst joint, at the first wrong one: there the fault begins."""
     worst, wrong = int(np.argmax(errors)), errors > tolerance
-    words = Sentence(message.template, {"joint": worst, **message.values})
-    where = int(np.argmax(wrong)) if wrong.any() else worst
-    return bounded(law, errors[worst], tolerance, unit, words, verdict=verdict, where=where)
+    filled = Sentence(message.template, {"joint": worst, **message.values})
+    index = int(np.argmax(wrong)) if wrong.any() else worst
+    return bounded(law, errors[worst], tolerance, unit, filled, verdict=verdict, index=index)
 
 
 def missing(message: Sentence) -> Finding:
-    """Return the finding that an answer lacks what is to be judged."""
+    """Return the finding that an answer lacks the output to judge."""
     return Finding("numbers", Verdict.BROKEN, np.inf, 0.0, "", message)
 
 
-def no_numbers(law: str, values: FloatArray, tolerance: float) -> Finding:
-    """Return the finding that some values of joints are NaN or infinite."""
-    joint = int(np.argmin(np.isfinite(values)))
+def no_numbers(law: str, outputs: FloatArray, tolerance: float) -> Finding:
+    """Return the finding that outputs of a joint are NaN or infinite."""
+    joint = int(np.argmin(np.isfinite(outputs)))
     message = sentence("The answer of joint {joint} is not a number.", joint=joint)
     return Finding(law, Verdict.BROKEN, np.inf, tolerance, "", message, joint)
 
 
 def unit(lengths: FloatArray, tolerance: float) -> Finding:
-    """Return how far quaternions are off unit length; they are normalised after that."""
+    """Return whether quaternions have unit length; other laws normalise them."""
     errors = np.abs(lengths - 1.0)
     joint = int(np.argmax(errors))
     message = sentence(
@@ -100,48 +101,38 @@ def unit(lengths: FloatArray, tolerance: float) -> Finding:
         length=distinct_texts(lengths[joint], 1.0)[0],
     )
     law, verdict = "unit quaternions", Verdict.RIGHT_BUT
-    return bounded(law, errors[joint], tolerance, "", message, verdict=verdict, where=joint)
+    return bounded(law, errors[joint], tolerance, "", message, verdict=verdict, index=joint)
 
 
 def angles(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the angles [rad] between unit quaternions, q and -q being one rotation."""
+    """Return the angles [rad] between the rotations of unit quaternions."""
     chords = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
     return 4.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))
 
 
 def digits(error: float, size: float) -> float:
-    """Return how many digits are correct, at most 16."""
+    """Return the number of correct digits, at most 16."""
     if not np.isfinite(error):
         return 0.0
     return float(np.clip(-np.log10(max(error, 1e-300) / size), 0.0, 16.0))
 
 
-def _repeated(answer: Answer, again: object, size: float, greeting: Greeting) -> Finding:
-    """Return whether the same request got the same answer again."""
-    if not isinstance(again, Answer):
+def _equal_answers(answer: Answer, repeat: object, size: float, greeting: Greeting) -> Finding:
+    """Return whether the same request got the same answer a second time."""
+    if not isinstance(repeat, Answer):
         message = sentence("Asked again, it gave no answer.")
         return Finding("equal answers", Verdict.BROKEN, np.inf, 0.0, "", message)
-    error = max(
-        (_difference(value, again.values.get(name)) for name, value in answer.values.items()),
-        default=0.0,
-    )
+    gaps = [largest_gap(a, repeat.values.get(name)) for name, a in answer.values.items()]
     tolerance = 16.0 * greeting.epsilon * max(size, 1.0)  # threads may add up in another order
     message = sentence(
         "Asked the same again, it answers something else, {error:.2g} away: state left over, or "
         "memory that nobody has filled."
     )
-    return bounded("equal answers", error, tolerance, "", message)
-
-
-def _difference(value: object, other: object) -> float:
-    a, b = np.asarray(value, dtype=float), np.asarray(other, dtype=float)
-    if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
-        return np.inf
-    return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
+    return bounded("equal answers", max(gaps, default=0.0), tolerance, "", message)
 
 
 def _remark(remark: Sentence) -> Finding:
-    """Return what was odd about an answer; a changed skeleton spoils every later request."""
+    """Return the finding of an oddity; a changed skeleton spoils every later request."""
     spoils = remark.values.get("name") in ("offsets", "parents")
     verdict = Verdict.WRONG if spoils else Verdict.RIGHT_BUT
     return Finding("untouched inputs", verdict, 1.0, 0.0, "", remark)

@@ -1,4 +1,4 @@
-"""What the textbook, right or with faults, answers to a case."""
+"""Answers of the textbook's solvers, right or with faults."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -27,70 +27,70 @@ def path_to(parents: IndexArray, effector: int) -> IndexArray:
 
 def forward(inputs: Mapping[str, Any], switched: Switches = RIGHT) -> tuple[FloatArray, FloatArray]:
     """Return positions and global rotations of all joints."""
-    pose = _unplaced(_read(inputs["local_rotations"], switched))
+    pose = _read(inputs, switched)
     chain = Chain(inputs["parents"], inputs["offsets"], np.zeros(0, dtype=np.int64))
     place_all(chain, switched, pose)
     return pose.positions, pose.rotations
 
 
-def _unplaced(local: FloatArray) -> Pose:
-    return Pose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
-
-
 def solve(
     method: str, inputs: Mapping[str, Any], switched: Switches = RIGHT
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Return local rotations, positions as the solver has them, and the number of sweeps."""
+    """Return local rotations, the solver's positions, and the number of sweeps."""
     parents = inputs["parents"]
-    pose = _unplaced(np.array(_read(inputs["local_rotations"], switched)))
+    pose = _read(inputs, switched)
     effector = len(parents) - 1 if switched.effector == 1 else inputs["effector"]
     chain = Chain(parents, inputs["offsets"], path_to(parents, effector))
     target = tuple(inputs["target"].tolist())
     ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]))
-    made = SOLVERS[method](chain, target, ending, switched, pose)
-    return _written(pose.local, switched), pose.positions, made
+    sweeps = SOLVERS[method](chain, target, ending, switched, pose)
+    return _reordered(pose.local, switched), pose.positions, sweeps
 
 
-def _read(local: FloatArray, switched: Switches) -> FloatArray:
-    """Return quaternions as a solver of another order understands them."""
-    return np.roll(local, 1, axis=-1) if switched.numbers in (1, 2) else local
+def _read(inputs: Mapping[str, Any], switched: Switches) -> Pose:
+    """Return the start, its quaternions in the order that the solver expects."""
+    local = np.array(inputs["local_rotations"])
+    if switched.numbers in (1, 2):
+        local = np.roll(local, 1, axis=-1)
+    return Pose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
 
 
-def _written(local: FloatArray, switched: Switches) -> FloatArray:
-    return np.roll(local, -1, axis=-1) if switched.numbers in (2, 3) else local
+def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:
+    """Return quaternions in the order in which the solver writes them."""
+    return np.roll(rotations, -1, axis=-1) if switched.numbers in (2, 3) else rotations
 
 
-def variants(method: str, most_faults: int = 3) -> Iterator[Variant]:
+def variants(method: str, max_faults: int = 3) -> Iterator[Variant]:
     """Yield the textbook's method with all combinations of its faults, the fewest first."""
     task, _, solver = method.rpartition(" ")
     predict: Callable[[Switches, Case], Mapping[str, Any]] = predict_forward
     if method != "forward":
         predict = partial(predict_track if task else predict_inverse, solver)
     for faults in combinations(method):
-        if len(faults) > most_faults:
+        if len(faults) > max_faults:
             return
         keys = tuple(fault.key for fault in faults)
         yield Variant(keys, partial(predict, switches(faults)))
 
 
 def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
-    """Return what forward kinematics answers."""
+    """Return the outputs of forward kinematics."""
     positions, rotations = forward(case.inputs, switched)
-    return {"positions": positions, "rotations": _written(rotations, switched)}
+    return {"positions": positions, "rotations": _reordered(rotations, switched)}
 
 
 def predict_inverse(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:
-    """Return what a solver answers, with `placed`: where its local rotations put the joints.
+    """Return the outputs of a solver, with `placed`: the positions by its local rotations.
 
-    The rotations that FABRIK's positions stand for are not unique: each link may twist.
+    FABRIK's local rotations are left out: each link may twist, so that they are not unique.
     """
-    return _predicted(method, switched, case.inputs)[0]
+    return _outputs(method, switched, case.inputs)[0]
 
 
-def _predicted(
+def _outputs(
     method: str, switched: Switches, inputs: Mapping[str, Any]
 ) -> tuple[dict[str, Any], FloatArray]:
-    """Return what a solver answers, and its local rotations."""
+    """Return the outputs of a solver, and its local rotations."""
     local, positions, _ = solve(method, inputs, switched)
     local = with_effector_of(local, inputs)
     if method == "ccd":
@@ -100,23 +100,23 @@ def _predicted(
 
 
 def predict_track(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:
-    """Return what a solver answers that follows a curve frame by frame."""
+    """Return the outputs of a solver that follows a curve frame by frame."""
     first, curve = case.inputs["local_rotations"], case.inputs["curve"]
     start, shift, frames = first, (0, -1, 1)[switched.frame_target], []
     for i in range(len(curve)):
         target = curve[np.clip(i + shift, 0, len(curve) - 1)]
         inputs = {**case.inputs, "target": target, "local_rotations": start}
-        frame, local = _predicted(method, switched, inputs)
+        frame, local = _outputs(method, switched, inputs)
         frames.append(frame)
         start = (local, first, rotation.identity(len(first)))[switched.frame_start]
-    answer = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
-    for local in answer.get("local_rotations", ()):
+    outputs = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
+    for local in outputs.get("local_rotations", ()):
         with_effector_of(local, case.inputs)
-    return answer
+    return outputs
 
 
 def with_effector_of(local: FloatArray, inputs: Mapping[str, Any]) -> FloatArray:
-    """Return rotations with the effector's own as they were, if it moves no joint."""
+    """Put back the rotation of an effector without children, which moves no joint."""
     effector = inputs["effector"]
     if not (inputs["parents"] == effector).any():
         local[effector] = inputs["local_rotations"][effector]

@@ -1,6 +1,6 @@
-"""Resampling a polyline: laws only, since every program has a rule of its own."""
+"""Resampling a polyline: laws, since every program has its own rule, and a few known faults."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -11,94 +11,100 @@ from plumbob.reference.arguments import FloatArray, distinct_texts
 
 from ..case import Case
 from ..contestant import Answer, Exchange
+from ..explain import Variant, explain
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
 from . import laws, rounding
-from .polylines import Line, even_by_count, even_by_spacing
+from .polylines import Polyline
 from .report import report
-from .resample_faults import diagnosis
 from .skeletons import generator
 
 TASK = "resample"
 # Points are even if no gap along the line differs from the mean by more than this share: chords
-# of a fine polyline are shorter than its arcs by so much.
+# of a fine polyline are shorter than its arcs by as much.
 UNEVEN = 0.02
 # By spacing, gaps from a half of it to the whole are as even as a rule that keeps corners allows.
-LEAST_GAP = 0.5 - 1e-9
+MIN_GAP = 0.5 - 1e-9
 
 
-class Scene(NamedTuple):
-    """A polyline, where its strokes begin, and whether it is closed."""
+class Curve(NamedTuple):
+    """A polyline to resample."""
 
     name: str
     about: Sentence
-    curve: FloatArray
-    strokes: tuple[int, ...] = (0,)
+    points: FloatArray  # (point, 3) [m]
+    strokes: tuple[int, ...] = (0,)  # index of the first point of each
     closed: bool = False
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return polylines to be resampled by count and by spacing, the smallest first."""
-    cases_of_scenes = [
+    unsorted = [
         case
         for i in range(5 if thorough else 1)
-        for scene in _scenes(generator(seed, f"resample {i}"))
-        for case in _cases_of(scene, i + 1)
+        for curve in _curves(generator(seed, f"resample {i}"))
+        for case in _cases_of(curve, i + 1)
     ]
-    return sorted(cases_of_scenes, key=lambda case: len(case.inputs["curve"]))
+    return sorted(unsorted, key=lambda case: len(case.inputs["curve"]))
 
 
-def _cases_of(scene: Scene, number: int) -> Iterator[Case]:
-    line = Line(scene.curve, scene.strokes, scene.closed)
-    count = max(5, len(scene.curve) // 3)
-    facts = {"line": line, "size": float(np.abs(scene.curve).max())}
-    family = f"{scene.name} {number}"
-    for kind, value in (("count", count), ("spacing", line.length / (2.5 * count))):
-        inputs = {
-            "curve": scene.curve,
-            "strokes": np.array(scene.strokes),
-            "closed": scene.closed,
-            kind: value,
-        }
-        yield Case(f"{family}, by {kind}", TASK, inputs, family, scene.about, facts=facts)
+def _cases_of(curve: Curve, number: int) -> Iterator[Case]:
+    line = Polyline(curve.points, curve.strokes, curve.closed)
+    count = max(5, len(curve.points) // 3)
+    facts = {"line": line, "size": float(np.abs(curve.points).max())}
+    family = f"{curve.name} {number}"
+    shared = {"curve": curve.points, "strokes": np.array(curve.strokes), "closed": curve.closed}
+    for rule in ({"count": count}, {"spacing": line.length / (2.5 * count)}):
+        name = f"{family}, by {next(iter(rule))}"
+        yield Case(name, TASK, {**shared, **rule}, family, curve.about, facts=facts)
 
 
-def _scenes(rng: np.random.Generator) -> list[Scene]:
+def _curves(rng: np.random.Generator) -> list[Curve]:
     corner = np.array([[0.1, 0.0, 0.2], [0.9, 0.0, 0.2], [0.9, 0.0, 0.6]])
     walk = np.cumsum(rng.standard_normal((12, 3)) * rng.uniform(0.05, 0.5, (12, 1)), axis=0)
     return [
-        Scene("segment", sentence("A single segment."), rng.uniform(-1.0, 1.0, (2, 3))),
-        Scene("corner", sentence("Two segments at a right angle."), corner),
-        Scene("uneven walk", sentence("A random walk in space with uneven steps."), walk),
-        Scene("closed square", sentence("A square whose end joins its start."),
+        Curve("segment", sentence("A single segment."), rng.uniform(-1.0, 1.0, (2, 3))),
+        Curve("corner", sentence("Two segments at a right angle."), corner),
+        Curve("uneven walk", sentence("A random walk in space with uneven steps."), walk),
+        Curve("closed square", sentence("A square whose end joins its start."),
               curves["square"](4), closed=True),
-        Scene("repeated points", sentence("A polyline in which a point comes twice."),
+        Curve("repeated points", sentence("A polyline in which a point comes twice."),
               np.repeat(walk[:5], [1, 2, 1, 3, 1], axis=0)),
-        Scene("two strokes", sentence("Two strokes apart: bridged or kept, both are right."),
+        Curve("two strokes", sentence("Two strokes apart: bridged or kept, both are right."),
               np.concatenate([walk[:6], walk[6:] + 1.5]), (0, 6)),
-        Scene("plumb bob", sentence("A drawing in five strokes with uneven samples."),
+        Curve("plumb bob", sentence("A drawing in five strokes with uneven samples."),
               curves["plumb_bob"](100), tuple(range(0, 100, 20))),
-        Scene("heart", sentence("The lab's heart."), curves["heart"](90), closed=True),
+        Curve("heart", sentence("The lab's heart."), curves["heart"](90), closed=True),
     ]  # fmt: skip
 
 
-def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-    """Hold points against the laws of resampling; strokes may be bridged or kept."""
-    judgements = [_judged(one, greeting) for one in asked]
-    wrong = [one for one, message in zip(asked, judgements, strict=True) if message.verdict]
-    report_of_faults = diagnosis(asked, wrong, greeting, _strokes(asked, greeting))
-    return report(TASK, method, judgements, report_of_faults)
+def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+    """Judge points by the laws of resampling; strokes may be bridged or not."""
+    judgements = [_judge(exchange, greeting) for exchange in exchanges]
+    is_wrong = [judgement.verdict > Verdict.RIGHT for judgement in judgements]
+    wrong_first = [
+        exchange
+        for wanted in (True, False)
+        for exchange, wrong in zip(exchanges, is_wrong, strict=True)
+        if wrong is wanted
+    ]
+    has_wrong = any(isinstance(e.answer, Answer) for e in wrong_first[: sum(is_wrong)])
+    behaviour = _behaviour_at_strokes(exchanges, greeting)
+    diagnosis = Diagnosis(behaviour=behaviour)
+    if has_wrong:
+        diagnosis = _diagnosis(wrong_first, greeting, behaviour)
+    return report(TASK, method, judgements, diagnosis)
 
 
-def _strokes(asked: Sequence[Exchange], greeting: Greeting) -> Sentence | None:
-    """Return whether strokes are bridged or kept, where an answer shows it."""
-    for one in asked:
-        if len(one.case.inputs["strokes"]) > 1 and isinstance(one.answer, Answer):
-            points, line = one.answer.values.get("points"), one.case.facts["line"]
+def _behaviour_at_strokes(exchanges: Sequence[Exchange], greeting: Greeting) -> Sentence | None:
+    """Return whether strokes are bridged or kept apart, if an answer shows it."""
+    for exchange in exchanges:
+        if len(exchange.case.inputs["strokes"]) > 1 and isinstance(exchange.answer, Answer):
+            points, line = exchange.answer.values.get("points"), exchange.case.facts["line"]
             if points is None or not len(points) or not np.isfinite(points).all():
                 continue
-            if _distances(points, line, False).max() > _bound(one.case, greeting):
+            if _distances(points, line, False).max() > _bound(exchange.case, greeting):
                 return sentence("It bridges strokes: points lie between them as well.")
             return sentence("It keeps strokes apart: no points lie between them.")
     return None
@@ -110,21 +116,19 @@ def _bound(case: Case, greeting: Greeting) -> float:
     return float(rounding.ROUNDINGS_A_JOINT * greeting.epsilon * size)
 
 
-def _distances(points: FloatArray, line: Line, bridged: bool) -> FloatArray:
-    return np.array([line.nearest(point, bridged)[0] for point in points])
+def _distances(points: FloatArray, line: Polyline, bridged: bool) -> FloatArray:
+    return np.array([line.distance(point, bridged) for point in points])
 
 
-def _judged(one: Exchange, greeting: Greeting) -> CaseJudgement:
-    inputs, line = one.case.inputs, one.case.facts["line"]
-    if "count" in inputs:
-        reference = partial(even_by_count, line, inputs["count"], True)
-    else:
-        reference = partial(even_by_spacing, line, inputs["spacing"], True)
-    return laws.judged(one, greeting, partial(_findings, one.case, greeting), reference)
+def _judge(exchange: Exchange, greeting: Greeting) -> CaseJudgement:
+    case = exchange.case
+    return laws.judge_case(
+        exchange, greeting, partial(_findings, case, greeting), partial(_even, case)
+    )
 
 
-def _findings(case: Case, greeting: Greeting, values: Mapping[str, Any]) -> list[Finding]:
-    points = values.get("points")
+def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> list[Finding]:
+    points = outputs.get("points")
     if points is None or not len(points):
         return [laws.missing(sentence("The answer has no points."))]
     if not np.isfinite(points).all():
@@ -133,21 +137,21 @@ def _findings(case: Case, greeting: Greeting, values: Mapping[str, Any]) -> list
 
 
 def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Finding]:
-    """Return whether points are on the line, in order, evenly spaced and as many as asked for."""
+    """Return whether points are on the line, ordered, evenly spaced and of the requested count."""
     line, bound = case.facts["line"], _bound(case, greeting)
     distances = _distances(points, line, True)
     findings = [_on_line(points, distances, line, bound), _ends(points, case, bound)]
     if "count" in case.inputs:
         findings.append(_count(points, case))
     if distances.max() <= bound:
-        at = line.parameters(points, bound)
-        findings += [_order(at, line, bound), _gaps(points, at, case, bound)]
+        arc = line.arc_lengths(points, bound)
+        findings += [_order(arc, bound), _gaps(points, arc, case, bound)]
         if case.inputs["closed"] and len(points) > 1:
-            findings.append(_closing(points, at, line, bound))
+            findings.append(_closing(points, arc, line, bound))
     return findings
 
 
-def _on_line(points: FloatArray, distances: FloatArray, line: Line, bound: float) -> Finding:
+def _on_line(points: FloatArray, distances: FloatArray, line: Polyline, bound: float) -> Finding:
     """Return whether points are on the line, or between two of its points."""
     is_cut = all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(distances > bound))
     message = sentence(
@@ -172,50 +176,36 @@ def _ends(points: FloatArray, case: Case, bound: float) -> Finding:
 
 
 def _count(points: FloatArray, case: Case) -> Finding:
-    asked, came = case.inputs["count"], len(points)
-    message = sentence("It was asked for {asked} points and gives {came}.", asked=asked, came=came)
-    repeated = case.inputs["closed"] and came == asked + 1
-    verdict = Verdict.RIGHT_BUT if repeated else Verdict.WRONG
-    return laws.bounded("count", abs(came - asked), 0.0, "", message, verdict=verdict)
+    expected, count = case.inputs["count"], len(points)
+    message = sentence(
+        "It was asked for {asked} points and gives {came}.", asked=expected, came=count
+    )
+    is_start_repeated = case.inputs["closed"] and count == expected + 1
+    verdict = Verdict.RIGHT_BUT if is_start_repeated else Verdict.WRONG
+    return laws.bounded("count", abs(count - expected), 0.0, "", message, verdict=verdict)
 
 
-def _order(at: FloatArray, line: Line, bound: float) -> Finding:
-    back = float(np.max(-np.diff(at), initial=0.0))
+def _order(arc: FloatArray, bound: float) -> Finding:
+    step_back = float(np.max(-np.diff(arc), initial=0.0))
     message = sentence("The points go back along the curve, by {error:.2g} m.")
-    return laws.bounded("order", back, 2.0 * bound, "m", message)
+    return laws.bounded("order", step_back, 2.0 * bound, "m", message)
 
 
-def _gaps(points: FloatArray, at: FloatArray, case: Case, bound: float) -> Finding:
-    """Return whether gaps are even, along the line with its bridges or without, or by chords."""
-    line = case.facts["line"]
-    kinds = [
-        np.diff(at), np.diff(line.without_bridges(at)),
+def _gaps(points: FloatArray, arc: FloatArray, case: Case, bound: float) -> Finding:
+    """Return whether gaps are even along the line, with its bridges or without, or by chords."""
+    measures = [
+        np.diff(arc), np.diff(case.facts["line"].without_bridges(arc)),
         np.linalg.norm(np.diff(points, axis=0), axis=-1),
     ]  # fmt: skip
-    if "count" in case.inputs:
-        error = min(_spread(gaps) for gaps in kinds)
-        message = sentence(
-            "The points are not evenly spaced: a gap differs from the mean by {error:.0%}."
-        )
-        verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else Verdict.WRONG
-        tolerance = UNEVEN + 4.0 * bound / max(float(kinds[2].mean()), bound)
-        return laws.bounded("spacing", error, tolerance, "", message, verdict=verdict)
-    return _widest(kinds, case, bound)
-
-
-def _closing(points: FloatArray, at: FloatArray, line: Line, bound: float) -> Finding:
-    """Return whether the gap that closes the curve is no wider than the others."""
-    back = float(np.linalg.norm(points[-1] - points[0])) > bound
-    gap = line.length - float(at[-1]) if back else 0.0
-    widest = float(np.diff(at).max()) * (1.0 + UNEVEN)
-    side, others = distinct_texts(gap, widest, 3)
+    if "count" not in case.inputs:
+        return _gaps_by_spacing(measures, case, bound)
+    error = min(_spread(gaps) for gaps in measures)
     message = sentence(
-        "The side that closes the curve is left out: from the last point to the start it is "
-        "{gap} m, between others at most {widest} m.",
-        gap=side,
-        widest=others,
+        "The points are not evenly spaced: a gap differs from the mean by {error:.0%}."
     )
-    return laws.bounded("closing side", gap, widest + 2.0 * bound, "m", message)
+    verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else Verdict.WRONG
+    tolerance = UNEVEN + 4.0 * bound / max(float(measures[2].mean()), bound)
+    return laws.bounded("spacing", error, tolerance, "", message, verdict=verdict)
 
 
 def _spread(gaps: FloatArray) -> float:
@@ -223,24 +213,124 @@ def _spread(gaps: FloatArray) -> float:
     return float(np.abs(gaps / mean - 1.0).max()) if mean > 0.0 else 0.0
 
 
-def _widest(kinds: Sequence[FloatArray], case: Case, bound: float) -> Finding:
-    """Return whether no gap within a stroke is wider than asked for, and few are much narrower."""
-    spacing, line = case.inputs["spacing"], case.facts["line"]
+def _gaps_by_spacing(measures: Sequence[FloatArray], case: Case, bound: float) -> Finding:
+    """Return whether gaps within strokes keep to the requested spacing, and few are much less."""
+    spacing, line, chords = case.inputs["spacing"], case.facts["line"], measures[2]
     bridges = len(line.strokes) - 1
-    wide = min(float(np.sort(gaps)[: len(gaps) - bridges].max(initial=0.0)) for gaps in kinds)
-    if wide > spacing * (1.0 + 1e-6) + 2.0 * bound:
-        gap, limit = distinct_texts(wide, spacing, 3)
+    widest = min(float(np.sort(gaps)[: len(gaps) - bridges].max(initial=0.0)) for gaps in measures)
+    if widest > spacing * (1.0 + 1e-6) + 2.0 * bound:
+        gap, limit = distinct_texts(widest, spacing, 3)
         message = sentence(
             "Neighbouring points are {gap} m apart, more than the {spacing} m asked for.",
             gap=gap,
             spacing=limit,
         )
-        return Finding("spacing", Verdict.WRONG, wide, spacing, "m", message)
-    if len(kinds[2]) > 4.0 * line.length / spacing + 1.0 + bridges + len(case.inputs["curve"]):
-        narrow = int((kinds[2] < LEAST_GAP * spacing - 2.0 * bound).sum())
+        return Finding("spacing", Verdict.WRONG, widest, spacing, "m", message)
+    if len(chords) > 4.0 * line.length / spacing + 1.0 + bridges + len(case.inputs["curve"]):
+        count = int((chords < MIN_GAP * spacing - 2.0 * bound).sum())
         message = sentence(
             "{narrow} gaps are narrower than half the spacing: the points are uneven.",
-            narrow=narrow,
+            narrow=count,
         )
-        return Finding("spacing", Verdict.RIGHT_BUT, narrow, 0.0, "", message)
-    return Finding("spacing", Verdict.RIGHT, wide, spacing, "m", laws.HOLDS)
+        return Finding("spacing", Verdict.RIGHT_BUT, count, 0.0, "", message)
+    return Finding("spacing", Verdict.RIGHT, widest, spacing, "m", laws.HOLDS)
+
+
+def _closing(points: FloatArray, arc: FloatArray, line: Polyline, bound: float) -> Finding:
+    """Return whether the gap that closes the curve is no wider than the others."""
+    is_open = float(np.linalg.norm(points[-1] - points[0])) > bound
+    gap = line.length - float(arc[-1]) if is_open else 0.0
+    widest = float(np.diff(arc).max()) * (1.0 + UNEVEN)
+    gap_text, widest_text = distinct_texts(gap, widest, 3)
+    message = sentence(
+        "The side that closes the curve is left out: from the last point to the start it is "
+        "{gap} m, between others at most {widest} m.",
+        gap=gap_text,
+        widest=widest_text,
+    )
+    return laws.bounded("closing side", gap, widest + 2.0 * bound, "m", message)
+
+
+def _expected_count(case: Case) -> int:
+    """Return the number of points that a case requests."""
+    inputs = case.inputs
+    if "count" in inputs:
+        return int(inputs["count"])
+    return int(case.facts["line"].count(inputs["spacing"], inputs["closed"]))
+
+
+def _even(case: Case, extra: int = 0) -> FloatArray:
+    """Return evenly spaced points, by default the right number of them."""
+    points: FloatArray = case.facts["line"].even_points(
+        _expected_count(case) + extra, case.inputs["closed"]
+    )
+    return points
+
+
+def _without_end(case: Case) -> FloatArray:
+    """Leave out the last point of an open curve."""
+    points: FloatArray = case.facts["line"].even_points(_expected_count(case), True)
+    return points
+
+
+def _by_index(case: Case) -> FloatArray:
+    """Space points by the number of samples instead of the length along the curve."""
+    points, closed = case.facts["line"].points, bool(case.inputs["closed"])
+    place = np.linspace(0.0, len(points) - 1.0, _expected_count(case), endpoint=not closed)
+    return np.stack([np.interp(place, np.arange(len(points)), x) for x in points.T], axis=-1)
+
+
+def _left_open(case: Case) -> FloatArray:
+    """Leave out the segment from the end of a closed curve to its start."""
+    line = Polyline(case.inputs["curve"], case.facts["line"].strokes, False)
+    return line.even_points(_expected_count(case), False)
+
+
+def _samples_before(case: Case) -> FloatArray:
+    """Take the samples at or before the even lengths, without interpolating between them."""
+    line, closed = case.facts["line"], bool(case.inputs["closed"])
+    arc = np.linspace(0.0, line.length, _expected_count(case), endpoint=not closed)
+    last = np.searchsorted(line.arc, arc, side="right") - 1
+    points: FloatArray = line.points[np.minimum(last, len(line.points) - 1)]
+    return points
+
+
+# The points that a faulty program answers, and the sentence about its fault.
+FAULTS: dict[str, tuple[Callable[[Case], FloatArray], Sentence]] = {
+    "by index": (_by_index, sentence(
+        "Points are spaced by the number of samples, not by the length along the curve: they are "
+        "as uneven as the samples. Add up the lengths of the segments and divide those.")),
+    "end left out": (_without_end, sentence(
+        "The last point is left out on open curves: divide the length by count - 1, so that the "
+        "end is kept.")),
+    "one point less": (partial(_even, extra=-1), sentence(
+        "There is one point less than asked for: the loop ends too early.")),
+    "one point more": (partial(_even, extra=1), sentence(
+        "There is one point more than asked for: count points, not gaps.")),
+    "left open": (_left_open, sentence(
+        "The segment from the end of a closed curve back to its start is missing.")),
+    "reversed": (lambda case: _even(case)[::-1], sentence(
+        "The points come in the reverse order of the curve.")),
+    "samples only": (_samples_before, sentence(
+        "Points are taken from the samples. Interpolate between two samples where the even length "
+        "falls between them.")),
+}  # fmt: skip
+
+
+def _diagnosis(
+    wrong_first: Sequence[Exchange], greeting: Greeting, behaviour: Sentence | None
+) -> Diagnosis:
+    """Return the faults that reproduce the answers."""
+    right = {"": (_even, sentence("It does what the textbook does."))}
+
+    def variant(key: str, points: Callable[[Case], FloatArray]) -> Variant:
+        return Variant((key,) if key else (), lambda case: {"points": points(case)})
+
+    def tolerance(case: Case) -> float:
+        return max(1e-9, 64.0 * greeting.epsilon * len(case.inputs["curve"]))
+
+    faults = {**right, **FAULTS}
+    variants = [variant(key, points) for key, (points, _) in faults.items()]
+    explanations, count = explain(variants, wrong_first, tolerance, lambda keys: faults[keys[0]][1])
+    named = tuple(explanation for explanation in explanations if explanation.faults != ("",))
+    return Diagnosis(named, behaviour, variant_count=count)

@@ -26,11 +26,11 @@ from .skeletons import suits
 TASK = "robot_inverse_kinematics"
 ITERATIONS = 200
 TOLERANCES = {"double": 1e-5, "single": 1e-3}
-# Where a start is so near to an answer, joint by joint, no minimum but the target's is nearer.
+# From a start so near to an answer [rad, m] no other minimum than the target's is nearer.
 NEAR = 0.1
 # Starts at the answer, near it, anywhere; targets that nothing reaches.
 AT, CLOSE, ANYWHERE, BEYOND = "start at the target", "near start", "any start", "beyond reach"
-# Coordinates beyond this count as there: the reference takes none beyond 1e75.
+# Larger coordinates are clipped to this: the reference takes none beyond 1e75.
 FARTHEST = 1e74
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 _SEED = 1955
@@ -72,12 +72,12 @@ def judgement_of(inputs: Mapping[str, Any], q: FloatArray) -> PoseJudgement:
 def urdf(inputs: Mapping[str, Any]) -> str:
     """Return a robot as URDF: links base, link_0 and so on, and the tool."""
     count = len(inputs["parents"])
-    named = [f'<link name="{link}"/>' for link in ("base", *map(_link, range(count)), "tool")]
+    links = [f'<link name="{link}"/>' for link in ("base", *map(_link, range(count)), "tool")]
     joints = [_urdf_joint(inputs, j) for j in range(count)]
-    placed = _urdf_origin(inputs["tool_position"], inputs["tool_rotation"])
+    origin = _urdf_origin(inputs["tool_position"], inputs["tool_rotation"])
     ends = f'<parent link="{_link(inputs["effector"])}"/><child link="tool"/>'
-    joints.append(f'<joint name="to_tool" type="fixed">{placed}{ends}</joint>')
-    return f'<robot name="robot">{"".join(named + joints)}</robot>'
+    joints.append(f'<joint name="to_tool" type="fixed">{origin}{ends}</joint>')
+    return f'<robot name="robot">{"".join(links + joints)}</robot>'
 
 
 def _link(j: int) -> str:
@@ -97,15 +97,15 @@ def _urdf_joint(inputs: Mapping[str, Any], j: int) -> str:
 
 
 def _urdf_origin(position: FloatArray, quaternion: FloatArray) -> str:
-    """Return an origin; roll, pitch and yaw rotate about x, then y, then z, all fixed axes."""
+    """Return an origin; roll, pitch and yaw rotate about the fixed axes x, y and z in turn."""
     R = rotation.to_matrix(quaternion)
     pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
     angles = (math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0]))
     return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(angles)}"/>'
 
 
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(repr(float(x)) for x in values)
+def _numbers(vector: Iterable[float]) -> str:
+    return " ".join(repr(float(x)) for x in vector)
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -116,11 +116,11 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
         for name, robot in _robots(rng).items()
         if suits(robot["parents"], greeting)
         for number in range(3 if thorough else 1)
-        for case in _of_robot(f"{name}, pose {number + 1}", robot, rng, greeting)
+        for case in _cases_of(f"{name}, pose {number + 1}", robot, rng, greeting)
     ]
 
 
-def _of_robot(
+def _cases_of(
     name: str, robot: dict[str, Any], rng: np.random.Generator, greeting: Greeting
 ) -> Iterator[Case]:
     lower, upper = robot["lower"], robot["upper"]
@@ -129,11 +129,11 @@ def _of_robot(
     anywhere = rng.uniform(lower, upper)
     reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
     size = reach + float(np.abs(np.where(robot["slides"], upper - lower, 0.0)).sum())
-    near = tool_pose(robot, answer)
-    far = near._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * size)
+    tool = tool_pose(robot, answer)
+    unreachable = tool._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * size)
     tolerance = TOLERANCES[greeting.precision]
-    starts = ((AT, answer, near), (CLOSE, close, near), (ANYWHERE, anywhere, near),
-              (BEYOND, anywhere, far))  # fmt: skip
+    starts = ((AT, answer, tool), (CLOSE, close, tool), (ANYWHERE, anywhere, tool),
+              (BEYOND, anywhere, unreachable))  # fmt: skip
     for family, start, target in starts:
         inputs = {
             **robot,
@@ -163,12 +163,12 @@ def _robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
                            parents=[-1, 0, 0, 1], tool=[0.2, 0, 0.1]),
         "six hinges": _robot([z, y, y, y, z, y], arm, tool=[0, 0.05, 0.1]),
         "seven hinges": _robot([z, y, z, y, z, y, z], taller, tool=[0, 0, 0.1]),
-        **{f"seven hinges in rotated frames {i}": _anyhow(rng) for i in range(1, 4)},
+        **{f"seven hinges in rotated frames {i}": _random_frames(rng) for i in range(1, 4)},
     }  # fmt: skip
 
 
-def _anyhow(rng: np.random.Generator) -> dict[str, Any]:
-    """Return a robot whose frames and axes point anywhere."""
+def _random_frames(rng: np.random.Generator) -> dict[str, Any]:
+    """Return a robot with random frames and axes."""
     axes = rng.standard_normal((7, 3))
     return _robot(
         axes / np.linalg.norm(axes, axis=1, keepdims=True), 0.3 * rng.standard_normal((7, 3)),

@@ -1,38 +1,35 @@
-"""What rounding allows in answers of kinematics, each figure with its reason.
+"""Bounds of rounding errors in answers of kinematics, each figure with its reason.
 
-Every bound is an ulp of the size times the work done, by the solver's declared precision.
+Every bound is the work done times an ulp of the size in the solver's declared precision.
 """
 
-# Rotating an offset and adding it rounds ten times or so; products of unit quaternions as often.
+# Rotating an offset and adding it rounds about ten times; products of unit quaternions as often.
 # Inputs rounded to the solver's precision add as much again.
 ROUNDINGS_A_JOINT = 16.0
-# Rotations off unit length by e stretch what they rotate by up to this times e, joint after joint.
+# Rotations with a length error e stretch what they rotate by up to this times e at every joint.
 STRETCH = 4.0
-# Helpers that give a rotation between two directions return the identity below an angle of some
+# Helpers that give a rotation between two directions return the identity below an angle of about
 # sqrt(epsilon): 5e-4 rad in single precision, 1.5e-8 in double precision. Students' own helpers
 # often test the cross product against 1e-6.
 DEAD_ANGLE = {"single": 5e-4, "double": 1e-6}
-# A solver whose rotations below the dead angle are lost comes to rest about a reach times that
-# angle from its target, and farther on a chain that is nearly straight.
+# A solver that loses rotations below the dead angle comes to rest about a reach times that angle
+# from its target, and farther on a chain that is nearly straight.
 STALL = {"single": 4e-3, "double": 1e-5}
-# The arc cosine and the sine by which many make a rotation lose digits near 0 and pi; the cases of
-# single sweeps stay away from both by 0.1 rad, where that is a factor of ten.
+# Rotations by arc cosine and sine lose digits near 0 and pi; the cases of single sweeps keep a
+# distance of 0.1 rad from both, where that is a factor of ten.
 SWEEP_ROUNDINGS = 10.0 * ROUNDINGS_A_JOINT
 
 
 def positions(epsilon: float, joints: int, size: float, drift: float = 0.0) -> float:
-    """Return how far rounding moves a joint [m], with rotations off unit length by `drift`."""
+    """Return how far rounding moves a joint [m] if rotations are off unit length by `drift`."""
     return joints * (ROUNDINGS_A_JOINT * epsilon + STRETCH * drift) * size
 
 
 def rotations(epsilon: float, joints: int) -> float:
-    """Return by what angle rounding rotates a joint [rad]."""
+    """Return the angle by which rounding rotates a joint [rad]."""
     return ROUNDINGS_A_JOINT * joints * epsilon
 
 
 def sweep(epsilon: float, joints: int, size: float, amplification: float) -> float:
-    """Return how far rounding moves a joint in a sweep [m].
-
-    The amplification is by how much the sweep enlarges small changes of its start.
-    """
+    """Return how far rounding moves a joint in a sweep that enlarges small changes [m]."""
     return SWEEP_ROUNDINGS * joints * epsilon * size * max(1.0, amplification)

@@ -1,8 +1,8 @@
 """Forward kinematics, CCD and FABRIK as textbooks have them, with a switch for each known fault.
 
-With every switch at 0 they are right. Switches are independent of one another, so that faults
-combine; `faults.py` says what each number of a switch does. Where faults are other choices of one
-quantity, the code lists them in the order of their numbers, the right one first.
+With every switch at 0 they are right. Switches are independent, so that faults combine;
+`faults.toml` describes each number of a switch. Where faults are other choices of one quantity, the
+code lists the choices in the order of their numbers, the right choice first.
 
 The solvers keep the local rotations of the whole skeleton and place all joints anew after each
 rotation, as a student's program does, not the reference's chain of global rotations. In CCD, d is
@@ -36,8 +36,6 @@ from plumbob.reference.quaternion import (
 ORIGIN = (0.0, 0.0, 0.0)
 # Numbers of `applied` from this one on rotate the child on the path.
 GIVEN_TO_CHILD = 10
-
-
 UNCAPPED = 10.0  # an angle that no rotation has [rad]
 
 
@@ -68,7 +66,7 @@ class Switches(NamedTuple):
     frame_target: int = 0  # which target a frame has
     # What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad].
     gain: float = 1.0
-    most: float = UNCAPPED
+    cap: float = UNCAPPED
 
 
 class Chain(NamedTuple):
@@ -167,14 +165,14 @@ def solve(chain: Chain, target: Any, ending: Ending, faults: Switches, pose: Pos
     return i
 
 
-def is_reached(distance: float, before: float, tolerance: float, made: int, fault: int) -> bool:
+def is_reached(distance: float, before: float, tolerance: float, sweeps: int, fault: int) -> bool:
     """Return whether the solve ends before its next sweep."""
     tests = (
         (distance, tolerance),
         (distance * distance, tolerance),
         (distance, tolerance * tolerance),
         (abs(before - distance), tolerance),
-        (distance, tolerance * (made + 1)),
+        (distance, tolerance * (sweeps + 1)),
     )
     error, bound = tests[fault]
     return error <= bound
@@ -219,13 +217,13 @@ def damped(d: Any, faults: Switches) -> Any:
     if faults.angle == 2:
         return multiply(d, d)
     factor = 0.5 * faults.gain if faults.angle == 3 else faults.gain
-    if factor == 1.0 and faults.most >= UNCAPPED:
+    if factor == 1.0 and faults.cap >= UNCAPPED:
         return d
     v = logarithm(d)
     angle = norm(v)
     if angle == 0.0:
         return d
-    return rotation_about(scale(1.0 / angle, v), min(factor * angle, faults.most))
+    return rotation_about(scale(1.0 / angle, v), min(factor * angle, faults.cap))
 
 
 def apply_rotation(chain: Chain, k: int, d: Any, fault: int, pose: Pose) -> None:
@@ -237,27 +235,27 @@ def apply_rotation(chain: Chain, k: int, d: Any, fault: int, pose: Pose) -> None
         P = load_quaternion(pose.rotations, p)
     if fault >= GIVEN_TO_CHILD:
         j = chain.path[k + 1]
-    Q, none = load_quaternion(pose.local, j), IDENTITY
+    Q, unit = load_quaternion(pose.local, j), IDENTITY
     P_inverse, R_inverse = conjugate(P), conjugate(R)
     products = (
         (P_inverse, d, P, Q),
-        (none, none, d, Q),
-        (none, none, Q, d),
+        (unit, unit, d, Q),
+        (unit, unit, Q, d),
         (P, d, P_inverse, Q),
         (R_inverse, d, R, Q),
         (R, d, R_inverse, Q),
-        (none, none, d, R),
-        (none, P_inverse, d, Q),
-        (none, none, none, d),
+        (unit, unit, d, R),
+        (unit, P_inverse, d, Q),
+        (unit, unit, unit, d),
         (Q, P_inverse, d, P),
-        (none, none, d, Q),
+        (unit, unit, d, Q),
         (R_inverse, d, R, Q),
     )
     a, b, c, e = products[fault]
     store_quaternion(pose.local, j, renormalised(multiply(multiply(multiply(a, b), c), e)))
 
 
-def keep(chain: Chain, made: int, faults: Switches, pose: Pose) -> None:
+def keep(chain: Chain, sweeps: int, faults: Switches, pose: Pose) -> None:
     """Leave a pose of CCD as it is: its sweeps keep rotations and positions together."""
 
 
@@ -296,14 +294,14 @@ def pull(positions: FloatArray, fixed: int, moved: int, length: float) -> None:
         store_vector(positions, moved, add(start, scale(length / distance, direction)))
 
 
-def follow(chain: Chain, made: int, faults: Switches, pose: Pose) -> None:
+def follow(chain: Chain, sweeps: int, faults: Switches, pose: Pose) -> None:
     """Rotate each joint of the path so that its link points to where the next one has moved.
 
     The positions on the path stay those that the passes leave; below it they are what the rotations
     give.
     """
     moved, start = pose.positions.copy(), pose.rotations.copy()
-    for k in range(len(chain.path) - 1 if made > 0 else 0):
+    for k in range(len(chain.path) - 1 if sweeps > 0 else 0):
         place(chain, faults, pose)
         parents_of = start if faults.rotations == 4 else pose.rotations
         point_link(chain, k, moved, faults.rotations, parents_of, pose)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,13 +19,13 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import sentence
 from . import laws, pose_laws, problems, rounding, skeletons, sweeps
-from .faults import Switches
-from .inverse_kinematics import KNOWN
+from .inverse_kinematics import METHODS
 from .pose_laws import AnsweredPose
 from .predictions import forward, path_to, predict_track
-from .problems import Problem
-from .report import diagnosed, report
-from .skeletons import Family, Make, chains, trees
+from .problems import TargetProblem
+from .report import diagnosis_of, report
+from .skeletons import CaseFamily, DrawSkeleton, chains, trees
+from .textbook import Switches
 
 TASK = "track"
 # Another method that is within this share of the reach is slow, not wrong.
@@ -33,160 +33,177 @@ SLOW = 1e-2
 CONTINUES = "each frame from the one before"
 FRAMES, TOLERANCE, SWEEPS = 8, 1e-4, 60
 # A joint that moves farther than this between neighbouring frames has jumped: on these curves the
-# textbook's CCD and FABRIK, each frame from the one before, move none half as far [m].
+# textbook's CCD and FABRIK, each frame from the one before, move no joint half as far [m].
 JUMP = 1.0
-Scene = tuple[Problem, FloatArray]
+
+
+class CurveProblem(NamedTuple):
+    """A skeleton, the joint that follows a curve, and the curve (frame, 3) [m]."""
+
+    start: TargetProblem
+    curve: FloatArray
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return short curves for chains, the lab's arm on its curves, and a tree."""
     return [
-        _case(name, family, scene, method)
-        for name, family, scene in skeletons.drawn(FAMILIES, seed, 5 if thorough else 1)
-        if skeletons.suits(scene[0].posed.parents, greeting)
+        _case(name, family, problem, method)
+        for name, family, problem in skeletons.drawn(FAMILIES, seed, 5 if thorough else 1)
+        if skeletons.suits(problem.start.skeleton.parents, greeting)
     ]
 
 
-def _case(name: str, family: Family, scene: Scene, method: str) -> Case:
-    problem, curve = scene
-    inputs = problems.request(problem, TOLERANCE, SWEEPS, method)
-    frames = [problems.facts({**inputs, "target": target}, problem.posed) for target in curve]
+def _case(name: str, family: CaseFamily, problem: CurveProblem, method: str) -> Case:
+    inputs = problems.request(problem.start, TOLERANCE, SWEEPS, method)
+    frames = [problems.facts({**inputs, "target": target}) for target in problem.curve]
     del inputs["target"]
-    facts = {"size": problem.posed.size, "frames": frames, "path": frames[0]["path"]}
-    inputs["curve"] = curve
+    inputs["curve"] = problem.curve
+    facts = {"size": frames[0]["size"], "frames": frames, "path": frames[0]["path"]}
     return Case(name, TASK, inputs, family.name, family.about, facts=facts)
 
 
-def _is_smooth(scene: Scene) -> bool:
+def _is_smooth(problem: CurveProblem) -> bool:
     """Return whether both textbook solvers track a curve without large rotations of joints."""
-    problem, curve = scene
-    inputs = problems.request(problem, TOLERANCE, problems.EASY, "") | {"curve": curve}
+    start, curve = problem
+    inputs = problems.request(start, TOLERANCE, problems.EASY, "") | {"curve": curve}
     case = Case("", TASK, inputs, "", laws.HOLDS)
-    path = path_to(problem.posed.parents, problem.effector)
-    for method in KNOWN:
+    path = path_to(start.skeleton.parents, start.effector)
+    for method in METHODS:
         x = predict_track(method, Switches(), case)["positions"]
-        missed = np.linalg.norm(x[:, problem.effector] - curve, axis=-1).max() > TOLERANCE
+        missed = np.linalg.norm(x[:, start.effector] - curve, axis=-1).max() > TOLERANCE
         if missed or np.linalg.norm(np.diff(x[:, path], axis=0), axis=-1).max() >= 0.5:
             return False
     return True
 
 
-def _circle(make: Make, effector: int) -> problems.Draw:
-    """Return how to draw a small circle in space about where the effector is."""
+def _circle(make: DrawSkeleton, effector: int) -> problems.Draw:
+    """Return a function that draws a small circle in space about the effector."""
 
-    def scene(rng: np.random.Generator) -> Scene:
-        posed = make(rng)
-        x, _ = forward(posed._asdict())
+    def problem(rng: np.random.Generator) -> CurveProblem:
+        skeleton = make(rng)
+        x, _ = forward(skeleton._asdict())
         t = 2.0 * np.pi * np.arange(FRAMES) / FRAMES
         circle = 0.15 * np.stack([np.cos(t), np.sin(t), 0.5 * np.sin(2.0 * t)], axis=-1)
         curve = x[effector] + rotation.rotate(rotation.random(rng), circle)
-        return Problem(posed, effector, x[effector]), curve
+        return CurveProblem(TargetProblem(skeleton, effector, x[effector]), curve)
 
-    return problems.accepted(scene, _is_smooth)
+    return problems.accepted(problem, _is_smooth)
 
 
 def _arm(curve: str, step: int) -> problems.Draw:
-    """Return how to draw a part of one of the arm's curves."""
+    """Return a function that draws a part of one of the arm's curves."""
 
-    def scene(rng: np.random.Generator) -> Scene:
+    def problem(rng: np.random.Generator) -> CurveProblem:
         points = curves[curve](150)
         first = int(rng.integers(len(points)))
         part = np.roll(points, -first, axis=0)[: step * FRAMES : step]
-        return Problem(skeletons.moved_arm(rng), 4, part[0]), part
+        return CurveProblem(TargetProblem(skeletons.moved_arm(rng), 4, part[0]), part)
 
-    return problems.accepted(scene, _is_smooth)
+    return problems.accepted(problem, _is_smooth)
 
 
 FAMILIES = (
-    Family("small circle", sentence("A chain draws a small circle."), _circle(chains(4), 3)),
-    Family("arm, circle", sentence("The lab's arm draws a part of its circle."), _arm("circle", 2)),
-    Family("arm, square", sentence("The lab's arm draws a part of its square."), _arm("square", 4)),
-    Family("tree", sentence("A branch of a tree draws a small circle."), _circle(trees(6), 5)),
-    Family("joint in the middle", sentence("A joint with others below it draws a circle."),
-           _circle(chains(6), 4)),
+    CaseFamily("small circle", sentence("A chain draws a small circle."), _circle(chains(4), 3)),
+    CaseFamily("arm, circle", sentence("The lab's arm draws a part of its circle."),
+               _arm("circle", 2)),
+    CaseFamily("arm, square", sentence("The lab's arm draws a part of its square."),
+               _arm("square", 4)),
+    CaseFamily("tree", sentence("A branch of a tree draws a small circle."), _circle(trees(6), 5)),
+    CaseFamily("joint in the middle", sentence("A joint with others below it draws a circle."),
+               _circle(chains(6), 4)),
 )  # fmt: skip
 
 
-def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-    """Hold each frame against the laws of poses, and frames against one another."""
-    judgements = [_judged(one, method.lower(), greeting) for one in asked]
-    seen = {one.case.name: _seen(one) for one in asked if frames_of(one)}
+class Frame(NamedTuple):
+    """A frame as a case of inverse kinematics, and its pose."""
+
+    case: Case
+    pose: AnsweredPose
+
+
+def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+    """Judge each frame by the laws of poses, and compare it with its neighbours."""
+    method = method.lower()
+    judgements = [_judge(exchange, method, greeting) for exchange in exchanges]
+    comparable = {e.case.name: _comparable(e) for e in exchanges if frames_of(e)}
     wrong = [
-        seen[judgement.case.name]
+        comparable[judgement.case.name]
         for judgement in judgements
-        if judgement.case.name in seen and _is_wrong(judgement)
+        if judgement.case.name in comparable and _is_wrong(judgement)
     ]
-    diagnosis = _diagnosis(list(seen.values()), wrong, method.lower(), greeting)
-    return report(TASK, method, judgements, diagnosis)
+    bound = partial(_prediction_bound, greeting)
+    diagnoses = [
+        diagnosis_of(f"track {textbook}", list(comparable.values()), wrong, bound)
+        for textbook in ((method,) if method in METHODS else METHODS)
+    ]
+    return report(TASK, method, judgements, max(diagnoses, key=_largest_share))
 
 
 def _is_wrong(judgement: CaseJudgement) -> bool:
     """Return whether frames break a law, or jump."""
-    laws_of_frames = ("continuity", CONTINUES)
-    jumps = any(one.law in laws_of_frames and one.verdict for one in judgement.findings)
-    return jumps or judgement.verdict >= Verdict.WRONG
+    return judgement.verdict >= Verdict.WRONG or any(
+        finding.verdict and finding.law in ("continuity", CONTINUES)
+        for finding in judgement.findings
+    )
 
 
-def _diagnosis(
-    seen: Sequence[Exchange], wrong: Sequence[Exchange], method: str, greeting: Greeting
-) -> Diagnosis:
-    alike = partial(_likeness, greeting)
-    methods = (method,) if method in KNOWN else KNOWN
-    diagnoses = [diagnosed(f"track {known}", seen, wrong, alike) for known in methods]
-    return max(diagnoses, key=lambda one: max((e.share for e in one.explanations), default=0.0))
+def _largest_share(diagnosis: Diagnosis) -> float:
+    return max((explanation.share for explanation in diagnosis.explanations), default=0.0)
 
 
-def _likeness(greeting: Greeting, case: Case) -> float:
-    """Return the relative difference that still counts as a variant's answer.
+def _prediction_bound(greeting: Greeting, case: Case) -> float:
+    """Return the relative difference from a variant's answer that rounding explains.
 
     Frames hand on their rounding to the next, each solve enlarging it a few times.
     """
-    return max(1e-8, 16.0 * sweeps.likeness(greeting, case))
+    return max(1e-8, 16.0 * sweeps.prediction_bound(greeting, case))
 
 
-def frames_of(one: Exchange) -> list[tuple[Case, AnsweredPose]]:
-    """Return each frame as a case of inverse kinematics, and its pose; none if there are none."""
-    values = one.answer.values if isinstance(one.answer, Answer) else {}
-    names, frames = {"local_rotations", "positions"} & values.keys(), []
-    for i, facts in enumerate(one.case.facts["frames"] if names else ()):
-        inputs = {**one.case.inputs, "target": one.case.inputs["curve"][i]}
-        posed = pose_laws.understood({name: values[name][i] for name in names}, inputs, facts)
-        frames.append((replace(one.case, inputs=inputs, facts=facts), posed))
+def frames_of(exchange: Exchange) -> list[Frame]:
+    """Return the frames of an answer; an empty list if it has no poses."""
+    case, answer = exchange.case, exchange.answer
+    outputs = answer.values if isinstance(answer, Answer) else {}
+    names, frames = {"local_rotations", "positions"} & outputs.keys(), []
+    for i, facts in enumerate(case.facts["frames"] if names else ()):
+        inputs = {**case.inputs, "target": case.inputs["curve"][i]}
+        pose = pose_laws.read_pose({name: outputs[name][i] for name in names}, inputs, facts)
+        frames.append(Frame(replace(case, inputs=inputs, facts=facts), pose))
     return frames
 
 
-def _seen(one: Exchange) -> Exchange:
-    """Return the answer as variants predict it."""
-    parts = [posed.comparable for _, posed in frames_of(one)]
-    values = {name: np.array([part[name] for part in parts]) for name in parts[0]}
-    answer = Answer(values, 0.0)
-    return Exchange(one.case, answer, answer)
+def _comparable(exchange: Exchange) -> Exchange:
+    """Return the exchange with the outputs that variants predict."""
+    frames = [frame.pose.outputs for frame in frames_of(exchange)]
+    answer = Answer({name: np.array([x[name] for x in frames]) for name in frames[0]}, 0.0)
+    return Exchange(exchange.case, answer, answer)
 
 
-def _judged(one: Exchange, method: str, greeting: Greeting) -> CaseJudgement:
-    skeleton = Skeleton(one.case.inputs["parents"], one.case.inputs["offsets"])
+def _judge(exchange: Exchange, method: str, greeting: Greeting) -> CaseJudgement:
+    inputs = exchange.case.inputs
     reference = partial(
-        track, skeleton, one.case.inputs["curve"], method if method in KNOWN else "ccd",
-        start=one.case.inputs["local_rotations"],
-        **{name: one.case.inputs[name] for name in ("effector", "tolerance", "max_iterations")},
+        track, Skeleton(inputs["parents"], inputs["offsets"]), inputs["curve"],
+        method if method in METHODS else "ccd", start=inputs["local_rotations"],
+        **{name: inputs[name] for name in ("effector", "tolerance", "max_iterations")},
     )  # fmt: skip
 
-    def findings(values: Mapping[str, Any]) -> list[Finding]:
-        frames = frames_of(one)
+    def findings(outputs: Mapping[str, Any]) -> list[Finding]:
+        frames = frames_of(exchange)
         if not frames:
             return [laws.missing(pose_laws.NEITHER)]
-        findings = [*_frame_laws(frames, greeting), *_continuity([posed for _, posed in frames])]
-        return [*findings, _goes_on(one, method, greeting)] if method in KNOWN else findings
+        findings = [*_frame_laws(frames, greeting), *_continuity([f.pose for f in frames])]
+        return (
+            [*findings, _continues(exchange, method, greeting)] if method in METHODS else findings
+        )
 
-    return laws.judged(one, greeting, findings, reference)
+    return laws.judge_case(exchange, greeting, findings, reference)
 
 
-def _goes_on(one: Exchange, method: str, greeting: Greeting) -> Finding:
-    """Return whether each frame starts from the one before, as far as a textbook's solver shows."""
-    answer, bound = _seen(one).answer, _likeness(greeting, one.case)
+def _continues(exchange: Exchange, method: str, greeting: Greeting) -> Finding:
+    """Return whether frames start from the frame before, as far as a textbook's solver shows."""
+    answer, bound = _comparable(exchange).answer, _prediction_bound(greeting, exchange.case)
     assert isinstance(answer, Answer)
     warm, cold = (
-        difference(predict_track(method, Switches(frame_start=start), one.case), answer.values)
+        difference(predict_track(method, Switches(frame_start=start), exchange.case), answer.values)
         for start in (0, 1)
     )
     if not warm > bound >= cold:
@@ -198,27 +215,28 @@ def _goes_on(one: Exchange, method: str, greeting: Greeting) -> Finding:
     return Finding(CONTINUES, Verdict.RIGHT_BUT, 1.0, 0.0, "", message)
 
 
-def _frame_laws(frames: Sequence[tuple[Case, AnsweredPose]], greeting: Greeting) -> list[Finding]:
+def _frame_laws(frames: Sequence[Frame], greeting: Greeting) -> list[Finding]:
     """Return the worst finding of each law over all frames."""
     worst: dict[str, Finding] = {}
-    for i, (case, posed) in enumerate(frames):
-        findings = pose_laws.all_of(posed, case, greeting)
-        if posed.finite:
-            findings.append(_on_target(posed, case, greeting))
+    for i, (case, pose) in enumerate(frames):
+        findings = pose_laws.all_of(pose, case, greeting)
+        if pose.finite:
+            findings.append(_on_target(pose, case, greeting))
         for finding in findings:
-            known = worst.get(finding.law)
-            if known is None or (finding.verdict, finding.error) > (known.verdict, known.error):
+            rank = finding.verdict, finding.error
+            previous = worst.get(finding.law)
+            if previous is None or rank > (previous.verdict, previous.error):
                 message = finding.sentence
                 if finding.verdict:
-                    message = sentence("Frame {frame}: {what}", frame=i, what=finding.sentence)
+                    message = sentence("Frame {frame}: {what}", frame=i, what=message)
                 worst[finding.law] = replace(finding, sentence=message)
     return list(worst.values())
 
 
-def _on_target(posed: AnsweredPose, case: Case, greeting: Greeting) -> Finding:
-    joints, size, error = len(posed.positions), case.facts["size"], posed.distance
-    slack = rounding.positions(greeting.epsilon, joints, size, posed.drift)
-    share = rounding.STALL[greeting.precision] if case.inputs["method"] in KNOWN else SLOW
+def _on_target(pose: AnsweredPose, case: Case, greeting: Greeting) -> Finding:
+    joints, size, error = len(pose.positions), case.facts["size"], pose.distance
+    slack = rounding.positions(greeting.epsilon, joints, size, pose.drift)
+    share = rounding.STALL[greeting.precision] if case.inputs["method"] in METHODS else SLOW
     message = sentence("It is {error:.2g} m off a target that it can reach.")
     verdict = Verdict.RIGHT_BUT if error <= share * case.facts["reach"] else Verdict.WRONG
     bound = case.inputs["tolerance"] + slack
@@ -227,16 +245,16 @@ def _on_target(posed: AnsweredPose, case: Case, greeting: Greeting) -> Finding:
 
 def _continuity(poses: Sequence[AnsweredPose]) -> list[Finding]:
     """Return whether no joint jumps from a frame to the next."""
-    x = np.array([posed.positions[posed.path] for posed in poses])
+    x = np.array([pose.positions[pose.path] for pose in poses])
     if not np.isfinite(x).all():
         return []
-    moves = np.linalg.norm(np.diff(x, axis=0), axis=-1)
-    frame, k = np.unravel_index(int(np.argmax(moves)), moves.shape)
-    joint, error = int(poses[0].path[k]), float(moves[frame, k])
+    distances = np.linalg.norm(np.diff(x, axis=0), axis=-1)
+    frame, k = np.unravel_index(int(np.argmax(distances)), distances.shape)
+    joint, error = int(poses[0].path[k]), float(distances[frame, k])
     message = sentence(
         "Joint {joint} jumps by {error:.2g} m from frame {frame} to the next: start each frame "
         "from the one before.",
         frame=int(frame),
     )
     verdict = Verdict.RIGHT_BUT
-    return [laws.bounded("continuity", error, JUMP, "m", message, verdict=verdict, where=joint)]
+    return [laws.bounded("continuity", error, JUMP, "m", message, verdict=verdict, index=joint)]

@@ -1,7 +1,7 @@
-"""Cases of mass-spring systems, the smallest first, fitted to what a solver takes.
+"""Cases of mass-spring systems, the smallest first, fitted to the systems that a solver takes.
 
-A probe is a small case in which one more aspect of a step matters than in those before it: flight,
-a spring, a damper, a pin, a changed h. Faults are sought along the probes.
+Each probe is a small case that adds an aspect of a step to the cases before it: flight, a spring,
+a damper, a pin, a changed h. Faults are sought along the probes.
 """
 
 from collections.abc import Mapping
@@ -17,10 +17,14 @@ from ..case import Case
 from ..greeting import Greeting, System
 from ..sentence import Sentence, sentence
 from ..task import TASKS
+from .faults import read_table
 
 # In place of the mass 1, which hides what is divided by it.
 ONE_MASS = 0.8
 MOTION_STEPS = 6
+STEPS = ("mass_spring_step", "mass_spring_motion")
+GRAVITY = np.array([0.0, -9.81, 0.0])
+_TABLE = read_table("scenes.toml")
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +41,10 @@ class SpringScene:
     masses: FloatArray
     stiffnesses: FloatArray
     dampings: FloatArray
-    gravity: FloatArray
     h: float
+    gravity: FloatArray = field(default_factory=GRAVITY.copy)
     pinned: tuple[int, ...] = ()
-    rest_lengths: FloatArray | None = None
+    rest_lengths: FloatArray | str = "measured"  # or those of `rest`
     external_forces: FloatArray | float = 0.0
     tension_only: bool = False
     # attributes of `System` without which it makes no sense: "pinned" and so on
@@ -63,15 +67,21 @@ def task_cases(task: str, greeting: Greeting, seed: int, thorough: bool) -> list
     return [case for case in suitable if case.follows in names]
 
 
+def trace_of(family: str) -> Sentence:
+    """Return where to look if a scene of this family is the first that a solver gets wrong."""
+    traces = _TABLE["traces"]
+    return Sentence(traces.get(family, traces["cloth"])["sentence"], {})
+
+
 def _has(system: System, need: str) -> bool:
     return system.gravity == "vector" if need == "gravity" else bool(getattr(system, need))
 
 
 def _case(task: str, scene: SpringScene, system: System) -> Case:
-    """Return the scene as a request, with one value for all where the solver has but one."""
+    """Return the scene as a request, with equal numbers where the solver takes a single number."""
     springs = np.asarray(scene.springs, dtype=np.int64).reshape(-1, 2)
     x, v, g = scene.positions, scene.velocities, scene.gravity
-    measured = system.rest_lengths == "measured" or scene.rest_lengths is None
+    measured = system.rest_lengths == "measured" or isinstance(scene.rest_lengths, str)
     values: dict[str, Any] = {
         "masses": np.full(len(x), ONE_MASS) if system.masses == "one" else scene.masses,
         "springs": springs,
@@ -93,13 +103,14 @@ def _case(task: str, scene: SpringScene, system: System) -> Case:
         values["external_forces"] = np.zeros_like(x) + scene.external_forces
     if system.tension_only:
         values["tension_only"] = np.full(len(springs), scene.tension_only)
-    inputs = {one.name: values[one.name] for one in TASKS[task].inputs if one.name in values}
+    names = (definition.name for definition in TASKS[task].inputs)
+    inputs = {name: values[name] for name in names if name in values}
     facts = {**scene.facts, "probe": scene.probe}
     return Case(scene.name, task, inputs, scene.family, scene.about, scene.follows, facts)
 
 
-def _shared(values: FloatArray, how: str) -> FloatArray:
-    return np.full(len(values), values.mean()) if how == "one" else values
+def _shared(values: FloatArray, number: str) -> FloatArray:
+    return np.full(len(values), values.mean()) if number == "one" else values
 
 
 def _lengths(x: FloatArray, springs: Any) -> FloatArray:
@@ -108,69 +119,48 @@ def _lengths(x: FloatArray, springs: Any) -> FloatArray:
 
 def scenes(seed: int, thorough: bool) -> list[SpringScene]:
     """Return all scenes in their order; the long list has more random cloths."""
-    found = [*_particles(), *_small(seed), *_changes(seed), *_cloths(seed)]
-    if thorough:
-        found += [_cloth_scene(f"random cloth {i}", seed + 1 + i, 3 + i % 3) for i in range(12)]
-    return found
-
-
-G = np.array([0.0, -9.81, 0.0])
-PAIR = np.array([[0.1, 1.5, 0.0], [0.55, 1.3, 0.3]])
-PAIR_AT_REST = np.array([[0.1, 1.5, 0.0], [0.5, 1.5, 0.2]])
-PAIR_COMPRESSED = np.array([[0.18, 1.52, 0.03], [0.45, 1.51, 0.18]])
-PAIR_VELOCITIES = np.array([[0.6, -0.4, 0.2], [-0.5, 1.1, 0.9]])
-PAIR_MASSES = np.array([0.7, 1.9])
-HEIGHT = np.array([0.0, 1.6, 0.0])
-STEPS = ("mass_spring_step", "mass_spring_motion")
-
-
-def _pair(name: str, family: str, about: Sentence, **changes: Any) -> SpringScene:
-    """Return two particles with one spring, moving and stretched."""
-    scene = SpringScene(
-        name, family, about, PAIR_AT_REST, [(0, 1)], PAIR, PAIR_VELOCITIES, PAIR_MASSES,
-        np.array([60.0]), np.array([0.0]), G, 0.05, probe=True,
-    )  # fmt: skip
-    return replace(scene, **changes)
-
-
-def _particles() -> list[SpringScene]:
-    """Return the scenes of one spring."""
-    hanging = {"velocities": PAIR_VELOCITIES * [[0.0], [1.0]], "pinned": (0,), "needs": ("pinned",)}
-    damped = {"dampings": np.array([1.5])}
+    more = 12 if thorough else 0
     return [
-        _pair("two particles in flight", "flight", sentence(
-            "Two particles fly freely: the spring between them has no stiffness."),
-            stiffnesses=np.array([0.0])),
-        _pair("one spring", "springs", sentence("One stretched spring, both ends moving.")),
-        _pair("one spring at rest", "rest", sentence(
-            "One spring at its rest length, without gravity: nothing moves."),
-            positions=PAIR_AT_REST, velocities=np.zeros((2, 3)), gravity=np.zeros(3), probe=False),
-        _pair("one spring, compressed", "springs", sentence(
-            "One spring a third shorter than at rest."), positions=PAIR_COMPRESSED),
-        _pair("one damped spring", "dampers", sentence(
-            "One stretched spring with a damper, both ends moving."), **damped),
-        _pair("pendulum", "pins", sentence(
-            "One particle hangs from a pinned one by a spring."), **hanging),
-        _pair("damped pendulum", "pins", sentence(
-            "One particle hangs from a pinned one by a damped spring."), **hanging, **damped),
-    ]  # fmt: skip
+        *(SpringScene(**_fields(_TABLE["pair_defaults"] | entry)) for entry in _TABLE["pair"]),
+        *(_random(seed, **entry) for entry in _TABLE["random"]),
+        *_changes(seed),
+        *(_random(seed, **entry) for entry in _TABLE["small_step"]),
+        *_cloths(seed),
+        *(_cloth_scene(f"random cloth {i}", seed + 1 + i, 3 + i % 3) for i in range(more)),
+    ]
 
 
-def _random(
-    name: str, family: str, about: Sentence, seed: int, n: int, **changes: Any
-) -> SpringScene:
-    """Return a triangle or a chain of triangles with values of its own for each spring."""
-    rng = np.random.default_rng([11, seed, n])
-    springs = [(i, j) for i in range(n) for j in range(i + 1, min(i + 3, n))]
-    rest = np.cumsum(rng.uniform(0.2, 0.4, (n, 3)) * [1.0, -0.6, 0.5], axis=0) + HEIGHT
-    s = len(springs)
-    scene = SpringScene(
-        name, family, about, rest, springs,
-        rest + 0.05 * rng.standard_normal((n, 3)), rng.standard_normal((n, 3)),
-        rng.uniform(0.4, 2.5, n), rng.uniform(30.0, 120.0, s), rng.uniform(0.3, 2.0, s), G, 0.04,
-        rest_lengths=_lengths(rest, np.array(springs)) * rng.uniform(0.85, 1.1, s), probe=True,
-    )  # fmt: skip
-    return _pins_still(replace(scene, **changes))
+def _fields(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an entry of the table as fields of a scene, a probe unless it says otherwise."""
+    fields: dict[str, Any] = {
+        name: np.array(content)
+        if isinstance(content, list) and name not in ("needs", "tasks")
+        else content
+        for name, content in entry.items()
+    }
+    about = Sentence(fields.pop("sentence"), {})
+    return {"about": about, "probe": True, **fields}
+
+
+def _random(seed: int, count: int, **entry: Any) -> SpringScene:
+    """Return a triangle or a chain of triangles in which every spring has numbers of its own."""
+    rng = np.random.default_rng([11, seed, count])
+    springs = [(i, j) for i in range(count) for j in range(i + 1, min(i + 3, count))]
+    rest = np.cumsum(rng.uniform(0.2, 0.4, (count, 3)) * [1.0, -0.6, 0.5], axis=0)
+    rest += [0.0, 1.6, 0.0]
+    n = len(springs)
+    fields: dict[str, Any] = {
+        "rest": rest,
+        "springs": springs,
+        "positions": rest + 0.05 * rng.standard_normal((count, 3)),
+        "velocities": rng.standard_normal((count, 3)),
+        "masses": rng.uniform(0.4, 2.5, count),
+        "stiffnesses": rng.uniform(30.0, 120.0, n),
+        "dampings": rng.uniform(0.3, 2.0, n),
+        "rest_lengths": _lengths(rest, np.array(springs)) * rng.uniform(0.85, 1.1, n),
+        "h": 0.04,
+    }
+    return _pins_still(SpringScene(**fields | _fields(entry)))
 
 
 def _pins_still(scene: SpringScene) -> SpringScene:
@@ -179,53 +169,24 @@ def _pins_still(scene: SpringScene) -> SpringScene:
     return replace(scene, velocities=v)
 
 
-def _small(seed: int) -> list[SpringScene]:
-    slack = np.array([[0, 1, 0], [0.2, 0.9, 0.1], [0.7, 0.7, 0.2], [0.8, 0.6, 0.5]])
-    loads = np.array([[1.0, 2.0, -3.0], [-4.0, 1.0, 2.0], [3.0, -1.0, 1.0]])
-    return [
-        _random("three particles", "dampers", sentence(
-            "Three damped springs between three particles, all different."), seed, 3),
-        _random("three particles, two pinned", "pins", sentence(
-            "Three damped springs, the first and the last particle pinned."), seed, 3,
-            pinned=(0, 2), needs=("pinned",)),
-        _random("oblique gravity", "gravity", sentence(
-            "Gravity in a direction of its own."), seed, 3,
-            gravity=np.array([2.0, -5.0, 3.0]), needs=("gravity",)),
-        _random("external forces", "external forces", sentence(
-            "A force of its own on each particle."), seed, 3,
-            external_forces=loads, needs=("external_forces",), tasks=STEPS),
-        _random("slack springs", "tension only", sentence(
-            "Springs that resist no compression, some of them slack."), seed, 4,
-            tension_only=True, positions=slack, needs=("tension_only",), tasks=STEPS),
-        _random("rope of five", "pins", sentence(
-            "Five particles on a string, the first one pinned, undamped."), seed, 5,
-            springs=[(0, 1), (1, 2), (2, 3), (3, 4)], stiffnesses=np.full(4, 300.0),
-            dampings=np.zeros(4), rest_lengths=None, pinned=(0,), needs=("pinned",), h=1 / 60),
-    ]  # fmt: skip
-
-
 def _changes(seed: int) -> list[SpringScene]:
-    """Return scenes that are asked one after another, and those for small h."""
-    before = _random(
-        "before h changes", "h changes", sentence("Three particles, the step before h changes."),
-        seed + 1, 3, tasks=STEPS, dampings=np.zeros(3),
+    """Return scenes whose requests follow each other."""
+    before = replace(
+        _random(seed + 1, 3, name="before h changes", family="h changes", sentence=""),
+        about=sentence("Three particles, the step before h changes."),
+        tasks=STEPS, dampings=np.zeros(3),
     )  # fmt: skip
     after = replace(
         before, name="h changed", about=sentence("The same three particles with half the h."),
         h=before.h / 2, follows=before.name,
     )  # fmt: skip
-    again = replace(
+    other_masses = replace(
         before, name="masses changed", family="system changes",
         about=sentence("The same three particles with other masses and springs."),
         masses=before.masses[::-1] * 1.3, stiffnesses=before.stiffnesses * 2.0,
         h=before.h / 2, follows=after.name,
     )  # fmt: skip
-    small = _random(
-        "small h", "small h",
-        sentence("A step so small that every model comes to the acceleration f / m."),
-        seed, 3, h=1e-3, tasks=("mass_spring_step",), facts={"consistent": True}, probe=False,
-    )  # fmt: skip
-    return [before, after, again, small]
+    return [before, after, other_masses]
 
 
 def _cloth_scene(
@@ -234,13 +195,13 @@ def _cloth_scene(
     """Return a moved cloth of n x n particles."""
     rng = np.random.default_rng([12, seed, n])
     system, state = grid_cloth(n, n)
-    s = len(system.springs)
+    count = len(system.springs)
     scene = SpringScene(
         name, "cloth", sentence("A moving cloth of {n} x {n} particles.", n=n),
         state.positions, system.springs,
         state.positions + 0.02 * rng.standard_normal((n * n, 3)),
         0.5 * rng.standard_normal((n * n, 3)), rng.uniform(0.5, 1.5, n * n),
-        np.full(s, stiffness), np.full(s, damping), G, 1 / 60,
+        np.full(count, stiffness), np.full(count, damping), 1 / 60,
         pinned=tuple(int(i) for i in system.pinned),
     )  # fmt: skip
     return _pins_still(replace(scene, **changes))
@@ -266,9 +227,8 @@ def _cloths(seed: int) -> list[SpringScene]:
 
 def _symmetries(base: SpringScene) -> list[SpringScene]:
     """Return the scene moved, mirrored, rotated about the vertical, and with other numbers."""
-    c, s = 0.6, 0.8
     mirror = np.diag([1.0, 1.0, -1.0])
-    rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    rotation = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
     order = np.random.default_rng(5).permutation(len(base.masses))
     return [
         _transformed(base, "shifted", sentence("The same cloth elsewhere."),
@@ -286,17 +246,13 @@ def _transformed(base: SpringScene, name: str, about: Sentence, **changes: Any) 
     unchanged = {"matrix": np.eye(3), "shift": np.zeros(3), "order": np.arange(len(base.masses))}
     facts = {"of": base.name, **unchanged, **changes}
     matrix, shift, order = (facts[key] for key in unchanged)
-    place = np.argsort(order)
+    inverse = np.argsort(order)
     return replace(
-        base,
-        name=name,
-        family="symmetry",
-        about=about,
-        rest=(base.rest @ matrix.T)[place] + shift,
-        positions=(base.positions @ matrix.T)[place] + shift,
-        velocities=(base.velocities @ matrix.T)[place],
-        masses=base.masses[place],
+        base, name=name, family="symmetry", about=about, facts=facts,
+        rest=(base.rest @ matrix.T)[inverse] + shift,
+        positions=(base.positions @ matrix.T)[inverse] + shift,
+        velocities=(base.velocities @ matrix.T)[inverse],
+        masses=base.masses[inverse],
         springs=order[np.asarray(base.springs)],
         pinned=tuple(int(order[i]) for i in base.pinned),
-        facts=facts,
-    )
+    )  # fmt: skip

@@ -22,7 +22,9 @@ from ..sentence import sentence
 from ..timing import timed
 from . import laws
 from .cases import task_cases
-from .faults import GRAVITY, SPRINGS, Option, combined, faults_of
+from .faults import ENERGY_FAULTS, Option, apply, combined
+from .laws import correct_digits
+from .model import StepModel
 from .problem import (
     SpringProblem,
     all_forces,
@@ -31,25 +33,24 @@ from .problem import (
     state_of,
     system_of,
 )
-from .rounding import correct_digits
 
 TASK = "energy"
-Values = Mapping[str, Any]
+Energies = Mapping[str, Any]
 PARTS = ("total", "kinetic", "potential", "elastic", "gravitational")
+SUMS = {"total": ("kinetic", "potential"), "potential": ("elastic", "gravitational")}
 # Those of which each has a formula of its own.
 FORMULAS = ("kinetic", "elastic")
 ROUNDINGS = 16.0
+MAX_EXPLANATIONS = 3
 # Gauss points that integrate the force along a displacement of a tenth of a spring to rounding.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
-    """Return cases that suit the solver, most of them followed by a displaced one."""
-    return [
-        one
-        for case in task_cases(TASK, greeting, seed, thorough)
-        for one in ((case,) if "of" in case.facts else (case, _displaced(case, seed)))
-    ]
+    """Return cases that suit the solver, most of them followed by the same case displaced."""
+    pairs = ([case] if "of" in case.facts else [case, _displaced(case, seed)]
+             for case in task_cases(TASK, greeting, seed, thorough))  # fmt: skip
+    return [case for pair in pairs for case in pair]
 
 
 def _displaced(case: Case, seed: int) -> Case:
@@ -65,189 +66,145 @@ def _displaced(case: Case, seed: int) -> Case:
     )
 
 
-def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold the energies against formulas and the work of forces, and name the faults."""
-    judgements = [_judge_case(one, asked, greeting) for one in asked]
-    return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
+    judgements = [_judge_case(exchange, exchanges, greeting) for exchange in exchanges]
+    return TaskReport(TASK, "", judgements, _diagnose(judgements, greeting.epsilon))
 
 
-def right(p: SpringProblem) -> dict[str, float]:
-    """Return all energies by the formulas [J]."""
-    kinetic = 0.5 * float((p.masses[:, None] * p.velocities**2).sum())
-    return _sums(kinetic, elastic_energy(p), -float((p.constant * p.positions).sum()))
-
-
-def _sums(kinetic: float, elastic: float, gravitational: float) -> dict[str, float]:
+def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
+    """Return all energies by the formulas, as a solver with these faults has them [J]."""
+    p, _ = apply(faults, p, StepModel())
+    parts = np.array([
+        0.5 * (p.masses[:, None] * p.velocities**2).sum(),
+        elastic_energy(p),
+        -(p.constant * p.positions).sum(),
+    ])  # fmt: skip
+    for fault in faults:
+        parts *= fault.parts or 1.0
+    kinetic, elastic, gravitational = parts.tolist()
     potential = elastic + gravitational
-    values = (kinetic + potential, kinetic, potential, elastic, gravitational)
-    return dict(zip(PARTS, values, strict=True))
+    energies = (kinetic + potential, kinetic, potential, elastic, gravitational)
+    return dict(zip(PARTS, energies, strict=True))
 
 
 def tolerance(p: SpringProblem, epsilon: float) -> float:
     """Return how far rounding may take an energy [J]."""
-    x, v = np.abs(p.positions), np.abs(p.velocities)
-    size = float(x.max() + p.rest_lengths.max(initial=0.0))
-    stretch = np.abs(p.incidence @ p.positions).max(initial=0.0) + p.rest_lengths.max(initial=0.0)
-    terms = float((p.stiffnesses * size * stretch).sum())
-    terms += float((p.masses[:, None] * v**2).sum())
+    x, rest = np.abs(p.positions), p.rest_lengths.max(initial=0.0)
+    stretch = np.abs(p.incidence @ p.positions).max(initial=0.0) + rest
+    terms = float((p.stiffnesses * (x.max() + rest) * stretch).sum())
+    terms += float((p.masses[:, None] * p.velocities**2).sum())
     terms += float((p.masses[:, None] * x * np.abs(p.gravity).max()).sum())
     return ROUNDINGS * epsilon * terms + 1e-300
 
 
-def _judge_case(one: Exchange, asked: Sequence[Exchange], greeting: Greeting) -> CaseJudgement:
-    p = problem_of(one.case.inputs)
+def _judge_case(
+    exchange: Exchange, exchanges: Sequence[Exchange], greeting: Greeting
+) -> CaseJudgement:
+    case, answer = exchange.case, exchange.answer
+    p = problem_of(case.inputs)
     system, state = system_of(p), state_of(p)
     _, seconds = timed(
         lambda: potential_energy(system, state.positions) + kinetic_energy(system, state)
     )
-    expected, allowed = right(p), tolerance(p, greeting.epsilon)
-    if not isinstance(one.answer, Answer):
-        return CaseJudgement(one.case, one.answer, (), expected, None, seconds)
-    given = one.answer.values
-    findings = tuple(_findings(one, one.answer, asked, p, allowed))
-    errors = [abs(given[name] - expected[name]) for name in FORMULAS if name in given]
-    size, worst = max(expected[name] for name in FORMULAS), max(errors, default=np.nan)
-    digits = correct_digits(worst, size) if size > allowed and worst >= 0.0 else None
-    return CaseJudgement(one.case, one.answer, findings, expected, digits, seconds)
-
-
-def _findings(
-    one: Exchange, answer: Answer, asked: Sequence[Exchange], p: SpringProblem, allowed: float
-) -> list[Finding]:
-    given, expected = answer.values, right(p)
-    if not np.isfinite(list(given.values())).all():
-        return [laws.no_numbers(sentence("Energies hold NaN or infinity."))]
-    gaps = {name: abs(given[name] - expected[name]) for name in FORMULAS if name in given}
-    found = [
-        laws.bounded(name, gap, allowed, "J", sentence(
-            "The {name} energy is {gap:.2g} J off its formula.", name=name, gap=gap))
-        for name, gap in gaps.items()
-    ]  # fmt: skip
-    found += _sum_laws(given, allowed)
-    before = next((o for o in asked if o.case.name == one.case.facts.get("from")), None)
+    expected, allowed = predict((), p), tolerance(p, greeting.epsilon)
+    if not isinstance(answer, Answer):
+        return CaseJudgement(case, answer, (), expected, None, seconds)
+    if not np.isfinite(list(answer.values.values())).all():
+        findings = [laws.not_finite(sentence("Energies hold NaN or infinity."))]
+        return CaseJudgement(case, answer, tuple(findings), expected, None, seconds)
+    energies = answer.values
+    gaps = {name: abs(energies[name] - expected[name]) for name in FORMULAS if name in energies}
+    findings = [_formula(name, gap, allowed) for name, gap in gaps.items()]
+    findings += _sums(energies, allowed)
+    before = next((e for e in exchanges if e.case.name == case.facts.get("from")), None)
     if before is not None and isinstance(before.answer, Answer):
-        found += _work(problem_of(before.case.inputs), p, before.answer.values, given, allowed)
-    found.append(laws.equal_requests(one, dict.fromkeys(PARTS, allowed)))
-    return found + laws.remarks(answer)
+        q = problem_of(before.case.inputs)
+        findings += _work(q, p, before.answer.values, energies, 4.0 * allowed)
+    findings += [laws.equal_requests(exchange, dict.fromkeys(PARTS, allowed))]
+    findings += laws.remarks(answer)
+    size = max(expected[name] for name in FORMULAS)
+    digits = correct_digits(max(gaps.values()), size) if gaps and size > allowed else None
+    return CaseJudgement(case, answer, tuple(findings), expected, digits, seconds)
 
 
-def _sum_laws(given: Values, allowed: float) -> list[Finding]:
-    """Return whether the parts add up, where all of them were answered."""
-    found = []
-    for whole, parts in (
-        ("total", ("kinetic", "potential")),
-        ("potential", ("elastic", "gravitational")),
-    ):
-        if all(name in given for name in (whole, *parts)):
-            gap = abs(given[whole] - sum(given[name] for name in parts))
-            said = sentence(
+def _formula(name: str, gap: float, allowed: float) -> Finding:
+    message = sentence("The {name} energy is {gap:.2g} J off its formula.", name=name, gap=gap)
+    return laws.bounded(name, gap, allowed, "J", message)
+
+
+def _sums(energies: Energies, allowed: float) -> list[Finding]:
+    """Return whether the parts add up, where the answer holds all of them."""
+    findings = []
+    for whole, parts in SUMS.items():
+        if all(name in energies for name in (whole, *parts)):
+            gap = abs(energies[whole] - sum(energies[name] for name in parts))
+            message = sentence(
                 "The {whole} energy is {gap:.2g} J off the sum of its parts.", whole=whole, gap=gap
             )
-            found.append(laws.bounded("sum of energies", gap, 4.0 * allowed, "J", said))
-    return found
+            findings.append(laws.bounded("sum of energies", gap, 4.0 * allowed, "J", message))
+    return findings
 
 
 def _work(
-    p: SpringProblem, q: SpringProblem, before: Values, after: Values, allowed: float
+    p: SpringProblem, q: SpringProblem, before: Energies, after: Energies, allowed: float
 ) -> list[Finding]:
     """Return whether energies change by the work of forces between the two states."""
-    found = []
+    findings = []
     for name, work in works(p, q).items():
         if name not in before or name not in after:
             continue
         gap = abs((after[name] - before[name]) + work)
-        said = sentence(
+        message = sentence(
             "From one place to another the {name} energy changes by {gap:.2g} J other than by the "
             "work of the forces.",
             name=name,
             gap=gap,
         )
-        found.append(laws.bounded("energy and work", gap, 4.0 * allowed, "J", said))
-    return found
+        findings.append(laws.bounded("energy and work", gap, allowed, "J", message))
+    return findings
 
 
 def works(p: SpringProblem, q: SpringProblem) -> dict[str, float]:
-    """Return the work of forces along the line from one state to the other, by energy [J]."""
-    d = q.positions - p.positions
-    still = p.changed(velocities=0.0 * p.velocities)
-    elastic = sum(
-        0.5 * weight * float(
-            ((all_forces(still.changed(positions=p.positions + 0.5 * (1.0 + t) * d))
-              - p.constant) * d).sum()
-        )
-        for t, weight in zip(POINTS, WEIGHTS, strict=True)
-    )  # fmt: skip
+    """Return the work of forces along the line between two states, by energy [J]."""
+    d, p = q.positions - p.positions, p.changed(velocities=np.zeros_like(p.velocities))
+    elastic = 0.0
+    for t, weight in zip(POINTS, WEIGHTS, strict=True):
+        forces = all_forces(p.changed(positions=p.positions + 0.5 * (1.0 + t) * d)) - p.constant
+        elastic += 0.5 * weight * float((forces * d).sum())
     gravitational = float((p.constant * d).sum())
+    potential = elastic + gravitational
     return {
         "elastic": elastic,
         "gravitational": gravitational,
-        "potential": elastic + gravitational,
-        "total": elastic + gravitational,
+        "potential": potential,
+        "total": potential,
     }
 
 
-_OF_FORCES = ("first end only", "second end only", "both ends alike",
-              "last spring of a particle only", "direction not normalised",
-              "springs push", "springs twice", "tension only ignored")  # fmt: skip
-FAULTS = (
-    *faults_of("kinetic", {
-        "kinetic without 1/2": ({"parts": (2.0, 1.0, 1.0)}, sentence(
-            "The kinetic energy lacks its 1/2: it is m/2 v².")),
-        "kinetic missing": ({"parts": (0.0, 1.0, 1.0)}, sentence("The kinetic energy is missing.")),
-        "kinetic without mass": (
-            lambda p: p.changed(masses=np.ones(p.count), weighing=p.masses), sentence(
-            "The kinetic energy lacks the mass: it is m/2 v².")),
-        "kinetic subtracted": ({"parts": (-1.0, 1.0, 1.0)}, sentence(
-            "The kinetic energy is subtracted.")),
-    }),
-    *faults_of("elastic", {
-        "elastic without 1/2": ({"parts": (1.0, 2.0, 1.0)}, sentence(
-            "The elastic energy lacks its 1/2: it is k/2 (l - r)².")),
-        "elastic missing": ({"parts": (1.0, 0.0, 1.0)}, sentence("The elastic energy is missing.")),
-        "elastic subtracted": ({"parts": (1.0, -1.0, 1.0)}, sentence(
-            "The elastic energy is subtracted.")),
-    }),
-    *(one for one in SPRINGS if one.key not in _OF_FORCES),
-    *GRAVITY[:-3],
-)  # fmt: skip
-
-
-def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
-    """Return the energies that a solver with these faults answers."""
-    factors = np.ones(3)
-    for fault in faults:
-        factors = factors * fault.fields.get("parts", 1.0)
-        p = fault.change(p) if fault.change is not None else p
-    values = right(p)
-    parts = (values["kinetic"], values["elastic"], values["gravitational"])
-    return _sums(*(float(f * part) for f, part in zip(factors, parts, strict=True)))
-
-
-def _diagnose(
-    asked: Sequence[Exchange], judgements: Sequence[CaseJudgement], greeting: Greeting
-) -> Diagnosis:
-    answered = [
-        (problem_of(one.case.inputs), one.answer.values)
-        for one in asked
-        if isinstance(one.answer, Answer)
+def _diagnose(judgements: Sequence[CaseJudgement], epsilon: float) -> Diagnosis:
+    answers = [
+        (problem_of(judgement.case.inputs), judgement.answer.values)
+        for judgement in judgements
+        if isinstance(judgement.answer, Answer)
     ]
-    if not answered or all(one.verdict < Verdict.WRONG for one in judgements):
+    if not answers or all(judgement.verdict < Verdict.WRONG for judgement in judgements):
         return Diagnosis()
-    tried = 0
-    for _, same_size in groupby(combined(FAULTS), key=len):
+    count = 0
+    for _, same_size in groupby(combined(ENERGY_FAULTS), key=len):
         matches = []
         for faults in same_size:
-            tried += 1
-            if all(_matches(faults, *one, greeting.epsilon) for one in answered):
+            count += 1
+            if all(_matches(predict(faults, p), p, values, epsilon) for p, values in answers):
                 matches.append(faults)
         if matches:
-            keys = tuple(" + ".join(one.key for one in faults) for faults in matches)[:3]
-            said = either([[one.sentence for one in faults] for faults in matches])
-            return Diagnosis((Explanation(keys, said, 1.0, 0.0),), variant_count=tried)
-    return Diagnosis(first_broken=first_broken(judgements), variant_count=tried)
+            keys = [" + ".join(fault.key for fault in faults) for faults in matches]
+            message = either([[fault.sentence for fault in faults] for faults in matches])
+            explanation = Explanation(tuple(keys[:MAX_EXPLANATIONS]), message, 1.0, 0.0)
+            return Diagnosis((explanation,), variant_count=count)
+    return Diagnosis(first_broken=first_broken(judgements), variant_count=count)
 
 
-def _matches(faults: Sequence[Option], p: SpringProblem, given: Values, epsilon: float) -> bool:
-    expected = predict(faults, p)
+def _matches(expected: Energies, p: SpringProblem, answers: Energies, epsilon: float) -> bool:
     limit = 8.0 * tolerance(p, epsilon)
-    return all(abs(given[name] - expected[name]) <= limit for name in PARTS if name in given)
+    return all(abs(answers[name] - expected[name]) <= limit for name in answers.keys() & PARTS)

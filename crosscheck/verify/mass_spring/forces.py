@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import forces as reference_forces
 
 from ..case import Case
@@ -18,6 +19,7 @@ from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
+from .laws import correct_digits
 from .model import StepModel
 from .problem import (
     SpringProblem,
@@ -28,11 +30,13 @@ from .problem import (
     state_of,
     system_of,
 )
-from .rounding import correct_digits
 
 TASK = "mass_spring_forces"
 # Rounding of a length by the coordinates' epsilon, times the stiffness, and of some ten terms.
 ROUNDINGS = 8.0
+# An error is like a force if the cosine of the angle between them is larger.
+ALIKE = 0.7
+_SENTENCES = {fault.key: fault.sentence for fault in FORCE_FAULTS}
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -40,10 +44,10 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return task_cases(TASK, greeting, seed, thorough)
 
 
-def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold the forces against the formula and the balance of momentum, and name the faults."""
-    judgements = [_judge_case(one, asked, greeting) for one in asked]
-    return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
+    judgements = [_judge_case(exchange, exchanges, greeting) for exchange in exchanges]
+    return TaskReport(TASK, "", judgements, _diagnose(judgements, exchanges, greeting))
 
 
 def tolerance(p: SpringProblem, epsilon: float) -> float:
@@ -55,55 +59,46 @@ def tolerance(p: SpringProblem, epsilon: float) -> float:
     return ROUNDINGS * epsilon * float((springs + weights).max())
 
 
-def _judge_case(one: Exchange, asked: Sequence[Exchange], greeting: Greeting) -> CaseJudgement:
-    p = problem_of(one.case.inputs)
+def _judge_case(
+    exchange: Exchange, exchanges: Sequence[Exchange], greeting: Greeting
+) -> CaseJudgement:
+    case, answer = exchange.case, exchange.answer
+    p = problem_of(case.inputs)
     system, state = system_of(p), state_of(p)
     forces, seconds = timed(lambda: reference_forces(system, state))
-    expected = {"forces": forces}
-    if not isinstance(one.answer, Answer):
-        return CaseJudgement(one.case, one.answer, (), expected, None, seconds)
-    given, allowed = one.answer.values["forces"], tolerance(p, greeting.epsilon)
-    findings = tuple(_findings(one, one.answer, asked, p, forces, allowed))
-    size, gap = float(np.abs(forces).max()), float(np.abs(given - forces).max())
-    digits = correct_digits(gap, size) if size > allowed and np.isfinite(gap) else None
-    return CaseJudgement(one.case, one.answer, findings, expected, digits, seconds)
+    if not isinstance(answer, Answer):
+        return CaseJudgement(case, answer, (), {"forces": forces}, None, seconds)
+    output, allowed, digits = answer.values["forces"], tolerance(p, greeting.epsilon), None
+    if np.isfinite(output).all():
+        symmetry = laws.symmetry(exchange, exchanges, {"forces": 2.0 * allowed})
+        findings = [
+            _formula(p, output, forces, allowed),
+            _balance(p, output, allowed),
+            *([symmetry] if symmetry else []),
+            laws.equal_requests(exchange, {"forces": 2.0 * allowed}),
+            *laws.remarks(answer),
+        ]
+        size = float(np.abs(forces).max())
+        if size > allowed:
+            digits = correct_digits(float(np.abs(output - forces).max()), size)
+    else:
+        findings = [laws.not_finite(sentence("Forces hold NaN or infinity."))]
+    return CaseJudgement(case, answer, tuple(findings), {"forces": forces}, digits, seconds)
 
 
-def _findings(
-    one: Exchange,
-    answer: Answer,
-    asked: Sequence[Exchange],
-    p: SpringProblem,
-    expected: Any,
-    allowed: float,
-) -> list[Finding]:
-    given = answer.values["forces"]
-    if not np.isfinite(given).all():
-        return [laws.no_numbers(sentence("Forces hold NaN or infinity."))]
-    limits = {"forces": 2.0 * allowed}
-    symmetry = laws.symmetry(one, asked, limits)
-    return [
-        _formula(p, given, expected, allowed),
-        _balance(p, given, allowed),
-        *([symmetry] if symmetry else []),
-        laws.equal_requests(one, limits),
-        *laws.remarks(answer),
-    ]
-
-
-def _formula(p: SpringProblem, given: Any, expected: Any, allowed: float) -> Finding:
-    gap = np.abs(given - expected).max(axis=1)
-    where, worst = int(gap.argmax()), float(gap.max())
-    said = sentence(
+def _formula(p: SpringProblem, output: FloatArray, expected: FloatArray, allowed: float) -> Finding:
+    gap = np.abs(output - expected).max(axis=1)
+    index, worst = int(gap.argmax()), float(gap.max())
+    message = sentence(
         "The force on particle {where} is {gap:.2g} N off {term}.",
-        where=where,
+        where=index,
         gap=worst,
-        term=_term(p, given - expected),
+        term=_likeness(p, output - expected),
     )
-    return laws.bounded("force formula", worst, allowed, "N", said, where)
+    return laws.bounded("force formula", worst, allowed, "N", message, index)
 
 
-def _term(p: SpringProblem, error: Any) -> Sentence:
+def _likeness(p: SpringProblem, error: FloatArray) -> Sentence:
     """Return which term's force looks most like the error."""
     x, v = p.positions, p.velocities
     terms = (
@@ -112,19 +107,20 @@ def _term(p: SpringProblem, error: Any) -> Sentence:
         (damper_forces(p, x, v), sentence("(an error like the force of the dampers)")),
     )
     size = np.linalg.norm(error)
-    likeness = [
+    cosines = [
         abs(float((force * error).sum())) / max(float(np.linalg.norm(force) * size), 1e-300)
         for force, _ in terms
     ]
-    best = int(np.argmax(likeness))
-    return terms[best][1] if likeness[best] > 0.7 else sentence("(an error like no single term)")
+    best = int(np.argmax(cosines))
+    return terms[best][1] if cosines[best] > ALIKE else sentence("(an error like no single term)")
 
 
-def _balance(p: SpringProblem, given: Any, allowed: float) -> Finding:
+def _balance(p: SpringProblem, output: FloatArray, allowed: float) -> Finding:
     """Springs and dampers pull both ends alike: the sum of forces is the weight."""
-    gap = float(np.abs(given.sum(0) - p.constant.sum(0)).max())
-    said = sentence("The sum of all forces is {gap:.2g} N off the weight.", gap=gap)
-    return laws.bounded("momentum balance", gap, allowed * np.sqrt(p.count) * 2.0, "N", said)
+    gap = float(np.abs(output.sum(0) - p.constant.sum(0)).max())
+    message = sentence("The sum of all forces is {gap:.2g} N off the weight.", gap=gap)
+    limit = allowed * np.sqrt(p.count) * 2.0
+    return laws.bounded("momentum balance", gap, limit, "N", message)
 
 
 def _predict(faults: tuple[Option, ...], case: Case) -> Mapping[str, Any]:
@@ -134,31 +130,28 @@ def _predict(faults: tuple[Option, ...], case: Case) -> Mapping[str, Any]:
 def variants() -> Iterator[Variant]:
     """Yield the right formula's faults, up to three of different aspects."""
     for faults in combined(FORCE_FAULTS):
-        yield Variant(tuple(one.key for one in faults), partial(_predict, faults))
-
-
-_BY_KEY = {one.key: one.sentence for one in FORCE_FAULTS}
+        yield Variant(tuple(fault.key for fault in faults), partial(_predict, faults))
 
 
 def describe(keys: Sequence[str]) -> Sentence:
     """Return the sentences of faults, given the keys of a class that no answer tells apart."""
-    return either([[_BY_KEY[one] for one in key.split(" + ")] for key in keys])
+    return either([[_SENTENCES[fault] for fault in key.split(" + ")] for key in keys])
 
 
 def _diagnose(
-    asked: Sequence[Exchange], judgements: Sequence[CaseJudgement], greeting: Greeting
+    judgements: Sequence[CaseJudgement], exchanges: Sequence[Exchange], greeting: Greeting
 ) -> Diagnosis:
-    wrong = [one.verdict >= Verdict.WRONG for one in judgements]
+    wrong = [judgement.verdict >= Verdict.WRONG for judgement in judgements]
     if not any(wrong):
         return Diagnosis()
-    order = sorted(zip(asked, wrong, strict=True), key=lambda pair: not pair[1])
-    explanations, tried = explain(
-        variants(), [one for one, _ in order], partial(_relative, greeting.epsilon), describe
-    )
+
+    def relative_tolerance(case: Case) -> float:
+        p = problem_of(case.inputs)
+        return tolerance(p, greeting.epsilon) / max(float(np.abs(all_forces(p)).max()), 1e-3)
+
+    # Wrong answers come first, for they tell variants apart.
+    order = sorted(range(len(wrong)), key=lambda i: not wrong[i])
+    telling = [exchanges[i] for i in order]
+    explanations, count = explain(variants(), telling, relative_tolerance, describe)
     first = None if explanations else first_broken(judgements)
-    return Diagnosis(explanations, None, first, (), tried)
-
-
-def _relative(epsilon: float, case: Case) -> float:
-    p = problem_of(case.inputs)
-    return tolerance(p, epsilon) / max(float(np.abs(all_forces(p)).max()), 1e-3)
+    return Diagnosis(explanations, None, first, (), count)

@@ -1,8 +1,7 @@
 """A small mass-spring system as dense arrays, with the changes that a wrong solver makes to it.
 
 Its forces are written from the formulas, apart from `reference`: a spring pulls its first end with
--(k (l - r) + c (v_i - v_j)·u) u. What a faulty solver does otherwise, as to forget an end, is a
-field.
+-(k (l - r) + c (v_i - v_j)·u) u. A field states each deviation of a faulty solver.
 """
 
 import dataclasses
@@ -22,9 +21,9 @@ COINCIDENT = 1e-150
 
 @dataclass(frozen=True, eq=False)
 class SpringProblem:
-    """What a request of a force, an energy or a step says, and how a faulty solver reads it."""
+    """The content of a request of a force, an energy or a step, as a solver reads it."""
 
-    masses: FloatArray
+    masses: FloatArray  # of inertia [kg]
     springs: IndexArray
     rest_lengths: FloatArray
     stiffnesses: FloatArray
@@ -33,23 +32,20 @@ class SpringProblem:
     positions: FloatArray
     velocities: FloatArray
     pinned: IndexArray  # indices of pinned particles
-    tension_only: Any
+    tension_only: Any  # a boolean, or one for each spring
     external: FloatArray  # forces besides gravity [N], shape (particle, 3)
-    # time step [s]; h_before: that of the request before; both 0 for forces and energies
-    h: float = 0.0
-    h_before: float = 0.0
+    weighing: FloatArray  # the masses that gravity pulls [kg]
+    weights: FloatArray  # the force of gravity [N], shape (particle, 3)
+    h: float = 0.0  # time step [s]
+    h_before: float = 0.0  # time step of the request before [s]
     steps: int | None = None  # number of steps, or None for a task of one step
-    # the force of gravity if it is not m gravity [N], shape (particle, 3)
-    weights: FloatArray | None = None
-    # the masses m in m gravity, if they are others than those of inertia
-    weighing: FloatArray | None = None
-    # what share of its force a spring exerts on its first and on its second end
+    # the share of its force that a spring exerts on its first and on its second end
     ends: tuple[float, float] = (1.0, 1.0)
     # whether forces of springs at one particle add up; else the last one stays, of those whose
     # first end it is and of those whose second
     accumulated: bool = True
-    # what the dampers see: the velocity along the spring, all of the relative velocity, the
-    # particle's own velocity, or the particle's own along the spring
+    # the velocity that dampers see: "along" the spring, "all" of the relative velocity, the
+    # particle's own ("drag"), or its own along the spring ("own")
     damping: str = "along"
     normalised: bool = True  # whether a spring's direction is of length one
 
@@ -61,15 +57,15 @@ class SpringProblem:
     @cached_property
     def incidence(self) -> FloatArray:
         """Rows with 1 at a spring's first end and -1 at its second, shape (spring, particle)."""
-        every = np.eye(self.count)
-        return every[self.springs[:, 0]] - every[self.springs[:, 1]]
+        identity = np.eye(self.count)
+        return identity[self.springs[:, 0]] - identity[self.springs[:, 1]]
 
     @cached_property
     def pulled(self) -> FloatArray:
         """The incidence with the ends that the springs pull, shape (spring, particle)."""
         rows = self.incidence * np.where(self.incidence > 0.0, *self.ends)
         if not self.accumulated:
-            for (first, second), row in zip(self.springs, range(len(rows)), strict=True):
+            for row, (first, second) in enumerate(self.springs):
                 later = self.springs[row + 1 :]
                 rows[row, first] *= first not in later[:, 0]
                 rows[row, second] *= second not in later[:, 1]
@@ -85,20 +81,17 @@ class SpringProblem:
         """Whether any spring has a damper."""
         return bool(self.dampings.any())
 
-    @property
-    def weighed(self) -> FloatArray:
-        """The masses that gravity pulls."""
-        return self.masses if self.weighing is None else self.weighing
-
     @cached_property
     def constant(self) -> FloatArray:
         """Gravity and external forces [N], shape (particle, 3)."""
-        weights = self.weighed[:, None] * self.gravity if self.weights is None else self.weights
-        return weights + self.external
+        return self.weights + self.external
 
     def changed(self, **fields: Any) -> "SpringProblem":
         """Return the problem with other fields."""
         return dataclasses.replace(self, **fields)
+
+
+_NUMBERS = ("masses", "rest_lengths", "stiffnesses", "dampings", "gravity", "positions")
 
 
 def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> SpringProblem:
@@ -108,22 +101,20 @@ def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> Spri
     velocities[pinned] = 0.0
     springs = np.asarray(inputs["springs"], dtype=int).reshape(-1, 2)
     h = float(inputs.get("h", 0.0))
-    loads, slack = np.zeros_like(velocities), np.zeros(len(springs))
     numbers: dict[str, Any] = {name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS}
     return SpringProblem(
         **numbers,
         springs=springs,
         velocities=velocities,
         pinned=pinned,
-        tension_only=np.asarray(inputs.get("tension_only", slack), dtype=bool),
-        external=np.asarray(inputs.get("external_forces", loads), dtype=float),
+        tension_only=np.asarray(inputs.get("tension_only", np.zeros(len(springs))), dtype=bool),
+        external=np.asarray(inputs.get("external_forces", np.zeros_like(velocities)), dtype=float),
+        weighing=numbers["masses"],
+        weights=numbers["masses"][:, None] * numbers["gravity"],
         h=h,
         h_before=h if h_before is None else h_before,
         steps=inputs.get("steps"),
     )
-
-
-_NUMBERS = ("masses", "rest_lengths", "stiffnesses", "dampings", "gravity", "positions")
 
 
 def system_of(p: SpringProblem) -> MassSpring:
@@ -164,12 +155,11 @@ def spring_forces(p: SpringProblem, x: FloatArray) -> FloatArray:
 
 def damper_forces(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return the dampers' forces at velocities v on the particles [N], shape (particle, 3)."""
-    if not p.dampings.any():
+    if not p.damped:
         return np.zeros_like(x)
-    c = p.dampings[:, None]
     if p.damping == "drag":
         return -p.dampings[0] * v
-    _, u = frames(p, x)
+    c, (_, u) = p.dampings[:, None], frames(p, x)
     first, second = v[p.springs[:, 0]], v[p.springs[:, 1]]
     if p.damping == "own":
         return -sum(
@@ -190,12 +180,8 @@ def all_forces(p: SpringProblem) -> FloatArray:
 
 def accelerations(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return M^-1 f, pins included, shape (particle, 3) [m/s^2]."""
-    total = p.constant
-    if p.stiff:
-        total = total + spring_forces(p, x)
-    if p.damped:
-        total = total + damper_forces(p, x, v)
-    return total / p.masses[:, None]
+    total = p.constant + damper_forces(p, x, v)
+    return (total + spring_forces(p, x) if p.stiff else total) / p.masses[:, None]
 
 
 def elastic_energy(p: SpringProblem) -> float:

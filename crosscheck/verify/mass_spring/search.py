@@ -1,204 +1,228 @@
-"""Find what a solver does by assuming one choice after another along the probes.
+"""Find the model of a solver by assuming choices in turn along the probes.
 
-In each probe one more aspect matters than in those before it. Choices are therefore refuted where
+Each probe adds an aspect to the probes before it. Choices are therefore refuted where
 they first matter, so that combinations of three among some hundred faults and as many honest models
 are found without trying the millions that there are.
 """
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..contestant import Answer, Exchange
 from ..greeting import Step
-from .faults import ASPECTS, INTEGRATORS, Option, apply
+from .faults import ASPECTS, MAX_FAULTS, STEP_FAULTS, Option, apply
 from .honest import compatible, domains
-from .model import PIN_STRENGTHS, Integrator, StepModel, predicted
+from .laws import SOLVED, Rounding, relative_gap, rounding
+from .model import Integrator, StepModel, predicted
 from .problem import SpringProblem
-from .rounding import SOLVED, Rounding, apart, rounding
 
-MOST_FAULTS = 3
 # Seconds of the processor for honest choices, one fault, two, and three.
 PATIENCE = (6.0, 6.0, 3.0, 3.0)
 # Integrators with more iterations are not combined with faults.
-MOST_ITERATIONS = 10
+MAX_ITERATIONS = 10
 # Matrices that are singular without pins, where they predict nothing.
 SINGULAR = ("matrix L", "matrix L without h²")
+# Matrices that matter where no spring acts.
+OF_MASSES = (*SINGULAR, "matrix 2M+h²L")
 # Positions beyond this [m] come from dividing by zero; those of the probes are some metres.
-ABSURD = 1e4
-FAULTY = frozenset(id(one) for one in INTEGRATORS)
+LARGEST = 1e4
 # Of what is not declared, only these are tried together with faults.
 FREQUENT = (
     1, 2, 3, 5, 10, 100, 1000, "penalty 1e10", "springs 5e5", "heavy 1e8", "falling 1e8",
-    "one kilogram",
 )  # fmt: skip
 # Aspects that matter in any step; the others where there are springs, dampers, pins.
 ALWAYS = (
     "time", "inertia", "masses", "gravity", "integrator", "matrix", "substeps", "velocity",
     "scaling",
 )  # fmt: skip
+FAULTY = frozenset(map(id, STEP_FAULTS))
 
-Chosen = dict[str, Option]
+# An option for each aspect. Where no spring has acted yet, "flight" stands for "integrator": the
+# first of those that move free particles alike.
+Choices = dict[str, Option]
 
 
-class Found(NamedTuple):
+class ModelMatch(NamedTuple):
     """Choices that reproduce the answers to all probes."""
 
     # one for each aspect that matters in a probe, in the order of the computation
     options: tuple[Option, ...]
     faults: tuple[Option, ...]  # those of them that the greeting denies, or that nobody should make
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys of the faults."""
+        return tuple(fault.key for fault in self.faults)
+
 
 class Probe(NamedTuple):
-    """A problem, and what was answered."""
+    """A problem, and the answer to it."""
 
     problem: SpringProblem
-    answered: Mapping[str, Any]
+    answers: Mapping[str, Any]
     name: str
 
+    @property
+    def coupled(self) -> bool:
+        """Whether springs or dampers act."""
+        return self.problem.stiff or self.problem.damped
 
-class Search:
+    def aspects(self) -> list[str]:
+        """Return the aspects that matter, in the order in which they are chosen."""
+        p = self.problem
+        more = {"springs": p.stiff, "damper": p.damped, "damping": p.damped, "pins": p.pinned.size}
+        return [*ALWAYS, *(aspect for aspect, matters in more.items() if matters)]
+
+
+class ModelSearch:
     """The search of the choices that explain a solver's answers to the probes."""
 
     def __init__(self, probes: Sequence[Probe], step: Step, epsilon: float) -> None:
         """Set up the domains of all choices."""
         self.probes, self.step, self.epsilon = probes, step, epsilon
         self.domains = domains(step)
-        self.classes, self.members = _classes(self.domains["integrator"])
-        pairs = [*chain.from_iterable(self.domains.values()), *self.classes]
-        self.costs = {id(option): cost for option, cost in pairs}
-        self.tried = 0
-        self._misplaced: set[tuple[Any, ...]] = set()
+        # the integrators that each one of the domain "flight" stands for
+        self.classes: dict[Integrator, list[tuple[Option, int]]] = {}
+        for option, cost in self.domains["integrator"]:
+            flight = in_flight(option.fields["integrator"])
+            self.classes.setdefault(flight, []).append((option, cost))
+        self.domains["flight"] = [
+            (pairs[0][0]._replace(fields={"integrator": flight}), min(cost for _, cost in pairs))
+            for flight, pairs in self.classes.items()
+        ]
+        self.costs = {id(option): cost for pairs in self.domains.values() for option, cost in pairs}
+        self.prediction_count = 0  # number of predictions
+        self._misplaced: set[tuple[Any, ...]] = set()  # choices whose positions are wrong
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
-        self._known: dict[tuple[Any, ...], bool | None] = {}
-        self._seen: set[tuple[str, ...]] = set()
-        self._until = 0.0
+        self._explained: dict[tuple[Any, ...], bool | None] = {}
+        self._matched_keys: set[tuple[str, ...]] = set()  # faults that explain all probes
+        self._deadline = 0.0
 
-    def run(self) -> list[Found]:
-        """Return what explains all probes with the fewest faults; none if nothing does."""
-        for budget in range(MOST_FAULTS + 1) if self.probes else ():
-            self._until = time.process_time() + PATIENCE[budget]
-            found = [one for one in self._extend({}, 0, budget) if len(one.faults) == budget]
-            if found:
-                return found
+    def run(self) -> list[ModelMatch]:
+        """Return the matches of all probes with the fewest faults, none if there are none."""
+        for budget in range(MAX_FAULTS + 1) if self.probes else ():
+            self._deadline = time.process_time() + PATIENCE[budget]
+            matches = [m for m in self._explanations({}, 0, budget) if len(m.faults) == budget]
+            if matches:
+                return matches
         return []
 
-    def _extend(self, chosen: Chosen, index: int, budget: int) -> Iterator[Found]:
-        """Yield what explains the probes from this one on, given the choices made before."""
+    def _explanations(self, choices: Choices, index: int, budget: int) -> Iterator[ModelMatch]:
+        """Yield the matches of the probes from an index on, given the choices made before."""
         if index == len(self.probes):
-            if self._explains_most(chosen):
-                found = self._found(chosen)
-                self._seen.add(_keys(found))
-                yield found
+            if self._explains_enough(choices):
+                match = self._match(choices)
+                self._matched_keys.add(match.keys)
+                yield match
             return
-        known = {*chosen, "integrator"} if "class" in chosen else chosen
-        new = [one for one in _relevant(self.probes[index].problem) if one not in known]
-        springs = _has_springs(self.probes[index].problem)
-        for more in self._choices(chosen, new, budget, springs):
-            if self._told(more):
+        probe = self.probes[index]
+        aspects = probe.aspects()
+        if not probe.coupled and "integrator" not in choices:
+            aspects[aspects.index("integrator")] = "flight"
+        aspects = [aspect for aspect in aspects if aspect not in choices]
+        for extended in self._extensions(choices, aspects, budget):
+            if self._is_named(extended):
                 continue
-            if time.process_time() > self._until:
+            if time.process_time() > self._deadline:
                 return
-            if self._explains(more, index) is not False:
-                yield from self._extend(more, index + 1, budget)
+            if self._explains(extended, index) is not False:
+                yield from self._explanations(extended, index + 1, budget)
 
-    def _told(self, chosen: Chosen) -> bool:
-        """Return whether the same faults explain all probes with other honest choices already."""
-        if not self._seen or "class" in chosen:
+    def _is_named(self, choices: Choices) -> bool:
+        """Return whether the same faults explain all probes with other honest choices."""
+        if not self._matched_keys or "flight" in choices:
             return False
-        return _keys(self._found(chosen)) in self._seen
+        return self._match(choices).keys in self._matched_keys
 
-    def _explains_most(self, chosen: Chosen) -> bool:
-        """Return whether no more than a few answers are left out because of singular matrices."""
-        explained = [self._explains(chosen, i) for i in range(len(self.probes))]
-        return 2 * sum(one is True for one in explained) >= min(4, len(explained))
+    def _extensions(
+        self, choices: Choices, aspects: Sequence[str], budget: int
+    ) -> Iterator[Choices]:
+        """Yield the choices extended by options of more aspects, within a number of faults."""
+        remaining = budget - sum(self.costs[id(option)] for option in choices.values())
+        if remaining < 0 or not compatible(choices):
+            return
+        if not aspects:
+            yield choices
+            return
+        aspect, *later = aspects
+        domain = self.domains[aspect]
+        if aspect == "integrator" and "flight" in choices:
+            flight = choices["flight"]
+            domain, remaining = self.classes[flight.fields["integrator"]], budget
+            choices = {name: option for name, option in choices.items() if name != "flight"}
+        for option, cost in domain:
+            if cost <= remaining and not self._is_left_out(option, budget):
+                yield from self._extensions(choices | {aspect: option}, later, budget)
 
-    def _choices(
-        self, chosen: Chosen, new: Sequence[str], budget: int, springs: bool
-    ) -> Iterator[Chosen]:
-        """Yield the choices extended by those of the aspects that now matter."""
-        if springs and "class" in chosen:
-            others = {key: value for key, value in chosen.items() if key != "class"}
-            for option in self.members[chosen["class"].fields["integrator"]]:
-                if not self._tedious(option, budget):
-                    yield from self._choices(others | {"integrator": option}, new, budget, springs)
-            return
-        left = budget - sum(self.costs[id(option)] for option in chosen.values())
-        if left < 0 or not compatible(chosen):
-            return
-        if not new:
-            yield chosen
-            return
-        aspect, *remaining = new
-        options = self.domains[aspect]
-        if aspect == "integrator" and not springs:
-            options, aspect = self.classes, "class"
-        for option, cost in options:
-            if cost <= left and not self._tedious(option, budget):
-                yield from self._choices(chosen | {aspect: option}, remaining, budget, springs)
-
-    def _tedious(self, option: Option, budget: int) -> bool:
+    def _is_left_out(self, option: Option, budget: int) -> bool:
         """Return whether a choice is not tried together with so many faults."""
         return (
-            (budget > 0 and self._guessed(option))
+            (budget > 0 and self._is_rare(option))
             or (budget > 1 and self.costs[id(option)] > 0 and _takes_long(option))
             or (budget > 2 and option.key in SINGULAR)
         )
 
-    def _guessed(self, option: Option) -> bool:
+    def _is_rare(self, option: Option) -> bool:
         """Return whether a choice is honest, rare, and nowhere declared."""
-        value, step = option.fields.get(option.aspect), self.step
+        choice, step = option.fields.get(option.aspect), self.step
         match option.aspect:
             case "scaling":
-                return step.damper is None and value != 1.0
+                return step.damper is None and choice != 1.0
             case "substeps":
-                return step.substeps is None and value not in FREQUENT
+                return step.substeps is None and choice not in FREQUENT
             case "damper":
-                return step.damper is None and value in ("diagonal", "blocks", "matrix")
+                return step.damper is None and choice in ("diagonal", "blocks", "matrix")
             case "pins":
-                return value in PIN_STRENGTHS and value not in FREQUENT
+                return id(option) not in FAULTY and " " in str(choice) and choice not in FREQUENT
             case "integrator":
-                how = option.fields["integrator"]
-                return how.method in ("taylor", "runge_kutta") or how.hessian == "projected"
+                integrator = option.fields["integrator"]
+                rare = integrator.method in ("taylor", "runge_kutta")
+                return rare or integrator.hessian == "projected"
         return False
 
-    def _explains(self, chosen: Chosen, index: int) -> bool | None:
+    def _explains_enough(self, choices: Choices) -> bool:
+        """Return whether no more than a few answers are left out because of singular matrices."""
+        explained = [self._explains(choices, i) for i in range(len(self.probes))]
+        return 2 * explained.count(True) >= min(4, len(explained))
+
+    def _explains(self, choices: Choices, index: int) -> bool | None:
         """Return whether choices reproduce an answer; None where neither is a number of use."""
         probe = self.probes[index]
-        in_springs = _has_springs(probe.problem)
-        matters = chosen if in_springs else _in_flight_only(chosen)
-        centre = not in_springs and chosen["matrix"].key.startswith("matrix without k")
-        key = ((index, centre), *sorted((aspect, id(one)) for aspect, one in matters.items()))
-        place = tuple(one for one in key if one[0] != "velocity") if _once(matters) else key
-        if place in self._misplaced:
+        relevant = choices if probe.coupled else _relevant_in_flight(choices)
+        by_centre = not probe.coupled and choices["matrix"].key.startswith("matrix without k")
+        key = ((index, by_centre), *sorted((name, id(o)) for name, o in relevant.items()))
+        position_key = key
+        if relevant["substeps"].fields["substeps"] == 1:  # velocities do not enter positions
+            position_key = tuple(part for part in key if part[:1] != ("velocity",))
+        if position_key in self._misplaced:
             return False
-        if key not in self._known:
-            options = tuple(matters.values())
-            if centre:
-                self._known[key] = self._compare_centre(options, probe)
+        if key not in self._explained:
+            options = tuple(relevant.values())
+            if by_centre:
+                self._explained[key] = self._has_right_centre(options, probe)
             else:
-                self.tried += 1
-                self._known[key], there = self._compare(options, probe)
-                if not there:
-                    self._misplaced.add(place)
-        return self._known[key]
+                self.prediction_count += 1
+                self._explained[key], is_placed = self._compare(options, probe)
+                if not is_placed:
+                    self._misplaced.add(position_key)
+        return self._explained[key]
 
-    def _compare_centre(self, options: tuple[Option, ...], probe: Probe) -> bool | None:
+    def _has_right_centre(self, options: tuple[Option, ...], probe: Probe) -> bool | None:
         """Return False where the centre of mass is elsewhere, else None.
 
         A matrix without stiffness joins particles even where their spring has none, differently
         for each integrator, but leaves their centre where it is.
         """
         problem, model = apply(options, probe.problem, StepModel(damper="none"))
-        x, _ = predicted(problem, model).values()
         share = problem.masses / problem.masses.sum()
+        x = predicted(problem, model)["positions"]
         centre = {"positions": share @ x, "velocities": np.zeros(0)}
-        answered = {"positions": share @ probe.answered["positions"]}
+        answers = {"positions": share @ probe.answers["positions"]}
         whole = probe.problem.changed(positions=share @ probe.problem.positions)
-        error = apart(whole, centre, answered, self._rounding(probe, model))
+        error = relative_gap(whole, centre, answers, self._rounding(probe, model))
         return None if error <= SOLVED else False
 
     def _rounding(self, probe: Probe, model: StepModel) -> Rounding:
@@ -210,103 +234,68 @@ class Search:
     def _compare(self, options: tuple[Option, ...], probe: Probe) -> tuple[bool | None, bool]:
         """Return whether an answer is reproduced, and whether its positions may be."""
         problem, model = apply(options, probe.problem, StepModel(damper="none"))
-        values, answered = predicted(problem, model), probe.answered
-        if _absurd(values):  # a singular matrix predicts nothing but that
-            return (None if _absurd(answered) else False), True
+        prediction, answers = predicted(problem, model), probe.answers
+        if _is_singular(prediction):
+            return (None if _is_singular(answers) else False), True
         allowed = self._rounding(probe, model)
-        same = apart(probe.problem, values, answered, allowed) <= SOLVED
-        if same or problem.steps or "positions" not in answered:
-            return bool(same), True
-        places = {"positions": answered["positions"]}
-        return False, bool(apart(probe.problem, values, places, allowed) <= SOLVED)
+        if relative_gap(probe.problem, prediction, answers, allowed) <= SOLVED:
+            return True, True
+        if problem.steps or "positions" not in answers:
+            return False, True
+        positions = {"positions": answers["positions"]}
+        return False, relative_gap(probe.problem, prediction, positions, allowed) <= SOLVED
 
-    def _found(self, chosen: Chosen) -> Found:
-        if "class" in chosen:
-            option = self.members[chosen["class"].fields["integrator"]][0]
-            chosen = {**chosen, "integrator": option}
-        options = tuple(chosen[one] for one in ASPECTS if one in chosen)
-        return Found(options, tuple(one for one in options if self.costs[id(one)]))
-
-
-def _absurd(values: Mapping[str, Any]) -> bool:
-    """Return whether positions are those that a singular matrix gives."""
-    return "positions" not in values or not np.abs(values["positions"]).max() < ABSURD
+    def _match(self, choices: Choices) -> ModelMatch:
+        if "flight" in choices:
+            members = self.classes[choices["flight"].fields["integrator"]]
+            choices = {**choices, "integrator": members[0][0]}
+        options = tuple(choices[aspect] for aspect in ASPECTS if aspect in choices)
+        return ModelMatch(options, tuple(o for o in options if self.costs[id(o)]))
 
 
-def _once(chosen: Chosen) -> bool:
-    """Return whether there is one substep, so that velocities do not enter positions."""
-    return "substeps" in chosen and chosen["substeps"].fields["substeps"] == 1
+def _is_singular(values: Mapping[str, Any]) -> bool:
+    """Return whether positions are missing or huge, as from a singular matrix."""
+    return "positions" not in values or not np.abs(values["positions"]).max() < LARGEST
 
 
 def _takes_long(option: Option) -> bool:
     """Return whether a choice is not tried together with other faults.
 
-    These are integrators that take long, and those, as well as numbers of substeps, that are honest
-    but denied by the greeting.
+    These are integrators that take long, and honest integrators and numbers of substeps that the
+    greeting denies.
     """
-    how = option.fields.get("integrator")
-    if how is None:
+    integrator = option.fields.get("integrator")
+    if integrator is None:
         return option.aspect in ("substeps", "scaling")
-    denied = id(option) not in FAULTY
-    return denied or how.method == "descent" or how.iterations > MOST_ITERATIONS
+    is_long = integrator.method == "descent" or integrator.iterations > MAX_ITERATIONS
+    return is_long or id(option) not in FAULTY
 
 
-def _classes(
-    integrators: Sequence[tuple[Option, int]],
-) -> tuple[list[tuple[Option, int]], dict[Integrator, list[Option]]]:
-    """Return one integrator of each class that flight does not tell apart, and all of them."""
-    classes: dict[Integrator, tuple[Option, int]] = {}
-    members: dict[Integrator, list[Option]] = {}
-    for option, cost in integrators:
-        how = in_flight(option.fields["integrator"])
-        members.setdefault(how, []).append(option)
-        first, least = classes.get(how, (option._replace(fields={"integrator": how}), cost))
-        classes[how] = first, min(least, cost)
-    return list(classes.values()), members
-
-
-def _in_flight_only(chosen: Chosen) -> Chosen:
-    """Return those choices that matter where no spring acts."""
-    mattering = (*SINGULAR, "matrix 2M+h²L")
+def _relevant_in_flight(choices: Choices) -> Choices:
+    """Return the choices that matter where no spring acts."""
     return {
         aspect: option
-        for aspect, option in chosen.items()
-        if not (aspect == "matrix" and option.key not in mattering)
-        and not (aspect == "time" and option.fields.get("time") == "before")
+        for aspect, option in choices.items()
+        if (aspect != "matrix" or option.key in OF_MASSES)
+        and (aspect != "time" or option.fields.get("time") != "before")
     }
 
 
-def in_flight(how: Integrator) -> Integrator:
+def in_flight(integrator: Integrator) -> Integrator:
     """Return an integrator that moves free particles alike: without springs g is quadratic."""
-    if how.explicit or how.method == "descent":
-        return how
-    if how.method == "newton" and how.rate != 1.0:
-        return how._replace(hessian="gauss")
+    if integrator.explicit or integrator.method == "descent":
+        return integrator
+    if integrator.method == "newton" and integrator.rate != 1.0:
+        return integrator._replace(hessian="gauss")
     return Integrator("newton", "x_n", 1, "gauss")
 
 
-def _has_springs(p: SpringProblem) -> bool:
-    return bool(p.stiffnesses.any() or p.dampings.any())
-
-
-def _relevant(p: SpringProblem) -> list[str]:
-    """Return the aspects that matter in a problem, in the order in which they are chosen."""
-    springs = ["springs"] if p.stiffnesses.any() else []
-    dampers = ["damper", "damping"] if p.dampings.any() else []
-    pins = ["pins"] if len(p.pinned) else []
-    return [*ALWAYS, *springs, *dampers, *pins]
-
-
-def _keys(found: Found) -> tuple[str, ...]:
-    return tuple(fault.key for fault in found.faults)
-
-
 def probes_of(
-    asked: Sequence[Exchange], problems: Mapping[str, SpringProblem], every: bool = False
+    exchanges: Sequence[Exchange], problems: Mapping[str, SpringProblem], every: bool = False
 ) -> list[Probe]:
-    """Return the probes, or every case, that were answered, in their order."""
+    """Return the probes, or every case, that were answers, in their order."""
     return [
-        Probe(problems[one.case.name], one.answer.values, one.case.name)
-        for one in asked
-        if isinstance(one.answer, Answer) and (every or one.case.facts.get("probe"))
+        Probe(problems[exchange.case.name], exchange.answer.values, exchange.case.name)
+        for exchange in exchanges
+        if isinstance(exchange.answer, Answer) and (every or exchange.case.facts.get("probe"))
     ]

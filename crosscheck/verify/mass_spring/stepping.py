@@ -1,9 +1,9 @@
-"""Judge steps and motions: against what is declared, or else inferred, and against laws."""
+"""Judge steps and motions by the declared or inferred model and by laws."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain, product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,23 +18,22 @@ from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskRepo
 from ..sentence import Sentence, sentence
 from ..timing import timed
 from . import laws
-from .cases import task_cases
+from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
-from .honest import DAMPERS, HONEST_VELOCITIES, compatible, domains, honest
-from .laws import Context
+from .honest import HONEST, compatible, domains, honest
+from .laws import SOLVED, StepContext, correct_digits, relative_gap, rounding
 from .model import StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
-from .rounding import SOLVED, apart, correct_digits, rounding
-from .search import Found, Probe, Search, probes_of
+from .search import ModelMatch, ModelSearch, Probe, probes_of
 
-MOST_TOLD = 3
-LAWS: tuple[Callable[[Context], Finding | None], ...] = (
+MAX_EXPLANATIONS = 3
+LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
     laws.pins, laws.declared_step, laws.velocities, laws.momentum, laws.minimiser,
 )  # fmt: skip
 
 
 class Stepping(NamedTuple):
-    """The discipline of a task that makes one step, or several."""
+    """The discipline of a task of a single step or of several."""
 
     task: str
 
@@ -42,61 +41,61 @@ class Stepping(NamedTuple):
         """Return cases that suit the solver, the smallest first."""
         return task_cases(self.task, greeting, seed, thorough)
 
-    def judge(self, asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+    def judge(self, exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
         """Hold answers against the step that is declared, or inferred, and name the faults."""
-        problems = problems_of(asked, greeting)
-        search = Search(probes_of(asked, problems), greeting.step, greeting.epsilon)
-        found = search.run()
-        right = honest_options(found, greeting.step)
-        known = greeting.step.method is not None or bool(found and not found[0].faults)
+        problems = problems_of(exchanges, greeting)
+        search = ModelSearch(probes_of(exchanges, problems), greeting.step, greeting.epsilon)
+        matches = search.run()
+        options = honest_options(matches, greeting.step)
+        recognised = greeting.step.method is not None or bool(matches and not matches[0].faults)
         judgements = [
-            _judge_case(one, asked, problems[one.case.name], greeting, right, known)
-            for one in asked
+            _judge_case(
+                exchange, exchanges, problems[exchange.case.name], greeting, options, recognised
+            )
+            for exchange in exchanges
         ]
-        diagnosis = _diagnose(judgements, search, found, probes_of(asked, problems, every=True))
-        return TaskReport(self.task, "", _with_faults(judgements, diagnosis, known), diagnosis)
+        probes = probes_of(exchanges, problems, every=True)
+        diagnosis = _diagnose(judgements, search, matches, probes)
+        if diagnosis.explained and not recognised:
+            judgements = list(map(_with_wrong_step, judgements))
+        return TaskReport(self.task, "", judgements, diagnosis)
 
 
-def problems_of(asked: Sequence[Exchange], greeting: Greeting) -> dict[str, SpringProblem]:
+def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, SpringProblem]:
     """Return the problem of each case; a solver that goes on starts from its own answer."""
-    by_name = {one.case.name: one for one in asked}
+    by_name = {exchange.case.name: exchange for exchange in exchanges}
     problems: dict[str, SpringProblem] = {}
-    for one in asked:
-        before = by_name.get(one.case.follows)
+    for name, exchange in by_name.items():
+        before = by_name.get(exchange.case.follows)
         h_before = before.case.inputs["h"] if before is not None else None
-        inputs = dict(one.case.inputs)
+        inputs = dict(exchange.case.inputs)
         if greeting.system.continues and before is not None and isinstance(before.answer, Answer):
-            inputs |= _state(before.answer.values)
-        problems[one.case.name] = problem_of(inputs, h_before)
+            answers = before.answer.values
+            for state in {"positions", "velocities"} & answers.keys():
+                frames = answers[state]
+                inputs[state] = frames.reshape(-1, *frames.shape[-2:])[-1]
+        problems[name] = problem_of(inputs, h_before)
     return problems
 
 
-def _state(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the last frame of an answer."""
-    return {
-        name: values[name].reshape(-1, *values[name].shape[-2:])[-1]
-        for name in ("positions", "velocities")
-        if name in values
-    }
-
-
-def honest_options(found: Sequence[Found], step: Step) -> tuple[Option, ...]:
-    """Return what was found of a solver, its faults replaced by what it declares."""
-    wrong = {one.aspect for one in found[0].faults} if found else set()
-    options = {o.aspect: o for o in found[0].options if o.aspect not in wrong} if found else {}
+def honest_options(matches: Sequence[ModelMatch], step: Step) -> tuple[Option, ...]:
+    """Return the recognised choices of a solver, its faults replaced by declared choices."""
+    options, faults = matches[0] if matches else ((), ())
+    wrong = {fault.aspect for fault in faults}
+    recognised = {option.aspect: option for option in options if option.aspect not in wrong}
     choices = domains(step)
-    usual = {aspect: choices[aspect][0][0] for aspect in ASPECTS} | options
+    usual = {aspect: choices[aspect][0][0] for aspect in ASPECTS} | recognised
     if usual["integrator"].fields["integrator"].explicit:
-        for aspect, value in (("damper", "explicit"), ("velocity", "separate")):
-            if aspect not in options:
-                fits = (o for o, cost in choices[aspect] if not cost and o.fields[aspect] == value)
+        for aspect, name in (("damper", "explicit"), ("velocity", "separate")):
+            if aspect not in recognised:
+                fits = (o for o, cost in choices[aspect] if not cost and o.fields[aspect] == name)
                 usual[aspect] = next(fits, usual[aspect])
     return tuple(usual[aspect] for aspect in ASPECTS)
 
 
 def describe_model(options: Sequence[Option]) -> Sentence:
     """Return a model in words."""
-    parts = {one.aspect: one.sentence for one in options}
+    parts = {option.aspect: option.sentence for option in options}
     names = ("integrator", "substeps", "damper", "pins", "velocity")
     return sentence(
         "{integrator} ({substeps}, {damper}, {pins}, {velocity})",
@@ -105,63 +104,57 @@ def describe_model(options: Sequence[Option]) -> Sentence:
 
 
 def _judge_case(
-    one: Exchange,
-    asked: Sequence[Exchange],
+    exchange: Exchange,
+    exchanges: Sequence[Exchange],
     p: SpringProblem,
     greeting: Greeting,
     options: tuple[Option, ...],
-    known: bool,
+    recognised: bool,
 ) -> CaseJudgement:
-    if not isinstance(one.answer, Answer):
-        return CaseJudgement(one.case, one.answer, (), {})
+    case, answer = exchange.case, exchange.answer
+    if not isinstance(answer, Answer):
+        return CaseJudgement(case, answer, (), {})
     _, model = apply(options, p, StepModel())
     expected = predicted(p, model)
-    context = Context(
-        p, one.answer.values, rounding(p, model, greeting.epsilon), model, known,
+    context = StepContext(
+        p, answer.values, rounding(p, model, greeting.epsilon), model, recognised,
         describe_model(options), expected, greeting.step.pins is not None,
     )  # fmt: skip
-    findings = tuple(_findings(one, one.answer, asked, context))
+    findings = tuple(_findings(exchange, exchanges, context)) + tuple(laws.remarks(answer))
     seconds = _reference_seconds(p, model)
-    if not known:
-        return CaseJudgement(one.case, one.answer, findings, {}, None, seconds)
-    digits = _digits(expected, one.answer.values)
-    return CaseJudgement(one.case, one.answer, findings, expected, digits, seconds)
+    if not recognised:
+        return CaseJudgement(case, answer, findings, {}, None, seconds)
+    digits = None
+    if expected and "positions" in answer.values:
+        gap = float(np.abs(expected["positions"] - answer.values["positions"]).max())
+        size = float(np.abs(expected["positions"]).max())
+        digits = correct_digits(gap, size) if np.isfinite(gap) else None
+    return CaseJudgement(case, answer, findings, expected, digits, seconds)
 
 
 def _findings(
-    one: Exchange, answer: Answer, asked: Sequence[Exchange], context: Context
+    exchange: Exchange, exchanges: Sequence[Exchange], context: StepContext
 ) -> list[Finding]:
-    """Return what all laws that apply say."""
-    broken = laws.finite(context)
-    if broken is not None:
-        return [broken]
+    """Return the findings of all laws that apply."""
+    values = context.answers
+    invalid = [name for name, numbers in values.items() if not np.isfinite(numbers).all()]
+    if invalid:
+        message = sentence("{name} hold NaN or infinity.", name=", ".join(invalid))
+        return [laws.not_finite(message)]
+    # What rounding and an iterative solver may leave of two answers that should be alike.
+    origins = {"positions": context.problem.positions, "velocities": 0.0}
     limits = {
-        "positions": 4.0 * context.allowed.positions + _slack(context, "positions"),
-        "velocities": 4.0 * context.allowed.velocities + _slack(context, "velocities"),
+        name: 4.0 * getattr(context.allowed, name)
+        + SOLVED * float(np.abs(values.get(name, origin) - origin).max(initial=0.0))
+        for name, origin in origins.items()
     }
-    found = [
-        *(law(context) for law in LAWS),
-        laws.consistency(context) if one.case.facts.get("consistent") else None,
-        laws.symmetry(one, asked, limits) if context.model.damper != "diagonal" else None,
-        laws.equal_requests(one, limits),
-    ]
-    return [finding for finding in found if finding is not None] + laws.remarks(answer)
-
-
-def _slack(context: Context, name: str) -> float:
-    """Return what an iterative solver may leave of two answers that should be alike."""
-    before = context.problem.positions if name == "positions" else 0.0
-    changed = np.abs(np.asarray(context.answered.get(name, before)) - before)
-    return SOLVED * float(changed.max(initial=0.0))
-
-
-def _digits(expected: Mapping[str, Any], answered: Mapping[str, Any]) -> float | None:
-    """Return the correct digits of the largest coordinate."""
-    if not expected or "positions" not in answered:
-        return None
-    x = np.asarray(expected["positions"])
-    gap = float(np.abs(x - answered["positions"]).max())
-    return correct_digits(gap, float(np.abs(x).max())) if np.isfinite(gap) else None
+    findings = [law(context) for law in LAWS]
+    if exchange.case.facts.get("consistent"):
+        findings.append(laws.consistency(context))
+    if context.model.damper != "diagonal":
+        findings.append(laws.symmetry(exchange, exchanges, limits))
+    findings.append(laws.equal_requests(exchange, limits))
+    return [finding for finding in findings if finding is not None]
 
 
 def _reference_seconds(p: SpringProblem, model: StepModel) -> float:
@@ -175,25 +168,28 @@ def _reference_seconds(p: SpringProblem, model: StepModel) -> float:
 
 
 def _diagnose(
-    judgements: Sequence[CaseJudgement], search: Search, found: Sequence[Found], every: list[Probe]
+    judgements: Sequence[CaseJudgement],
+    search: ModelSearch,
+    matches: Sequence[ModelMatch],
+    probes: Sequence[Probe],
 ) -> Diagnosis:
     explanations: tuple[Explanation, ...] = ()
     behaviour, step = None, search.step
-    if found and found[0].faults:
-        explanations = (_explanation(found, every, search.epsilon),)
-    elif found and any(getattr(step, name) is None for name in _DECLARED):
+    if matches and matches[0].faults:
+        explanations = (_explanation(matches, probes, search.epsilon),)
+    elif matches and any(getattr(step, name) is None for name in _DECLARED):
         behaviour = sentence(
             "In small cases it behaves like {model}, with which it is compared."
-            if any(one.verdict >= Verdict.WRONG for one in judgements)
+            if any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
             else "It behaves like {model}.",
-            model=describe_model(honest_options(found, step)),
+            model=describe_model(honest_options(matches, step)),
         )
     hints = hints_of(judgements)
-    diagnosis = Diagnosis(explanations, behaviour, None, hints, search.tried)
+    diagnosis = Diagnosis(explanations, behaviour, None, hints, search.prediction_count)
     if diagnosis.explained:
         return diagnosis
     if search.probes and behaviour is None and step.method is None:
-        hints += (_nearest(search), _what_holds(judgements))
+        hints += (_nearest(search), _laws_that_hold(judgements))
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
 
 
@@ -201,16 +197,16 @@ def _diagnose(
 _DECLARED = ("method", "substeps", "damper", "pins", "velocity")
 
 
-def _nearest(search: Search) -> Sentence:
-    """Return which of the steps that are known comes nearest to the answers to the probes."""
+def _nearest(search: ModelSearch) -> Sentence:
+    """Return which of the known steps comes nearest to the answers to the probes."""
     usual = {option.aspect: option for option in honest_options((), search.step)}
     steps = []
-    for integrator, damper in product(honest(search.step)["integrator"], DAMPERS):
-        velocity = HONEST_VELOCITIES[integrator.fields["integrator"].explicit]
+    for integrator, damper in product(honest(search.step)["integrator"], HONEST["damper"]):
+        velocity = HONEST["velocity"][integrator.fields["integrator"].explicit]
         step = usual | {"integrator": integrator, "damper": damper, "velocity": velocity}
         if compatible(step):
-            errors = _errors(tuple(step.values()), search.probes, search.epsilon)
-            steps.append((float(np.median(errors)), max(errors), tuple(step.values())))
+            gaps = _gaps(tuple(step.values()), search.probes, search.epsilon)
+            steps.append((float(np.median(gaps)), max(gaps), tuple(step.values())))
     median, worst, options = min(steps, key=lambda step: step[0])
     return sentence(
         "The nearest step that is known is {model}; it differs by {median:.2g} of a displacement "
@@ -221,7 +217,7 @@ def _nearest(search: Search) -> Sentence:
     )
 
 
-def _what_holds(judgements: Sequence[CaseJudgement]) -> Sentence:
+def _laws_that_hold(judgements: Sequence[CaseJudgement]) -> Sentence:
     """Return the laws that no answer breaks."""
     verdicts: dict[str, Verdict] = {}
     for finding in chain.from_iterable(judgement.findings for judgement in judgements):
@@ -230,79 +226,59 @@ def _what_holds(judgements: Sequence[CaseJudgement]) -> Sentence:
     return sentence("What holds in every case: {laws}.", laws=names or "–")
 
 
-def _explanation(found: Sequence[Found], every: Sequence[Probe], epsilon: float) -> Explanation:
+def _explanation(
+    matches: Sequence[ModelMatch], probes: Sequence[Probe], epsilon: float
+) -> Explanation:
     """Return the faults found with the share of all answers that they reproduce, in classes."""
     scores = []
-    for one in found:
-        errors = _errors(one.options, every, epsilon)
-        hits = [error for error in errors if error <= SOLVED]
-        scores.append((-len(hits) / max(len(errors), 1), max(hits, default=0.0), one.faults))
+    for match in matches:
+        gaps = _gaps(match.options, probes, epsilon)
+        hits = [gap for gap in gaps if gap <= SOLVED]
+        scores.append((-len(hits) / max(len(gaps), 1), max(hits, default=0.0), match))
     scores.sort(key=lambda score: score[:2])
-    share, distance, _ = scores[0]
-    classes = {
-        " + ".join(one.key for one in faults): faults for lost, _, faults in scores if lost == share
-    }
-    keys = tuple(classes)[:MOST_TOLD]
-    said = either([list(map(_fault_sentence, classes[key])) for key in keys])
-    return Explanation(keys, said, -share, distance)
+    best, distance, _ = scores[0]
+    classes = {" + ".join(m.keys): m.faults for share, _, m in scores if share == best}
+    keys = tuple(classes)[:MAX_EXPLANATIONS]
+    message = either([list(map(_fault_sentence, classes[key])) for key in keys])
+    return Explanation(keys, message, -best, distance)
 
 
-def _errors(options: tuple[Option, ...], probes: Sequence[Probe], epsilon: float) -> list[float]:
-    """Return how far each answer is from a step with these options, relative to what it moves."""
-    errors = []
-    for plain, answered, _ in probes:
+def _gaps(options: tuple[Option, ...], probes: Sequence[Probe], epsilon: float) -> list[float]:
+    """Return how far answers are from a step with these options, relative to displacements."""
+    gaps = []
+    for plain, answers, _ in probes:
         p, model = apply(options, plain, StepModel(damper="none"))
         expected, allowed = predicted(p, model), rounding(plain, model, epsilon)
-        errors.append(apart(plain, expected, answered, allowed) if expected else np.inf)
-    return errors
+        gaps.append(relative_gap(plain, expected, answers, allowed) if expected else np.inf)
+    return gaps
 
 
-def _fault_sentence(one: Option) -> Sentence:
-    """Return what is said of a fault; of an honest choice that was denied, that it is one."""
-    if any(one.key == other.key for other in honest(Step()).get(one.aspect, ())):
-        return sentence("Other than declared, it behaves like this: {what}.", what=one.sentence)
-    return one.sentence
+def _fault_sentence(option: Option) -> Sentence:
+    """Return the sentence of a fault, or of an honest choice that the greeting denies."""
+    if any(option.key == choice.key for choice in honest(Step()).get(option.aspect, ())):
+        return sentence("Other than declared, it behaves like this: {what}.", what=option.sentence)
+    return option.sentence
 
 
 def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
     """Return the first law that broke, and where to look if all cases before are right.
 
-    The cases add one aspect after another.
+    Each case adds an aspect to the cases before it.
     """
     law = first_broken(judgements)
-    case = next((one.case for one in judgements if one.verdict > Verdict.RIGHT_BUT), None)
+    case = next((j.case for j in judgements if j.verdict > Verdict.RIGHT_BUT), None)
     if law is None or case is None or case.name != law.values["case"]:
         return law
-    return sentence("{law} {trace}", law=law, trace=_TRACES.get(case.family, _TRACES["cloth"]))
+    return sentence("{law} {trace}", law=law, trace=trace_of(case.family))
 
 
-_TRACES: Mapping[str, Sentence] = {
-    "flight": sentence("Look at gravity, h and the velocity: no spring acts there."),
-    "springs": sentence("Free flight is right: look at the spring's force and the system matrix."),
-    "rest": sentence("Nothing should move there: look at rest lengths."),
-    "dampers": sentence("Undamped springs are right: look at the damper."),
-    "pins": sentence("Without pins all is right: look at how particles are held."),
-    "gravity": sentence("Gravity along y is right: look at its other components."),
-    "external forces": sentence("Look at how external forces are added."),
-    "tension only": sentence("Look at springs shorter than at rest."),
-    "h changes": sentence("A single h is right: look at what is kept from one request to another."),
-    "system changes": sentence("Look at what is kept from one request to another."),
-    "cloth": sentence("Small systems are right: look at indices and at what larger ones add."),
-}
-
-
-def _with_faults(
-    judgements: Sequence[CaseJudgement], diagnosis: Diagnosis, known: bool
-) -> list[CaseJudgement]:
-    """Return the judgements, undecided steps wrong where a fault explains them."""
-    if known or not diagnosis.explained:
-        return list(judgements)
-    said = sentence("No honest step gives its answers; a faulty one does.")
-    return [
-        replace(judgement, findings=tuple(
-            replace(one, verdict=Verdict.WRONG, sentence=said)
-            if one.law == "declared step" and one.verdict is Verdict.UNDECIDED else one
-            for one in judgement.findings
-        ))
-        for judgement in judgements
-    ]  # fmt: skip
+def _with_wrong_step(judgement: CaseJudgement) -> CaseJudgement:
+    """Return a judgement with an undecided step judged as wrong, for a fault explains it."""
+    message = sentence("No honest step gives its answers; a faulty one does.")
+    findings = [
+        replace(finding, verdict=Verdict.WRONG, sentence=message)
+        if (finding.law, finding.verdict) == ("declared step", Verdict.UNDECIDED)
+        else finding
+        for finding in judgement.findings
+    ]
+    return replace(judgement, findings=tuple(findings))

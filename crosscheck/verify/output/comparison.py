@@ -1,86 +1,183 @@
-"""A few numbers of a wrong answer beside ours, from where the two part."""
+"""An answer beside the expected answer: the numbers in which they differ, and points to draw."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from plumbob.reference.arguments import digits_apart
+from plumbob.reference import Skeleton, forward_kinematics, local_from_global, rotation, solve_ik
+from plumbob.reference.arguments import FloatArray, digits_apart
 
 from ..contestant import Answer
 from ..judgement import CaseJudgement
-from .geometry import outputs, pose
 
+Outputs = Mapping[str, Any]
 # Differences below this part of the largest one are not where two answers part.
 _PARTING = 0.01
 # An output that differs by less than this part of another one is rounded, not wrong.
 _ROUNDED = 1e-4
+# The length of the longest force arrow, relative to the system's extent.
+_ARROW = 0.3
 
 
-class Row(NamedTuple):
-    """Numbers that should be equal: what they are, the solver's, and ours."""
+class NumberRow(NamedTuple):
+    """Numbers that should be equal."""
 
     label: str
-    theirs: list[float]
-    ours: list[float]
+    answer: list[float]
+    expected: list[float]
 
 
-def rows(judgement: CaseJudgement, most: int = 3) -> list[Row]:
+class Shape(NamedTuple):
+    """Points (point, 3) and the pairs of them (line, 2) that a line joins."""
+
+    points: FloatArray
+    lines: FloatArray
+
+
+class Drawing(NamedTuple):
+    """The shapes of a failing case; None where there is no shape."""
+
+    request: Shape | None  # a curve, or the system that forces act on
+    answer: Shape | None
+    expected: Shape | None
+    marks: FloatArray  # a target, or pins (point, 3)
+
+
+def _outputs(judgement: CaseJudgement) -> tuple[Outputs, Outputs]:
+    """Return the outputs of the solver and those of the reference, {} where there are none."""
+    case, answer, expected = judgement.case, judgement.answer, judgement.expected
+    if not expected and case.task == "inverse_kinematics":  # many answers are right
+        start, target = case.inputs["local_rotations"], case.inputs["target"]
+        skeleton = Skeleton(case.inputs["parents"], case.inputs["offsets"])
+        effector = int(case.inputs["effector"])
+        try:
+            solution = solve_ik(skeleton, start, target, solver="fabrik", effector=effector)
+            expected = {"local_rotations": solution.local_rotations}
+        except ValueError:
+            expected = {}
+    return answer.values if isinstance(answer, Answer) else {}, expected
+
+
+def _positions(inputs: Outputs, outputs: Outputs) -> FloatArray | None:
+    """Return the positions (joint, 3) of all joints, of a motion's last frame, or None."""
+    if "positions" in outputs:
+        return _last(outputs["positions"])
+    try:
+        skeleton = Skeleton(inputs["parents"], inputs["offsets"])
+        if "local_rotations" in outputs:
+            unit, _ = rotation.normalise(_last(outputs["local_rotations"]))
+        elif "rotations" in outputs:
+            unit = local_from_global(skeleton, rotation.normalise(outputs["rotations"])[0])
+        else:
+            return None
+        return forward_kinematics(skeleton, unit).positions
+    except ValueError:  # rotations of length 0, NaN
+        return None
+
+
+def _last(array: Any) -> FloatArray:
+    frames = np.asarray(array, dtype=float)
+    return frames if frames.ndim == 2 else frames[-1]
+
+
+def rows(judgement: CaseJudgement, count: int = 3) -> list[NumberRow]:
     """Return the first numbers, in the order of the computation, in which answers part."""
     if not isinstance(judgement.answer, Answer):
         return []
-    found: list[Row] = []
-    for name, ours in judgement.expected.items():
+    differing: list[NumberRow] = []
+    for name, expected in judgement.expected.items():
         if name in judgement.answer.values:
-            found += _of_output(name, judgement.answer.values[name], ours, most)
-    largest = max(map(_gap, found), default=0.0)
-    wrong_rows = [row for row in found if _gap(row) >= _ROUNDED * largest]
-    return (wrong_rows or _effector(judgement))[:most]
+            differing += _of_output(name, judgement.answer.values[name], expected, count)
+    gaps = [
+        float(np.nan_to_num(np.abs(np.subtract(row.answer, row.expected)), nan=np.inf).max())
+        for row in differing
+    ]
+    wrong = [row for row, gap in zip(differing, gaps, strict=True) if gap >= _ROUNDED * max(gaps)]
+    return (wrong or _effector(judgement.case.inputs, judgement.answer.values))[:count]
 
 
-def _gap(row: Row) -> float:
-    return float(np.nan_to_num(np.abs(np.subtract(row.theirs, row.ours)), nan=np.inf).max())
-
-
-def _of_output(name: str, theirs: Any, ours: Any, most: int) -> list[Row]:
-    a, b = np.asarray(theirs, dtype=float), np.asarray(ours, dtype=float)
+def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[NumberRow]:
+    a, b = np.asarray(answer, dtype=float), np.asarray(expected, dtype=float)
     if a.shape != b.shape:
-        return [Row(f"len({name})", [float(len(a))], [float(len(b))])]
+        return [NumberRow(f"len({name})", [float(len(a))], [float(len(b))])]
     if name.endswith("rotations"):
         b = b * np.where((a * b).sum(-1, keepdims=True) < 0.0, -1.0, 1.0)
-    apart = np.nan_to_num(np.abs(a - b), nan=np.inf)
+    gaps = np.nan_to_num(np.abs(a - b), nan=np.inf)
     if a.ndim:
-        apart = apart.max(-1)
-    worst = apart.max(initial=0.0)
-    parted = np.argwhere((apart > 0.0) & (apart >= _PARTING * worst))[:most]
-    return [_row(name, a, b, tuple(map(int, i))) for i in parted]
+        gaps = gaps.max(-1)
+    parting = np.argwhere((gaps > 0.0) & (gaps >= _PARTING * gaps.max(initial=0.0)))[:count]
+    indices = [tuple(map(int, index)) for index in parting]
+    return [
+        NumberRow(
+            f"{name}[{', '.join(map(str, i))}]" if i else name,
+            np.atleast_1d(a[i]).tolist(), np.atleast_1d(b[i]).tolist(),
+        )
+        for i in indices
+    ]  # fmt: skip
 
 
-def _row(name: str, a: Any, b: Any, i: tuple[int, ...]) -> Row:
-    label = f"{name}[{', '.join(map(str, i))}]" if i else name
-    return Row(label, np.atleast_1d(a[i]).tolist(), np.atleast_1d(b[i]).tolist())
-
-
-def _effector(judgement: CaseJudgement) -> list[Row]:
-    """Return where the effector is beside where it should be, if the case is about that."""
-    inputs = judgement.case.inputs
-    if "target" not in inputs:
-        return []
-    positions = pose(inputs, outputs(judgement, "theirs"))
+def _effector(inputs: Outputs, outputs: Outputs) -> list[NumberRow]:
+    """Return the position of the effector beside its target, if the case has one."""
+    positions = _positions(inputs, outputs) if "target" in inputs else None
     if positions is None:
         return []
     reached = positions[int(inputs["effector"])]
-    return [Row("effector", reached.tolist(), np.asarray(inputs["target"]).tolist())]
+    return [NumberRow("effector", reached.tolist(), np.asarray(inputs["target"]).tolist())]
 
 
-def written(row: Row) -> tuple[str, str]:
-    """Return both sides with so few digits that they still differ where they differ most."""
-    apart = [
+def texts(row: NumberRow) -> tuple[str, str]:
+    """Return both sides of a row, with the fewest digits that show their largest difference."""
+    gaps = [
         0.0 if a == b else abs(a - b) if np.isfinite([a, b]).all() else np.inf
-        for a, b in zip(row.theirs, row.ours, strict=True)
+        for a, b in zip(row.answer, row.expected, strict=True)
     ]
-    worst = int(np.argmax(apart))
-    digits = digits_apart(row.theirs[worst], row.ours[worst], 4)
+    worst = int(np.argmax(gaps))
+    digits = digits_apart(row.answer[worst], row.expected[worst], 4)
     sides = [[f"{x:.{digits}g}".replace("nan", "NaN") for x in side] for side in row[1:]]
     width = max(len(text) for side in sides for text in side)
-    theirs, ours = ("  ".join(text.rjust(width) for text in side) for side in sides)
-    return theirs, ours
+    answer, expected = ("  ".join(text.rjust(width) for text in side) for side in sides)
+    return answer, expected
+
+
+def drawing_of(judgement: CaseJudgement) -> Drawing | None:
+    """Return the shapes of a case, or None if there is nothing to draw."""
+    inputs, task = judgement.case.inputs, judgement.case.task
+    answer, expected = (_shape(task, inputs, outputs) for outputs in _outputs(judgement))
+    if answer is None and expected is None:
+        return None
+    request, marks = None, np.empty((0, 3))
+    if "curve" in inputs:
+        request = _path(inputs["curve"])
+    elif task == "mass_spring_forces":
+        request = Shape(inputs["positions"], np.asarray(inputs["springs"]))
+    if "target" in inputs:
+        marks = np.asarray(inputs["target"], dtype=float)[None]
+    elif "pinned" in inputs and "positions" in inputs:
+        marks = np.asarray(inputs["positions"])[np.asarray(inputs["pinned"], dtype=int)]
+    return Drawing(request, answer, expected, marks)
+
+
+def _shape(task: str, inputs: Outputs, outputs: Outputs) -> Shape | None:
+    """Return an answer as points and lines, None if it has no shape."""
+    if not outputs:
+        return None
+    if task in ("forward_kinematics", "inverse_kinematics", "track"):
+        points, parents = _positions(inputs, outputs), np.asarray(inputs["parents"])
+        joints = np.flatnonzero(parents >= 0)
+        return points if points is None else Shape(points, np.stack([parents[joints], joints], 1))
+    if task in ("mass_spring_step", "mass_spring_motion") and "positions" in outputs:
+        return Shape(_last(outputs["positions"]), np.asarray(inputs["springs"]))
+    if task == "mass_spring_forces":
+        start, forces = inputs["positions"], np.asarray(outputs["forces"])
+        longest = np.nanmax(np.abs(forces), initial=0.0) or 1.0
+        ends = start + forces * (_ARROW * max(np.ptp(start, axis=0).max(), 1e-9) / longest)
+        first = np.arange(len(start))
+        return Shape(np.concatenate([start, ends]), np.stack([first, first + len(start)], 1))
+    return _path(outputs["points"]) if task == "resample" else None
+
+
+def _path(curve: Any) -> Shape:
+    points = np.asarray(curve)
+    first = np.arange(max(len(points) - 1, 0))
+    return Shape(points, np.stack([first, first + 1], 1))

@@ -19,7 +19,7 @@ RIGHT, WRONG, FAILED = 0, 1, 2
 
 
 class Files(NamedTuple):
-    """Where to write, None for nowhere; all three and the failing cases into `folder`."""
+    """The files to write, None for none; a folder gets all three and the failing cases."""
 
     json: Path | None
     junit: Path | None
@@ -27,7 +27,7 @@ class Files(NamedTuple):
     folder: Path | None
 
     def paths(self) -> tuple[Path | None, Path | None, Path | None]:
-        """Return where JSON, JUnit XML and the page are wanted."""
+        """Return the paths of JSON, JUnit XML and the page."""
         if self.folder is None:
             return self.json, self.junit, self.html
         return (
@@ -56,20 +56,20 @@ class Files(NamedTuple):
             lambda: junit.text(report, context.say),
             lambda: page.render(report, context),
         )
-        written = [
+        finished = [
             _attempt(path, partial(_write, path, make), failures)
             for path, make in zip(self.paths(), makers, strict=True)
             if path is not None
         ]
-        if screen and any(written):
-            print(" ".join(visible(str(path)) for path in written if path))
+        if screen and any(finished):
+            print(" ".join(visible(str(path)) for path in finished if path))
         for failure in failures:
             print(f"plumbob: {context.say(failure)}", file=sys.stderr)
         return FAILED if failures else RIGHT if report.verdict in GOOD else WRONG
 
 
 def _show(report: Report, context: Presentation) -> Path:
-    with suppress(BrokenPipeError, SystemExit):  # files are wanted though nobody reads this
+    with suppress(BrokenPipeError, SystemExit):  # the files are still written
         terminal.show(report, context)
     return SCREEN
 
@@ -80,7 +80,7 @@ def _write(path: Path, make: Callable[[], str]) -> Path:
 
 
 def _attempt(path: Path, write: Callable[[], Path | None], failures: list[Sentence]) -> Path | None:
-    """Return the file that is written; where that fails, note why and return None."""
+    """Return the written file; on an error add a sentence and return None."""
     try:
         return write()
     except Exception as error:

@@ -1,4 +1,4 @@
-"""The result of `verify` as JSON, versioned; docs/verify.md says what each key holds."""
+"""The result of `verify` as JSON, versioned; docs/verify.md describes each key."""
 
 from typing import Any, Literal
 
@@ -7,7 +7,7 @@ import msgspec
 from ..contestant import Answer
 from ..judgement import CaseJudgement, Finding, Report, TaskReport
 from ..message import plain
-from ..sentence import Sentence, all_visible
+from ..sentence import all_visible
 from .words import GOOD, Say, advice, remarks
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"
@@ -31,51 +31,50 @@ def record(report: Report, say: Say) -> Record:
     }  # fmt: skip
 
 
-def _name(judged: Report | TaskReport | CaseJudgement | Finding) -> str:
-    return judged.verdict.name.lower()
+def _name(subject: Report | TaskReport | CaseJudgement | Finding) -> str:
+    return subject.verdict.name.lower()
 
 
 def _task(task: TaskReport, say: Say) -> Record:
     """Return a task, or one method of it."""
-    found = task.diagnosis
+    diagnosis = task.diagnosis
+    behaviour, first_broken = diagnosis.behaviour, diagnosis.first_broken
     return {
         "task": task.task, "method": task.method, "verdict": _name(task), "digits": task.digits,
         "slowdown": task.slowdown,
-        "passed": sum(one.verdict in GOOD for one in task.judgements),
+        "passed": sum(judgement.verdict in GOOD for judgement in task.judgements),
         "explanations": [
-            {"faults": one.faults, "text": say(one.sentence), "share": one.share,
-             "distance": one.distance}
-            for one in found.explanations
+            {"faults": explanation.faults, "text": say(explanation.sentence),
+             "share": explanation.share, "distance": explanation.distance}
+            for explanation in diagnosis.explanations
         ],
-        "behaviour": _said(found.behaviour, say), "first_broken": _said(found.first_broken, say),
-        "hints": list(map(say, found.hints)), "tried": found.variant_count,
+        "behaviour": behaviour and say(behaviour),
+        "first_broken": first_broken and say(first_broken),
+        "hints": list(map(say, diagnosis.hints)), "tried": diagnosis.variant_count,
         "smallest_failure": task.smallest_failure.case.name if task.smallest_failure else None,
-        "cases": [_case(one, say) for one in task.judgements],
+        "cases": [_case(judgement, say) for judgement in task.judgements],
     }  # fmt: skip
 
 
-def _said(words: Sentence | None, say: Say) -> str | None:
-    return None if words is None else say(words)
-
-
-def _case(one: CaseJudgement, say: Say) -> Record:
+def _case(judgement: CaseJudgement, say: Say) -> Record:
     """Return a case; `seconds` is the solver's own time, null if only the round trip was timed."""
-    case, answer = one.case, one.answer
-    failure = None if isinstance(answer, Answer) else answer
+    case, answer = judgement.case, judgement.answer
+    fields: Record = {"seconds": None, "failure": None, "failure_text": None, "remarks": []}
+    if isinstance(answer, Answer):
+        fields["seconds"] = None if answer.untimed else answer.seconds
+        fields["remarks"] = list(map(say, answer.remarks))
+    else:
+        fields["failure"], fields["failure_text"] = answer.kind.value, say(answer.sentence)
     return {
-        "name": case.name, "family": case.family, "about": say(case.about), "verdict": _name(one),
-        "digits": one.digits,
-        "seconds": answer.seconds if isinstance(answer, Answer) and not answer.untimed else None,
-        "reference_seconds": one.reference_seconds,
-        "failure": failure and failure.kind.value,
-        "failure_text": failure and say(failure.sentence),
-        "findings": [_finding(finding, say) for finding in one.findings],
-        "remarks": list(map(say, answer.remarks)) if isinstance(answer, Answer) else [],
-    }  # fmt: skip
-
-
-def _finding(one: Finding, say: Say) -> Record:
-    return {
-        "law": one.law, "verdict": _name(one), "error": one.error, "tolerance": one.tolerance,
-        "unit": one.unit, "text": say(one.sentence), "where": one.index,
+        "name": case.name, "family": case.family, "about": say(case.about),
+        "verdict": _name(judgement), "digits": judgement.digits, "seconds": fields["seconds"],
+        "reference_seconds": judgement.reference_seconds,
+        "failure": fields["failure"], "failure_text": fields["failure_text"],
+        "findings": [
+            {"law": finding.law, "verdict": _name(finding), "error": finding.error,
+             "tolerance": finding.tolerance, "unit": finding.unit, "text": say(finding.sentence),
+             "where": finding.index}
+            for finding in judgement.findings
+        ],
+        "remarks": fields["remarks"],
     }  # fmt: skip

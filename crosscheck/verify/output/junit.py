@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 from ..contestant import Answer
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict
-from .words import Say, complaints, explanations, title
+from .words import Say, explanations, title
 
-# What a verdict other than RIGHT is in JUnit's words.
+# JUnit's element for a verdict that is not good.
 _ELEMENTS = {
     Verdict.UNDECIDED: "skipped",
     Verdict.WRONG: "failure",
@@ -28,36 +28,35 @@ def text(report: Report, say: Say) -> str:
 def _suite(task: TaskReport, say: Say) -> ElementTree.Element:
     suite = ElementTree.Element("testsuite", name=title(task))
     _count(suite, task.judgements)
-    for one in task.judgements:
-        suite.append(_case(one, title(task), say))
-    if told := "\n".join(map(say, filter(None, (task.precision, *explanations(task))))):
-        ElementTree.SubElement(suite, "system-out").text = told
+    for judgement in task.judgements:
+        suite.append(_case(judgement, title(task), say))
+    if lines := list(map(say, filter(None, (task.precision, *explanations(task))))):
+        ElementTree.SubElement(suite, "system-out").text = "\n".join(lines)
     return suite
 
 
-def _count(element: ElementTree.Element, cases: Sequence[CaseJudgement]) -> None:
-    verdicts = [one.verdict for one in cases]
-    element.set("tests", str(len(cases)))
-    for name, verdict in (
-        ("failures", Verdict.WRONG), ("errors", Verdict.BROKEN), ("skipped", Verdict.UNDECIDED),
-    ):  # fmt: skip
-        element.set(name, str(verdicts.count(verdict)))
-    element.set("time", f"{sum(map(_seconds, cases)):.6f}")
+def _count(element: ElementTree.Element, judgements: Sequence[CaseJudgement]) -> None:
+    verdicts = [judgement.verdict for judgement in judgements]
+    element.set("tests", str(len(judgements)))
+    element.set("failures", str(verdicts.count(Verdict.WRONG)))
+    element.set("errors", str(verdicts.count(Verdict.BROKEN)))
+    element.set("skipped", str(verdicts.count(Verdict.UNDECIDED)))
+    element.set("time", f"{sum(map(_seconds, judgements)):.6f}")
 
 
-def _seconds(one: CaseJudgement) -> float:
-    return one.answer.seconds if isinstance(one.answer, Answer) else 0.0
+def _seconds(judgement: CaseJudgement) -> float:
+    return judgement.answer.seconds if isinstance(judgement.answer, Answer) else 0.0
 
 
-def _case(one: CaseJudgement, suite: str, say: Say) -> ElementTree.Element:
-    names = {"name": one.case.name, "classname": suite, "time": f"{_seconds(one):.6f}"}
+def _case(judgement: CaseJudgement, suite: str, say: Say) -> ElementTree.Element:
+    names = {"name": judgement.case.name, "classname": suite, "time": f"{_seconds(judgement):.6f}"}
     element = ElementTree.Element("testcase", names)
-    told = list(map(say, complaints(one)))
-    if tag := _ELEMENTS.get(one.verdict, "system-out" if told else None):
-        found = ElementTree.SubElement(element, tag)
-        if one.verdict in _ELEMENTS:
-            found.set("message", told[0] if told else "")
-        if one.verdict >= Verdict.WRONG:
-            found.set("type", one.verdict.name)
-        found.text = "\n".join(told)
+    lines = list(map(say, judgement.complaints))
+    if tag := _ELEMENTS.get(judgement.verdict, "system-out" if lines else None):
+        outcome = ElementTree.SubElement(element, tag)
+        if judgement.verdict in _ELEMENTS:
+            outcome.set("message", lines[0] if lines else "")
+        if judgement.verdict >= Verdict.WRONG:
+            outcome.set("type", judgement.verdict.name)
+        outcome.text = "\n".join(lines)
     return element

@@ -1,4 +1,4 @@
-"""What `verify` prints for `--list`, `--template`, `--export-cases` and `--self-test`."""
+"""The output of `--list`, `--template`, `--export-cases` and `--self-test`."""
 
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 def described(names: Sequence[str], say: Say) -> Iterator[str]:
-    """Yield a paragraph a task; of tasks that are named, every input and output.
+    """Yield a paragraph a task; of named tasks, every input and output.
 
     Raises:
-        ValueError: if there is no task of a name.
+        ValueError: if a name is unknown.
     """
     for name in names:
         if name not in TASKS:
@@ -34,8 +34,8 @@ def described(names: Sequence[str], say: Say) -> Iterator[str]:
 
 
 def _short(task: Task, say: Say) -> Iterator[str]:
-    yield f"{task.name}({', '.join(_name(one) for one in task.inputs)})"
-    returned = ", ".join(one.name for one in task.outputs)
+    yield f"{task.name}({', '.join(map(_name, task.inputs))})"
+    returned = ", ".join(field.name for field in task.outputs)
     about = Sentence(task.about, {}), sentence("Returns some of: {names}", names=returned)
     yield from paragraphs(about, say, "  ")
 
@@ -56,10 +56,10 @@ def _long(task: Task, say: Say) -> Iterator[str]:
 
 
 def starter(language: str, folder: Path, say: Say) -> list[str]:
-    """Write the files of a starter and return what to do next; nothing is overwritten.
+    """Write the files of a starter and return what to do next.
 
     Raises:
-        ValueError: if there is none in this language, or one of its files is there already.
+        ValueError: if the language is unknown, or a file exists already.
     """
     from ..templates import LANGUAGES, template
 
@@ -72,12 +72,13 @@ def starter(language: str, folder: Path, say: Say) -> list[str]:
             )))  # fmt: skip
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
-    known = LANGUAGES[language]
-    run = known.files[0] if language == "python" else f"-- {known.run}"
+    starter = LANGUAGES[language]
+    program = starter.files[0]
+    run = program if language == "python" else f"-- {starter.run}"
     steps = [
         sentence("Written: {files}", files=", ".join(texts)),
-        sentence("Put your code into {file}; delete what you do not have.", file=known.files[0]),
-        *([sentence("Build: {command}", command=known.build)] if known.build else []),
+        sentence("Put your code into {file}; delete what you do not have.", file=program),
+        *([sentence("Build: {command}", command=starter.build)] if starter.build else []),
         sentence("Then: {command}", command=f"plumbob verify {run}"),
     ]
     return paragraphs(steps, say)
@@ -87,7 +88,7 @@ def exported(folder: Path, tasks: Sequence[str], seed: int, thorough: bool, say:
     """Write cases into a folder and return what to do next.
 
     Raises:
-        ValueError: if the folder holds something else.
+        ValueError: if the folder holds other files.
     """
     count = export_cases(folder, None, tasks or None, seed, thorough)
     place = shlex.quote(str(folder))
@@ -100,18 +101,18 @@ def exported(folder: Path, tasks: Sequence[str], seed: int, thorough: bool, say:
 
 
 def self_test(trials: Iterable["Trial"], say: Say) -> Iterator[str]:
-    """Yield a line a family of solvers, then what did not pass, then the sum."""
+    """Yield a line a family of solvers, then the failed trials, then their number."""
     families: dict[str, list[Trial]] = {}
     for trial in trials:
         families.setdefault(trial.subject.family, []).append(trial)
     for family, members in families.items():
         yield say(_sum(family, members))
-    failed = [one for members in families.values() for one in members if not one.passed]
-    for one in failed:
+    failed = [trial for members in families.values() for trial in members if not trial.passed]
+    for trial in failed:
         yield say(sentence(
             "Not passed: {family}, {name}. Verdict {verdict}, laws broken: {laws}.",
-            family=one.subject.family, name=one.subject.name, verdict=one.verdict.name,
-            laws=", ".join(sorted(one.laws)) or "0",
+            family=trial.subject.family, name=trial.subject.name, verdict=trial.verdict.name,
+            laws=", ".join(sorted(trial.laws)) or "0",
         ))  # fmt: skip
     yield say(
         sentence("{n} of all did not pass.", n=len(failed))
@@ -123,11 +124,11 @@ def self_test(trials: Iterable["Trial"], say: Say) -> Iterator[str]:
 def _sum(family: str, members: list["Trial"]) -> Sentence:
     from ..self_test import HONEST  # which loads all engines
 
-    n, accused = len(members), sum(not one.passed for one in members)
+    n, accused = len(members), sum(not trial.passed for trial in members)
     if family == HONEST:
         return sentence("{n} honest solvers tried, {accused} accused.", n=n, accused=accused)
-    caught, named = sum(one.caught for one in members), sum(one.named for one in members)
     return sentence(
         "{family}: {n} faults planted, {caught} caught by a law, {named} named.",
-        family=family, n=n, caught=caught, named=named,
+        family=family, n=n, caught=sum(trial.caught for trial in members),
+        named=sum(trial.named for trial in members),
     )  # fmt: skip

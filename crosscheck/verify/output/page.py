@@ -1,4 +1,4 @@
-"""The result of `verify` as one page that needs nothing else, with the failing cases drawn."""
+"""The result of `verify` as a self-contained page, with the failing cases drawn."""
 
 from pathlib import Path
 from typing import Any
@@ -10,10 +10,9 @@ from ..judgement import Report, TaskReport
 from ..sentence import Sentence, sentence
 from ..task import TASKS
 from . import BASE_STYLE, comparison, drawing, words
-from .geometry import scene
-from .words import Presentation, Say
+from .words import Presentation
 
-_HERE = Path(__file__).parent
+_FOLDER = Path(__file__).parent
 _ROWS = 8
 WORDS = {
     "heading": sentence("Verdict on your solver"),
@@ -34,9 +33,16 @@ WORDS = {
 
 
 def render(report: Report, context: Presentation) -> str:
-    """Return the page; nothing that a solver says stands in it unescaped."""
-    return _environment(context.say).get_template("page.html").render(
-        style=Markup(BASE_STYLE + (_HERE / "page.css").read_text(encoding="utf-8")),
+    """Return the page, all texts of the solver escaped."""
+    environment = Environment(
+        loader=FileSystemLoader(_FOLDER), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters |= {
+        "say": context.say, "numbers": comparison.texts, "digits": words.digits,
+    }  # fmt: skip
+    return environment.get_template("page.html").render(
+        style=Markup(BASE_STYLE + (_FOLDER / "page.css").read_text(encoding="utf-8")),
         language={"zh": "zh-CN"}.get(context.language, context.language),
         words=WORDS,
         verdicts=words.VERDICTS,
@@ -44,25 +50,24 @@ def render(report: Report, context: Presentation) -> str:
         advice=words.advice(report.tasks),
         remarks=list(words.remarks(report)),
         tasks=[_task(task, context) for task in report.tasks],
-    )  # fmt: skip
-
-
-def _environment(say: Say) -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    environment.filters |= {"say": say, "numbers": comparison.written, "digits": words.digits,
-                            "complaints": words.complaints}  # fmt: skip
-    return environment
+    )
 
 
 def _task(task: TaskReport, context: Presentation) -> dict[str, Any]:
-    """Return a task's report and all that the page says of it."""
-    failure = task.smallest_failure
-    drawn = scene(failure) if failure else None
-    larger, factor = drawing.magnified(drawn) if drawn else (None, 1.0)
-    in_metres = task.task != "mass_spring_forces"
+    """Return the fields of a task's section."""
+    failure, picture, caption = task.smallest_failure, None, None
+    if failure and (shapes := comparison.drawing_of(failure)):
+        larger, factor = drawing.magnified(shapes)
+        picture = drawing.svg(larger, words.title(task))
+        gap = drawing.distance(shapes)
+        if gap is not None and task.task != "mass_spring_forces":  # arrows have no lengths
+            caption = sentence(
+                "They are {distance:.2g} m apart at most."
+                if factor == 1.0
+                else "They are {distance:.2g} m apart at most, drawn {factor:,.0f} times larger.",
+                distance=gap,
+                factor=factor,
+            )
     return {
         "report": task,
         "title": words.title(task),
@@ -71,20 +76,8 @@ def _task(task: TaskReport, context: Presentation) -> dict[str, Any]:
         "speed": words.speed(task, context.say),
         "explanations": list(words.explanations(task)),
         "failure": failure,
-        "drawing": drawing.svg(larger, words.title(task)) if larger else None,
-        "apart": _apart(drawing.apart(drawn), factor) if drawn and in_metres else None,
+        "drawing": picture,
+        "apart": caption,
         "rows": comparison.rows(failure, _ROWS) if failure else [],
         "command": context.command(task),
     }
-
-
-def _apart(distance: float | None, factor: float) -> Sentence | None:
-    if distance is None:
-        return None
-    if factor == 1.0:
-        return sentence("They are {distance:.2g} m apart at most.", distance=distance)
-    return sentence(
-        "They are {distance:.2g} m apart at most, drawn {factor:,.0f} times larger.",
-        distance=distance,
-        factor=factor,
-    )

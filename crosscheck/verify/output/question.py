@@ -1,6 +1,6 @@
-"""Which solver a command line means, and what it is asked."""
+"""The solver and the cases that a command line names."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -10,15 +10,11 @@ from ..judgement import Report
 from ..sentence import sentence
 from ..solvers import LIMITS, ProcessLimits, open_contestant
 from ..solvers.files import FileContestant
-from ..verify import DISCIPLINES, judge_cases, verify
+from ..verify import DISCIPLINES, Notify, judge_cases, verify
 from . import saved
 from .words import Say
 
-# Told the task, the number of cases done, and of all, before each case.
-Notify = Callable[[str, int, int], None]
-
-
-# What stands before a program, and before a folder of answers.
+# The words before a program, and before a folder of answers.
 PROGRAM, ANSWERS = "--", "--answers"
 
 
@@ -26,30 +22,30 @@ def limits(seconds: float | None, mebibytes: int | None) -> ProcessLimits:
     """Return the limits of a program; the first request of a task may take longer, to compile.
 
     Raises:
-        ValueError: if the time is none.
+        ValueError: if the time is not positive.
     """
     if seconds is not None and not 0.0 < seconds < float("inf"):
         raise ValueError(f"time-limit: expected seconds above 0, got {seconds}")
-    chosen = LIMITS if mebibytes is None else LIMITS._replace(memory=mebibytes << 20)
+    limits = LIMITS if mebibytes is None else LIMITS._replace(memory=mebibytes << 20)
     if seconds is None:
-        return chosen
-    return chosen._replace(request=seconds, first=max(seconds, chosen.first))
+        return limits
+    return limits._replace(request=seconds, first=max(seconds, limits.first))
 
 
-def opened(words: Sequence[str], chosen: ProcessLimits, say: Say) -> Contestant:
-    """Return the solver behind its door.
+def opened(words: Sequence[str], limits: ProcessLimits, say: Say) -> Contestant:
+    """Return the solver that words name.
 
     Args:
-        words: a Python file, module:object or the like; or "--", a program, its arguments; or
-            "--answers" and a folder.
-        chosen: what it may take.
-        say: for what is wrong with the words.
+        words: a Python file or module:object; or "--", a program and its arguments; or "--answers"
+            and a folder.
+        limits: of its time and memory.
+        say: translates errors.
 
     Raises:
         ValueError: if the words name no solver.
     """
     if words[:1] == [PROGRAM] and len(words) > 1:
-        return open_contestant(words[1:], chosen)
+        return open_contestant(words[1:], limits)
     if words[:1] == [ANSWERS] and len(words) > 2:
         raise ValueError(say(sentence(
             "answers: expected a folder in place of a solver, got {solver} as well",
@@ -68,27 +64,27 @@ def opened(words: Sequence[str], chosen: ProcessLimits, say: Say) -> Contestant:
             "stands behind --, as in plumbob verify -- {program}",
             count=len(words), program=" ".join(words),
         )))  # fmt: skip
-    return open_contestant(words[0], chosen)
+    return open_contestant(words[0], limits)
 
 
 class Question(NamedTuple):
-    """Which cases to ask."""
+    """The cases to ask; arguments as of `verify`."""
 
-    tasks: tuple[str, ...] = ()  # only these, () for all that the solver offers
-    rerun: Path | None = None  # a saved failing case, which is then all that is asked
-    thorough: bool = False  # thorough, seed: as of `plumbob.crosscheck.verify.verify`
+    tasks: tuple[str, ...] = ()  # () for all that the solver offers
+    rerun: Path | None = None  # a saved failing case, then the only one
+    thorough: bool = False
     seed: int = 0
 
 
 def suited(question: Question, contestant: Contestant) -> Question:
-    """Return the question with the cases that were exported, where answers are files."""
+    """Return the question about the exported cases if the answers are files."""
     if isinstance(contestant, FileContestant):
         return question._replace(seed=contestant.seed, thorough=contestant.thorough)
     return question
 
 
 def ask(contestant: Contestant, question: Question, notify: Notify) -> Report:
-    """Return what was found; the solver is ended then, whatever happens."""
+    """Return the report, and end the solver."""
     try:
         report = _report(contestant, question, notify)
     finally:
@@ -99,11 +95,10 @@ def ask(contestant: Contestant, question: Question, notify: Notify) -> Report:
 def _report(contestant: Contestant, question: Question, notify: Notify) -> Report:
     if question.rerun is None:
         return verify(contestant, question.tasks or None, question.seed, question.thorough, notify)
-    one = saved.load(question.rerun)
-    greeting = contestant.greeting
-    if one.task not in greeting.tasks or one.task not in DISCIPLINES:
-        raise ValueError(f"--rerun: the solver does not offer the task {one.task!r}")
-    cases = DISCIPLINES[one.task].cases(greeting, one.method, one.seed, one.thorough)
-    wanted = saved.cases_of(one, cases)
-    judged = judge_cases(contestant, one.task, one.method, wanted, notify)
-    return Report(greeting, [judged], one.seed)
+    case, greeting = saved.load(question.rerun), contestant.greeting
+    if case.task not in greeting.tasks or case.task not in DISCIPLINES:
+        raise ValueError(f"--rerun: the solver does not offer the task {case.task!r}")
+    cases = DISCIPLINES[case.task].cases(greeting, case.method, case.seed, case.thorough)
+    cases = saved.cases_of(case, cases)
+    report = judge_cases(contestant, case.task, case.method, cases, notify)
+    return Report(greeting, [report], case.seed)

@@ -1,7 +1,7 @@
 """Failing cases as files that `--rerun` asks again.
 
-A case is made anew from its name and the seed: laws may need more of it than a file can hold. The
-request stands in the file as the solver got it, with the answer and the reference's, for a reader.
+A case is generated again from its name and the seed: laws need more of it than a file can hold. The
+file also holds the request, the answer and the reference's answer for a reader.
 """
 
 import re
@@ -21,14 +21,14 @@ from ..message import plain
 from ..sentence import Sentence, sentence
 
 FORMAT, VERSION = "plumbob failing case", 1
-# A case with the longest answer that is read, written anew with indentation, has fewer bytes.
+# A case with the longest answer that is read, with indentation, has fewer bytes.
 _LARGEST = 1 << 28
 
 
-class Saved(msgspec.Struct, frozen=True):
-    """What finds a case again: its task, method, seed and name, and which list it is from.
+class SavedCase(msgspec.Struct, frozen=True):
+    """The task, method, seed, name and list of a case, which identify it.
 
-    The request, the answer and what was expected stand beside it to be read.
+    The request, the answer and the expected answer are there for a reader.
     """
 
     task: str
@@ -45,14 +45,14 @@ class Saved(msgspec.Struct, frozen=True):
 
 
 def save(report: TaskReport, folder: Path, seed: int, thorough: bool) -> Path | None:
-    """Write the smallest failing case into a folder and return where, or None if there is none."""
+    """Write the smallest failing case into a folder; return its path, None if no case fails."""
     failure = report.smallest_failure
     if failure is None:
         return None
     folder.mkdir(parents=True, exist_ok=True)
     name = re.sub(r"[^A-Za-z0-9_]+", "-", f"{report.task} {report.method}").strip("-")[:100]
     case, answer = failure.case, failure.answer
-    content = Saved(
+    content = SavedCase(
         report.task, report.method, seed, thorough, case.name, FORMAT, VERSION, str(case.about),
         {"id": 1, "task": report.task, **case.inputs},
         answer.values if isinstance(answer, Answer) else {"error": str(answer.sentence)},
@@ -64,26 +64,26 @@ def save(report: TaskReport, folder: Path, seed: int, thorough: bool) -> Path | 
     return path
 
 
-def load(path: Path) -> Saved:
-    """Return what was saved.
+def load(path: Path) -> SavedCase:
+    """Return the case in a file.
 
     Raises:
-        ValueError: if the file holds something else or cannot be read.
+        ValueError: if the file holds no saved case or cannot be read.
     """
     try:
-        found = msgspec.json.decode(read_bytes(path, largest=_LARGEST), type=Saved)
+        saved = msgspec.json.decode(read_bytes(path, largest=_LARGEST), type=SavedCase)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
-        found = None
-    if found is None or found.format != FORMAT or found.version != VERSION:
+        saved = None
+    if saved is None or saved.format != FORMAT or saved.version != VERSION:
         raise ValueError(f"--rerun: expected a case that verify saved, got {path}")
-    return found
+    return saved
 
 
-def cases_of(saved: Saved, cases: Sequence[Case]) -> list[Case]:
-    """Return a saved case among those of its task, after those that it follows or refers to.
+def cases_of(saved: SavedCase, cases: Sequence[Case]) -> list[Case]:
+    """Return a saved case among those of its task, after the cases that it refers to.
 
     Raises:
-        ValueError: if there is none of its name.
+        ValueError: if no case has its name.
     """
     by_name = {case.name: case for case in cases}
     if saved.name not in by_name:
@@ -91,19 +91,19 @@ def cases_of(saved: Saved, cases: Sequence[Case]) -> list[Case]:
             f"--rerun: the case {saved.name!r} of {saved.task} is not asked of this solver any "
             "more: run verify without --rerun"
         )
-    wanted = {saved.name}
-    while more := {name for one in wanted for name in _mentioned(by_name[one], by_name)} - wanted:
-        wanted |= more
-    return [case for case in cases if case.name in wanted]
-
-
-def _mentioned(case: Case, by_name: dict[str, Case]) -> set[str]:
-    facts = [fact for fact in case.facts.values() if isinstance(fact, str)]
-    return {name for name in (case.follows, *facts) if name in by_name}
+    needed, queue = set[str](), [saved.name]
+    while queue:
+        case = by_name[queue.pop()]
+        needed.add(case.name)
+        references = [
+            fact for fact in (case.follows, *case.facts.values()) if isinstance(fact, str)
+        ]
+        queue += [name for name in references if name in by_name and name not in needed]
+    return [case for case in cases if case.name in needed]
 
 
 def command(solver: Sequence[str], path: Path) -> Sentence:
-    """Return what asks a saved case again, as a shell takes it."""
+    """Return the shell command that asks a saved case again."""
     return sentence(
         "plumbob verify --rerun {path} {solver}",
         path=shlex.quote(str(path)),

@@ -1,10 +1,9 @@
-"""What the terminal, the files and the page of `verify` have in common: verdicts in words."""
+"""What the terminal, the files and the page of `verify` share: verdicts in words."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from ..contestant import Answer
 from ..judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
 from ..language import translator
 from ..sentence import Sentence, sentence, visible
@@ -22,24 +21,24 @@ VERDICTS = {
 
 
 class Presentation(NamedTuple):
-    """What is shown besides a report."""
+    """The language, the command line and the saved cases."""
 
-    say: Say  # puts sentences into words of the language
+    say: Say  # translates a sentence
     language: str  # a key of LANGUAGES
-    solver: Sequence[str]  # as it stands on the command line
-    # where the smallest failing case of a task and method is saved
+    solver: Sequence[str]  # its words on the command line
+    # the file of the smallest failing case of a task and method
     files: Mapping[tuple[str, str], Path] = {}
 
     def command(self, task: TaskReport) -> Sentence | None:
-        """Return what asks the saved case of a task again, None if there is none."""
+        """Return the command that asks the saved case of a task again, None if there is none."""
         path = self.files.get((task.task, task.method))
         return saved.command(self.solver, path) if path else None
 
 
 def speaker(language: str) -> Say:
-    """Return what puts a sentence into words of a language, on one line, all of it printable."""
+    """Return a function that translates a sentence to one line of printable text."""
     translate = translator(language)
-    return lambda one: visible(one.text(translate))
+    return lambda words: visible(words.text(translate))
 
 
 def title(report: TaskReport) -> str:
@@ -48,17 +47,18 @@ def title(report: TaskReport) -> str:
 
 
 def passed(report: TaskReport) -> str:
-    """Return how many cases of all are right, or right but for what is said."""
-    return f"{sum(one.verdict in GOOD for one in report.judgements)}/{len(report.judgements)}"
+    """Return the number of cases that are RIGHT or RIGHT BUT, and of all."""
+    count = sum(judgement.verdict in GOOD for judgement in report.judgements)
+    return f"{count}/{len(report.judgements)}"
 
 
-def digits(judged: TaskReport | CaseJudgement) -> str:
-    """Return how many digits are correct, a dash where that says nothing."""
-    return "–" if judged.digits is None else f"{judged.digits:.1f}"
+def digits(subject: TaskReport | CaseJudgement) -> str:
+    """Return the number of correct digits, a dash if it cannot be counted."""
+    return "–" if subject.digits is None else f"{subject.digits:.1f}"
 
 
 def speed(report: TaskReport, say: Say) -> str:
-    """Return the time of a solver beside the reference's, a dash if that is not measured."""
+    """Return the speed of a solver relative to the reference, a dash if it is not measured."""
     if report.untimed:
         return say(sentence("not timed"))
     if report.slowdown is None:
@@ -67,23 +67,22 @@ def speed(report: TaskReport, say: Say) -> str:
     times = f"{rate:,.0f}" if rate >= 9.95 else f"{rate:.1f}"
     if rate < 1.05:
         return say(sentence("as fast"))
-    if report.slowdown > 1.0:
-        return say(sentence("{times} x slower", times=times))
-    return say(sentence("{times} x faster", times=times))
+    is_slower = report.slowdown > 1.0
+    return say(sentence("{times} x slower" if is_slower else "{times} x faster", times=times))
 
 
 def introduction(report: Report) -> Sentence:
-    """Return who is judged: its name, version, language and precision, if that is so."""
+    """Return the solver's name, version and language, and its precision if it is as declared."""
     greeting = report.greeting
-    words = " ".join(filter(None, (greeting.name, greeting.version)))
+    name = " ".join(filter(None, (greeting.name, greeting.version)))
     language = sentence(", {language}", language=greeting.language) if greeting.language else ""
     if any(task.precision for task in report.tasks):
-        return sentence("{name}{language}", name=words, language=language)
+        return sentence("{name}{language}", name=name, language=language)
     return sentence(
         "{name}{language}, single precision"
         if greeting.precision == "single"
         else "{name}{language}, double precision",
-        name=words,
+        name=name,
         language=language,
     )
 
@@ -99,31 +98,23 @@ def remarks(report: Report) -> Iterator[Sentence]:
     yield from report.remarks
 
 
-def complaints(judgement: CaseJudgement) -> list[Sentence]:
-    """Return what is wrong with an answer, the worst first; nothing where it is right."""
-    if not isinstance(judgement.answer, Answer):
-        return [judgement.answer.sentence]
-    found = [one for one in judgement.findings if one.verdict is not Verdict.RIGHT]
-    return [one.sentence for one in sorted(found, key=lambda one: -one.verdict)]
-
-
 def explanations(report: TaskReport) -> Iterator[Sentence]:
-    """Yield why answers are wrong, nearest first, and what the solver behaves like."""
-    for one in report.diagnosis.explanations:
+    """Yield explanations of wrong answers, nearest first, then the inferred behaviour and hints."""
+    diagnosis = report.diagnosis
+    for explanation in diagnosis.explanations:
         yield sentence(
             "{what} (explains {share:.0%} of the answers compared)"
-            if one.share >= LEAST_SHARE
+            if explanation.share >= LEAST_SHARE
             else "The nearest known mistake explains only {share:.0%} of the answers: {what}",
-            what=one.sentence,
-            share=one.share,
+            what=explanation.sentence,
+            share=explanation.share,
         )
-    found = report.diagnosis
-    yield from filter(None, (found.first_broken, found.behaviour, *found.hints))
+    yield from filter(None, (diagnosis.first_broken, diagnosis.behaviour, *diagnosis.hints))
 
 
 def advice(tasks: Sequence[TaskReport]) -> Sentence:
     """Return what to do next."""
-    bad = [one for one in tasks if one.verdict not in GOOD]
+    bad = [task for task in tasks if task.verdict not in GOOD]
     if not bad:
         return sentence(
             "Next: --junit FILE for your CI, plumbob.testing for your pytest, --thorough for "

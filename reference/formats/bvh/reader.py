@@ -1,19 +1,22 @@
 """Read BVH files."""
 
+import contextlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ... import arguments
+from ... import arguments, rotation
 from ...arguments import LARGEST_COORDINATE, FloatArray, frozen
+from ...articulation import Articulation
+from ...kinematics import forward_kinematics
 from ...quaternion import IDENTITY, multiply
-from ...skeleton import Skeleton
+from ...skeleton import Pose, Skeleton, checked_skeleton
 from ..robot import MOST_JOINTS, ORIGIN
 from ..source import read_text, warn
-from .motion import Motion
 
 # Frames times joints, so that a motion needs at most about a gigabyte.
 MOST_POSES = 20_000_000
@@ -25,13 +28,36 @@ LINE = re.compile(r"\S[^\n]*")
 BRACES = re.compile(r"([{}])")
 
 
+class Motion(NamedTuple):
+    """A skeleton and its poses over time; `bvh.write(path, *motion)` writes it to a file."""
+
+    skeleton: Skeleton  # the offset of its root is the root's position in the first frame
+    local_rotations: FloatArray  # (frame, joint, 4)
+    frame_time: float  # time between frames [s]
+    # each joint's position in its parent's frame, for the root in the world, (frame, joint, 3);
+    # equal to the skeleton's offsets for joints without position channels
+    offsets: FloatArray
+
+    def pose(self) -> Pose:
+        """Return the global poses of all joints, with frames as the leading axis.
+
+        Without position channels it equals `forward_kinematics(skeleton, local_rotations)`. Raise a
+        ValueError if the skeleton is none, or the rotations or offsets are not its own.
+        """
+        skeleton = checked_skeleton(self.skeleton)
+        count = skeleton.joint_count
+        R = arguments.array("local_rotations", self.local_rotations, "frame", count, 4)
+        x = arguments.array("offsets", self.offsets, len(R), count, 3)
+        centred = Skeleton(skeleton.parents, np.zeros_like(skeleton.offsets))
+        q = np.concatenate([x, rotation.unit("local_rotations", R)], axis=-1)
+        return forward_kinematics(Articulation(centred, "free"), q.reshape(len(q), 7 * count))
+
+
 def read(path: str | Path) -> Motion:
     """Return the motion in a file.
 
     A single frame beyond the count in the file, as some programs write, is dropped with a warning.
-
-    Raises:
-        ValueError: if it cannot be read or is not a BVH file; names the file and the line.
+    Raise a ValueError if it cannot be read or is not a BVH file; names the file and the line.
     """
     return _motion(read_text(path), str(path))
 
@@ -74,11 +100,11 @@ class _Lines:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.found = LINE.finditer(text)
+        self.matches = LINE.finditer(text)
         self.position = 0
 
     def __iter__(self) -> Iterator[str]:
-        for line in self.found:
+        for line in self.matches:
             self.position = line.start()
             yield line[0].rstrip()
         self.position = len(self.text)
@@ -113,7 +139,7 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
 
 
 class _Tree:
-    """The joints read so far, and the path of those whose braces are open."""
+    """The joints read so far, and the path of joints with open braces."""
 
     def __init__(self) -> None:
         self.joints: list[_Joint] = []
@@ -134,12 +160,19 @@ class _Tree:
             self.open(word, *rest)
         elif word in ("OFFSET", "CHANNELS", "}") and self.path:
             joint = self.joints[self.path[-1]]
-            {"OFFSET": _set_offset, "CHANNELS": _set_channels, "}": self.close}[word](joint, *rest)
+            if word == "}":
+                self.close(joint)
+            elif word == "CHANNELS":
+                _set_channels(joint, *rest)
+            elif joint.offset:
+                raise ValueError(f"expected one OFFSET in {joint.name!r:.40}, got two")
+            else:
+                joint.offset = tuple(_numbers(" ".join(rest), 3))
         else:
             raise ValueError(f"expected a joint or what belongs to one, got {piece!r:.40}")
 
     def open(self, word: str, name: str = "") -> None:
-        """Start a joint or an end site, whose opening brace must follow."""
+        """Start a joint or an end site; its opening brace must follow."""
         if (word == "ROOT") == bool(self.joints) or (word != "ROOT" and not self.path):
             raise ValueError(f"expected one ROOT and all joints in it, got {word} {name!r:.40}")
         parent = self.path[-1] if self.path else -1
@@ -164,26 +197,20 @@ class _Tree:
             self.names.remove(self.joints.pop().name)
 
     def check_complete(self) -> None:
-        """Raise a ValueError if there is no joint or one is still open."""
+        """Raise a ValueError if there is no joint or a joint is still open."""
         if self.path or not self.joints:
             got = f"{self.joints[self.path[-1]].name!r:.40} still open" if self.path else "none"
             raise ValueError(f"expected complete joints before MOTION, got {got}")
 
 
-def _set_offset(joint: _Joint, rest: str = "") -> None:
-    if joint.offset:
-        raise ValueError(f"expected one OFFSET in {joint.name!r:.40}, got two")
-    joint.offset = tuple(_numbers(rest, 3))
-
-
-def _set_channels(joint: _Joint, rest: str = "") -> None:
-    count, *names = rest.split(maxsplit=7) or [""]
-    found = [CHANNEL.fullmatch(name) for name in names]
-    channels = [("XYZ".index(m[1].upper()), m[2].upper() == "ROTATION") for m in found if m]
+def _set_channels(joint: _Joint, text: str = "") -> None:
+    count, *names = text.split(maxsplit=7) or [""]
+    matches = filter(None, map(CHANNEL.fullmatch, names))
+    channels = [("XYZ".index(m[1].upper()), m[2].upper() == "ROTATION") for m in matches]
     if joint.is_end or joint.channels is not None:
-        raise ValueError(f"expected CHANNELS once, and in joints only, got {rest!r:.40}")
+        raise ValueError(f"expected CHANNELS once, and in joints only, got {text!r:.40}")
     if not COUNT.fullmatch(count) or not int(count) == len(names) == len(set(channels)):
-        raise ValueError(f"expected a count and so many different channels, got {rest!r:.80}")
+        raise ValueError(f"expected a count and so many different channels, got {text!r:.80}")
     joint.channels = tuple(channels)
 
 
@@ -226,17 +253,13 @@ def _extra_frame(lines: _Lines, values: FloatArray) -> int:
     count, width = values.shape
     line = next(iter(lines), "")
     number = lines.number
-    follows = next(iter(lines), "") if line and _is_frame(line, width) else line
+    follows = line
+    with contextlib.suppress(ValueError):
+        if line and len(_numbers(line, width)) == width > 0:
+            follows = next(iter(lines), "")
     if follows:
         raise ValueError(f"expected the end after {count:,} frames, got {follows!r:.40}")
     return number if line else 0
-
-
-def _is_frame(line: str, width: int) -> bool:
-    try:
-        return len(_numbers(line, width)) == width > 0
-    except ValueError:
-        return False
 
 
 def _after(title: str, lines: _Lines) -> str:
@@ -256,16 +279,12 @@ def _poses(joints: list[_Joint], values: FloatArray) -> tuple[FloatArray, FloatA
         R = IDENTITY
         for axis, is_rotation in joint.channels or ():
             if is_rotation:
-                R = multiply(R, _rotation_about(axis, np.radians(next(columns))))
+                vector: list[Any] = [0.0, 0.0, 0.0]
+                half = 0.5 * np.radians(next(columns))
+                vector[axis] = np.sin(half)
+                R = multiply(R, (np.cos(half), *vector))
             else:
                 offsets[:, j, axis] = next(columns)
         for part in range(4):
             rotations[:, j, part] = R[part]
     return offsets, rotations
-
-
-def _rotation_about(axis: int, angle: FloatArray) -> Sequence[FloatArray | float]:
-    """Return the rotations by angles [rad] about one of the axes x, y, z."""
-    vector: list[FloatArray | float] = [0.0, 0.0, 0.0]
-    vector[axis] = np.sin(0.5 * angle)
-    return (np.cos(0.5 * angle), *vector)

@@ -162,10 +162,10 @@ def _end_sites(skeleton: Skeleton, R: FloatArray, shifts: np.ndarray) -> set[int
     children = _children(skeleton)
     for siblings in children:
         j = siblings[0] if len(siblings) == 1 else 0
-        named = skeleton.names[j] == f"{skeleton.names[skeleton.parents[j]]} end"
+        is_named = skeleton.names[j] == f"{skeleton.names[skeleton.parents[j]]} end"
         distinct = np.round(skeleton.offsets[j], DECIMALS).any()
         fixed = not shifts[j] and (np.abs(R[:, j, 0]) == 1.0).all()
-        if named and distinct and fixed and not children[j]:
+        if is_named and distinct and fixed and not children[j]:
             ends.add(j)
     return ends
 

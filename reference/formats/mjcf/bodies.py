@@ -9,7 +9,7 @@ from ...quaternion import exponential, rotate, scale, subtract
 from ..robot import INFINITY, ORIGIN, Link, Robot, Vector, assemble
 from ..source import warn
 from ..xml import Element
-from .settings import Settings, Transform, direction, one_of, settings
+from .settings import CompilerSettings, Transform, direction, one_of, settings
 
 KINDS = ("hinge", "slide", "ball", "free")
 GENERATORS = ("replicate", "attach", "composite", "flexcomp")
@@ -43,17 +43,17 @@ def robot(root: Element, origin: str) -> Robot:
     tree = _Tree(settings(root))
     for world in root.named("worldbody"):
         tree.add_world(world)
-    found = assemble(origin, tree.links, tree.joints)
-    home = np.array(found.home)
+    robot = assemble(origin, tree.links, tree.joints)
+    home = np.array(robot.home)
     for joint, coordinates in tree.homes.items():
-        home[found.articulation.coordinates_of(joint)] = coordinates
-    return found._replace(home=frozen(home))
+        home[robot.articulation.coordinates_of(joint)] = coordinates
+    return robot._replace(home=frozen(home))
 
 
 class _Tree:
     """The links read so far, the file's joints by name, and the home coordinates of each."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: CompilerSettings) -> None:
         self.settings = settings
         self.links = [Link("world", -1)]
         self.bodies = {"world"}
@@ -80,16 +80,18 @@ class _Tree:
         self.bodies.add(name)
         pose = part.frame.compose(self.settings.transform(body))
         inherited = self.settings.class_of(body, "childclass", part.inherited)
-        found, bodies = self.parts(_Part(body, Transform(), inherited))
-        joints = [self.joint(child, index) for index, child in enumerate(found)]
-        _check_free(body, joints, parent)
-        for number, (joint, child) in enumerate(zip(joints, found, strict=True), len(self.links)):
-            self.record(child.element, joint, f"{name}/{joint.label}", number, pose)
+        tags, bodies = self.parts(_Part(body, Transform(), inherited))
+        joints = [self.joint(tag, index) for index, tag in enumerate(tags)]
+        is_free = any(joint.kind == "free" for joint in joints)
+        if is_free and (len(joints) > 1 or parent != 0):
+            raise body.error("expected a single free joint, in a body of the world")
+        for number, (joint, tag) in enumerate(zip(joints, tags, strict=True), len(self.links)):
+            self.record(tag.element, joint, f"{name}/{joint.label}", number, pose)
         self.links += _chain(name, parent, len(self.links), pose, joints)
         return bodies
 
     def parts(self, body: _Part) -> tuple[list[_Part], list[_Part]]:
-        """Return the joints and the child bodies of a body, those inside frames included."""
+        """Return the joints and the child bodies of a body, also inside frames."""
         joints, bodies = [], []
         waiting = [body._replace(element=child) for child in reversed(body.element.children)]
         while waiting:
@@ -119,7 +121,11 @@ class _Tree:
             kind = one_of(element, "type", KINDS, "hinge")
         label = part.element.word("name", f"{kind}{index + 1}")
         if kind == "free":
-            self.check_aligned(element)
+            align = one_of(element, "align", ("true", "false", "auto"), "auto")
+            if align == "true" or (align == "auto" and self.settings.alignfree):
+                raise element.error(
+                    "expected a free joint that is not aligned with the body's inertia"
+                )
             return _Joint(label, kind)
         anchor = frame.apply(element.numbers("pos", ORIGIN))
         angle = 1.0 if kind == "slide" else self.settings.angle
@@ -139,16 +145,10 @@ class _Tree:
         if limited == "false" or (limited == "auto" and lower >= upper):
             return -INFINITY, INFINITY
         if lower >= upper or (kind == "ball" and lower != 0.0):
-            least = "0" if kind == "ball" else "the least"
+            lowest = "0" if kind == "ball" else "the least"
             bounds = " to ".join(distinct_texts(lower, upper))
-            raise joint.error(f"expected a range from {least} up, got {bounds}")
+            raise joint.error(f"expected a range from {lowest} up, got {bounds}")
         return lower, upper
-
-    def check_aligned(self, joint: Element) -> None:
-        """Refuse a free body whose frame depends on its inertia, which is not read."""
-        align = one_of(joint, "align", ("true", "false", "auto"), "auto")
-        if align == "true" or (align == "auto" and self.settings.alignfree):
-            raise joint.error("expected a free joint that is not aligned with the body's inertia")
 
     def record(
         self, element: Element, joint: _Joint, path: str, number: int, pose: Transform
@@ -164,15 +164,10 @@ class _Tree:
             self.homes[number] = (joint.ref,)
 
 
-def _check_free(body: Element, joints: list[_Joint], parent: int) -> None:
-    if any(joint.kind == "free" for joint in joints) and (len(joints) > 1 or parent != 0):
-        raise body.error("expected a single free joint, in a body of the world")
-
-
 def _chain(
     name: str, parent: int, number: int, pose: Transform, joints: list[_Joint]
 ) -> list[Link]:
-    """Return the links of a body; the last one has the name and the pose of the body.
+    """Return the links of a body; the last has the name and the pose of the body.
 
     The frames of the links are at the anchors of the joints. The file states the anchors in the
     body's frame for zero coordinates, and the joints act in the order of the file.
@@ -185,16 +180,12 @@ def _chain(
         if kind != "slide":
             pose = Transform(pose.apply(subtract(next_anchor, anchor)), pose.R)
             anchor = next_anchor
-        x, R = pose.compose(_displacement(kind, axis, -ref))
+        shift = scale(-ref, axis)
+        x, R = pose.compose(
+            Transform(R=exponential(shift)) if kind == "hinge" else Transform(shift)
+        )
         links.append(Link(f"{name}/{label}", parent, x, R, kind, axis, *limits))
         parent, pose = number + len(links) - 1, Transform()
     if links and anchor == ORIGIN:
         return [*links[:-1], links[-1]._replace(name=name)]
     return [*links, Link(name, parent, pose.apply(scale(-1.0, anchor)), pose.R)]
-
-
-def _displacement(kind: str, axis: Vector, q: float) -> Transform:
-    """Return the pose of a hinge or a slide at q; of a ball the identity."""
-    if kind == "hinge":
-        return Transform(ORIGIN, exponential(scale(q, axis)))
-    return Transform(scale(q, axis)) if kind == "slide" else Transform()

@@ -1,17 +1,9 @@
 """Replace each <include> of an MJCF file by the content of the included file."""
 
 from pathlib import Path
-from typing import NamedTuple
 
 from .. import xml
 from ..xml import Element
-
-
-class _Folders(NamedTuple):
-    """The folder of the main file, and the folder that must contain all included files."""
-
-    main: Path
-    top: Path
 
 
 def include_files(root: Element, path: Path, top: str | Path | None) -> None:
@@ -22,21 +14,21 @@ def include_files(root: Element, path: Path, top: str | Path | None) -> None:
     folder is a ValueError, as is a folder that does not contain the main file.
     """
     main = path.resolve()
-    folders = _Folders(main.parent, main.parent if top is None else _checked_top(main, top))
-    seen = {main}
+    folder = main.parent if top is None else _checked_top(main, top)
+    files = {main}
     waiting = [(root, main)]
     while waiting:
         element, file = waiting.pop()
-        found = [(child, file) for child in reversed(element.children)]
+        children = [(child, file) for child in reversed(element.children)]
         element.children.clear()
-        while found:
-            child, file = found.pop()
+        while children:
+            child, file = children.pop()
             if child.tag == "include":
-                included = _included(child, file, folders)
-                if included in seen:
+                included = _included(child, file, main.parent, folder)
+                if included in files:
                     raise child.error("expected every file to be included once, got it again")
-                seen.add(included)
-                found += [(part, included) for part in reversed(xml.read(included).children)]
+                files.add(included)
+                children += [(part, included) for part in reversed(xml.read(included).children)]
             else:
                 element.children.append(child)
                 waiting.append((child, file))
@@ -50,26 +42,23 @@ def refuse_includes(root: Element) -> None:
 
 
 def _checked_top(main: Path, top: str | Path) -> Path:
-    found = _resolved(Path(top)) if isinstance(top, str | Path) else None
-    if found is None or not (found.is_dir() and main.is_relative_to(found)):
+    folder = _resolved(Path(top)) if isinstance(top, str | Path) else None
+    if folder is None or not (folder.is_dir() and main.is_relative_to(folder)):
         raise ValueError(f"root: expected a folder that holds {main.name!r:.80}, got {top!r:.80}")
-    return found
+    return folder
 
 
-def _included(include: Element, file: Path, folders: _Folders) -> Path:
-    """Return the included file, relative to the main file or else to the including one."""
+def _included(include: Element, file: Path, main_folder: Path, top: Path) -> Path:
+    """Return the included file, relative to the main file or else to the including file."""
     name = include.word("file")
-    found = [_resolved(folder / name) for folder in (folders.main, file.parent)]
-    possible = [path for path in found if path is not None]
-    inside = [path for path in possible if path.is_relative_to(folders.top)]
+    paths = [path for base in (main_folder, file.parent) if (path := _resolved(base / name))]
+    inside = [path for path in paths if path.is_relative_to(top)]
     for path in inside:
         if path.is_file():
             return path
-    outside = possible and not inside
-    fault = "outside; root= names a wider folder" if outside else "not there"
-    raise include.error(
-        f"expected a file in {folders.top.name!r:.60}, got {name!r:.80}, which is {fault}"
-    )
+    is_outside = paths and not inside
+    fault = "outside; root= names a wider folder" if is_outside else "not there"
+    raise include.error(f"expected a file in {top.name!r:.60}, got {name!r:.80}, which is {fault}")
 
 
 def _resolved(path: Path) -> Path | None:

@@ -1,6 +1,6 @@
 """The compiler settings and default classes of an MJCF file, applied to poses and joints.
 
-What the file may not have is a ValueError that names the location, the element and the problem.
+Errors are a ValueError that names the location, the element and the problem.
 """
 
 import math
@@ -46,7 +46,7 @@ class Transform(NamedTuple):
         return Transform(self.apply(inner.x), multiply(self.R, inner.R))
 
 
-class Settings(NamedTuple):
+class CompilerSettings(NamedTuple):
     """The compiler's settings and the default classes of a file."""
 
     angle: float  # the file's unit of angles [rad]
@@ -60,7 +60,7 @@ class Settings(NamedTuple):
         return Transform(element.numbers("pos", ORIGIN), self._orientation(element))
 
     def class_of(self, element: Element, attribute: str, inherited: str) -> str:
-        """Return the default class that an element names, or the one it inherits."""
+        """Return the default class that an element names or inherits."""
         name = element.word(attribute, inherited)
         if name not in self.classes:
             raise element.error(f"expected a default class, got {name!r:.80}")
@@ -99,7 +99,7 @@ class Settings(NamedTuple):
         return R
 
 
-def settings(root: Element) -> Settings:
+def settings(root: Element) -> CompilerSettings:
     """Return the settings of a file."""
     merged = Element("compiler", {}, [], root.location)
     for compiler in root.named("compiler"):
@@ -109,7 +109,7 @@ def settings(root: Element) -> Settings:
     if len(sequence) != 3 or not set(sequence.lower()) <= set(AXES):
         raise merged.error(f"expected three axes such as xyz for eulerseq, got {sequence!r:.80}")
     unit = one_of(merged, "angle", ("degree", "radian"), "degree")
-    return Settings(
+    return CompilerSettings(
         math.radians(1.0) if unit == "degree" else 1.0,
         sequence,
         one_of(merged, "autolimits", ("true", "false"), "true") == "true",
@@ -150,7 +150,7 @@ def _normalised(element: Element, name: str, q: Quaternion) -> Quaternion:
 
 
 def _classes(root: Element) -> dict[str, dict[str, str]]:
-    """Return the joint attributes of each default class, those of outer classes included."""
+    """Return the joint attributes of each default class, with those of outer classes."""
     classes: dict[str, dict[str, str]] = {"main": {}}
     waiting = [(element, "") for element in reversed(root.named("default"))]
     while waiting:
@@ -163,7 +163,7 @@ def _classes(root: Element) -> dict[str, dict[str, str]]:
         elif name != "main":
             raise element.error(f"expected the outermost class to be 'main', got {name!r:.80}")
         joint = element.single("joint")
-        found = joint.attributes if joint else {}
-        classes[name] = classes[name] | {key: found[key] for key in OF_JOINTS if key in found}
+        own = joint.attributes if joint else {}
+        classes[name] = classes[name] | {key: own[key] for key in OF_JOINTS if key in own}
         waiting += [(inner, name) for inner in reversed(element.named("default"))]
     return classes

@@ -18,9 +18,9 @@ from kinematics_solvers import (
 )
 
 from plumbob.crosscheck.verify.judgement import Verdict
-from plumbob.crosscheck.verify.kinematics import resample_faults
 from plumbob.crosscheck.verify.kinematics.faults import FAULTS, by_key
-from plumbob.crosscheck.verify.kinematics.polylines import Line, even_by_count, even_by_spacing
+from plumbob.crosscheck.verify.kinematics.polylines import Polyline
+from plumbob.crosscheck.verify.kinematics.resample import FAULTS as RESAMPLE_FAULTS
 from plumbob.reference import IK_SOLVERS, resample
 
 FOLLOW = [fault for fault in FAULTS["track ccd"] if fault.part == "follow"]
@@ -69,15 +69,15 @@ def resampler(make):
     def function(curve, strokes, closed, count=None, spacing=None):
         inputs = {"curve": curve, "strokes": strokes, "closed": closed}
         inputs |= {"count": count} if count is not None else {"spacing": spacing}
-        line = Line(curve, tuple(int(i) for i in strokes), closed)
+        line = Polyline(curve, tuple(int(i) for i in strokes), closed)
         return make(case_of(RESAMPLE, inputs, line=line))
 
     return function
 
 
-@pytest.mark.parametrize("key", resample_faults.FAULTS)
+@pytest.mark.parametrize("key", RESAMPLE_FAULTS)
 def test_fault_of_resampling_is_caught_and_named(key):
-    report = judged(RESAMPLE, resampler(resample_faults.FAULTS[key][0]))
+    report = judged(RESAMPLE, resampler(RESAMPLE_FAULTS[key][0]))
     assert report.verdict is Verdict.WRONG
     assert named(report)[0] == {key}
 
@@ -85,8 +85,8 @@ def test_fault_of_resampling_is_caught_and_named(key):
 def bridged(case):
     line, closed = case.facts["line"], case.inputs["closed"]
     if "count" in case.inputs:
-        return even_by_count(line, case.inputs["count"], closed)
-    return even_by_spacing(line, case.inputs["spacing"], closed)
+        return line.even_points(case.inputs["count"], closed)
+    return line.even_points(line.count(case.inputs["spacing"], closed), closed)
 
 
 def kept(case):
@@ -94,16 +94,16 @@ def kept(case):
     curve, strokes = case.inputs["curve"], [*case.inputs["strokes"], len(case.inputs["curve"])]
     if len(strokes) == 2:
         return bridged(case)
-    lines = [Line(curve[a:b], (0,), False) for a, b in itertools.pairwise(strokes)]
+    lines = [Polyline(curve[a:b], (0,), False) for a, b in itertools.pairwise(strokes)]
     if "spacing" in case.inputs:
         return np.concatenate(
-            [even_by_spacing(line, case.inputs["spacing"], False) for line in lines]
+            [line.even_points(line.count(case.inputs["spacing"], False), False) for line in lines]
         )
     total, count = sum(line.length for line in lines), case.inputs["count"]
     shares = np.maximum(2, np.round([count * line.length / total for line in lines]).astype(int))
     shares[np.argmax(shares)] += count - shares.sum()
     return np.concatenate(
-        [even_by_count(line, n, False) for line, n in zip(lines, shares, strict=True)]
+        [line.even_points(n, False) for line, n in zip(lines, shares, strict=True)]
     )
 
 

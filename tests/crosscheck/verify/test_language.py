@@ -48,7 +48,7 @@ def test_the_compiled_catalogue_is_that_of_the_text(language):
 def test_the_text_is_as_it_would_be_written(language):
     """But for its head, which names the version of Babel."""
     stored = catalogue.path_of(language, ".po")
-    written = catalogue.written(catalogue.renewed(catalogue.read(stored), TEMPLATES))
+    written = catalogue.to_po(catalogue.renewed(catalogue.read(stored), TEMPLATES))
     assert written.split(b"\n\n")[1:] == stored.read_bytes().split(b"\n\n")[1:]
 
 

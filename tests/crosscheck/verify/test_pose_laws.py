@@ -47,7 +47,7 @@ def findings(case, precision="double", **changes):
     """Return the findings, by their laws, of the pose at the start with its outputs changed."""
     answer = {"local_rotations": case.inputs["local_rotations"], "positions": case.facts["x"]}
     answer = {name: value + changes.get(name, 0.0) for name, value in answer.items()}
-    posed = pose_laws.understood(answer, case.inputs, case.facts)
+    posed = pose_laws.read_pose(answer, case.inputs, case.facts)
     greeting = Greeting(1, ("inverse_kinematics",), precision=precision)
     return {one.law: one for one in pose_laws.all_of(posed, case, greeting)}
 
@@ -140,7 +140,7 @@ def test_what_lacks_numbers_is_judged_where_it_has_some(case):
     for joint, placed in ((3, True), (1, False)):
         local = case.inputs["local_rotations"].copy()
         local[joint] = np.nan
-        posed = pose_laws.understood({"local_rotations": local}, case.inputs, case.facts)
+        posed = pose_laws.read_pose({"local_rotations": local}, case.inputs, case.facts)
         assert posed.finite is placed
         (found,) = pose_laws.all_of(posed, case, GREETING)
         assert (found.law, found.verdict, found.index) == ("numbers", Verdict.BROKEN, joint)
@@ -202,5 +202,5 @@ def test_a_sweep_takes_no_effector_farther_away(case, growth, verdict):
     ],
 )
 def test_what_a_solver_says_of_its_answer_is_true(case, claims, distance, verdicts):
-    found = inverse_kinematics.claims(distance, 1e-11, claims, case)
+    found = list(inverse_kinematics.claims(distance, 1e-11, claims, case))
     assert [one.verdict for one in found] == verdicts

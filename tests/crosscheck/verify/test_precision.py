@@ -10,7 +10,8 @@ from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import Report, Verdict
 from plumbob.crosscheck.verify.kinematics.faults import FAULTS, switches
 from plumbob.crosscheck.verify.kinematics.predictions import forward, solve
-from plumbob.crosscheck.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
+from plumbob.crosscheck.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, apply
+from plumbob.crosscheck.verify.mass_spring.model import StepModel
 from plumbob.crosscheck.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.crosscheck.verify.output import json_file, junit, page, terminal
 from plumbob.crosscheck.verify.output.words import Presentation, speaker
@@ -41,8 +42,9 @@ def ccd(key):
 
 def forces(key):
     def function(**inputs):
-        p = problem_of(inputs)
-        return {"forces": all_forces(fault_of(FORCE_FAULTS, key).change(p) if key else p)}
+        faults = [fault_of(FORCE_FAULTS, key)] if key else []
+        p, _ = apply(faults, problem_of(inputs), StepModel())
+        return {"forces": all_forces(p)}
 
     return function
 

@@ -25,9 +25,9 @@ from plumbob.crosscheck.verify.kinematics import (
     robot_models,
     track,
 )
-from plumbob.crosscheck.verify.kinematics.faults import Switches
-from plumbob.crosscheck.verify.kinematics.polylines import Line, even_by_count
+from plumbob.crosscheck.verify.kinematics.polylines import Polyline
 from plumbob.crosscheck.verify.kinematics.predictions import predict_track
+from plumbob.crosscheck.verify.kinematics.textbook import Switches
 from plumbob.crosscheck.verify.mass_spring import energy, forces
 from plumbob.crosscheck.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.crosscheck.verify.precision import AS_SINGLE, is_off_by_single, judging_greeting
@@ -110,10 +110,10 @@ GREETING = Greeting(1, ("resample",))
 def segments():
     """A request for eleven points on a line of five metres with a corner."""
     curve = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 2.0, 0.0]])
-    line = Line(curve, (0,), False)
+    line = Polyline(curve, (0,), False)
     inputs = {"curve": curve, "strokes": np.array([0]), "closed": False, "count": 11}
     case = Case("", "resample", inputs, "", laws.HOLDS, facts={"line": line, "size": 3.0})
-    return case, even_by_count(line, 11, False)
+    return case, line.even_points(11, False)
 
 
 # Sixteen epsilons of three points of three metres and of the line's length.
@@ -146,10 +146,10 @@ def test_gaps_differ_from_the_mean_by_a_fiftieth_at_most(segments, share, verdic
 def test_the_last_side_of_a_closed_curve_counts():
     """It may be a fiftieth longer than the others, and is not if the start comes again."""
     curve = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
-    line = Line(curve, (0,), True)
+    line = Polyline(curve, (0,), True)
     inputs = {"curve": curve, "strokes": np.array([0]), "closed": True, "count": 8}
     case = Case("", "resample", inputs, "", laws.HOLDS, facts={"line": line, "size": 1.0})
-    points = even_by_count(line, 8, True)
+    points = line.even_points(8, True)
     for shortened, verdict in ((0.0, RIGHT), (0.001, RIGHT), (0.005, WRONG)):
         uneven = line.point_at(np.arange(8) * (0.5 - shortened))
         found = by_law(resample.point_laws(uneven, case, GREETING))
@@ -232,7 +232,7 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
     ],
 )
 def test_a_claim_is_about_the_position_and_the_rotation(distance, angle, claim, verdicts):
-    found = robot_inverse_kinematics._claims(distance, angle, 1.0, 1.0, {"converged": claim})
+    found = list(robot_inverse_kinematics._claims(distance, angle, 1.0, 1.0, {"converged": claim}))
     assert [finding.verdict for finding in found] == verdicts
 
 

@@ -1,0 +1,194 @@
+"""Solve the named scenes, and write them as animations, pictures, pages or BVH motions."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from plumbob.reference import (
+    IK_SOLVERS,
+    STEP_SOLVERS,
+    IKSolution,
+    ImplicitEuler,
+    MassSpring,
+    Skeleton,
+    State,
+    curves,
+    resample,
+    scenes,
+    track,
+)
+from plumbob.reference.arguments import FloatArray, choice
+from plumbob.reference.formats import bvh
+
+from ..figures.view import ARM_VIEW, CLOTH_VIEW
+from ..motion import motion
+from ..motion.motion import Moving, Scene
+from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING
+from ..tables.results import label
+from .your_solver import ARM_TASKS, CLOTH_TASKS, H, YourSolver
+
+ARM, CLOTH = "arm", "cloth"
+SCENES = (ARM, CLOTH, *curves)
+GIF, SVG, HTML, BVH = ".gif", ".svg", ".html", ".bvh"
+SECONDS = 5
+# An animation shows every third step of a cloth; the frames of an arm are thinned to as many.
+EVERY = 3
+RATE = 20
+FRAMES = SECONDS * RATE
+# The solver of the exact implicit motion of a cloth, to which others are compared.
+EXACT = "newton"
+Progress = Callable[[int, int], None]
+
+
+class ArmMotion(NamedTuple):
+    """An arm, its first pose, the points of its curve, a point a frame, and its motion."""
+
+    skeleton: Skeleton
+    rest: FloatArray
+    curve: FloatArray
+    motion: IKSolution
+
+
+class ClothMotion(NamedTuple):
+    """A cloth, its start, and its positions after each step, the start first."""
+
+    system: MassSpring
+    start: State
+    positions: FloatArray
+
+
+def write(
+    name: str,
+    path: Path,
+    solver: str | None,
+    progress: Progress,
+    coherent: bool = False,
+    yours: YourSolver | None = None,
+) -> None:
+    """Write a scene as an animated GIF or, by the file's suffix, an SVG, a page or a BVH motion.
+
+    Args:
+        name: of the scene.
+        path: of the file.
+        solver: of Plumbob; FABRIK or Newton's if None.
+        progress: called with the frames done and their number.
+        coherent: whether Plumbob's arm moves as smoothly as it can.
+        yours: a solver beside Plumbob's.
+
+    Raises:
+        ValueError: if scene or solver are unknown, the suffix does not fit them, a cloth is to be
+            coherent, or the user's solver does not answer.
+    """
+    is_cloth = choice("scene", name, SCENES) == CLOTH
+    pictures = (GIF, SVG, HTML)
+    has_bones = not is_cloth and yours is None
+    choice("suffix of the file", path.suffix, (*pictures, BVH) if has_bones else pictures)
+    if is_cloth and coherent:
+        raise ValueError("coherent: expected an arm that follows a curve, got a cloth")
+    if yours:
+        yours.offered("a cloth", CLOTH_TASKS) if is_cloth else yours.offered("an arm", ARM_TASKS)
+    competitor: tuple[str, FloatArray] | None = None
+    if is_cloth:
+        solver = choice("solver", solver or EXACT, STEP_SOLVERS)
+        cloth = cloth_motion(solver)
+        if yours:
+            steps = len(cloth.positions) - 1
+            competitor = yours.name, yours.step_cloth(cloth.system, cloth.start, steps, progress)
+        scene = cloth_scene(cloth, solver, competitor)
+    else:
+        solver = choice("solver", solver or "fabrik", IK_SOLVERS)
+        arm = arm_motion(name, solver, coherent)
+        if path.suffix == BVH:
+            seconds = SECONDS / len(arm.curve)
+            return bvh.write(path, arm.skeleton, arm.motion.local_rotations, seconds)
+        if yours:
+            positions = yours.follow_curve(arm.skeleton, arm.rest, arm.curve, progress)
+            competitor = yours.name, positions
+        scene = arm_scene(
+            name, arm, f"Plumbob {label(solver)}" + ", coherent" * coherent, competitor
+        )
+    if path.suffix == HTML:
+        path.write_text(motion.page(scene), encoding="utf-8")
+        return None
+    from . import film
+
+    return (film.animate if path.suffix == GIF else film.picture)(scene, path, progress)
+
+
+def arm_motion(name: str, solver: str, coherent: bool) -> ArmMotion:
+    """Return the arm drawing a curve; a coherent motion is closed, and can be repeated."""
+    skeleton, rest = scenes.lab_arm()
+    points = curves[CUSTOM if name == ARM else name]()
+    even = resample(points, min_spacing=MIN_SPACING, max_spacing=MAX_SPACING, closed=coherent)
+    solution = track(skeleton, even, solver, rest, coherent=coherent, closed=coherent)
+    return ArmMotion(skeleton, rest, even, solution)
+
+
+def arm_scene(
+    name: str, arm: ArmMotion, solver: str, competitor: tuple[str, FloatArray] | None = None
+) -> Scene:
+    """Return the scene of an arm, beside a competitor's name and joint positions."""
+    points = arm.curve
+    frames = np.linspace(0, len(points) - 1, min(len(points), FRAMES)).round().astype(int)
+    moves = [(solver, arm.motion.positions)]
+    moves = [competitor, *moves] if competitor else moves
+    motions = []
+    for title, x in moves:
+        errors = np.linalg.norm(x[frames, -1] - points[frames], axis=-1)
+        motions.append(Moving(title, x[frames], errors))
+    curve = "the custom curve" if name == ARM else f"the curve “{name.replace('_', ' ')}”"
+    return Scene(
+        "arm",
+        f"The lab’s arm draws {curve}{_labels(motions)}",
+        "The line drawn has the colour of its error.",
+        motions,
+        SECONDS / len(frames),
+        "distance to the target",
+        ARM_VIEW,
+        len(motions),
+        points,
+    ).checked()
+
+
+def cloth_motion(solver: str) -> ClothMotion:
+    """Return the motion of the lab's cloth from rest."""
+    system, start = scenes.lab_cloth()
+    integrator, state = ImplicitEuler(system, h=H, solver=solver), start
+    positions = [state.positions]
+    for _ in range(FRAMES * EVERY):
+        state = integrator.step(state).state
+        positions.append(state.positions)
+    return ClothMotion(system, start, np.array(positions))
+
+
+def cloth_scene(
+    cloth: ClothMotion, solver: str, competitor: tuple[str, FloatArray] | None = None
+) -> Scene:
+    """Return the scene of a cloth, with distances to the exact implicit motion."""
+    exact = cloth.positions if solver == EXACT else cloth_motion(EXACT).positions
+    moves = [(f"Plumbob {label(solver)}", cloth.positions)]
+    moves = [competitor, *moves] if competitor else moves
+    motions = []
+    for title, x in moves:
+        distances = np.linalg.norm(x[::EVERY] - exact[::EVERY], axis=-1)
+        rms = np.sqrt(np.mean(distances**2, axis=-1))
+        motions.append(Moving(title, x[::EVERY], rms, distances))
+    return Scene(
+        "cloth",
+        f"The lab’s cloth swings from two corners{_labels(motions)}",
+        "Every particle has the colour of its distance to the converged motion of implicit Euler; "
+        "the numbers are root mean squares over the particles.",
+        motions,
+        H * EVERY,
+        "distance to the exact implicit motion",
+        CLOTH_VIEW,
+        len(motions),
+        marked=cloth.system.pinned.tolist(),
+    ).checked()
+
+
+def _labels(motions: Sequence[Moving]) -> str:
+    """Return the names of two solvers beside each other, "" for a single solver."""
+    return f": {motions[0].label} beside {motions[1].label}" if len(motions) > 1 else ""

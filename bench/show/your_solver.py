@@ -1,0 +1,172 @@
+"""Ask a user's solver for the motion of a scene, by the same doors as `plumbob verify`."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Contestant, Failure, NoGreetingError
+from plumbob.crosscheck.verify.message import shown
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.solvers import open_contestant
+from plumbob.reference import MassSpring, Skeleton, State, forward_kinematics
+from plumbob.reference.arguments import FloatArray
+
+TRACK, REACH = "track", "inverse_kinematics"
+STEP, MOTION = "mass_spring_step", "mass_spring_motion"
+# The tasks of which a scene needs one.
+ARM_TASKS, CLOTH_TASKS = (TRACK, REACH), (STEP, MOTION)
+SYSTEM = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity")
+TOLERANCE, MAX_ITERATIONS = 1e-4, 100
+# The step of a cloth [s].
+H = 1 / 60
+Progress = Callable[[int, int], None]
+
+
+class YourSolver:
+    """A user's solver, open until `close`.
+
+    Attributes:
+        address: as the user gave it.
+        name: as the solver gave it, else its address.
+        tasks: that it offers.
+    """
+
+    def __init__(self, words: Sequence[str]) -> None:
+        """Open the solver.
+
+        Raises:
+            ValueError: if there is no solver, or it does not describe itself.
+        """
+        self.address = " ".join(words)
+        self._contestant: Contestant = open_contestant(words[0] if len(words) == 1 else words)
+        try:
+            self._greeting = self._contestant.greeting
+        except NoGreetingError as error:
+            self.close()
+            reason = shown(str(error.failure.sentence), 500)
+            raise ValueError(f"with: expected a solver, got {self.address}: {reason}") from None
+        self.tasks = self._greeting.tasks
+        self.name = self.address if self._greeting.name == "solver" else self._greeting.name
+
+    def close(self) -> None:
+        """End the solver and its processes."""
+        self._contestant.close()
+
+    @property
+    def scene(self) -> str:
+        """The default scene of the solver."""
+        task = self.offered("an arm or a cloth", ARM_TASKS + CLOTH_TASKS)
+        return "arm" if task in ARM_TASKS else "cloth"
+
+    def offered(self, scene: str, tasks: Sequence[str]) -> str:
+        """Return the first of some tasks that the solver offers.
+
+        Raises:
+            ValueError: if it offers none of them.
+        """
+        for task in tasks:
+            if task in self.tasks:
+                return task
+        raise ValueError(
+            f"with: expected a solver with a function {' or '.join(tasks)} for {scene}, got "
+            f"{self.address}, which has {', '.join(self.tasks)}; plumbob verify --list "
+            "describes the arguments and results of each"
+        )
+
+    def follow_curve(
+        self, skeleton: Skeleton, rest: FloatArray, curve: FloatArray, progress: Progress
+    ) -> FloatArray:
+        """Return the positions of the joints as they follow a curve, (frame, joint, 3)."""
+        inputs = {
+            "parents": skeleton.parents,
+            "offsets": skeleton.offsets,
+            "local_rotations": rest,
+            "effector": len(skeleton.parents) - 1,
+            "tolerance": TOLERANCE,
+            "max_iterations": MAX_ITERATIONS,
+            "method": self._greeting.methods[0] if self._greeting.methods else "",
+        }
+        if TRACK in self.tasks:
+            answer = self._answer(TRACK, {**inputs, "curve": curve}, "the curve")
+            return _joint_positions(skeleton, answer)
+        frames = []
+        for i, target in enumerate(curve):
+            request = f"frame {i + 1} of {len(curve)}"
+            answer = self._answer(REACH, {**inputs, "target": target}, request)
+            frames.append(_joint_positions(skeleton, answer))
+            if "local_rotations" in answer:  # each frame starts from the one before
+                inputs["local_rotations"] = answer["local_rotations"]
+            progress(i + 1, len(curve))
+        return np.array(frames)
+
+    def step_cloth(
+        self, system: MassSpring, start: State, steps: int, progress: Progress
+    ) -> FloatArray:
+        """Return the positions after each step, the start first, (frame, particle, 3).
+
+        They are NaN from the first step with a position that is not finite.
+        """
+        fields = self._greeting.system
+        inputs: dict[str, Any] = {name: getattr(system, name) for name in SYSTEM} | {"h": H}
+        if fields.tension_only:
+            inputs["tension_only"] = system.tension_only
+        if fields.external_forces:
+            inputs["external_forces"] = np.zeros_like(start.positions)
+        if fields.rest_lengths == "measured":
+            inputs["rest_positions"] = start.positions
+        x, v = start.positions, start.velocities
+        if self.offered("a cloth", CLOTH_TASKS) == MOTION:
+            request = {**inputs, "steps": steps, **self._state(x, v)}
+            answer = self._answer(MOTION, request, "the motion")
+            return np.array([x, *_array(answer, "positions")])
+        frames = np.full((steps + 1, *x.shape), np.nan)
+        frames[0] = x
+        for i in range(steps):
+            request = inputs | self._state(x, v)
+            answer = self._answer(STEP, request, f"step {i + 1} of {steps}")
+            positions = _array(answer, "positions")
+            x, v = positions, answer.get("velocities", (positions - x) / H)
+            if not np.isfinite(x).all():
+                break
+            frames[i + 1] = x
+            progress(i + 1, steps)
+        return frames
+
+    def _state(self, x: FloatArray, v: FloatArray) -> dict[str, FloatArray]:
+        state = {"positions": x, "velocities": v}
+        if self._greeting.system.state == "previous_positions":
+            state["previous_positions"] = x - H * v
+        return state
+
+    def _answer(self, task: str, inputs: dict[str, Any], request: str) -> dict[str, Any]:
+        """Return the answer to a request, which error messages name."""
+        answer = self._contestant.answer(Case(request, task, inputs, "show", sentence("")))
+        if isinstance(answer, Failure):
+            reason = shown(str(answer.sentence), 300)
+            raise ValueError(
+                f"with: expected an answer to {request}, got none from {self.address}: {reason}"
+            )
+        return dict(answer.values)
+
+
+def _joint_positions(skeleton: Skeleton, answer: dict[str, Any]) -> FloatArray:
+    """Return the positions of joints, by rotations if they were answered."""
+    if "local_rotations" not in answer:
+        return _array(answer, "positions")
+    rotations = answer["local_rotations"]
+    with np.errstate(all="ignore"):
+        unit = rotations / np.linalg.norm(rotations, axis=-1, keepdims=True)
+    valid = np.isfinite(unit).all(axis=(-2, -1))
+    unit[~valid] = [1.0, 0.0, 0.0, 0.0]
+    positions = np.array(forward_kinematics(skeleton, unit).positions)
+    positions[~valid] = np.nan
+    return positions
+
+
+def _array(answer: dict[str, Any], name: str) -> FloatArray:
+    if name not in answer:
+        raise ValueError(f"with: expected {name} in the answer, got {', '.join(answer)}")
+    array: FloatArray = answer[name]
+    return array
