@@ -45,7 +45,7 @@ class Sketch:
     Attributes:
         name: the stem of its files.
         title: heading.
-        shows: a sentence on what the figure shows.
+        shows: a sentence on its contents.
         data: of the figure: arrays, words, numbers, and tuples of such.
         draw: returns the figure of the data; imports matplotlib only then.
     """

@@ -18,10 +18,11 @@ from .forces import engine_of, flex
 NEWTON_ITERATIONS = 12
 
 
-def symplectic_steps(case: int) -> Comparison:
-    """Compare the state after one step of symplectic Euler with one of MuJoCo's Euler."""
+def explicit_steps(integrator: str, case: int) -> Comparison:
+    """Compare a step of symplectic Euler with MuJoCo's Euler, or of Runge-Kutta with its RK4."""
     system, state, external, h = samples.network(case)
-    return _compare_with("Euler", case, symplectic_euler(system, state, h, external))
+    step = runge_kutta if integrator == "RK4" else symplectic_euler
+    return _compare_with(integrator, case, step(system, state, h, external))
 
 
 def flex_steps(case: int) -> Comparison:
@@ -31,24 +32,12 @@ def flex_steps(case: int) -> Comparison:
     return compare_states(end, flex(case).step(state, external), state)
 
 
-def runge_kutta_steps(case: int) -> Comparison:
-    """Compare the state after one step of the classical Runge-Kutta method with MuJoCo's RK4."""
-    system, state, external, h = samples.network(case)
-    return _compare_with("RK4", case, runge_kutta(system, state, h, external))
-
-
-def damper_diagonal_steps(case: int) -> Comparison:
-    """Compare the step with implicit diag(C) with MuJoCo's implicitfast."""
-    system, state, external, h = samples.network(case)
-    D = damper_blocks(system, state) * np.eye(3)
-    return _compare_with("implicitfast", case, semi_implicit(system, state, h, external, D))
-
-
-def damper_block_steps(case: int) -> Comparison:
-    """Compare the step with implicit 3 x 3 blocks of C with MuJoCo's implicit."""
+def damper_steps(integrator: str, case: int) -> Comparison:
+    """Compare steps with implicit blocks of C with "implicit", with diag(C) with "implicitfast"."""
     system, state, external, h = samples.network(case)
     D = damper_blocks(system, state)
-    return _compare_with("implicit", case, semi_implicit(system, state, h, external, D))
+    D = D * np.eye(3) if integrator == "implicitfast" else D
+    return _compare_with(integrator, case, semi_implicit(system, state, h, external, D))
 
 
 def gauss_newton_steps(case: int, *, damped: bool) -> Comparison:

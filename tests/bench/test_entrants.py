@@ -457,13 +457,13 @@ def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
 
 
 def dry(folder, *words):
-    from plumbob.commands import outlook
-    from plumbob.commands.bench import Asked, _choice
+    from plumbob.commands import plan
+    from plumbob.commands.selection import Request, choose
 
     given = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--problem"]
     entered = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--with"]
-    choice = _choice(["ik"], "quick", Asked(entered, problems=given))
-    return "\n".join(outlook.dry_run(["ik"], choice, folder / "out"))
+    choice = choose(["ik"], "quick", Request(entered, problems=given))
+    return "\n".join(plan.dry_run(["ik"], choice, folder / "out"))
 
 
 @pytest.mark.slow
