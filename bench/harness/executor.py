@@ -1,4 +1,4 @@
-"""Where blocks are measured: the interface of an executor, and the one that is this process."""
+"""Where blocks are measured: the interface of an executor, and this process as an executor."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ Step = Block | Record | NotMeasured
 
 
 class Executor:
-    """Measure blocks in this process, one after the other; subclasses measure elsewhere.
+    """Measure blocks in this process, in order; subclasses measure elsewhere.
 
     Attributes:
         takes_suites_together: whether the blocks of all suites are best given at once.

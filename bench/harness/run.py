@@ -31,13 +31,13 @@ class Event(NamedTuple):
         state: "kept" if a record of it was there, "measuring", "measured", "failed", or "not run"
             for records of a solver that are not part of this run.
         suite: the suite.
-        what: problem and solver.
+        subject: problem and solver.
         message: why it is measured again, why it failed, or how many were not run; else "".
     """
 
     state: str
     suite: str
-    what: str
+    subject: str
     message: str = ""
 
 
@@ -134,7 +134,7 @@ def _unselected(suite: str, suite_keys: Set[Key], file: RecordFile) -> Iterator[
 
 
 def _unrequested(suite: str, suite_keys: Set[Key], file: RecordFile) -> Iterator[Event]:
-    """Report the records of a suite that are not part of it now; mark those with old settings."""
+    """Report the records of a suite that are not part of it now; mark records with old settings."""
     extra = [r for r in file.read().records if r.suite == suite and r.key not in suite_keys]
     current = {key[:3] for key in suite_keys}
     old = [record for record in extra if _is_missing(record) or record.key[:3] in current]

@@ -1,4 +1,4 @@
-"""The user's solver that works in this worker's child: one at a time, opened at its first use."""
+"""The user's solver that works in this worker's child, opened at its first use."""
 
 from collections.abc import Mapping
 from time import perf_counter

@@ -1,6 +1,6 @@
-"""Environments of peers whose requirements contradict ours, a folder each.
+"""Environments of peers with requirements that contradict ours, a folder each.
 
-`make peers` makes them as `peers/NAME` below the environment that runs the bench. Such a peer works
+`make peers` makes them as `peers/NAME` below the environment that runs the bench. Their peers work
 in a process of that environment's Python.
 """
 

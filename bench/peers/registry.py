@@ -2,7 +2,7 @@
 
 A solver of the reference takes part as soon as the reference lists it; a line here gives it a
 label, a style and limits of its own. A peer is an adapter and an entry in `solvers.toml`. A user's
-solver is a peer of the run that it was entered for. Nothing here imports an engine.
+solver is a peer of the run that it was entered for. No engine is imported.
 """
 
 import functools
@@ -70,12 +70,12 @@ class StepSolver(Solver):
     """A solver of implicit Euler's steps, and its iterations in each experiment.
 
     Attributes:
-        is_linear: whether it solves one linear system, and so makes one iteration only.
+        is_linear: whether it solves a linear system, and so makes a single iteration.
         converges: whether it solves a step to the end, in few iterations.
-        followed: iterations of one step whose residual and error are kept; 0 for none.
-        counted: the maximum of one step in which powers of ten of the error are counted.
+        followed: iterations of a step with recorded residual and error; 0 for none.
+        counted: the maximum of a step in which powers of ten of the error are counted.
         certified: the maximum before an answer is certified.
-        ladder: iterations of one step in a work-precision diagram.
+        ladder: iterations of a step in a work-precision diagram.
         motion: iterations of a frame there.
     """
 
@@ -143,9 +143,9 @@ class Adapter:
     Attributes:
         title: how it is written.
         module: its adapter.
-        package: what must be installed.
-        environment: of its own, whose Python runs it; "" if it works in ours.
-        entrant: the user's solver, if it is one: it is always there.
+        package: the package that must be installed.
+        environment: of its own, with the Python that runs it; "" if it works in ours.
+        entrant: the user's solver, if any, which is always there.
     """
 
     title: str
@@ -194,9 +194,9 @@ class PeerEntry:
     """A peer with settings, as it enters the tables.
 
     Attributes:
-        kind: one start, or restarts.
+        kind: `ONE_START` or `RESTARTS`.
         settings: of its adapter.
-        restarts: further attempts from random poses, for solvers that make only one.
+        restarts: further attempts from random poses, for solvers without restarts.
         note: tells it from another entry of the same solver and kind.
     """
 
@@ -212,7 +212,7 @@ class Peer(Adapter):
 
     Attributes:
         license: of the package.
-        can: what it takes.
+        can: the robots that it takes.
         entries: its settings.
         kinematics: whether its forward kinematics is compared with ours.
         precision: how exact that is, where it is not in double precision.
@@ -254,8 +254,8 @@ class ClothPeer(Adapter):
     Attributes:
         engine: its engine.
         kind: how its settings differ from try to try.
-        settings: those of its adapter that are always the same.
-        ladder: iterations in one step, where it iterates.
+        settings: the constant settings of its adapter.
+        ladder: iterations in a step, where it iterates.
         motion: iterations a frame of a motion.
         converges: whether it solves a step to the end.
     """
@@ -269,10 +269,10 @@ class ClothPeer(Adapter):
 
 
 _IK_ADAPTERS, _CLOTH_ADAPTERS = f"{__package__}.ik", f"{__package__}.cloth"
-_Entered = TypeVar("_Entered", Peer, ClothPeer)
+_Row = TypeVar("_Row", Peer, ClothPeer)
 
 
-def _listed(table: str, adapters: str, kind: type[_Entered]) -> tuple[_Entered, ...]:
+def _listed(table: str, adapters: str, kind: type[_Row]) -> tuple[_Row, ...]:
     """Return the peers of a table of `solvers.toml`."""
     text = Path(__file__).with_name("solvers.toml").read_text(encoding="utf-8")
     rows = [{**row, "module": f"{adapters}.{row['adapter']}"} for row in tomllib.loads(text)[table]]
@@ -289,7 +289,7 @@ SINGLE_PRECISION = {peer.title: peer.precision for peer in PEERS if peer.precisi
 
 
 def robot_peers(entrants: Iterable[Entrant] = ()) -> list[Peer]:
-    """Return the solvers for robots: those known, then those of a user that take robots."""
+    """Return the solvers for robots: `PEERS`, then the user's that take robots."""
     restarts = PeerEntry(RESTARTS, {}, _RESTART_COUNT, f"{_RESTART_COUNT} restarts")
     adapter = (f"{_IK_ADAPTERS}.entrant", "", "", "", (PeerEntry(ONE_START), restarts))
     takers = [entrant for entrant in entrants if ROBOT_TASK in entrant.tasks]
@@ -307,10 +307,10 @@ def chain_peers(entrants: Iterable[Entrant]) -> list[ChainPeer]:
 
 
 def cloth_peers(entrants: Iterable[Entrant] = ()) -> tuple[ClothPeer, ...]:
-    """Return the solvers for cloths: the reference's, those of engines, those of a user."""
+    """Return the solvers for cloths: the reference's, the engines', the user's."""
     reference = map(_reference_cloth_peer, step_solvers().values())
-    entered = (_entered_cloth_peer(e) for e in entrants if e.offers("cloth"))
-    return (*reference, *CLOTH_ENGINES, *entered)
+    users = (_entered_cloth_peer(e) for e in entrants if e.offers("cloth"))
+    return (*reference, *CLOTH_ENGINES, *users)
 
 
 def _reference_cloth_peer(solver: StepSolver) -> ClothPeer:
@@ -343,17 +343,17 @@ def step_solvers() -> dict[str, StepSolver]:
 
 
 def followed_step_solvers() -> list[StepSolver]:
-    """Return those whose convergence is followed: the listed ones in order, then others."""
+    """Return the solvers with recorded convergence: the listed in order, then others."""
     solvers = step_solvers()
     order = dict.fromkeys([*(solver.name for solver in _STEP), *solvers])
     return [solvers[name] for name in order if name in solvers and solvers[name].followed]
 
 
 def find(name: str) -> Solver:
-    """Return the solver of a name in records; an unknown one is written by that name."""
-    known = _by_name(tuple(IK_SOLVERS), tuple(STEP_SOLVERS)).get(name)
-    if known:
-        return known
+    """Return the solver of a name in records; the label of an unknown solver is its name."""
+    solver = _by_name(tuple(IK_SOLVERS), tuple(STEP_SOLVERS)).get(name)
+    if solver:
+        return solver
     number = zlib.crc32(name.encode(errors="replace"))  # the same style whenever it is drawn
     colour = _COLOURS[number % len(_COLOURS)]
     line = _LINES[number // len(_COLOURS) % len(_LINES)]

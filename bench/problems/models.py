@@ -33,7 +33,8 @@ def robot(path: Path, name: str, effector: str | None) -> Robot:
     """Return the chain of hinges of a URDF or MJCF file, from its root to the effector.
 
     Raises:
-        ValueError: if it cannot be read, has no such link, or other joints than hinges on the path.
+        ValueError: if it cannot be read, has no link of this name, or other joints than hinges on
+        the path.
     """
     read = urdf.read if path.suffix.lower() == ".urdf" else mjcf.read
     model = read(path).articulation
@@ -95,7 +96,7 @@ def skeletons(
     """Return targets for the balls of a BVH file, from random poses: anywhere, far out, near.
 
     Raises:
-        ValueError: if it cannot be read, or has no such joint.
+        ValueError: if it cannot be read, or has no joint of this name.
     """
     skeleton = bvh.read(path).skeleton
     tip = _effector(skeleton, skeleton.names, effector)

@@ -234,7 +234,7 @@ def _run_with_progress(
                 events.append(event)
                 counts[event.state] += 1
                 advance = event.state in (run.KEPT, run.MEASURED, run.FAILED)
-                description = visible(f"{event.suite}: {event.what}")
+                description = visible(f"{event.suite}: {event.subject}")
                 bar.update(task, description=description, advance=advance, kept=counts[run.KEPT])
     return events
 
@@ -264,7 +264,7 @@ def _failures(events: "Sequence[Event]") -> list[str]:
     blocks: dict[str, list[str]] = {}
     for event in events:
         if event.state == run.FAILED:
-            blocks.setdefault(event.message, []).append(f"{event.suite}: {event.what}")
+            blocks.setdefault(event.message, []).append(f"{event.suite}: {event.subject}")
     return [
         f"{first}{f' and {len(more)} more' if more else ''}: {reason}"
         for reason, (first, *more) in blocks.items()
@@ -280,10 +280,10 @@ def _listener(bar: Any, task: Any, events: "Sequence[Event]") -> Callable[[Progr
 
     def listen(progress: Progress) -> None:
         if progress.state != TROUBLE:
-            bar.update(task, description=visible(progress.what))
-        elif progress.what not in solvers:
-            solvers.add(progress.what)
-            place = events[-1].what if events else progress.what
+            bar.update(task, description=visible(progress.subject))
+        elif progress.subject not in solvers:
+            solvers.add(progress.subject)
+            place = events[-1].subject if events else progress.subject
             print(visible(f"{place}: {progress.message}"), file=sys.stderr, flush=True)
 
     return listen

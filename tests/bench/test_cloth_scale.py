@@ -51,7 +51,7 @@ def test_what_is_measured_is_the_work_it_says(ours):
 
 def test_what_it_is_doing_is_told_on_the_way():
     heard = []
-    with listening(lambda progress: heard.append(progress.what)):
+    with listening(lambda progress: heard.append(progress.subject)):
         suite.in_its_own_process(SMALL, suite.OURS)
     assert heard[0] == f"cloth/{SMALL}x{SMALL}, supernodal: cloth"
     assert heard[-1].endswith("factor, once more")

@@ -386,7 +386,7 @@ def test_what_a_worker_does_is_heard(made_up, monkeypatch):
 
     cluster.submit = tell_and_submit
     heard = []
-    with listening(lambda progress: heard.append(progress.what)):
+    with listening(lambda progress: heard.append(progress.subject)):
         made_up(cluster)
     assert heard == [f"step {i}" for i in range(9)]
 

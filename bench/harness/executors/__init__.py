@@ -9,7 +9,7 @@ def executor_at(address: str, mix_machines: bool = False) -> Executor:
     """Return the executor of an address.
 
     Raises:
-        ValueError: if there is no such executor, it needs a package that is not installed, or it
+        ValueError: if the executor does not exist, needs a package that is not installed, or
             does not answer.
     """
     if address == LOCAL:

@@ -1,8 +1,8 @@
-"""The workers of a Dask cluster: blocks without times spread over them, timed ones are pinned.
+"""The workers of a Dask cluster: timed blocks are pinned, all others spread over them.
 
-Dask finds a worker for each block without times, and another one if that is lost. Timed blocks are
-placed here: those of a suite on one host, one after the other, and on hosts of one machine only,
-unless machines may be mixed.
+Dask finds a worker for each block without times, and another if that is lost. Timed blocks are
+placed here: a suite stays on a host, block after block, and on hosts of a single machine, unless
+machines may be mixed.
 """
 
 import asyncio
@@ -46,13 +46,13 @@ class Place(NamedTuple):
 
 @dataclass(eq=False)
 class _Queue:
-    """Blocks to be measured one after the other, pinned to a host if they take times.
+    """Blocks to be measured in order, pinned to a host if they take times.
 
     Attributes:
-        blocks: those that are not done.
-        is_pinned: whether they stay on one host.
+        blocks: the remaining blocks.
+        is_pinned: whether they stay on a host.
         is_begun: whether the first was reported as begun; another worker may begin it again.
-        host: the host that they are bound to, while there is one.
+        host: the host that they are bound to, if any.
         address: the worker that has the first block.
         future: the result of the first block, None if no worker has it.
     """
@@ -70,7 +70,7 @@ class DaskExecutor(Executor):
 
     Attributes:
         address: host and port of the scheduler.
-        mix_machines: whether times of several machines may stand in one table.
+        mix_machines: whether times of several machines may share a table.
     """
 
     takes_suites_together = True
@@ -86,7 +86,7 @@ class DaskExecutor(Executor):
 
         Raises:
             ValueError: if Dask is not installed, the scheduler does not answer in time [s], there
-                is no worker in time [s], or one has other versions or sources.
+                is no worker in time [s], or a worker has other versions or sources.
         """
         self.address, self.mix_machines, self._patience = address, mix_machines, workers
         self._client, self._results = _connected(address, answer), SimpleQueue[Any]()
@@ -107,7 +107,7 @@ class DaskExecutor(Executor):
         self._client.close(timeout=ANSWER)
 
     def note_records(self, records: Iterable[Record | None]) -> None:
-        """Choose the machine that times are taken on: of those here, that of the most records."""
+        """Choose the machine that times are taken on: the available one with the most records."""
         self._records = [r for r in records if r and r.arrays and not unlike(r.stamp, stamp())]
         recorded = Counter(_machine(record.stamp) for record in self._records)
         workers = Counter(place.machine for place in self._places.values())
@@ -138,7 +138,7 @@ class DaskExecutor(Executor):
         yield from self._measure(list(queues.values()), scale)
 
     def _mixed_suites(self, blocks: Sequence[Block]) -> dict[str, str]:
-        """Return the suites whose remaining rows are of another machine, and why that is bad."""
+        """Return the suites with remaining rows of another machine, and why that is bad."""
         keys, machine = {block_key(block) for block in blocks}, _in_words(self._machine)
         return {
             record.suite: f"others of {record.suite} are timed on another machine than is here "
@@ -171,7 +171,7 @@ class DaskExecutor(Executor):
                 yield record
 
     def _submit_first_blocks(self, queues: Sequence[_Queue], scale: Scale) -> Iterator[Block]:
-        """Submit the first block of each queue, a pinned one to a host without another queue."""
+        """Submit the first block of each queue, if pinned to a host without another queue."""
         for queue in queues:
             if queue.future:
                 continue
@@ -188,7 +188,7 @@ class DaskExecutor(Executor):
             queue.is_begun, queue.future = True, self._submit(queue.blocks[0], scale, **workers)
 
     def _free_worker(self, host: str, occupied: set[str]) -> str:
-        """Return a worker of this host; if it is "", of one that is not occupied; "" if none."""
+        """Return a worker of this host, or of any free host if it is ""; "" if there is none."""
         for address in self._addresses():
             place = self._places[address]
             is_allowed = self.mix_machines or place.machine == self._machine
@@ -255,10 +255,10 @@ class DaskExecutor(Executor):
             pass
 
     def _addresses(self) -> list[str]:
-        """Return the addresses of the workers that are there, in order; inspect new ones.
+        """Return the addresses of the present workers, in order; inspect new workers.
 
         Raises:
-            ValueError: if one has other versions or sources.
+            ValueError: if a worker has other versions or sources.
         """
         try:
             addresses = sorted(self._client.nthreads())

@@ -1,6 +1,6 @@
 """The work of a cluster's worker: find a block by its key, measure it, return its record.
 
-Each block is measured in a process of its own, as a solver may crash, print or hang. While one
+Each block is measured in a process of its own, as a solver may crash, print or hang. While a
 worker of a machine takes times, the other workers of that machine wait.
 """
 
@@ -40,8 +40,8 @@ class Task(NamedTuple):
         suite: its suite.
         scale: the pickled scale, with the user's solvers and problems.
         key: the block's key.
-        times: whether it takes times, so that the machine must do nothing else.
-        stamp: of the client, whose versions and sources the worker must have.
+        times: whether it takes times, so that the machine must be idle otherwise.
+        stamp: of the client; the worker must have the same versions and sources.
         topic: under which the client listens for progress.
     """
 
@@ -54,7 +54,7 @@ class Task(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """The record of a task as one line, or why it failed, or why it was refused."""
+    """The record of a task as a line, or why it failed, or why it was refused."""
 
     line: str = ""
     failed: str = ""
@@ -116,7 +116,7 @@ def _blocks(suite: str, pickled_scale: bytes) -> dict[Key, Block]:
 def _machine_to_itself(exclusive: bool) -> Iterator[None]:
     """Wait for a machine, the whole of it or a share, and hold it.
 
-    A process that was killed holds nothing. Containers with temporary folders of their own do not
+    The lock of a killed process is free. Containers with temporary folders of their own do not
     see each other's lock.
     """
     path = Path(tempfile.gettempdir(), f"plumbob-{os.getuid()}.lock")

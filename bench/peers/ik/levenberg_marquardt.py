@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt on anyone's kinematics: the reference's method as one loop for all.
+"""Levenberg-Marquardt on anyone's kinematics: the reference's method as a loop for all.
 
 The velocities v = J' (J J' + mu I)^-1 e bring the effector closer by the error e. The damping
 follows the error, mu = |e|² / 2 (Sugihara 2011), so that it is large far from the target and
@@ -13,7 +13,7 @@ from plumbob.reference.arguments import FloatArray
 
 
 class Kinematics(Protocol):
-    """What the loop asks of an engine; q are the engine's own coordinates of ball joints."""
+    """An engine of the loop; q are the engine's own coordinates of ball joints."""
 
     def position(self, joint: int) -> FloatArray:
         """Return where `jacobian` has put a joint [m], (3,)."""
@@ -34,7 +34,7 @@ class LoopOutput(NamedTuple):
 
 
 def within_reach(targets: FloatArray, root: FloatArray, reach: float) -> FloatArray:
-    """Return targets, (..., 3) [m], those beyond reach drawn to the nearest point within it."""
+    """Return targets, (..., 3) [m], moved to the nearest point within reach."""
     arms = targets - root
     distances = np.linalg.norm(arms, axis=-1, keepdims=True)
     nearest = root + arms * (reach / np.maximum(distances, reach))

@@ -1,7 +1,7 @@
 """PlaCo: differential inverse kinematics by quadratic programs, iterated to a target.
 
 Its wheels pin a Pinocchio older than ours, so it works in a process of an environment of its own,
-`placo_program`, which measures its own time: the connection costs it nothing.
+`placo_program`, which measures its own time: the connection is not timed.
 """
 
 import json

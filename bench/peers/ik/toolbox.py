@@ -54,7 +54,7 @@ def prepare(
 
 
 def chain_of_transforms(robot: Robot) -> ETS:
-    """Return the robot as elementary transforms: each hinge in a frame whose z is its axis."""
+    """Return the robot as elementary transforms: each hinge in a frame with its axis for z."""
     steps, pending, joint = [], np.eye(4), 0
     for transform, axis in links(robot):
         pending = pending @ transform
