@@ -12,7 +12,7 @@ import numpy as np
 from plumbob.reference.arguments import distinct_texts
 
 from .block import SCALES, Block, Choice
-from .executor import THIS_PROCESS, Executor, NotMeasured
+from .executors import THIS_PROCESS, Executor, NotMeasured
 from .experiment import blocks
 from .folder_lock import locked
 from .machine import conditions

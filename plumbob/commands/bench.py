@@ -23,7 +23,7 @@ from .verify import program_of
 
 if TYPE_CHECKING:
     from plumbob.bench.harness.block import Choice
-    from plumbob.bench.harness.executor import Executor
+    from plumbob.bench.harness.executors import Executor
     from plumbob.bench.harness.run import Event
 
 # The width of the names of suites in the help.
@@ -224,7 +224,7 @@ def _run_with_progress(
     suites: Sequence[str], scale: "str | Choice", output: Path, executor: "Executor | None"
 ) -> "list[Event]":
     from plumbob.bench.harness import run
-    from plumbob.bench.harness.executor import THIS_PROCESS
+    from plumbob.bench.harness.executors import THIS_PROCESS
 
     events: list[Event] = []
     with progress() as bar, lines_in_a_pipe(bar):

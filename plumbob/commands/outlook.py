@@ -9,7 +9,7 @@ from typing import NamedTuple
 from plumbob.bench.experiments import blocks
 from plumbob.bench.harness import run
 from plumbob.bench.harness.block import Block, Choice
-from plumbob.bench.harness.executor import THIS_PROCESS
+from plumbob.bench.harness.executors import THIS_PROCESS
 from plumbob.bench.harness.measure import block_key
 from plumbob.bench.harness.record import Key, Record, RecordFile
 

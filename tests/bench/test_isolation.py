@@ -23,7 +23,7 @@ from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robots import robot
 from plumbob.bench.tables.results import Results
-from plumbob.bench.tables.table import markdown
+from plumbob.bench.tables.writers import markdown
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4

@@ -18,13 +18,12 @@ from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 from ..block import Block, Scale
-from ..executor import Executor, NotMeasured, Step
 from ..machine import stamp
 from ..measure import block_key, failure, record_of
 from ..progress import Progress, announce
 from ..record import Record, decode
 from ..stopwatch import Budget
-from . import DASK
+from . import DASK, Executor, NotMeasured, Step
 from .work import Reply, Task, perform, place, unlike
 
 # How long [s] to wait for the scheduler, and for workers, at first and when all are lost.

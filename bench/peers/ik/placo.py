@@ -13,8 +13,8 @@ import numpy as np
 from plumbob.crosscheck.child_process import ChildProcess, LostError
 
 from ...problems.robots import UnableError
-from .. import environments
 from ..protocol import OwnTime
+from ..registry import environment_python
 from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 PROGRAM = Path(__file__).with_name("placo_program.py")
@@ -27,7 +27,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
         UnableError: if the robot is no chain, or the program does not take it.
     """
     robot.require_chain()
-    program = ChildProcess([environments.python("placo"), "-I", PROGRAM])
+    program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
     task = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
     try:
         _answer(program, {**task, "iterations": iterations, "limits": tolerance})
