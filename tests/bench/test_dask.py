@@ -188,23 +188,23 @@ class MadeUpCluster:
     def subscribe_topic(self, topic, handler):
         pass
 
-    def submit(self, function, task, key, workers=None):
+    def submit(self, function, suite, scale, name, *arguments, key, workers=None):
         future = MadeUpFuture(key)
         if not self.workers:
             return future
         (at,) = workers or [next(iter(self.workers))]
-        self.given.append((task, at if workers else None))
+        self.given.append((suite, at if workers else None))
         if len(self.given) in self.lose:
             del self.workers[at]
             return future
-        (block,) = (b for b in PLANTED if block_key(b) == task.key)
+        (block,) = (b for b in PLANTED if block_key(b) == name)
         made = replace(measure(block), stamp=self.place(at)["stamp"])
-        future.set_result(work.Reply(line=encode(made)))
+        future.set_result({"line": encode(made)})
         return future
 
     def hosts(self, suite):
         """The hosts of what was given out of a suite, in order; None where any would do."""
-        return [at and HOSTS[at] for task, at in self.given if task.suite == suite]
+        return [at and HOSTS[at] for name, at in self.given if name == suite]
 
 
 HOSTS = {"w1": "h1", "w2": "h1", "w3": "h2", "w4": "h3"}
@@ -307,8 +307,8 @@ def test_a_run_without_workers_ends_and_can_be_continued(made_up, tmp_path):
 @pytest.mark.parametrize("part", [{"versions": {"numpy": "0"}}, {"source": "0"}])
 def test_a_worker_with_other_versions_or_sources_refuses(made_up, part):
     other = {**stamp(), **part}
-    task = work.Task("arm", pickle.dumps(TINY), ("arm", "no such", "s", "{}"), False, other)
-    assert "other" in work.perform(task).refused
+    block = ("arm", pickle.dumps(TINY), ("arm", "no such", "s", "{}"), False)
+    assert "other" in work.perform(*block, other, "")["refused"]
     for reply, words in (
         ({"host": "h1", "stamp": other}, "what is installed here, got other"),
         (ModuleNotFoundError("No module named 'bench'"), "Plumbob, got No module named"),

@@ -279,7 +279,7 @@ run.blocks = blocks
 print("begun", flush=True)
 for event in run.run(["made up"], "quick", sys.argv[1]):
     if event.state == run.MEASURED:
-        print(event.what, flush=True)
+        print(event.subject, flush=True)
 """
 
 

@@ -24,7 +24,7 @@ from ..progress import Progress, announce
 from ..record import Record, decode
 from ..stopwatch import Budget
 from . import DASK, Executor, NotMeasured, Step
-from .work import Reply, Task, perform, place, unlike
+from .work import perform, place, unlike
 
 # How long [s] to wait for the scheduler, and for workers, at first and when all are lost.
 ANSWER, WORKERS = 10.0, 120.0
@@ -206,11 +206,9 @@ class DaskExecutor(Executor):
                 queue.host = ""
 
     def _submit(self, block: Block, scale: Scale, **workers: Any) -> Any:
-        task = Task(
-            *(block.suite, pickle.dumps(scale), block_key(block)),
-            *(block.times, stamp(), self._topic),
-        )
-        future = self._client.submit(perform, task, key=f"plumbob-{uuid.uuid4().hex}", **workers)
+        arguments = block.suite, pickle.dumps(scale), block_key(block), block.times, stamp()
+        name = f"plumbob-{uuid.uuid4().hex}"
+        future = self._client.submit(perform, *arguments, self._topic, key=name, **workers)
         future.add_done_callback(self._results.put)
         return future
 
@@ -228,21 +226,21 @@ class DaskExecutor(Executor):
         from distributed import KilledWorker
 
         try:
-            reply: Reply = future.result(timeout=ANSWER)
+            reply: Mapping[str, str] = future.result(timeout=ANSWER)
         except TimeoutError:
             self._results.put(future)
             return None
         except KilledWorker:
-            reply = Reply(failed="every worker that tried it was lost")
+            reply = {"failed": "every worker that tried it was lost"}
         except asyncio.CancelledError:
             raise self._error("the scheduler is gone") from None
         except Exception as error:
             raise self._error(f"{type(error).__name__}: {error}") from None
-        if reply.refused:
-            raise self._error(reply.refused)
-        if reply.failed:
-            return replace(record_of(block, failure(reply.failed), 0.0), stamp=self.stamp())
-        return decode(reply.line)
+        if "refused" in reply:
+            raise self._error(reply["refused"])
+        if "failed" in reply:
+            return replace(record_of(block, failure(reply["failed"]), 0.0), stamp=self.stamp())
+        return decode(reply["line"])
 
     def _wait_for_workers(self) -> None:
         try:
