@@ -104,14 +104,14 @@ def source_digest() -> str:
 
 def source_files() -> list[Path]:
     """Return all files of the three packages but files that only show numbers."""
-    every = (path for name in _PACKAGES for path in (ROOT / name).rglob("*") if path.is_file())
-    return sorted(path for path in every if not _is_left_out(path.relative_to(ROOT).parts))
-
-
-def _is_left_out(parts: tuple[str, ...]) -> bool:
-    shows = any("/".join(parts[:n]) in PRESENTATION for n in range(2, 4))
-    shows |= parts[:2] == ("bench", "experiments") and parts[-1] in PRESENTATION_FILES
-    return shows or "__pycache__" in parts
+    files = []
+    for path in (path for name in _PACKAGES for path in (ROOT / name).rglob("*") if path.is_file()):
+        parts = path.relative_to(ROOT).parts
+        shows = any("/".join(parts[:n]) in PRESENTATION for n in range(2, 4))
+        shows |= parts[:2] == ("bench", "experiments") and parts[-1] in PRESENTATION_FILES
+        if not shows and "__pycache__" not in parts:
+            files.append(path)
+    return sorted(files)
 
 
 def _processor() -> str:

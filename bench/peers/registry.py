@@ -37,12 +37,10 @@ _DATA: dict[str, Any] = tomllib.loads(
 )
 
 
-def _style(colour: str, line: Any, marker: str) -> Style:
-    is_dashed = isinstance(line, list)
-    return Style(colour, (line[0], tuple(line[1])) if is_dashed else line, marker)
-
-
-STYLES = {name: _style(*parts) for name, parts in _DATA["styles"].items()}
+STYLES = {
+    name: Style(colour, (line[0], tuple(line[1])) if isinstance(line, list) else line, marker)
+    for name, (colour, line, marker) in _DATA["styles"].items()
+}
 OTHER = STYLES["other"]
 # Styles of unknown solvers are made of these: lines that no solver above has.
 _COLOURS = ("ink", "blue", "orange", "green", "purple", "brass")

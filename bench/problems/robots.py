@@ -207,11 +207,16 @@ def chain_from(name: str, title: str, text: str, root: str, effector: str) -> Ro
     while link != root:
         joints.insert(0, above[link])
         link = _link(above[link], "parent")
+    return chain_of(name, title, root, joints)
+
+
+def chain_of(name: str, title: str, root: str, joints: Sequence[ElementTree.Element]) -> Robot:
+    """Return the chain of these joints of a URDF, in order from a root to the effector."""
     moving = [joint for joint in joints if joint.get("type") != "fixed"]
-    limits = np.array([_limits(joint) for joint in moving])
+    lower, upper = np.array([_limits(joint) for joint in moving]).T
     names = tuple(joint.get("name", "") for joint in moving)
-    text = _urdf(name, root, joints)
-    return Robot(name, title, text, root, (effector,), names, *limits.T)
+    effectors = (_link(joints[-1], "child"),)
+    return Robot(name, title, _urdf(name, root, joints), root, effectors, names, lower, upper)
 
 
 def _link(joint: ElementTree.Element, end: str) -> str:

@@ -184,7 +184,11 @@ class DaskExecutor(Executor):
                 workers = {"workers": [address]}
             if not queue.is_begun:
                 yield queue.blocks[0]
-            queue.is_begun, queue.future = True, self._submit(queue.blocks[0], scale, **workers)
+            block, name = queue.blocks[0], f"plumbob-{uuid.uuid4().hex}"
+            arguments = block.suite, pickle.dumps(scale), block_key(block), block.times, stamp()
+            future = self._client.submit(perform, *arguments, self._topic, key=name, **workers)
+            future.add_done_callback(self._results.put)
+            queue.is_begun, queue.future = True, future
 
     def _free_worker(self, host: str, occupied: set[str]) -> str:
         """Return a worker of this host, or of any free host if it is ""; "" if there is none."""
@@ -204,13 +208,6 @@ class DaskExecutor(Executor):
                 queue.future = None
             if queue.host not in hosts:
                 queue.host = ""
-
-    def _submit(self, block: Block, scale: Scale, **workers: Any) -> Any:
-        arguments = block.suite, pickle.dumps(scale), block_key(block), block.times, stamp()
-        name = f"plumbob-{uuid.uuid4().hex}"
-        future = self._client.submit(perform, *arguments, self._topic, key=name, **workers)
-        future.add_done_callback(self._results.put)
-        return future
 
     def _next(self) -> Any:
         """Return a future that is done, None if there is none for a while; pass on progress."""

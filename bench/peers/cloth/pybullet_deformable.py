@@ -46,7 +46,11 @@ class _Steps:
         self._system, self._flat, self._h, self._substeps = system, flat, h, substeps
 
     def begin(self, state: State) -> None:
-        before = self._velocities()
+        # The velocities [m/s], by a step of the flat cloth, in which no spring pulls.
+        self._body.write(self._flat)
+        self._body.set(0.0 * self._system.gravity, _PUSH)
+        self._body.step()
+        before = (self._body.positions() - self._flat) / _PUSH
         if not np.isfinite(before).all():  # it blew up, and does not forget
             _body.cache_clear()
             self._body, before = self._load(), np.zeros_like(before)
@@ -60,13 +64,6 @@ class _Steps:
 
     def positions(self) -> FloatArray:
         return self._body.positions()
-
-    def _velocities(self) -> FloatArray:
-        """Return the velocities [m/s], by a step of the flat cloth, in which no spring pulls."""
-        self._body.write(self._flat)
-        self._body.set(0.0 * self._system.gravity, _PUSH)
-        self._body.step()
-        return (self._body.positions() - self._flat) / _PUSH
 
     def _give(self, velocities: FloatArray) -> None:
         """Add to the velocities, which particles keep when they are put elsewhere."""
