@@ -40,11 +40,7 @@ class Contestant:
         self._door.close()
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], OwnTime]:
-        """Return its answer and its time.
-
-        Raises:
-            NoAnswerError: if it gives no answer.
-        """
+        """Return its answer and its time, or raise NoAnswerError if it gives no answer."""
         begin = perf_counter()
         answer = self._door.answer(Case("of the bench", task, inputs, "bench", _ABOUT))
         round_trip = perf_counter() - begin

@@ -48,11 +48,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 
 
 def _answer(program: ChildProcess, question: object) -> Any:
-    """Return the program's answer.
-
-    Raises:
-        ConnectionError: if it has ended.
-    """
+    """Return the program's answer, or raise ConnectionError if it has ended."""
     try:
         program.send(f"{json.dumps(question)}\n".encode())
         return json.loads(program.receive())
