@@ -79,10 +79,10 @@ class WorkerProcess:
                     case Numbers(by_name):
                         outcome = outcome._replace(numbers=by_name)
                     case Finished(trouble, is_lost, is_silent):
-                        trouble = trouble or raised(outcome.solved)
-                        ending = (trouble, is_lost and is_ready)
-                        outcome = Outcome(
-                            *outcome[:2], *ending, outcome.numbers, is_silent, outcome.remark
+                        outcome = outcome._replace(
+                            trouble=trouble or raised(outcome.solved),
+                            is_lost=is_lost and is_ready,
+                            is_silent=is_silent,
                         )
         if any(target.doubt for target in outcome.solved):  # then all times are round trips
             solved = [t._replace(seconds=max(t.seconds, t.round_trip)) for t in outcome.solved]

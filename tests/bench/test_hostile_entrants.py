@@ -1,4 +1,4 @@
-"""What a hostile solver gets, whatever it does and whichever way it comes in; nothing stays.
+"""Hostile solvers get a sentence, however they behave and however they are entered.
 
 Ways in: a Python file, a program, files of answers, and the bench, which takes the Python file.
 Elsewhere: what programs do to pipes and how they leave (`test_hostile_programs`), lines that take
@@ -61,7 +61,7 @@ for line in sys.stdin:
 """
 
 
-class Row(NamedTuple):
+class Behaviour(NamedTuple):
     """What a solver does, or answers, and what it gets by each way; None where it is not tried.
 
     In the bench it gets the sentence of the Python file if there is no other.
@@ -78,12 +78,12 @@ class Row(NamedTuple):
 def seconds(value, shown):
     """A row of a solver that claims a time: a Python file is timed by us, files are not timed."""
     refused = f'^answer; Not timed: expected "seconds" .*, got {shown}.$'
-    return Row({"local_rotations": POSE, "seconds": value}, "^answer$", refused, "^answer$")
+    return Behaviour({"local_rotations": POSE, "seconds": value}, "^answer$", refused, "^answer$")
 
 
 def alike(does, words, **other):
     """A row that gets the same by every way that takes data."""
-    return Row(does, words, words, words if isinstance(does, dict) else None, **other)
+    return Behaviour(does, words, words, words if isinstance(does, dict) else None, **other)
 
 
 def count(value, words):
@@ -96,7 +96,9 @@ NOT_FINITE = "local_rotations: expected finite numbers, got"
 SILENT = "ended after 1 s of silence"
 ALLOWED = f"0 to {HOSTILE}, the max_iterations sent, got"
 BEHAVIOURS = {
-    "replaces the clock": Row("time.perf_counter = lambda: 0.0\nreturn right(request)", "^answer$"),
+    "replaces the clock": Behaviour(
+        "time.perf_counter = lambda: 0.0\nreturn right(request)", "^answer$"
+    ),
     "claims 1e-12 s": seconds(1e-12, "1e-12"),
     "claims 5e-324 s": seconds(5e-324, "5e-324"),
     "claims no number of seconds": seconds(float("nan"), "nan"),
@@ -128,12 +130,12 @@ BEHAVIOURS = {
     "answers nothing known": alike(
         {"colour": "red"}, "^garbage: inverse_kinematics: expected some"
     ),
-    "raises": Row(
+    "raises": Behaviour(
         "raise ValueError('no arms')",
         "^raised: It raised ValueError in line 6 of solver.py: no arms$",
         "^crashed: It ended instead of answering: exit code 1. .* ValueError: no arms$",
     ),
-    "exits": Row(
+    "exits": Behaviour(
         "sys.exit(3)", "^raised: It raised SystemExit", "^crashed: .* answering: exit code 3.$"
     ),
     "leaves at once": alike(
@@ -150,7 +152,7 @@ BEHAVIOURS = {
     "writes standard error without end": alike(
         "while True: os.write(2, b'e' * 65536)", "^hung", waits=True, bench=SILENT
     ),
-    "floods its output": Row(
+    "floods its output": Behaviour(
         "for _ in range(1000): print('garbage')\nreturn right(request)",
         "^answer; It prints to its standard output, for example: garbage",
         "^garbage: It printed more than 100 lines that are no answers, for example: garbage$",
@@ -161,22 +163,22 @@ BEHAVIOURS = {
         waits=True,
         bench=None,
     ),
-    "changes its inputs": Row(
+    "changes its inputs": Behaviour(
         "request['offsets'] += 1.0\nreturn right(request)",
         "^answer; It changed its argument offsets.$",
     ),
     "changes its folder": alike("os.chdir('/')\nreturn right(request)", "^answer$"),
-    "closes its input": Row("sys.stdin.close()\nreturn right(request)", "^answer$"),
+    "closes its input": Behaviour("sys.stdin.close()\nreturn right(request)", "^answer$"),
     "leaves a child running": alike(
         "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)', __file__])\n"
         "return right(request)",
         "^answer$",
     ),
-    "replaces parts of NumPy and of json": Row(
+    "replaces parts of NumPy and of json": Behaviour(
         "np.asarray = np.array = json.dumps = None\nreturn right(request)",
         "^crashed: It ended instead of answering: exit code 1. .* TypeError: 'NoneType' object",
     ),
-    "replaces the reference": Row(
+    "replaces the reference": Behaviour(
         "from plumbob import reference\nreference.forward_kinematics = reference.Skeleton = None\n"
         "return right(request)",
         "^answer$",
