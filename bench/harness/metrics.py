@@ -365,9 +365,3 @@ def first_below(values: Floats, limit: float) -> int | None:
     """Return the index of the first value at or below the limit, None if there is none."""
     below = np.flatnonzero(np.asarray(values) <= limit)
     return int(below[0]) if below.size else None
-
-
-def cheapest_within(seconds: Floats, errors: Floats, limit: float) -> int | None:
-    """Return the index of the least time with an error within the limit, None without any."""
-    reached = np.flatnonzero(np.asarray(errors) <= limit)
-    return int(reached[np.argmin(np.asarray(seconds)[reached])]) if reached.size else None

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
-from ..experiments.pictures.readings import arm_motion, cloth_motion
+from ..experiments.pictures.figures import arm_motion, cloth_motion
 from ..harness.experiment import Experiment
 from ..motion.motion import Scene
 from ..tables.layout import Layout
@@ -56,7 +56,7 @@ MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
 
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:
-    """Return the tables of an experiment, imported only now; empty if another one shows them."""
+    """Return the tables of an experiment, imported only now; empty if it has none."""
     name = f"{experiment.package}.tables"
     if importlib.util.find_spec(name) is None:
         return ()

@@ -46,7 +46,7 @@ def folded(columns: Iterable[Column]) -> list[Column]:
 
 
 def number(title: str, name: str = "", unit: str = "") -> Column:
-    """Return the column of one number of a record, empty where a record has none."""
+    """Return the column of a number of a record, empty where a record has none."""
     return Column(title, unit, read=lambda record: record.arrays.get(name or title))
 
 
@@ -69,7 +69,7 @@ def spread_of(record: Record, name: str) -> Sequence[int | float]:
 
 
 def iterations_said(record: Record) -> metrics.Floats:
-    """Return the iterations of the solves whose solver counts them, (solve,)."""
+    """Return the iterations of the solves where the solver counts them, (solve,)."""
     counts = record.arrays["iterations"]
     return counts[~np.isnan(counts)]
 

@@ -1,7 +1,7 @@
 """Robots and characters in MuJoCo, read from URDF and MJCF files by its own reader."""
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
@@ -55,8 +55,12 @@ class MujocoRobot(RobotEngine):
 
     def _read(self, path: Path, mimic: bool) -> None:
         is_urdf = file_kind(path) == URDF
-        with silent():
+        before = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(lambda message: None)  # on the terminal and in its log file
+        try:
             self.model = (mujoco_urdf if is_urdf else mujoco_mjcf)(path)
+        finally:
+            mujoco.set_mju_user_warning(before)
         self.followers = _followers(self.model) if is_urdf and mimic else []
         self.data = mujoco.MjData(self.model)
         bodies = [self.model.body(i).name or f"body#{i}" for i in range(self.model.nbody)]
@@ -94,11 +98,10 @@ class MujocoRobot(RobotEngine):
 
 
 def mujoco_urdf(path: Path) -> mujoco.MjModel:
-    """Return the model of the links and joints of a URDF file.
+    """Return the model of the links and joints of a URDF file, or raise a ValueError.
 
     Shapes are removed because their files may be missing, inertias are replaced because MuJoCo
-    refuses many, and MuJoCo's fusion of links connected by fixed joints is disabled. Raise a
-    ValueError if MuJoCo does not read it.
+    refuses many, and MuJoCo's fusion of links connected by fixed joints is disabled.
     """
     root = xml_root(path)
     for link in root.findall("link"):
@@ -112,40 +115,24 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
 
 
 def mujoco_mjcf(path: Path) -> mujoco.MjModel:
-    """Return the model of an MJCF file, without shapes and masses if MuJoCo refuses it.
+    """Return the model of an MJCF file, or raise a ValueError.
 
-    Files of shapes may be missing, and MuJoCo refuses some masses. Raise a ValueError if MuJoCo
-    does not read it.
+    Shapes are removed and masses made equal if MuJoCo refuses the file, as files of shapes may be
+    missing and it refuses some masses.
     """
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         with contextlib.suppress(ValueError):
-            return _without_shapes(path)
+            spec = mujoco.MjSpec.from_file(str(path))
+            for kind in SHAPES:
+                for element in list(getattr(spec, kind)):
+                    spec.delete(element)
+            for body in spec.bodies:
+                body.explicitinertial, body.mass, body.inertia = True, 1.0, np.ones(3)
+                body.fullinertia = np.full(6, np.nan)
+            return spec.compile()
         raise error
-
-
-def _without_shapes(path: Path) -> mujoco.MjModel:
-    """Return the model of the bodies and joints of an MJCF file, with equal masses."""
-    spec = mujoco.MjSpec.from_file(str(path))
-    for kind in SHAPES:
-        for element in list(getattr(spec, kind)):
-            spec.delete(element)
-    for body in spec.bodies:
-        body.explicitinertial, body.mass, body.inertia = True, 1.0, np.ones(3)
-        body.fullinertia = np.full(6, np.nan)
-    return spec.compile()
-
-
-@contextlib.contextmanager
-def silent() -> Iterator[None]:
-    """Suppress MuJoCo's warnings on the terminal and in its log file."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 def _joint_name(model: mujoco.MjModel, bodies: list[str], joint: int) -> str:
@@ -156,21 +143,17 @@ def _joint_name(model: mujoco.MjModel, bodies: list[str], joint: int) -> str:
 
 
 def _followers(model: mujoco.MjModel) -> list[Follower]:
-    """Return the joints that follow others, each after its leader.
-
-    Raise a ValueError if some follow each other in a ring.
-    """
+    """Return the followers, each after its leader; raise a ValueError if some form a ring."""
     equalities = np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT)
-    followers = [
-        Follower(int(joint), int(leader), *map(float, data))
-        for joint, leader, data in zip(
-            model.eq_obj1id[equalities], model.eq_obj2id[equalities],
-            model.eq_data[equalities, :2], strict=True,
+    joints, leaders = model.eq_obj1id[equalities].tolist(), model.eq_obj2id[equalities].tolist()
+    by_joint = {
+        joint: Follower(joint, leader, *polynomial)
+        for joint, leader, polynomial in zip(
+            joints, leaders, model.eq_data[equalities, :2].tolist(), strict=True
         )
-    ]  # fmt: skip
-    by_joint = {follower.joint: follower for follower in followers}
+    }
     try:
-        order = TopologicalSorter({f.joint: [f.leader] for f in followers}).static_order()
+        order = TopologicalSorter({f.joint: [f.leader] for f in by_joint.values()}).static_order()
         return [by_joint[joint] for joint in order if joint in by_joint]
     except CycleError:
         raise ValueError("its mimic joints follow each other in a ring") from None

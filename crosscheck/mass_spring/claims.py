@@ -13,24 +13,24 @@ OUR_INTEGRATORS = ("symplectic Euler", "Runge-Kutta", "implicit Euler", "Gauss-N
 FIRST_ORDER = ("MuJoCo Euler", "MuJoCo implicit", "MuJoCo implicitfast", "MuJoCo discrete")
 
 COMPARISONS: dict[str, Callable[[int], Comparison]] = {
-    "spring forces": forces.tendon_springs,
-    "damper forces": forces.tendon_dampers,
+    "spring forces": partial(forces.tendon_forces, "springs"),
+    "damper forces": partial(forces.tendon_forces, "dampers"),
     "stiffness matrix": forces.tendon_stiffness,
     "potential energy": forces.tendon_potential,
     "kinetic energy": forces.point_kinetic,
     "flex forces": forces.flex_forces,
     "flex energy": forces.flex_potential,
-    "symplectic Euler step": steps.symplectic_steps,
+    "symplectic Euler step": partial(steps.explicit_steps, "Euler"),
     "symplectic Euler step, flex": steps.flex_steps,
     "symplectic Euler, 1,000 steps": partial(
         integrators.compare_long_runs, "symplectic Euler", "MuJoCo Euler", 1000
     ),
-    "Runge-Kutta step": steps.runge_kutta_steps,
+    "Runge-Kutta step": partial(steps.explicit_steps, "RK4"),
     "Runge-Kutta, 2,000 steps": partial(
         integrators.compare_long_runs, "Runge-Kutta", "MuJoCo RK4", 2000
     ),
-    "damper diagonal step": steps.damper_diagonal_steps,
-    "damper block step": steps.damper_block_steps,
+    "damper diagonal step": partial(steps.damper_steps, "implicitfast"),
+    "damper block step": partial(steps.damper_steps, "implicit"),
     "Gauss-Newton step": partial(steps.gauss_newton_steps, damped=False),
     "Gauss-Newton step, damped": partial(steps.gauss_newton_steps, damped=True),
     "implicit Euler on a line": integrators.joint_chains,

@@ -41,18 +41,15 @@ def flex(case: int) -> MujocoFlex:
     return engine
 
 
-def tendon_springs(case: int) -> Comparison:
-    """Compare the springs' forces on the free particles, relative to the largest."""
+def tendon_forces(elements: str, case: int) -> Comparison:
+    """Compare the forces of "springs" or "dampers" on the free particles."""
     system, state, _, _ = samples.network(case)
-    actual = spring_forces(system, state.positions)[system.free]
-    return _compare_forces(actual, _engine_at_start(case).spring_forces())
-
-
-def tendon_dampers(case: int) -> Comparison:
-    """Compare the dampers' forces on the free particles, relative to the largest."""
-    system, state, _, _ = samples.network(case)
-    actual = damper_forces(system, state)[system.free]
-    return _compare_forces(actual, _engine_at_start(case).damper_forces())
+    engine = _engine_at_start(case)
+    if elements == "springs":
+        actual, expected = spring_forces(system, state.positions), engine.spring_forces()
+    else:
+        actual, expected = damper_forces(system, state), engine.damper_forces()
+    return _compare_forces(actual[system.free], expected)
 
 
 def tendon_stiffness(case: int) -> Comparison:
@@ -85,7 +82,7 @@ def point_kinetic(case: int) -> Comparison:
 
 
 def flex_forces(case: int) -> Comparison:
-    """Compare the forces of springs and dampers with those of the edges of a flex."""
+    """Compare the forces of springs and dampers with the edges of a flex."""
     system, state, _, _ = samples.uniform(case)
     actual = spring_forces(system, state.positions) + damper_forces(system, state)
     engine = flex(case)

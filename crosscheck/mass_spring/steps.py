@@ -18,41 +18,30 @@ from .forces import engine_of, flex
 NEWTON_ITERATIONS = 12
 
 
-def symplectic_steps(case: int) -> Comparison:
-    """Compare the state after one step of symplectic Euler with one of MuJoCo's Euler."""
+def explicit_steps(integrator: str, case: int) -> Comparison:
+    """Compare a step of symplectic Euler with MuJoCo's Euler, or of Runge-Kutta with its RK4."""
     system, state, external, h = samples.network(case)
-    return _compare_with("Euler", case, symplectic_euler(system, state, h, external))
+    step = runge_kutta if integrator == "RK4" else symplectic_euler
+    return _compare_with(integrator, case, step(system, state, h, external))
 
 
 def flex_steps(case: int) -> Comparison:
-    """Compare the state after one step of symplectic Euler with MuJoCo's Euler on a flex."""
+    """Compare the state after a step of symplectic Euler with MuJoCo's Euler on a flex."""
     system, state, external, h = samples.uniform(case)
     end = symplectic_euler(system, state, h, external)
     return compare_states(end, flex(case).step(state, external), state)
 
 
-def runge_kutta_steps(case: int) -> Comparison:
-    """Compare the state after one step of the classical Runge-Kutta method with MuJoCo's RK4."""
-    system, state, external, h = samples.network(case)
-    return _compare_with("RK4", case, runge_kutta(system, state, h, external))
-
-
-def damper_diagonal_steps(case: int) -> Comparison:
-    """Compare the step with implicit diag(C) with MuJoCo's implicitfast."""
-    system, state, external, h = samples.network(case)
-    D = damper_blocks(system, state) * np.eye(3)
-    return _compare_with("implicitfast", case, semi_implicit(system, state, h, external, D))
-
-
-def damper_block_steps(case: int) -> Comparison:
-    """Compare the step with implicit 3 x 3 blocks of C with MuJoCo's implicit."""
+def damper_steps(integrator: str, case: int) -> Comparison:
+    """Compare steps with implicit blocks of C with "implicit", with diag(C) with "implicitfast"."""
     system, state, external, h = samples.network(case)
     D = damper_blocks(system, state)
-    return _compare_with("implicit", case, semi_implicit(system, state, h, external, D))
+    D = D * np.eye(3) if integrator == "implicitfast" else D
+    return _compare_with(integrator, case, semi_implicit(system, state, h, external, D))
 
 
 def gauss_newton_steps(case: int, *, damped: bool) -> Comparison:
-    """Compare the state after one Gauss-Newton step with one of MuJoCo's discrete."""
+    """Compare the state after a Gauss-Newton step with MuJoCo's discrete."""
     system, state, external, h = samples.network(case, damped=damped)
     end = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
     return _compare_with("discrete", case, end, damped=damped)
@@ -112,7 +101,7 @@ def damper_blocks(system: MassSpring, state: State) -> FloatArray:
 
 
 def compare_states(actual: State, expected: State, start: State) -> Comparison:
-    """Compare all positions and velocities, relative to the largest expected ones."""
+    """Compare all positions and velocities, relative to the largest expected."""
     scales = [[[np.abs(expected.positions).max()]], [[np.abs(expected.velocities).max()]]]
     actual_rows, expected_rows, start_rows = (
         np.stack([state.positions, state.velocities]) / scales
@@ -151,7 +140,7 @@ def _forces_at_end(
 
     Springs and gravity are MuJoCo's at x. The damper of the step is -c (l(x) - l_n)/h, a tendon of
     stiffness c/h and rest length l_n in MuJoCo, with l_n its own length of the spring at x_n.
-    MuJoCo's damper at the velocity (x - x_n)/h is another one: it takes the component of the
+    MuJoCo's damper at the velocity (x - x_n)/h differs: it takes the component of the
     velocity along the spring at x, which is not zero for a spring that only rotates.
 
     Returns:

@@ -18,7 +18,7 @@ from .newton_cg import NewtonCG
 from .objective import STARTS, Iterate, Objective
 
 
-class StepSolver(Protocol):
+class StepMethod(Protocol):
     """A minimiser of g for one system and one step length."""
 
     default_iterations: int
@@ -34,7 +34,7 @@ class StepSolver(Protocol):
         ...
 
 
-STEP_SOLVERS: dict[str, type[StepSolver]] = {
+STEP_SOLVERS: dict[str, type[StepMethod]] = {
     "local_global": LocalGlobal,
     "chebyshev": Chebyshev,
     "lbfgs": LBFGS,
@@ -95,7 +95,7 @@ class ImplicitEuler:
     tolerance: float = 1e-10
     max_iterations: int | None = None
     start: str | None = None
-    _solver: StepSolver = field(init=False, repr=False)
+    _solver: StepMethod = field(init=False, repr=False)
     _iteration_limit: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -109,7 +109,9 @@ class ImplicitEuler:
         method = STEP_SOLVERS[choice("solver", self.solver, STEP_SOLVERS)]
         limit = method.default_iterations if self.max_iterations is None else self.max_iterations
         object.__setattr__(self, "_iteration_limit", integer("max_iterations", limit, least=0))
-        object.__setattr__(self, "start", _start(self.solver, self.start))
+        starts = STARTS[1:] if self.solver == "gauss_newton" else STARTS
+        start = starts[0] if self.start is None else choice("start", self.start, starts)
+        object.__setattr__(self, "start", start)
         object.__setattr__(self, "_solver", method(self.system, self.h))
 
     def step(
@@ -133,8 +135,7 @@ class ImplicitEuler:
         """
         with np.errstate(over="ignore", invalid="ignore"):  # overflow ends in DIVERGED
             objective = self.objective(state, external_forces, pin_positions)
-            last, outcome, history, objectives = self._solve(objective)
-            return _result(state, objective, last, outcome, history, objectives)
+            return self._solve(state, objective)
 
     def objective(
         self,
@@ -176,28 +177,38 @@ class ImplicitEuler:
         """
         return self._solver.iterates(self.objective(state, external_forces, pin_positions))
 
-    def _solve(
-        self, objective: Objective
-    ) -> tuple[Iterate | None, Outcome, list[float], list[float]]:
-        """Return the last finite iterate, the outcome, and the residuals and g of all iterates."""
+    def _solve(self, state: State, objective: Objective) -> StepResult:
+        """Return the result of the last finite iterate, or the initial state if it overflows."""
         last: Iterate | None = None
         residuals: list[float] = []
-        values: list[float] = []
-        best = 0
-        if not objective.inertial.finite:
-            return last, Outcome.DIVERGED, residuals, values
-        for iterate in self._solver.iterates(objective):
+        objectives: list[float] = []
+        best, outcome = 0, None
+        for iterate in self._solver.iterates(objective) if objective.inertial.finite else ():
             if not iterate.finite:
                 break
             residuals.append(objective.residual(iterate))
-            values.append(iterate.value)
-            stuck, last = iterate is last, iterate
+            objectives.append(iterate.value)
+            is_stuck, last = iterate is last, iterate
             if residuals[-1] < residuals[best]:
                 best = len(residuals) - 1
-            outcome = self._outcome(objective, iterate, residuals, best, stuck)
+            outcome = self._outcome(objective, iterate, residuals, best, is_stuck)
             if outcome is not None:
-                return last, outcome, residuals, values
-        return last, Outcome.DIVERGED, residuals, values
+                break
+        if last is not None:
+            velocities = last.positions - objective.x_n
+            velocities /= objective.h
+            if np.abs([last.positions, velocities]).max() <= LARGEST_COORDINATE:
+                return StepResult(
+                    state=State.of(last.positions, velocities),
+                    residual=residuals[-1],
+                    iterations=len(residuals) - 1,
+                    outcome=Outcome.DIVERGED if outcome is None else outcome,
+                    at_floor=last.at_floor,
+                    history=frozen(np.array(residuals)),
+                    objectives=frozen(np.array(objectives)),
+                )
+        infinite = frozen(np.array([np.inf]))
+        return StepResult(state, np.inf, 0, Outcome.DIVERGED, False, infinite, infinite)
 
     def _outcome(
         self, objective: Objective, iterate: Iterate, residuals: list[float], best: int, stuck: bool
@@ -224,34 +235,3 @@ class ImplicitEuler:
             if stuck:
                 return Outcome.STALLED
         return Outcome.ITERATION_LIMIT if final else None
-
-
-def _start(solver: str, start: str | None) -> str:
-    """Return the checked first iterate of a solver; Gauss-Newton has no choice."""
-    valid = STARTS[1:] if solver == "gauss_newton" else STARTS
-    return valid[0] if start is None else choice("start", start, valid)
-
-
-def _result(
-    before: State,
-    objective: Objective,
-    last: Iterate | None,
-    outcome: Outcome,
-    residuals: list[float],
-    values: list[float],
-) -> StepResult:
-    if last is not None:
-        velocities = last.positions - objective.x_n
-        velocities /= objective.h
-        if np.abs([last.positions, velocities]).max() <= LARGEST_COORDINATE:
-            return StepResult(
-                state=State.of(last.positions, velocities),
-                residual=residuals[-1],
-                iterations=len(residuals) - 1,
-                outcome=outcome,
-                at_floor=last.at_floor,
-                history=frozen(np.array(residuals)),
-                objectives=frozen(np.array(values)),
-            )
-    infinite = frozen(np.array([np.inf]))
-    return StepResult(before, np.inf, 0, Outcome.DIVERGED, False, infinite, infinite)

@@ -1,6 +1,7 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
 import importlib
+import pickle
 import sys
 from functools import partial
 
@@ -9,9 +10,9 @@ import pytest
 
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.cloth_peers import measurement as peers_cloth
-from plumbob.bench.experiments.cloth_peers import tables
-from plumbob.bench.experiments.cloth_peers.job import ClothJob, Shape
-from plumbob.bench.experiments.cloth_peers.ladder import Rung, motion_rungs, step_rungs
+from plumbob.bench.experiments.cloth_peers import tables, truth
+from plumbob.bench.experiments.cloth_peers.job import Shape
+from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs, step_rungs
 from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_motion, truth_of
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
@@ -30,7 +31,6 @@ from plumbob.bench.problems.falling_cloth import (
     highest_mode,
     level_cloth,
 )
-from plumbob.bench.report.report import all_figures
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import best_cells
 from plumbob.reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
@@ -114,10 +114,10 @@ def test_explicit_steps_are_counted_from_the_limit():
 
 
 def test_the_truth_is_of_order_four_and_surer_than_any_error_measured():
-    truth = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
-    assert truth.order == pytest.approx(4.0, abs=0.15)
-    error = metrics.rms_distance(truth.implicit[-1], truth.true[-1])
-    assert truth.unsure < 0.01 * error < 0.01
+    answers = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
+    assert answers.order == pytest.approx(4.0, abs=0.15)
+    error = metrics.rms_distance(answers.implicit[-1], answers.true[-1])
+    assert answers.unsure < 0.01 * error < 0.01
 
 
 def test_the_truth_is_where_symplectic_euler_goes_at_order_one(cloth):
@@ -140,7 +140,7 @@ def test_converged_implicit_euler_is_the_same_by_another_solver(cloth):
 
 
 def test_newton_that_does_not_converge_is_no_answer(cloth, monkeypatch):
-    monkeypatch.setattr("plumbob.bench.experiments.cloth_peers.truth.MOST_ITERATIONS", 1)
+    monkeypatch.setattr(truth, "MAX_ITERATIONS", 1)
     with pytest.raises(ArithmeticError, match="frame 0 as ITERATION_LIMIT"):
         implicit_motion(cloth, 1)
 
@@ -149,13 +149,13 @@ def test_newton_that_does_not_converge_is_no_answer(cloth, monkeypatch):
 
 
 def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite_beyond():
-    truth = truth_of(falling_cloth(SIZE, STIFFNESS), 1)
-    assert peers_cloth.step_error(truth.first.positions, truth) < 1e-14
-    assert peers_cloth.step_error(truth.inertial, truth) == 1.0
-    half = 0.5 * (truth.implicit[0] + truth.inertial)
-    assert peers_cloth.step_error(half, truth) == pytest.approx(0.5)
+    answers = truth_of(falling_cloth(SIZE, STIFFNESS), 1)
+    half = 0.5 * (answers.implicit[0] + answers.inertial)
+    assert peers_cloth.step_error(answers.first.positions, answers) < 1e-14
+    assert peers_cloth.step_error(answers.inertial, answers) == 1.0
+    assert peers_cloth.step_error(half, answers) == pytest.approx(0.5)
     for lost in (np.nan, np.inf, 1e200):
-        assert peers_cloth.step_error(np.full_like(truth.inertial, lost), truth) == np.inf
+        assert peers_cloth.step_error(np.full_like(half, lost), answers) == np.inf
 
 
 def test_errors_do_not_care_how_the_world_is_turned_or_particles_are_numbered(rng):
@@ -174,13 +174,6 @@ def test_a_motion_has_diverged_if_one_particle_is_ever_too_far(rng):
         positions[1, 2, 0] += bad
         assert peers_cloth.diverged(positions, true)
     assert not peers_cloth.diverged(true[:0], true[:0])
-
-
-def test_the_cheapest_that_suffices_is_not_the_first():
-    seconds, errors = np.array([1.0, 5.0, 3.0, 9.0]), np.array([1.0, 0.1, 0.05, 0.0])
-    assert metrics.cheapest_within(seconds, errors, 0.1) == 2
-    assert metrics.cheapest_within(seconds, errors, 1.0) == 0
-    assert metrics.cheapest_within(seconds, errors, -1.0) is None
 
 
 # The adapters.
@@ -258,9 +251,15 @@ def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
     assert metrics.rms_distance(ends, exact) < 20 * PRECISION[peer.engine] + 1e-9
 
 
-def test_colours_are_proper_and_few(cloth):
-    newton_adapter = pytest.importorskip("plumbob.bench.peers.cloth.newton", exc_type=ImportError)
-    groups = newton_adapter.colours(cloth.system.springs, cloth.system.particle_count)
+@pytest.fixture
+def bullet():
+    name = "plumbob.bench.peers.cloth.pybullet_deformable"
+    return pytest.importorskip(name, exc_type=ImportError)
+
+
+def test_colours_of_newton_are_proper_and_few_where_its_own_is_one(cloth):
+    adapter = pytest.importorskip("plumbob.bench.peers.cloth.newton", exc_type=ImportError)
+    groups = adapter.colours(cloth.system.springs, cloth.system.particle_count)
     colour = np.full(cloth.system.particle_count, -1)
     for number, group in enumerate(groups):
         colour[group] = number
@@ -268,19 +267,11 @@ def test_colours_are_proper_and_few(cloth):
     assert (colour >= 0).all()
     assert (colour[i] != colour[j]).all()
     assert len(groups) <= 13  # no particle has more than twelve neighbours
-
-
-def test_by_itself_newton_gives_springs_one_colour(cloth):
-    newton_adapter = pytest.importorskip("plumbob.bench.peers.cloth.newton", exc_type=ImportError)
-    model = newton_adapter.model(cloth.system, own_colours=True)
-    assert len(model.particle_color_groups) == 1
+    assert len(adapter.model(cloth.system, own_colours=True).particle_color_groups) == 1
 
 
 @pytest.mark.parametrize("size", [3, 6])
-def test_bullets_mesh_has_the_springs_for_edges_and_no_corners_in_line(size):
-    bullet = pytest.importorskip(
-        "plumbob.bench.peers.cloth.pybullet_deformable", exc_type=ImportError
-    )
+def test_bullets_mesh_has_the_springs_for_edges_and_no_corners_in_line(bullet, size):
     system, _ = level_cloth(size, STIFFNESS)
     flat, triangles = bullet.mesh(system)
     ends = np.diff(flat[system.springs], axis=1)[:, 0]
@@ -290,10 +281,7 @@ def test_bullets_mesh_has_the_springs_for_edges_and_no_corners_in_line(size):
 
 
 @pytest.mark.parametrize("change", ["masses", "stiffnesses", "rest_lengths", "dampings"])
-def test_bullet_refuses_what_it_cannot_move(change):
-    bullet = pytest.importorskip(
-        "plumbob.bench.peers.cloth.pybullet_deformable", exc_type=ImportError
-    )
+def test_bullet_refuses_what_it_cannot_move(bullet, change):
     system, _ = level_cloth(4, STIFFNESS)
     values = getattr(system, change).copy()
     values[-1] += 0.1
@@ -303,11 +291,8 @@ def test_bullet_refuses_what_it_cannot_move(change):
         bullet.prepare(one_spring().system, FRAME)
 
 
-def test_bullet_goes_where_symplectic_euler_goes_whatever_was_before(cloth):
+def test_bullet_goes_where_symplectic_euler_goes_whatever_was_before(bullet):
     """A cloth whose spacing is no binary fraction; before, it was thrown until it blew up."""
-    bullet = pytest.importorskip(
-        "plumbob.bench.peers.cloth.pybullet_deformable", exc_type=ImportError
-    )
     system, level = level_cloth(6, STIFFNESS)
     thrown = State(level.positions, 50.0 * np.ones_like(level.positions))
     mover = bullet.prepare(system, 3.0)
@@ -385,42 +370,36 @@ def fakes(tmp_path_factory):
     sys.modules.pop("fake_cloth_solvers", None)
 
 
-def job(cloth, manner, frames=5, repeats=1, budget=60.0):
+def messages(cloth, manner, frames=5, repeats=1, budget=60.0):
     shape = Shape(frames, repeats, budget)
-    return peers_cloth.job(fake_peer(manner), cloth, {"manner": manner}, shape)
-
-
-def messages(*args, **more):
-    return list(job(*args, **more).perform())
+    return list(peers_cloth.job(fake_peer(manner), cloth, {"manner": manner}, shape).perform())
 
 
 def test_a_job_says_when_it_is_ready_each_frame_and_the_end(cloth):
-    said = messages(cloth, "well", frames=2, repeats=2)
-    assert [type(message) for message in said] == [Ready, *[Solved] * 4, Finished]
-    ends = [message.q for message in said if isinstance(message, Solved)]
+    sent = messages(cloth, "well", frames=2, repeats=2)
+    assert [type(message) for message in sent] == [Ready, *[Solved] * 4, Finished]
+    ends = [message.q for message in sent if isinstance(message, Solved)]
     np.testing.assert_array_equal(ends[1], ends[3])
     assert not np.array_equal(ends[0], ends[1])
 
 
-@pytest.mark.parametrize("manner", ["overflows", "explodes"])
-def test_one_that_blows_up_ends_with_positions_that_are_not_finite(cloth, manner):
-    solved = [m for m in messages(cloth, manner) if isinstance(m, Solved)]
-    assert [bool(np.isfinite(one.q).all()) for one in solved] == [True, True, False]
-
-
 @pytest.mark.parametrize(
-    ("manner", "frames", "why"),
-    [("raises", 2, "ArithmeticError: in one frame"), ("unable", 0, "ValueError: takes no cloths")],
+    ("manner", "budget", "finite", "last"),
+    [
+        ("overflows", 60.0, [True, True, False], Finished()),
+        ("explodes", 60.0, [True, True, False], Finished()),
+        ("raises", 60.0, [True, True], Finished("ArithmeticError: in one frame")),
+        ("unable", 60.0, [], Finished("ValueError: takes no cloths")),
+        ("slow", 0.1, [True], Finished()),
+    ],
 )
-def test_one_that_raises_keeps_its_frames_and_says_why(cloth, manner, frames, why):
-    said = messages(cloth, manner)
-    assert sum(isinstance(message, Solved) for message in said) == frames
-    assert said[-1] == Finished(why)
-
-
-def test_a_job_without_time_left_begins_no_further_frame(cloth):
-    said = messages(cloth, "slow", budget=0.1)
-    assert [type(message) for message in said] == [Ready, Solved, Finished]
+def test_frames_before_an_overflow_an_exception_or_the_end_of_the_budget_are_kept(
+    cloth, manner, budget, finite, last
+):
+    sent = messages(cloth, manner, budget=budget)
+    frames = [message.q for message in sent if isinstance(message, Solved)]
+    assert [bool(np.isfinite(q).all()) for q in frames] == finite
+    assert sent[-1] == last
 
 
 @pytest.fixture(scope="module")
@@ -478,38 +457,31 @@ def here(monkeypatch):
 
 
 def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch):
-    tried = []
+    jobs = []
 
     class Silent:
         def perform(self, job):
-            tried.append(job)
+            jobs.append(job)
             return Outcome(0.0, [], "ended after 300 s of silence", is_silent=True)
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
     measured = peers_cloth.motion(fake_peer("well"), [FALL, FALL])
     arrays, facts = measured.arrays, measured.facts
-    assert len(tried) == 1
+    assert len(jobs) == 1
     assert arrays["frames"].tolist() == [0, 0]
     assert np.isnan(arrays["true"]).all()
     assert "silence" in facts["remarks"][0]
 
 
-def test_a_ladder_ends_where_it_arrives(here):
-    """Two iterations of Newton and three are asked for, and no more once 1e-9 is reached."""
+def test_a_ladder_ends_where_it_arrives_or_its_time_is_used(here):
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
     measured = peers_cloth.one_step(newton, [FALL])
-    arrays, facts = measured.arrays, measured.facts
-    assert arrays["error"][0] > arrays["error"][-1] <= peers_cloth.NEAR_ENOUGH
-    assert (arrays["error"][:-1] > peers_cloth.NEAR_ENOUGH).all()
-    assert len(facts["rungs"]) == len(arrays["error"])
-
-
-def test_a_ladder_whose_time_is_used_is_climbed_no_further(here):
-    brief = FALL.level._replace(budget=1e-9)
-    newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    arrays = peers_cloth.one_step(newton, [FALL._replace(level=brief)]).arrays
-    assert len(arrays["error"]) == 1
+    errors = measured.arrays["error"]
+    assert errors[-1] <= peers_cloth.NEAR_ENOUGH < errors[:-1].min()
+    assert len(measured.facts["rungs"]) == len(errors) > 1
+    brief = FALL._replace(level=FALL.level._replace(budget=1e-9))
+    assert len(peers_cloth.one_step(newton, [brief]).arrays["error"]) == 1
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
@@ -533,21 +505,13 @@ def test_iterations_are_counted_to_each_power_of_ten():
 # Limits of stability.
 
 
-@pytest.mark.parametrize(("limit", "guess"), [(0.3, 1.0), (0.3, 1e-3), (0.3, 0.25)])
-def test_bisection_finds_a_limit_from_either_side(limit, guess):
-    found = peers_cloth.stability_limit(lambda h: h <= limit, guess)
-    assert found == pytest.approx(limit, rel=peers_cloth.BISECTION)
-
-
-@pytest.mark.parametrize("answer", [True, False])
-def test_where_there_is_no_limit_bisection_says_so(answer):
-    with pytest.raises(ArithmeticError, match="no limit of stability"):
-        peers_cloth.stability_limit(lambda h: answer, 1.0)
-
-
-def longest_step(peer, cloth, monkeypatch):
-    monkeypatch.setattr(peers_cloth, "hanging_cloth", lambda size, k: (cloth.system, REST))
-    return peers_cloth.stability(peer, (cloth.stiffness,)).arrays
+def test_bisection_finds_a_limit_from_either_side_or_says_that_there_is_none():
+    for limit, guess in ((0.3, 1.0), (0.3, 1e-3), (0.3, 0.25)):
+        step = peers_cloth.stability_limit(lambda h, limit=limit: h <= limit, guess)
+        assert step == pytest.approx(limit, rel=peers_cloth.BISECTION)
+    for answer in (True, False):
+        with pytest.raises(ArithmeticError, match="no limit of stability"):
+            peers_cloth.stability_limit(lambda h, answer=answer: answer, 1.0)
 
 
 REST = np.array([[0.0, 0, 0], [1.0, 0, 0]])
@@ -565,18 +529,18 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
     Runge-Kutta, of which |R(ih omega)| climbs with a slope of 2.5, h omega is 0.005 too large.
     """
     peer = next(peer for peer in registry.cloth_peers() if peer.title == title)
-    arrays = longest_step(peer, one_spring(), monkeypatch)
+    spring = one_spring()
+    monkeypatch.setattr(peers_cloth, "hanging_cloth", lambda size, k: (spring.system, REST))
+    arrays = peers_cloth.stability(peer, (spring.stiffness,)).arrays
     assert arrays["frequency"] == pytest.approx([np.sqrt(7.0 / 2.0)])
     reached = np.array(arrays["limit"]) * np.array(arrays["frequency"])
     assert reached == pytest.approx([LIMITS[title]], rel=2e-3 if "Kutta" in title else 5e-4)
 
 
-def test_a_solver_that_does_not_get_through_has_no_limit(monkeypatch, here):
-    peer = fake_peer("unable")
-    measured = peers_cloth.stability(peer, (STIFFNESS,))
-    arrays, notes = measured.arrays, measured.notes
-    assert np.isnan(arrays["limit"]).all()
-    assert "TypeError" in notes["remark"] or "takes no cloths" in notes["remark"]
+def test_a_solver_that_fails_has_no_limit_and_says_why(here):
+    measured = peers_cloth.stability(fake_peer("unable"), (STIFFNESS,))
+    assert np.isnan(measured.arrays["limit"]).all()
+    assert "TypeError" in measured.notes["remark"]
 
 
 def test_a_hanging_cloth_is_at_rest():
@@ -601,31 +565,27 @@ def test_the_table_of_one_step_names_the_cheapest_setting_and_the_fastest_solver
     ]
     table = tables.one_step(Results(records))
     assert column(table, "time to 1e-3 [ms]") == [10.0, 500.0, None]
-    assert column(table, "1e-3 by") == ["10 iterations", "10 iterations", None]
+    assert column(table, "setting for 1e-3") == ["10 iterations", "10 iterations", None]
     assert column(table, "time to 1e-6 [ms]") == [None] * 3
-    assert column(table, "least error") == [1e-4, 1e-4, 0.4]
+    assert column(table, "smallest error") == [1e-4, 1e-4, 0.4]
     assert column(table, "remark") == ["20 × 20, 10 iterations: tired"] * 3
     (point,) = table.summary.points
-    assert point == (
-        "20 × 20, 1,000 N/m: to 1e-3 Plumbob Newton, 10.0 ms (then Newton engine, VBD, 500 ms) "
-        "and to 1e-6 none"
-    )
+    first = "20 × 20, 1,000 N/m: to 1e-3 Plumbob Newton, 10.0 ms (then Newton engine, VBD, 500 ms)"
+    assert point.startswith(first)
+    assert point.endswith("to 1e-6 none")
 
 
 def test_the_table_of_motions_says_what_diverged_and_what_was_cut_short(make):
-    table = tables.motion(Results([make.fell("MuJoCo Euler")]))
-    assert column(table, "distance from the truth [m]") == [None, 2e-2, 1e-3]
-    assert column(table, "time for a simulated second [s]") == pytest.approx([0.006, 0.06, 60.0])
-    assert column(table, "remark") == ["diverged", "", "out of time before frame 4"]
-    assert "diverged: MuJoCo Euler" in table.summary.sentence
-    assert table.summary.points == ("20 × 20, 1,000 N/m: MuJoCo Euler by 4 steps, 0.0200 m",)
-    assert "order of 3.50" in table.measured
-
-
-def test_only_motions_that_got_to_their_end_are_best(make):
     farther = make.fell("MuJoCo RK4", true=[np.nan, 3e-2, 1e-4])
     table = tables.motion(Results([make.fell("MuJoCo Euler"), farther]))
-    place = [c.heading for c in table.columns].index("distance from the truth [m]")
+    assert column(table, "distance from the truth [m]")[:3] == [None, 2e-2, 1e-3]
+    seconds = column(table, "time for a simulated second [s]")[:3]
+    assert seconds == pytest.approx([0.006, 0.06, 60.0])
+    assert column(table, "remark")[:3] == ["diverged", "", "out of time before frame 4"]
+    assert "MuJoCo Euler and MuJoCo RK4" in table.summary.sentence
+    assert table.summary.points == ("20 × 20, 1,000 N/m: MuJoCo Euler by 4 steps, 0.0200 m",)
+    assert "order of 3.50" in table.measured
+    place = [c.title for c in table.columns].index("distance from the truth")
     assert {table.rows[i][j] for i, j in best_cells(table) if j == place} == {2e-2}
 
 
@@ -643,47 +603,36 @@ def test_a_limit_of_stability_stands_beside_the_motions_in_units_of_the_theory(m
     table = tables.motion(Results(records))
     assert column(table, "stable up to [2/ω]") == [pytest.approx(1.0)] * 3 + [None] * 3
     assert column(table, "longest stable step [ms]")[0] == 20.0
-    assert table.summary.points[-1] == "longest stable step in units of 2 / ω: a 1.00"
+    assert table.summary.points[-1].endswith("2 / ω: a 1.00")
 
 
 def test_the_published_times_stand_beside_ours(make):
     table = tables.liu_2013(Results([make.as_liu("local_global", 0.03)]))
     assert table.rows == (("local/global", "10 iterations", 50.0, 30.0, 0.5),)
     assert "abstract" in table.measured
-    assert table.summary.points == (
-        "local/global, 10 iterations: 30.0 ms, published 50.0 ms; here an error of 0.500 is left",
-    )
+    (point,) = table.summary.points
+    for part in ("local/global, 10 iterations", "30.0 ms", "50.0 ms", "0.500"):
+        assert part in point
 
 
 @pytest.mark.parametrize(
     ("name", "maker"),
-    [
-        ("work_precision_step", "worked"),
-        ("work_precision_implicit", "fell"),
-        ("work_precision_truth", "fell"),
-    ],
+    [("step_chart", "worked"), ("implicit_chart", "fell"), ("truth_chart", "fell")],
 )
 def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_each_solver(
     make, name, maker
 ):
-    records = [
-        getattr(make, maker)(solver, k)
-        for solver in ("Plumbob Newton", "MuJoCo Euler")
-        for k in (1e2, 1e4)
-    ]
-    made = [figure(Results(records)) for figure in all_figures()]
-    svg = next(drawn(sketch).svg for sketch in made if sketch and sketch.name == name)
-    for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", "Plumbob Newton", "MuJoCo Euler"):
+    solvers, maker = ("Plumbob Newton", "MuJoCo Euler"), getattr(make, maker)
+    records = [maker(solver, stiffness) for solver in solvers for stiffness in (1e2, 1e4)]
+    svg = drawn(getattr(tables, name)(Results(records))).svg
+    for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", *solvers):
         assert text in svg
 
 
 def test_a_job_of_a_worker_is_known_by_its_arrays(cloth):
-    """What travels between processes is rebuilt there: the same system, to the last bit."""
-    import pickle
-
-    sent = peers_cloth.job(fake_peer("m"), cloth, {}, Shape(1, 1, 1.0))
-    got = pickle.loads(pickle.dumps(sent))
-    assert isinstance(got, ClothJob)
-    system = MassSpring(**got.system._asdict())
+    """A job that travels between processes keeps the same system, to the last bit."""
+    shape = Shape(1, 1, 1.0)
+    copy = pickle.loads(pickle.dumps(peers_cloth.job(fake_peer("m"), cloth, {}, shape)))
+    system = MassSpring(**copy.system._asdict())
     for name, values in cloth.system.arrays._asdict().items():
         np.testing.assert_array_equal(getattr(system.arrays, name), values)

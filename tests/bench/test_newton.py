@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import SCALES, Scale, blocks
-from plumbob.bench.experiments.cloth import tables
-from plumbob.bench.experiments.cloth.problem import HEAVY_STIFFNESSES
+from plumbob.bench.experiments.newton import STIFFNESSES, tables
 from plumbob.bench.experiments.newton import measurement as suite
 from plumbob.bench.tables.results import Results
 from plumbob.reference import STEP_SOLVERS
@@ -20,17 +19,9 @@ def stiff():
         ("newton", suite.FROM_Y, 100),
         ("lbfgs", suite.FROM_Y, 2000),
         ("local_global", suite.FROM_Y, 3),
-        ("local_global", suite.FROM_BESIDE, 500),
+        ("local_global", suite.NEAR_NEWTON, 500),
     ]
     return {which: suite.certified_step(SIZE, 1e5, *which) for which in wanted}
-
-
-def stored(make, which, measured, **changed):
-    """A record of what was measured, some of it changed."""
-    solver, start, limit = which
-    arrays = dict(measured.arrays) | changed
-    settings = {"start": start, "iterations": limit}
-    return make.certified(solver, settings, arrays, measured.notes)
 
 
 def test_newton_reaches_the_tolerance_and_is_covered(stiff):
@@ -43,7 +34,7 @@ def test_newton_reaches_the_tolerance_and_is_covered(stiff):
 
 
 @pytest.mark.parametrize(
-    "which", [("lbfgs", suite.FROM_Y, 2000), ("local_global", suite.FROM_BESIDE, 500)]
+    "which", [("lbfgs", suite.FROM_Y, 2000), ("local_global", suite.NEAR_NEWTON, 500)]
 )
 def test_the_others_limits_are_newtons_wherever_both_are_covered(stiff, which):
     found = stiff[which].arrays
@@ -64,7 +55,7 @@ def test_an_answer_far_from_the_limit_has_no_bound_but_an_error(stiff):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stiffness", HEAVY_STIFFNESSES)
+@pytest.mark.parametrize("stiffness", STIFFNESSES)
 def test_on_thirty_by_thirty_newton_converges_and_the_others_limits_agree(stiffness):
     here = [
         block
@@ -80,13 +71,13 @@ def test_on_thirty_by_thirty_newton_converges_and_the_others_limits_agree(stiffn
             assert arrays["same"]
             assert arrays["apart"] <= arrays["distance"] + newton["distance"]
     others = set(STEP_SOLVERS) - {"newton", "gauss_newton"}
-    start = suite.FROM_BESIDE if stiffness >= suite.STIFF else suite.FROM_Y
+    start = suite.NEAR_NEWTON if stiffness >= suite.STIFF else suite.FROM_Y
     assert all(found[solver, start]["covered"] for solver in others)
 
 
 def test_every_solver_has_a_block_at_every_stiffness():
     listed = list(blocks("newton", Scale(targets=1, seconds=0.1)))
-    for stiffness in HEAVY_STIFFNESSES:
+    for stiffness in STIFFNESSES:
         here = {b.solver for b in listed if b.problem == f"swing/k{stiffness:g}"}
         assert here == set(STEP_SOLVERS)
     assert {b.size for b in listed} == {suite.QUICK}
@@ -94,21 +85,22 @@ def test_every_solver_has_a_block_at_every_stiffness():
 
 
 def test_table_and_sentence_follow_the_records(make, stiff):
-    records = [stored(make, which, measured) for which, measured in stiff.items()]
+    records = [
+        make.certified(solver, {"start": start, "iterations": limit}, step.arrays, step.notes)
+        for (solver, start, limit), step in stiff.items()
+    ]
     table = tables.proofs(Results(records))
-    columns = [column.title for column in table.columns]
-    bound, same = (columns.index(name) for name in ("bound", "Newton’s minimiser"))
-    assert [row[same] for row in table.rows] == ["yes", "yes", "not proven", "yes"]
-    assert [row[bound] == "yes" for row in table.rows] == [True, True, False, True]
-    assert table.rows[2][columns.index("a minimiser within")] is None
-    assert table.rows[0][0] == 1e5
-    assert "in 1 of 1 cloth." in table.summary.sentence
-    assert "3 answers, 2 are proven" in table.summary.sentence
+    cells = dict(zip([c.title for c in table.columns], zip(*table.rows, strict=True), strict=True))
+    assert cells["same minimiser as Newton"] == ("yes", "yes", "not proven", "yes")
+    assert [bound == "yes" for bound in cells["bound"]] == [True, True, False, True]
+    assert cells["distance to a minimiser, at most"][2] is None
+    assert cells["stiffness"][0] == 1e5
+    for part in ("in 1 of 1 cloth.", "3 solutions, 2 are proven"):
+        assert part in table.summary.sentence
 
 
-def test_another_minimiser_and_a_newton_that_fails_are_said(make, stiff):
-    (which, measured), *_ = stiff.items()
-    failed = stored(make, which, measured, residual=1.0, at_floor=False, same=False, different=True)
-    table = tables.proofs(Results([failed]))
+def test_another_minimiser_and_a_newton_that_fails_are_reported(make):
+    arrays = {"residual": 1.0, "at_floor": False, "same": False, "different": True}
+    table = tables.proofs(Results([make.certified(arrays=arrays)]))
     assert "no" in table.rows[0]
     assert "in 0 of 1 cloth." in table.summary.sentence

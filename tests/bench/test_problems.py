@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.problems.chains import STRATA, chain_targets, unit
 from plumbob.bench.problems.curves import MAX_SPACING, MIN_SPACING, arm_beyond, arm_curves
 

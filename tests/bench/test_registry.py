@@ -11,7 +11,8 @@ from plumbob.bench.experiments import Scale, blocks
 from plumbob.bench.experiments.chain import tables as chain_tables
 from plumbob.bench.experiments.cloth import measurement as cloth
 from plumbob.bench.experiments.cloth import tables as cloth_tables
-from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.cloth.measurement import cloth_swing
+from plumbob.bench.experiments.newton import tables as newton_tables
 from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots import tables as robot_tables
 from plumbob.bench.harness import run
@@ -59,7 +60,7 @@ def test_a_new_step_solver_stands_in_the_tables(make):
     assert not record.failed
     table = cloth_tables.convergence(Results([record]))
     assert table.rows[0][1:3] == ("damped global", record.arrays["error"][1])
-    certified = cloth_tables.proofs(Results([make.certified("damped_global")]))
+    certified = newton_tables.proofs(Results([make.certified("damped_global")]))
     assert certified.rows[0][1] == "damped global"
 
 

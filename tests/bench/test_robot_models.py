@@ -1,6 +1,7 @@
 """Files beside both engines: what is measured, and how it is shown."""
 
 import pytest
+from table_cells import column
 
 from plumbob.bench.experiments.robot_models.measurement import (
     compare,
@@ -41,11 +42,6 @@ def compared(make, tmp_path):
         ]  # fmt: skip
 
     return records
-
-
-def column(table, heading):
-    index = [c.heading for c in table.columns].index(heading)
-    return [row[index] for row in table.rows]
 
 
 def test_a_file_that_both_read_is_a_row_with_its_size_and_differences(compared):

@@ -9,7 +9,7 @@ import pytest
 from plumbob.bench.experiments import SUITES, Scale, blocks
 from plumbob.bench.experiments.cloth import ONE_STEP
 from plumbob.bench.experiments.cloth import measurement as cloth
-from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.cloth.tables import convergence
 from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.machine import stamp

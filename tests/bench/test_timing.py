@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import Scale
-from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.timing import case as timing_case
 from plumbob.bench.experiments.timing import cloth, kinematics, measurement
 from plumbob.bench.experiments.timing.case import (
     COMPILED,
     LIMIT,
     Case,
-    Work,
+    TimedWork,
     copying,
     stream,
     streaming,
@@ -27,7 +27,7 @@ from plumbob.bench.harness.record import RecordFile
 from plumbob.crosscheck.engines import MujocoMassSpring
 from plumbob.reference import forward_kinematics, set_num_threads
 
-WORK = Work("p", "s", "g", "t")
+WORK = TimedWork("p", "s", "g", "t")
 
 
 @pytest.fixture(scope="module")
@@ -35,17 +35,14 @@ def folder(tmp_path_factory):
     """The folder of the records of a run that times a few cases for a millisecond."""
     folder, few = tmp_path_factory.mktemp("timed"), pytest.MonkeyPatch()
     few.setitem(run.SCALES, "quick", Scale(1, 0.001))
-    few.setattr(measurement, "cases", lambda: [c for c in cases() if is_wanted(c)])
+    some = [c for c in cases() if (c.solver, c.work.group) == (COMPILED, "10 balls")]
+    few.setattr(measurement, "cases", lambda: some)
     try:
         events = list(run.run(["timing"], "quick", folder))
     finally:
         few.undo()
     assert {event.state for event in events} == {run.MEASURING, run.MEASURED}
     return folder
-
-
-def is_wanted(case):
-    return case.solver == COMPILED and case.work.group == "10 balls"
 
 
 def test_every_case_is_kept_with_rounds_of_one_operation_each(folder):
@@ -121,15 +118,12 @@ def test_rounds_are_as_long_and_as_many_as_the_time_allows(single, expected):
 
 
 def test_the_limit_moves_as_many_bytes_as_it_says(monkeypatch):
-    moved = []
-    monkeypatch.setattr(
-        np, "copyto", lambda sink, source: moved.append(sink.nbytes + source.nbytes)
-    )
+    sizes = []
+    monkeypatch.setattr(np, "copyto", lambda to, source: sizes.append(to.nbytes + source.nbytes))
     case = copying(WORK, 1600, passes=3, operations=10)
     case.prepare()()
-    assert moved == [1600] * 3
-    assert case.moved == 4800
-    assert case.solver == LIMIT
+    assert sizes == [1600] * 3
+    assert (case.moved, case.solver) == (4800, LIMIT)
 
 
 @pytest.mark.parametrize("many", [1, 3])
@@ -143,7 +137,7 @@ def test_the_limit_of_batches_reads_and_writes_all_that_it_says(many, monkeypatc
         assert (sink[len(source) :] == 1.0).all()
 
     monkeypatch.setattr(timing_case, "_stream", watched)
-    case = streaming(WORK, 320, 560, cores=many, least=0 if many == 1 else 8)
+    case = streaming(WORK, 320, 560, cores=many, minimum=0 if many == 1 else 8)
     with set_num_threads(many):
         case.prepare()()
     assert len(moved) == (1 if many == 1 else 3 * 4)
@@ -152,25 +146,20 @@ def test_the_limit_of_batches_reads_and_writes_all_that_it_says(many, monkeypatc
     assert (case.solver, case.cores) == (LIMIT, many)
 
 
-def test_a_batch_moves_what_its_limit_moves():
-    for name, (skeleton, batch) in kinematics.models().items():
-        given = np.zeros((batch, skeleton.joint_count, 4))
-        given[..., 0] = 1.0
-        pose = forward_kinematics(skeleton, given)
-        written = pose.positions.nbytes + pose.rotations.nbytes
-        limits = [case for case in kinematics.cases() if case.solver == LIMIT]
-        calls = name, f"{batch:,} poses a call"
-        (limit,) = [case for case in limits if (case.work.group, case.work.title) == calls]
-        assert limit.moved == given.nbytes + 2 * written
-
-
-def test_every_forward_kinematics_stands_beside_its_limit_on_as_many_cores():
+def test_every_batch_moves_what_its_limit_moves_on_as_many_cores():
     cases = list(kinematics.cases())
     limits = {case.work.problem: case for case in cases if case.solver == LIMIT}
     for case in cases:
-        assert limits[case.work.problem].cores == case.cores
-        assert limits[case.work.problem].operations == case.operations
+        limit = limits[case.work.problem]
+        assert (limit.cores, limit.operations) == (case.cores, case.operations)
     assert {case.cores for case in cases} == {1, None}
+    for name, (skeleton, batch) in kinematics.models().items():
+        rotations = np.zeros((batch, skeleton.joint_count, 4))
+        rotations[..., 0] = 1.0
+        pose = forward_kinematics(skeleton, rotations)
+        limit = limits[f"kinematics/{name}/{batch:,} poses a call"]
+        output = pose.positions.nbytes + pose.rotations.nbytes
+        assert limit.moved == rotations.nbytes + 2 * output
 
 
 @pytest.mark.parametrize(("integrator", "count"), [("Euler", 10), ("discrete", 1)])

@@ -35,31 +35,40 @@ FEW = 2
 PARTS = ["masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity"]
 PARTS += ["tension_only"]
 
-# Faults in the model or the forces: (system, state, h, external) -> (system, external).
-MODEL_FAULTS = {
-    "gravity times mass twice": lambda s, state, h, f: (s, f + (s.masses - 1)[:, None] * weight(s)),
-    "gravity left out": lambda s, state, h, f: (altered(s, gravity=(0, 0, 0)), f),
-    "gravity without h²": lambda s, state, h, f: (altered(s, gravity=s.gravity / h**2), f),
-    "rest lengths left out": lambda s, state, h, f: (altered(s, rest_lengths=0.0), f),
-    "L in place of M + h² L": lambda s, state, h, f: (
-        altered(s, masses=1e-9 * s.masses, gravity=(0, 0, 0)),
-        f + weight(s),
+# Faults in the system.
+SYSTEM_FAULTS = {
+    "gravity left out": lambda s: altered(s, gravity=(0, 0, 0)),
+    "rest lengths left out": lambda s: altered(s, rest_lengths=0.0),
+    "slack springs push": lambda s: altered(s, tension_only=False),
+    "springs twice": lambda s: altered(s, stiffnesses=2 * s.stiffnesses),
+    "one spring forgotten": lambda s: altered(s, stiffnesses=s.stiffnesses - first_stiffness(s)),
+    "dampers left out": lambda s: altered(s, dampings=0.0),
+    "dampers twice": lambda s: altered(s, dampings=2 * s.dampings),
+    "pins with a velocity": lambda s: altered(s, pinned=()),
+}
+# Faults in the external forces: (system, state, forces) -> forces.
+FORCE_FAULTS = {
+    "gravity times mass twice": lambda s, state, f: f + (s.masses - 1)[:, None] * weight(s),
+    "external forces left out": lambda s, state, f: 0.0 * f,
+    "dampers push": lambda s, state, f: f - 2.0 * damper_forces(s, state),
+    "dampers across the springs too": lambda s, state, f: (
+        f - damper_forces(s, state) + all_round(s, state)
     ),
-    "slack springs push": lambda s, state, h, f: (altered(s, tension_only=False), f),
-    "external forces left out": lambda s, state, h, f: (s, 0.0 * f),
-    "dampers left out": lambda s, state, h, f: (altered(s, dampings=0.0), f),
-    "dampers twice": lambda s, state, h, f: (altered(s, dampings=2 * s.dampings), f),
-    "dampers push": lambda s, state, h, f: (s, f - 2.0 * damper_forces(s, state)),
-    "dampers across the springs too": lambda s, state, h, f: (
-        s,
-        f - damper_forces(s, state) + all_round(s, state),
-    ),
-    "springs pull one end only": lambda s, state, h, f: (s, f + one_sided(s, state)),
+    "L in place of M + h² L": lambda s, state, f: f + weight(s),
+    "springs pull one end only": lambda s, state, f: f + one_sided(s, state),
 }
 
 
 def altered(system, **changes):
     return MassSpring(**{name: changes.get(name, getattr(system, name)) for name in PARTS})
+
+
+def first_stiffness(system):
+    return np.where(np.arange(len(system.springs)) == 0, system.stiffnesses, 0.0)
+
+
+def faulted(system, fault):
+    return SYSTEM_FAULTS.get(fault, lambda same: same)(system)
 
 
 def weight(system):
@@ -78,57 +87,40 @@ def all_round(system, state):
 
 def one_sided(system, state):
     """The force that cancels the first spring's pull at its second end."""
-    k = np.where(np.arange(len(system.springs)) == 0, system.stiffnesses, 0.0)
-    pulls = spring_forces(altered(system, stiffnesses=k), state.positions)
+    pulls = spring_forces(altered(system, stiffnesses=first_stiffness(system)), state.positions)
     pulls[system.springs[0, 0]] = 0.0
     return -pulls
 
 
 def changed(fault, system, state, h, external):
     """The system and the external forces as the fault has them."""
-    given = np.zeros_like(state.positions) if external is None else external
-    return MODEL_FAULTS.get(fault, lambda *same: (same[0], same[3]))(system, state, h, given)
+    loads = np.zeros_like(state.positions) if external is None else external
+    model = faulted(system, fault)
+    if fault == "gravity without h²":
+        model = altered(system, gravity=system.gravity / h**2)
+    if fault == "L in place of M + h² L":
+        model = altered(system, masses=1e-9 * system.masses, gravity=(0, 0, 0))
+    return model, FORCE_FAULTS.get(fault, lambda s, state, f: f)(system, state, loads)
 
 
 def faulty_springs(system, positions, *, fault):
-    pulls = spring_forces(system, positions)
-    if fault == "push":
-        return -pulls
-    if fault == "twice":
-        return spring_forces(altered(system, stiffnesses=2 * system.stiffnesses), positions)
-    if fault == "rest lengths left out":
-        return spring_forces(altered(system, rest_lengths=0.0), positions)
-    if fault == "slack springs push":
-        return spring_forces(altered(system, tension_only=False), positions)
-    if fault == "one spring forgotten":
-        k = np.where(np.arange(len(system.springs)) == 0, 0.0, system.stiffnesses)
-        return spring_forces(altered(system, stiffnesses=k), positions)
-    return pulls
+    pulls = spring_forces(faulted(system, fault), positions)
+    return -pulls if fault == "push" else pulls
 
 
 def faulty_dampers(system, state, *, fault):
-    pulls = damper_forces(system, state)
     if fault == "across the spring too":
         return all_round(system, state)
-    if fault == "pins with a velocity":
-        return damper_forces(altered(system, pinned=()), state)
-    return {"push": -1.0, "twice": 2.0}.get(fault, 1.0) * pulls
+    pulls = damper_forces(faulted(system, fault), state)
+    return -pulls if fault == "push" else pulls
 
 
 def faulty_stiffness(system, positions, *, fault):
-    K = stiffness_matrix(system, positions)
+    K = stiffness_matrix(faulted(system, fault), positions)
     blocks = spring_blocks(system, np.array(positions), geometric=False)
-    along = stiffness_matrix_of(system, blocks)
-    if fault == "one spring forgotten":
-        k = np.where(np.arange(len(system.springs)) == 0, 0.0, system.stiffnesses)
-        return stiffness_matrix(altered(system, stiffnesses=k), positions)
-    return {"geometric term dropped": along, "geometric term with the wrong sign": 2 * along - K,
-            "rest lengths left out": stiffness_matrix(altered(system, rest_lengths=0.0), positions),
-            "negated": -K}.get(fault, K)  # fmt: skip
-
-
-def stiffness_matrix_of(system, blocks):
-    return BlockSum(derivation(system).A).matrix(blocks)
+    along = BlockSum(derivation(system).A).matrix(blocks)
+    return {"geometric term dropped": along, "negated": -K,
+            "geometric term with the wrong sign": 2 * along - K}.get(fault, K)  # fmt: skip
 
 
 def faulty_potential(system, positions, *, fault):
@@ -261,7 +253,7 @@ IMPLICIT_FAULTS = [*STEP_FAULTS, "gravity without h²", "L in place of M + h² L
 DAMPER_FAULTS = ["dampers left out", "dampers twice", "dampers push",
                  "dampers across the springs too"]  # fmt: skip
 ENERGY_FAULTS = ["k (l - r)²", "gravity upwards", "gravity times mass twice"]
-SPRING_FAULTS = ["push", "twice", "rest lengths left out", "one spring forgotten"]
+SPRING_FAULTS = ["push", "springs twice", "rest lengths left out", "one spring forgotten"]
 REST_FAULTS = ["gravity times mass twice", "gravity left out", "rest lengths left out"]
 
 # What a claim uses, and what takes its place: (module or SIMULATORS, name, stand-in).
@@ -276,7 +268,7 @@ IMPLICIT_MOTION = (integrators.SIMULATORS, "implicit Euler",
 FAULTS = {
     "spring forces": ((force_claims, "spring_forces", faulty_springs), [*SPRING_FAULTS, LOOSE]),
     "damper forces": ((force_claims, "damper_forces", faulty_dampers),
-        ["push", "twice", "across the spring too", "pins with a velocity"]),
+        ["push", "dampers twice", "across the spring too", "pins with a velocity"]),
     "stiffness matrix": ((force_claims, "stiffness_matrix", faulty_stiffness),
         ["geometric term dropped", "geometric term with the wrong sign", "rest lengths left out",
          "negated", "one spring forgotten"]),

@@ -65,32 +65,6 @@ def network(rng, request):
     return system, State(x, rng.standard_normal((7, 3)))
 
 
-@pytest.fixture
-def relabelled(network, rng):
-    """Return the network with its particles in another order, its state, and that order."""
-    system, state = network
-    order = rng.permutation(system.particle_count)
-    place = np.argsort(order)
-    renamed = rebuilt(
-        system,
-        masses=system.masses[order],
-        springs=place[system.springs],
-        pinned=place[system.pinned],
-    )
-    return renamed, State(state.positions[order], state.velocities[order]), order
-
-
-@pytest.fixture
-def shuffled(network, rng):
-    """Return the network with its springs in another order, every second one reversed."""
-    system, _ = network
-    order = rng.permutation(len(system.springs))
-    ends = system.springs[order].copy()
-    ends[::2] = ends[::2, ::-1]
-    names = ("rest_lengths", "stiffnesses", "dampings", "tension_only")
-    return rebuilt(system, springs=ends, **{name: getattr(system, name)[order] for name in names})
-
-
 def random_articulation(kinds, seed):
     """Return a random tree of joints of these kinds; two in three are limited, some are mimics."""
     rng = np.random.default_rng(seed)

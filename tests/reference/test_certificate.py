@@ -8,7 +8,7 @@ import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plumbob.reference import rotation, scenes
+from plumbob.reference import scenes
 from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
 from plumbob.reference.implicit_euler.certificate import (
     Coverage,
@@ -87,24 +87,6 @@ class TestCurvature:
         )
         self.curvature_is_below_every_eigenvalue(*step_of(heavy, state))
 
-    def test_a_poor_estimate_costs_sharpness_only(self, swing, monkeypatch):
-        objective, x = step_of(*swing, h=1 / 30)
-        sharp = certify(objective, x).curvature
-        monkeypatch.setattr(
-            certificate, "_estimate_smallest_eigenvalue", lambda factor, n: 3.0 * sharp
-        )
-        blunt = certify(objective, x)
-        assert blunt.covered
-        assert 0.3 * sharp < blunt.curvature < sharp
-
-    def test_ten_times_too_much_is_seen(self, network, monkeypatch):
-        objective, x = step_of(*network)
-        monkeypatch.setattr(
-            certificate, "least_curvature", lambda H, error: (10 * least(H)[0], least(H)[1])
-        )
-        with pytest.raises(AssertionError):
-            self.curvature_is_below_every_eigenvalue(objective, x)
-
     def test_an_indefinite_matrix_has_none(self):
         assert least(scipy.sparse.csc_array(np.diag([1.0, -1e-9, 2.0]))) == (0.0, None)
 
@@ -176,22 +158,6 @@ class TestHessianChange:
         there, far = (hessian_change(objective, state.positions, r)[1] for r in (0.0, radius))
         assert far == pytest.approx(4 * there, rel=1e-7)
 
-    @pytest.mark.parametrize(
-        "fault",
-        [
-            lambda free, springs, c: laplacian_norm(free, springs[1:], c[1:]),
-            lambda free, springs, c: laplacian_norm(free, springs, c) / 2,
-            lambda free, springs, c: max(c),
-        ],
-        ids=["a spring dropped", "halved", "the largest in place of the sum"],
-    )
-    def test_a_dropped_term_is_seen(self, monkeypatch, fault):
-        system, state = one_spring((), 3)
-        objective = ImplicitEuler(system, h=h).objective(state)
-        monkeypatch.setattr(certificate, "laplacian_norm", fault)
-        _, L = hessian_change(objective, state.positions, 0.0)
-        assert self.steepest(objective, state.positions, ()) > L * (1 + 1e-3)
-
     def test_springs_that_are_linear_or_slack_or_pinned_do_not_count(self, altered):
         system = MassSpring(
             [1, 1, 1], [[0, 1], [0, 1], [0, 2], [0, 1]], [0.0, 2.0, 1.0, 1.0],
@@ -258,63 +224,11 @@ class TestDistance:
             assert abs(error - known.newton_step) <= 0.5 * known.newton_step + ROUNDED
             assert error <= known.distance + ROUNDED
 
-    @given(exponents, seeds)
-    def test_it_is_at_least_as_sharp_as_convexity_on_a_ball(self, exponent, seed):
-        """rho = 2 |grad g| / mu, and L rho <= mu / 2 with the L of that ball."""
-        system, state = scenes.random_network(particles=12, seed=seed % 5)
-        objective, exact = step_of(system, state)
-        x = beside(exact, exponent, seed, system.free)
-        known = certify(objective, x)
-        if known.curvature:
-            rho = 2 * objective.evaluate(x).gradient_norm / known.curvature
-            smooth, L = hessian_change(objective, x, rho + ROUNDED)
-            if smooth == Coverage.COVERED and L * (rho + ROUNDED) <= known.curvature / 2:
-                assert known.covered
-                assert known.distance <= rho + ROUNDED
-
-    def test_of_a_free_fall_it_is_rounding(self):
-        system = MassSpring([1.0, 2.0], np.empty((0, 2)), 1.0, 1.0)
-        objective, x = step_of(system, State(np.eye(3)[:2], np.ones((2, 3))))
-        known = certify(objective, x)
-        assert known.covered
-        assert known.lipschitz == 0
-        assert 0 < known.distance < 1e-13
-
     def test_it_is_zero_if_all_particles_are_pinned(self):
         system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
         known = certify(*step_of(system, State(np.eye(3)[:2], np.ones((2, 3)))))
         assert known.covered
         assert (known.distance, known.unique_within) == (0.0, math.inf)
-
-    def test_it_is_invariant_under_rotations_and_relabelling(
-        self, network, relabelled, altered, rng
-    ):
-        system, state = network
-        known = certify(*step_of(system, state, max_iterations=2))
-        R = rotation.to_matrix(rotation.random(rng, 1))[0]
-        rotated = altered(system, gravity=R @ system.gravity)
-        displaced = State(state.positions @ R.T, state.velocities @ R.T)
-        renamed = relabelled[:2]
-        for other in ((rotated, displaced), renamed):
-            again = certify(*step_of(*other, max_iterations=2))
-            assert again.covered
-            assert again.distance == pytest.approx(known.distance, rel=1e-3)
-            assert again.lipschitz == pytest.approx(known.lipschitz, rel=1e-3)
-
-    @pytest.mark.parametrize("factor", [2.0**-20, 2.0**20])
-    def test_other_units(self, network, altered, factor):
-        """Kilograms and newtons together; a power of two changes no digit of g."""
-        system, state = network
-        scaled = altered(
-            system,
-            masses=factor * system.masses,
-            stiffnesses=factor * system.stiffnesses,
-            dampings=factor * system.dampings,
-        )
-        one, other = (certify(*step_of(s, state, max_iterations=2)) for s in (system, scaled))
-        assert one.covered
-        assert other.distance == pytest.approx(one.distance, rel=1e-6)
-        assert other.curvature == pytest.approx(factor * one.curvature, rel=1e-2)
 
     def test_a_result_is_certified_with_the_arguments_of_its_step(self, network, rng):
         system, state = network
@@ -326,20 +240,6 @@ class TestDistance:
         assert known.residual == result.residual
         assert known == certify(integrator.objective(state, *given), result.state.positions)
         assert integrator.certify(state, result).coverage == Coverage.PINS_ASTRAY
-
-    @pytest.mark.parametrize("kind", [list, np.float32])
-    def test_plain_positions_are_certified_like_a_result(self, network, kind):
-        system, state = network
-        integrator = ImplicitEuler(system, h=h)
-        result = integrator.step(state)
-        assert integrator.certify(state, result.state.positions) == integrator.certify(
-            state, result
-        )
-        x = result.state.positions.tolist() if kind is list else result.state.positions.astype(kind)
-        x = x if kind is list else np.where(system.free[:, None], x, state.positions)
-        known = integrator.certify(state, x)
-        assert known.covered
-        assert known.distance < 1e-6
 
 
 class TestMinimisers:
@@ -435,13 +335,6 @@ class TestReasons:
         assert objective.evaluate(state.positions).finite
         known = certify(objective, state.positions)
         assert (known.coverage, known.residual) == (Coverage.OVERFLOWN, math.inf)
-
-    def test_a_step_that_overflows(self):
-        system = MassSpring([1e75, 2e74], [[0, 1]], 1.0, 1e75)
-        state = State(1e75 * np.eye(3)[:2], np.ones((2, 3)))
-        integrator = ImplicitEuler(system, h=1e5)
-        known = integrator.certify(state, integrator.step(state))
-        assert known.coverage == Coverage.OVERFLOWN
 
     def test_a_pin_that_is_not_where_it_has_to_be(self):
         system, state = one_spring()

@@ -29,14 +29,6 @@ def errors(rho, iterations):
     return np.array(sizes), acceleration._R
 
 
-@pytest.mark.parametrize("rho", [0.5, 0.9, 0.99, 0.999])
-def test_the_acceleration_finds_the_rate_by_itself(rho):
-    _, R = errors(rho, iterations=int(60 / math.sqrt(1 - rho)))
-    # Errors shrink by R / (1 + sqrt(1 - R²)) an iteration, and that by which R is in doubt is a
-    # part of it.
-    assert pytest.approx(rho / (2 - rho), abs=0.5 * (1 - rho)) == R
-
-
 @pytest.mark.parametrize("rho", [0.9, 0.99, 0.999])
 def test_accelerated_iterations_number_as_the_square_root_of_plain_ones(rho):
     plain = math.log(1e-8) / math.log(rho)

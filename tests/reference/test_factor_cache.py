@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, factor_cache
-from plumbob.reference.implicit_euler.objective import Objective, global_matrix
-from plumbob.reference.mass_spring import State
+from plumbob.reference.implicit_euler.objective import global_matrix
 from plumbob.reference.sparse import factor
-from plumbob.reference.sparse.linear_solver import NotPositiveDefiniteError
 
 h = 0.05
 
@@ -101,23 +99,6 @@ def test_the_factor_is_that_of_the_matrix(network, rng, backend):
         x = factor_cache.global_factor(system, step).solve(b)
         np.testing.assert_allclose(global_matrix(system, step) @ x, b, rtol=0, atol=1e-13)
     np.testing.assert_allclose(global_matrix(system, h) @ kept.solve(b), b, rtol=0, atol=1e-13)
-
-
-def test_every_hessian_has_the_pattern_that_was_analysed(network, altered, analyses):
-    """Also where springs are slack, without stiffness, or all at rest length."""
-    system, state = network
-    made = factor_cache.hessian_factor(system)
-    loose = altered(system, stiffnesses=np.arange(len(system.springs)) % 2 * 10.0)
-    for model, x in ((system, state.positions), (loose, 0.5 * state.positions)):
-        for geometric in (False, True):
-            objective = Objective(model, State(x, state.velocities), h)
-            hessian = objective.hessian(x, geometric=geometric)
-            np.testing.assert_array_equal(hessian.toarray(), hessian.T.toarray())
-            try:
-                made.refactorize(hessian)
-            except NotPositiveDefiniteError:
-                assert geometric
-    assert analyses == [21]
 
 
 def test_the_pattern_of_a_matrix_cannot_be_changed_for_others(network):

@@ -1,33 +1,53 @@
-"""The lab's cloth: how implicit Euler's solvers converge, and what one iteration leaves behind."""
+"""Convergence of implicit Euler's solvers on the lab's cloth, and the error of few iterations."""
 
 import functools
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from plumbob.crosscheck.mass_spring.exact_step import exact_step
-from plumbob.reference import ImplicitEuler, State
+from plumbob.reference import ImplicitEuler, MassSpring, State, scenes
 from plumbob.reference.arguments import FloatArray
-from plumbob.reference.mass_spring import MassSpring, damper_forces, lengths, spring_forces
+from plumbob.reference.mass_spring import damper_forces, lengths, spring_forces
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from . import DAMPERS, FEW, ONE_STEP, SWING
-from .problem import DAMPING, FACTORS, ClothSwing, H, cloth_swing
-from .values import Converged, Dampers, FewIterations, Iterated
+from .values import ConsecutiveSteps, DamperDifferences, IterationErrors, TruncatedSteps
 
-# The cloth falls for three seconds; the steps of the next second are looked at.
-FALLING = 180
-STEPS = 60
+STIFFNESS, FACTORS = 100.0, (1, 10, 100)
+H = 1 / 60
+DAMPING = 0.2  # of the lab's own cloth; elsewhere it swings undamped
+# The cloth falls for three seconds; the steps of the next second are measured.
+FALLING, STEPS = 180, 60
 TOLERANCE = 1e-10
-# The step whose convergence is followed iteration by iteration.
+# The step whose convergence is recorded iteration by iteration.
 MIDDLE = FALLING + STEPS // 2
 FEW_ITERATIONS = (1, 10, 100)
-# Steps in which the two laws of dampers are compared [s], each half the one before.
+# Steps in which the two laws of dampers are compared [s], each half as long as the last.
 HALVED = tuple(H / 2**i for i in range(-1, 6))
+
+
+@dataclass(frozen=True)
+class ClothSwing:
+    """A cloth that falls and swings, in steps of fixed length."""
+
+    name: str  # of the problem
+    system: MassSpring
+    start: State
+    h: float  # the step [s]
+
+
+@functools.cache
+def cloth_swing(factor: float, size: int = 11, damping: float = 0.0) -> ClothSwing:
+    """Return the lab's cloth of size x size particles at rest, `factor` times as stiff."""
+    system, start = scenes.lab_cloth(stiffness=factor * STIFFNESS, size=size, damping=damping)
+    name = f"cloth/x{factor:g}" if size == 11 else f"cloth/x{factor:g}/{size}x{size}"
+    return ClothSwing(name, system, start, H)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -35,34 +55,29 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
     The cloth is the same at every scale.
     """
+    swing = {"h": H, "first": FALLING, "steps": STEPS}
     for factor in FACTORS:
-        problem = cloth_swing(factor)
-        title = {"title": f"stiffness × {factor:g}"}
-        for task, name, solver, measure, settings in _measurements(problem, factor):
-            facts = {**title, "task": task}
-            yield Block("cloth", f"{problem.name}{name}", solver, measure, settings, facts=facts)
+        problem, block = cloth_swing(factor), partial(_block, factor)
+        yield block(SWING, "newton", partial(newton_steps, problem), **swing, tolerance=TOLERANCE)
+        for solver in registry.followed_step_solvers():
+            measure = partial(one_step, problem, solver.name, solver.followed)
+            settings = {"h": H, "step": MIDDLE, "iterations": solver.followed}
+            yield block(ONE_STEP, solver.name, measure, **settings)
+        for count in FEW_ITERATIONS:
+            measure = partial(few_iterations, problem, count)
+            yield block(FEW, "local_global", measure, **swing, iterations=count)
+        measure = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
+        settings = {"first": MIDDLE, "damping": DAMPING}
+        settings |= {"longest": HALVED[0], "halvings": len(HALVED) - 1}
+        yield block(DAMPERS, "newton", measure, **settings)
 
 
-# Its task, name and solver, how it is measured, and with which settings.
-_Measurement = tuple[str, str, str, Callable[[], Measured], dict[str, Any]]
-
-
-def _measurements(problem: ClothSwing, factor: float) -> Iterator[_Measurement]:
-    swinging = {"h": H, "first": FALLING, "steps": STEPS}
-    settings = {**swinging, "tolerance": TOLERANCE}
-    yield (SWING, "", "newton", partial(newton_steps, problem), settings)
-    for solver in registry.followed_step_solvers():
-        measure = partial(one_step, problem, solver.name, solver.followed)
-        settings = {"h": H, "step": MIDDLE, "iterations": solver.followed}
-        yield (ONE_STEP, "/one step", solver.name, measure, settings)
-    for count in FEW_ITERATIONS:
-        measure = partial(few_iterations, problem, count)
-        settings = {**swinging, "iterations": count}
-        yield (FEW, "/few iterations", "local_global", measure, settings)
-    measure = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
-    settings = {"first": MIDDLE, "damping": DAMPING}
-    settings |= {"longest": HALVED[0], "halvings": len(HALVED) - 1}
-    yield (DAMPERS, "/dampers", "newton", measure, settings)
+def _block(
+    factor: float, task: str, solver: str, measure: Callable[[], Measured], **settings: Any
+) -> Block:
+    problem = cloth_swing(factor).name + (f"/{task}" if task != SWING else "")
+    facts = {"title": f"stiffness × {factor:g}", "task": task}
+    return Block("cloth", problem, solver, measure, settings, facts=facts)
 
 
 def newton_steps(problem: ClothSwing) -> Measured:
@@ -72,7 +87,7 @@ def newton_steps(problem: ClothSwing) -> Measured:
     columns = zip(
         *((r.iterations, r.residual, r.outcome, r.at_floor) for r in results), strict=True
     )
-    return Measured(Converged(*map(np.array, columns)))
+    return Measured(ConsecutiveSteps(*map(np.array, columns)))
 
 
 def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
@@ -86,50 +101,49 @@ def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
         (objective.residual(iterate), exact.error(iterate.positions, objective.y))
         for _, iterate in zip(range(iterations + 1), iterates, strict=False)
     ]
-    return Measured(Iterated(*np.array(pairs).T))
+    return Measured(IterationErrors(*np.array(pairs).T))
 
 
 def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
-    """Compare steps of a few local/global iterations with converged ones.
+    """Compare steps of a few local/global iterations with converged steps.
 
-    A step's error is that of one such step from each state of the converged motion. The drift is
-    the distance between the converged motion and one that takes all its steps so; the path, that
-    of the converged motion from where both began.
+    The error and distance are those of a single such step from each state of the converged motion.
+    The drift is the distance between the converged motion and the motion of such steps alone; the
+    path is the distance of the converged motion from its start.
     """
-    few = integrator_of(problem, "local_global", 0.0, iterations)
-    start, *exact = true = converged_motion(problem)[FALLING:]
-    after = [few.step(state).state for state in true[:-1]]
-    inertial = [integrator_of(problem).objective(state).y for state in true[:-1]]
+    integrator = integrator_of(problem, "local_global", 0.0, iterations)
+    start, *exact = converged = converged_motion(problem)[FALLING:]
+    ends = [integrator.step(state).state for state in converged[:-1]]
+    inertial = [integrator_of(problem).objective(state).y for state in converged[:-1]]
     errors = [
-        metrics.relative_error(state.positions, x.positions, y)
-        for state, x, y in zip(after, exact, inertial, strict=True)
+        metrics.relative_error(end.positions, x.positions, y)
+        for end, x, y in zip(ends, exact, inertial, strict=True)
     ]
-    pairs = after, motion(start, STEPS, few)[1:], [start] * STEPS
     distances = (
         [metrics.rms_distance(a.positions, b.positions) for a, b in zip(states, exact, strict=True)]
-        for states in pairs
+        for states in (ends, motion(start, STEPS, integrator)[1:], [start] * STEPS)
     )
-    return Measured(FewIterations(*map(np.array, (errors, *distances))))
+    return Measured(TruncatedSteps(*map(np.array, (errors, *distances))))
 
 
 def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
     """Take one step of each length after the first ones; compare the two laws at its end."""
-    state, apart = motion(problem.start, first, integrator_of(problem))[-1], []
+    state = motion(problem.start, first, integrator_of(problem))[-1]
+    differences = []
     for h in HALVED:
         end = ImplicitEuler(problem.system, h=h).step(state).state
         rates = damper_forces(problem.system, end)
-        differences = step_damper_forces(problem.system, state, end, h)
-        apart.append(np.linalg.norm(differences - rates) / np.linalg.norm(rates))
-    return Measured(Dampers(np.array(HALVED), np.array(apart)))
+        offsets = step_damper_forces(problem.system, state, end, h) - rates
+        differences.append(np.linalg.norm(offsets) / np.linalg.norm(rates))
+    return Measured(DamperDifferences(np.array(HALVED), np.array(differences)))
 
 
 def step_damper_forces(system: MassSpring, before: State, after: State, h: float) -> FloatArray:
     """Return the forces -(c/h) (l - l_n) u of a step's dampers at its end [N], (particle, 3)."""
-    count = len(system.springs)
     dampers = system.replaced(
         stiffnesses=system.dampings / h,
         rest_lengths=lengths(system, before.positions),
-        tension_only=np.zeros(count, dtype=bool),
+        tension_only=np.zeros(len(system.springs), dtype=bool),
     )
     return spring_forces(dampers, after.positions)
 
@@ -140,7 +154,7 @@ def integrator_of(
     tolerance: float = TOLERANCE,
     max_iterations: int = 100,
 ) -> ImplicitEuler:
-    """Return an integrator of a cloth, as it is one that solves every step to the end."""
+    """Return an integrator of a cloth; by default it converges in every step."""
     limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations}
     return ImplicitEuler(problem.system, h=problem.h, solver=solver, **limits)
 

@@ -1,10 +1,12 @@
 """The records of the lab's cloth: residuals and errors of steps, and two laws of dampers."""
 
+import msgspec
+
 from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
 from . import DAMPERS, FEW, ONE_STEP, SWING
 
 
-class Converged(Values, frozen=True):
+class ConsecutiveSteps(Values, frozen=True):
     """Consecutive converged steps, (step,): an outcome is the number of an `Outcome`."""
 
     iterations: Integers1
@@ -13,15 +15,15 @@ class Converged(Values, frozen=True):
     at_floor: Booleans1
 
 
-class Iterated(Values, frozen=True):
-    """Residual and error of one step, at first and after each iteration, (iteration + 1,)."""
+class IterationErrors(Values, frozen=True):
+    """Residual and error of one step at the start and after each iteration, (iteration + 1,)."""
 
     residual: Floats1
     error: Floats1
 
 
-class FewIterations(Values, frozen=True):
-    """Steps of a few iterations beside converged ones, (step,), in metres but for the error."""
+class TruncatedSteps(Values, frozen=True):
+    """Steps of a few iterations compared with converged steps, (step,): relative error, and [m]."""
 
     error: Floats1
     distance: Floats1
@@ -29,30 +31,30 @@ class FewIterations(Values, frozen=True):
     path: Floats1
 
 
-class Dampers(Values, frozen=True):
-    """How far the forces of two laws of dampers differ, relatively, in steps of h [s]."""
+class DamperDifferences(Values, frozen=True):
+    """Relative difference between the forces of two laws of dampers in steps of h [s]."""
 
     h: Floats1
-    apart: Floats1
+    difference: Floats1 = msgspec.field(name="apart")
 
 
 class StepDetails(Details, frozen=True):
-    """The length of a step [s], and how many iterations it makes, where that is fixed."""
+    """The length of a step [s], and its number of iterations where that is fixed."""
 
     h: float
     iterations: int = 0
 
 
 class DamperDetails(Details, frozen=True):
-    """The damping of every spring [N s/m], and after how many steps the laws are compared."""
+    """The damping of every spring [N s/m], and the number of steps before the comparison."""
 
     damping: float
     first: int
 
 
 KINDS = {
-    SWING: Kind(Converged, StepDetails),
-    ONE_STEP: Kind(Iterated, StepDetails),
-    FEW: Kind(FewIterations, StepDetails),
-    DAMPERS: Kind(Dampers, DamperDetails),
+    SWING: Kind(ConsecutiveSteps, StepDetails),
+    ONE_STEP: Kind(IterationErrors, StepDetails),
+    FEW: Kind(TruncatedSteps, StepDetails),
+    DAMPERS: Kind(DamperDifferences, DamperDetails),
 }

@@ -1,4 +1,4 @@
-"""A cloth to be moved frame by frame in a worker's process, by one solver with its settings."""
+"""A worker's job: move a cloth frame by frame, by one solver with its settings."""
 
 import importlib
 from collections.abc import Iterator, Mapping
@@ -17,56 +17,40 @@ from ...peers.cloth.protocol import Mover
 from ...peers.protocol import OwnTime, remark_of
 from ...problems.falling_cloth import FRAME
 
-# Moved once before anything is timed, in so short a frame [s] that any solver is stable: what has
-# to be compiled is compiled then.
+# A small cloth is moved once before the timing, so that everything is compiled, in a frame [s] in
+# which any solver is stable.
 _SMALL, _SHORT = 3, 1e-4
 UNKNOWN = -1
 
 
 class Shape(NamedTuple):
-    """How far and how often a cloth is moved.
-
-    Attributes:
-        frames: how many to move on.
-        repeats: how often, from the start each time.
-        budget: no further frame is begun after so long [s].
-        frame: the length of a frame [s].
-    """
+    """The length and repetitions of a motion."""
 
     frames: int
-    repeats: int
-    budget: float
-    frame: float = FRAME
+    repeats: int  # number of motions, each from the start
+    budget: float  # the time after which no further frame begins [s]
+    frame: float = FRAME  # its length [s]
 
 
 class ClothJob(NamedTuple):
-    """What is to be moved, and by what.
+    """A cloth to be moved, and its solver."""
 
-    Attributes:
-        module: the adapter's module, by its full name.
-        system: particles and springs.
-        start: where the particles are at first.
-        settings: what the adapter is prepared with.
-        shape: how far and how often it is moved.
-        entrant: the name of a user's solver, whose first trouble is announced; "" of others.
-    """
-
-    module: str
+    module: str  # of the adapter, by its full name
     system: SystemArrays
     start: State
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Any]  # of the adapter
     shape: Shape
-    entrant: str = ""
+    entrant: str = ""  # the name of a user's solver, whose first error is announced
 
     def perform(self) -> Iterator[Message]:
-        """Yield the positions after each frame and how long it took, as soon as they are there."""
+        """Yield the positions and the time of each frame as soon as it is computed."""
         try:
             adapter = importlib.import_module(self.module)
             mover, setup = self._prepared(adapter)
             yield Ready(setup, remark_of(adapter))
             yield from announced(self._moved(mover), self.entrant)
             yield Finished()
-        except Exception as error:  # whatever an engine raises is its result
+        except Exception as error:  # an exception of an engine is its result
             yield from unfit(error, self.entrant)
 
     def _prepared(self, adapter: Any) -> tuple[Mover, float]:
@@ -90,10 +74,10 @@ class ClothJob(NamedTuple):
 
 
 def advanced(mover: Mover, nowhere: FloatArray) -> Solved:
-    """Move on by one frame; the particles are nowhere if the solver says that it blew up."""
-    (stays_finite, own), seconds = time_call(lambda: _advance(mover))
-    q = mover.positions() if stays_finite else nowhere
-    return solved_in(own or OwnTime(seconds), q, UNKNOWN)
+    """Advance by one frame; the positions are `nowhere` if the solver reports an overflow."""
+    (is_finite, own_time), seconds = time_call(lambda: _advance(mover))
+    q = mover.positions() if is_finite else nowhere
+    return solved_in(own_time or OwnTime(seconds), q, UNKNOWN)
 
 
 def _advance(mover: Mover) -> tuple[bool, OwnTime | None]:

@@ -1,7 +1,7 @@
-"""One cloth for every solver that is installed: work and precision, limits of stability.
+"""One cloth for every installed solver: work and precision, limits of stability.
 
-Each solver works in a process of its own. What it returns is held against converged implicit Euler
-and against the motion itself.
+Each solver runs in a worker process. Its positions are compared with converged implicit Euler and
+with the true motion.
 """
 
 import functools
@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from plumbob.reference import ImplicitEuler, MassSpring, State
@@ -20,12 +21,13 @@ from ...harness.isolation import Outcome, WorkerProcess
 from ...harness.measure import not_installed
 from ...harness.values import Values
 from ...peers import registry
-from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
+from ...peers.registry import EXPLICIT, LINEARISED, UNDECLARED, ClothPeer
 from ...problems.falling_cloth import (
     FRAME,
     SIDE,
     STIFFNESSES,
     FallingCloth,
+    explicit_substeps,
     falling_cloth,
     hanging_cloth,
     highest_mode,
@@ -34,37 +36,37 @@ from ...problems.falling_cloth import (
 from ..published import problem as published
 from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
-from .ladder import Rung, motion_rungs, step_rungs
-from .truth import ClothTruth, implicit_motion, truth_of
-from .values import Counted, MotionWork, Published, Stability, StepWork
+from .truth import ClothTruth, implicit_motion, inertial_positions, truth_of
+from .values import IterationCounts, LiuFrame, MotionWork, StabilityLimits, StepWork
 
-SUITE = "cloth"
-# One step is timed so often, but for no more than a twentieth of its ladder's time.
+# Explicit steps a frame, relative to symplectic Euler's limit of stability.
+MARGINS = (1.1, 2.0, 4.0)
+# Implicit steps a frame.
+PARTS = (1, 4, 16)
+# Residual of solvers that converge, in motions.
+RESIDUAL, RESIDUAL_LABEL = 1e-6, "1e-6"
+# Repetitions of one step, within a twentieth of the budget of a ladder.
 REPEATS, _REPEATING = 5, 0.05
-# A ladder ends with the first rung this near to the answer.
+# A ladder ends with the first rung of this error.
 NEAR_ENOUGH = 1e-9
-# A silent frame of a large cloth is given up after so long [s], and so is one being set up.
+# Time limits of a silent frame of a large cloth and of its set-up [s].
 _PATIENCE, _START_PATIENCE = 60.0, 300.0
 
-# Iterations are counted on a cloth of so many particles a side.
+# Particles a side of the cloth on which iterations are counted.
 NEEDED_SIZE = 20
 
-# A mode is unstable if, begun with this amplitude [m], it grows so much in so many steps.
+# A mode is unstable if, from this amplitude [m], it grows by this factor in this number of steps.
 STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
-BISECTION = 2e-4
-_DOUBLINGS = 30
-# A solver that does not say that it is explicit, and is stable at so many times symplectic Euler's
-# limit, is taken not to be.
-_FAR = 8.0
+BISECTION, _DOUBLINGS = 2e-4, 30
+# An undeclared solver that is stable at this multiple of symplectic Euler's limit is implicit.
+_IMPLICIT_MULTIPLE = 8.0
 
-# Numbers, and a label in the end.
-Row = tuple[Any, ...]
-# Parts of a cloth's ladder that use its whole budget.
-_LADDER = 2.0
+# The parts of a cloth's ladder that use its whole budget.
+_LADDER_PARTS = 2.0
 
 
 class Level(NamedTuple):
-    """A size of the cloth: particles a side, frames of a motion, seconds for a solver's ladder."""
+    """A size of the cloth: particles a side, frames of a motion, budget of a ladder [s]."""
 
     size: int
     frames: int
@@ -74,48 +76,50 @@ class Level(NamedTuple):
 QUICK = (Level(20, 3, 0.2),)
 FULL = (Level(20, 30, 2.0), Level(40, 10, 3.0), Level(100, 2, 30.0))
 QUICK_STIFFNESS = STIFFNESSES[1:2]
-# The benchmarks of a scale that is full take so long [s].
-_FULL = 1.0
+# The shortest benchmarks of a full scale [s].
+_FULL_SECONDS = 1.0
 
 
 def levels(scale: Scale) -> tuple[Level, ...]:
     """Return the sizes of the cloth at a scale."""
-    return FULL if scale.seconds >= _FULL else QUICK
+    return FULL if scale.seconds >= _FULL_SECONDS else QUICK
 
 
 class Fall(NamedTuple):
-    """A cloth that falls: how far, and what makes it."""
+    """A falling cloth at a size."""
 
     level: Level
     make: Callable[[], FallingCloth]
 
     @property
     def truth(self) -> ClothTruth:
-        """Its answers."""
+        """Its reference solutions."""
         return truth_of(self.make(), self.level.frames)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield one step, a motion and the limit of every solver; what is missing makes one block.
+    """Yield one step, a motion and the limit of every solver; a missing package makes one block.
 
-    Larger cloths, the published one among them, are for the full scale.
+    Larger cloths, and the published one, are for the full scale.
     """
     peers = registry.cloth_peers(scale.entrants)
     for package in dict.fromkeys(peer.package for peer in peers if not peer.is_installed):
-        absent = partial(not_installed, package)
-        yield Block(SUITE, "peers/all", package, absent, facts={"task": MISSING})
+        yield _block(MISSING, "all", package, partial(not_installed, package), {})
     for stiffness in STIFFNESSES:
         settings = {"size": NEEDED_SIZE, "stiffness": stiffness, "frame": FRAME}
-        name, facts = f"peers/iterations/k{stiffness:g}", {"task": NEEDED}
         for solver in registry.step_solvers():
             measure = partial(iterations_needed, solver, stiffness)
-            yield Block(SUITE, name, solver, measure, settings, facts=facts)
+            yield _block(NEEDED, f"iterations/k{stiffness:g}", solver, measure, settings)
     for peer in (peer for peer in peers if peer.is_installed):
         yield from blocks_of(peer, scale)
     settings = {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME}
     for solver in published.LIU_2013 if levels(scale) == FULL else ():
-        measure, facts = partial(liu_2013, solver), {"task": LIU}
-        yield Block(SUITE, "peers/liu2013", solver, measure, settings, facts=facts)
+        yield _block(LIU, "liu2013", solver, partial(liu_2013, solver), settings)
+
+
+def _block(task: str, name: str, solver: str, measure: Any, settings: Any, **more: Any) -> Block:
+    facts = {"task": task}
+    return Block("cloth", f"peers/{name}", solver, measure, settings, facts=facts, **more)
 
 
 def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
@@ -127,102 +131,167 @@ def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
     for own in scale.problems:
         if own.cloth is not None:
             system, _ = own.cloth
-            settings: dict[str, Any] = {"stiffness": float(system.stiffnesses.mean())}
-            settings |= {"frame": own.h}
+            settings = {"stiffness": float(system.stiffnesses.mean()), "frame": own.h}
             fall = Fall(sizes[0]._replace(size=system.particle_count), partial(own_cloth, own))
             for block in _falling(peer, own.name, settings, [fall]):
                 yield replace(block, facts={**block.facts, "cloth": own.name}).on(own)
     if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
-        hung = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
-        settings = {"size": STABILITY_SIZE, "version": peer.version}
-        measure, facts = partial(stability, peer, hung), {"task": STABILITY}
-        block = Block(SUITE, "peers/stability", peer.title, measure, settings, len(hung), facts)
+        stiffnesses = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
+        measure, size = partial(stability, peer, stiffnesses), len(stiffnesses)
+        version = {"size": STABILITY_SIZE, "version": peer.version}
+        block = _block(STABILITY, "stability", peer.title, measure, version, size=size)
         yield block.of(peer.entrant)
 
 
 def _falling(
-    peer: ClothPeer, cloth: str, settings: dict[str, Any], falls: list[Fall]
+    peer: ClothPeer, cloth: str, settings: Mapping[str, Any], falls: Sequence[Fall]
 ) -> Iterator[Block]:
     """Yield one step and a motion of a cloth at some sizes."""
-    size, budget = (sum(fall.level[i] for fall in falls) for i in (0, 2))
-    settings = settings | {"version": peer.version}
-    for words, task, measure in (("one step", ONE_STEP, one_step), ("motion", MOTION, motion)):
-        known = (SUITE, f"peers/{words}/{cloth}", peer.title, partial(measure, peer, falls))
-        block = Block(*known, settings, size, {"task": task}, budget=_LADDER * budget)
+    settings = {**settings, "version": peer.version}
+    size, seconds = (sum(fall.level[i] for fall in falls) for i in (0, 2))
+    for task, name, measure in ((ONE_STEP, "one step", one_step), (MOTION, "motion", motion)):
+        work, budget = partial(measure, peer, falls), _LADDER_PARTS * seconds
+        block = _block(
+            task, f"{name}/{cloth}", peer.title, work, settings, size=size, budget=budget
+        )
         yield block.of(peer.entrant)
 
 
-class Remark(NamedTuple):
-    """A sentence on what happened on a cloth of so many particles a side."""
+class Rung(NamedTuple):
+    """A solver with settings, a point in a work-precision diagram, and their label."""
 
-    particles: int
-    sentence: str
-    is_trouble: bool
+    label: str
+    settings: Mapping[str, Any]
+
+
+def step_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
+    """Return the rungs for one step of one frame, cheap ones first."""
+    return _rungs(peer, frequency, peer.ladder, (1,))
+
+
+def motion_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
+    """Return the rungs for a motion; steps of part of a frame are nearer to the truth."""
+    return _rungs(peer, frequency, peer.motion, PARTS)
+
+
+def _rungs(
+    peer: ClothPeer, frequency: float, iterations: tuple[int, ...], parts: tuple[int, ...]
+) -> list[Rung]:
+    stable = [explicit_substeps(frequency, margin) for margin in MARGINS]
+    substeps = {EXPLICIT: stable, LINEARISED: parts, UNDECLARED: sorted({*parts, *stable})}
+    if peer.kind in substeps:
+        return [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps[peer.kind]]
+    rungs = [_rung(peer, _counted(n, "iteration"), iterations=n) for n in iterations]
+    if peer.converges and len(parts) > 1:
+        for n in parts:
+            label = f"{_counted(n, 'step')} to {RESIDUAL_LABEL}"
+            rungs.append(_rung(peer, label, tolerance=RESIDUAL, substeps=n))
+    return rungs
+
+
+def _rung(peer: ClothPeer, label: str, **settings: float) -> Rung:
+    return Rung(label, {**peer.settings, **peer.spec, **settings})
+
+
+def _counted(count: int, name: str) -> str:
+    return f"{count:,} {name}{'' if count == 1 else 's'}"
+
+
+# The notes on set-ups that ran out of time, by adapter, entrant and number of particles.
+_given_up: dict[tuple[str, str, int], str] = {}
+
+
+class RungResults:
+    """The results of one solver: the numbers and label of each rung, and remarks."""
+
+    def __init__(self, peer: ClothPeer) -> None:
+        self.rows: list[dict[str, Any]] = []
+        self._peer = peer
+        self._remarks: list[tuple[int, str, bool]] = []  # particles, sentence, whether it failed
+
+    def run(self, cloth: FallingCloth, rung: Rung, shape: Shape) -> Outcome:
+        """Return the outcome of a rung; a set-up that ran out of time is not repeated."""
+        task = self._peer.module, self._peer.entrant_name, len(cloth.start.positions)
+        if task in _given_up:
+            outcome = Outcome(0.0, [], _given_up[task])
+        else:
+            outcome = worker_process().perform(job(self._peer, cloth, rung.settings, shape))
+        if outcome.is_silent and not outcome.is_lost:
+            _given_up[task] = outcome.note
+        if outcome.note:
+            sentence = f"{cloth.size} × {cloth.size}, {rung.label}: {outcome.note}"
+            self._remarks.append((cloth.size, sentence, bool(outcome.trouble)))
+        return outcome
+
+    def measured(self, kind: type[Values], **more: Any) -> Measured:
+        """Return the rows as arrays, and their labels and remarks as facts."""
+        names = {field.name for field in msgspec.structs.fields(kind)} - {"remark_particles", *more}
+        arrays = {name: np.array([row[name] for row in self.rows]) for name in names}
+        sizes, sentences = ([remark[i] for remark in self._remarks] for i in (0, 1))
+        troubles = [sentence for _, sentence, failed in self._remarks if failed]
+        trouble = next(iter(troubles), "")
+        rungs = [row["rung"] for row in self.rows]
+        facts = {"rungs": rungs, "remarks": sentences, "trouble": trouble}
+        return Measured(kind(**arrays, remark_particles=np.array(sizes), **more), facts=facts)
 
 
 def one_step(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
-    """Take the same step with ever more work; keep time and what is left of the error.
+    """Take the same step at increasing cost; keep time and error.
 
-    A ladder that has used its time, or has arrived, is climbed no further.
+    Stop when the budget is spent or the error is reached.
     """
-    rows: list[Row] = []
-    remarks: list[Remark] = []
+    results = RungResults(peer)
     for fall in falls:
-        level, cloth, truth = fall.level, fall.make(), fall.truth
-        spent = 0.0
+        level, cloth, truth, spent_seconds = fall.level, fall.make(), fall.truth, 0.0
         for rung in step_rungs(peer, cloth.beat):
             shape = Shape(1, REPEATS, _REPEATING * level.budget, cloth.frame)
-            outcome = _tried(peer, cloth, rung, shape, remarks)
+            outcome = results.run(cloth, rung, shape)
             if not outcome.solved:
                 break
-            seconds = np.array([one.seconds for one in outcome.solved])
+            seconds = np.array([frame.seconds for frame in outcome.solved])
             error = step_error(outcome.solved[-1].q, truth)
-            rows.append((level.size, metrics.spread(seconds).median, error, rung.label))
-            spent += float(seconds.sum())
-            if error <= NEAR_ENOUGH or spent > level.budget:
+            row = {"particles": level.size, "error": error, "rung": rung.label}
+            results.rows.append({**row, "seconds": metrics.spread(seconds).median})
+            spent_seconds += float(seconds.sum())
+            if error <= NEAR_ENOUGH or spent_seconds > level.budget:
                 break
-    return _columns(StepWork, ("particles", "seconds", "error"), rows, remarks)
+    return results.measured(StepWork)
 
 
 def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
     """Move on frame after frame; keep the distances from implicit Euler and from the truth."""
-    rows: list[Row] = []
-    remarks: list[Remark] = []
+    results = RungResults(peer)
     for fall in falls:
         level, cloth, truth = fall.level, fall.make(), fall.truth
         for rung in motion_rungs(peer, cloth.beat):
             shape = Shape(level.frames, 1, level.budget, cloth.frame)
-            outcome = _tried(peer, cloth, rung, shape, remarks)
-            rows.append((*_moved(outcome, level, truth, cloth.extent), rung.label))
+            outcome = results.run(cloth, rung, shape)
+            row = {"particles": level.size, "target_frames": level.frames, "rung": rung.label}
+            results.rows.append(row | _distances(outcome, truth, cloth.extent))
             if not outcome.solved:
                 break
-    names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
     truths = [fall.truth for fall in falls]
-    known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
-    return _columns(MotionWork, names, rows, remarks, **known)
+    certainty = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
+    return results.measured(MotionWork, **certainty)
 
 
-def _tried(
-    peer: ClothPeer, cloth: FallingCloth, rung: Rung, shape: Shape, remarks: list[Remark]
-) -> Outcome:
-    """Return what came of a rung, and add a remark on it if there is something to say.
-
-    What could not be set up in time is not set up again.
-    """
-    task = peer.module, peer.entrant_name, len(cloth.start.positions)
-    if task in _given_up:
-        outcome = Outcome(0.0, [], _given_up[task])
-    else:
-        outcome = worker_process().perform(job(peer, cloth, rung.settings, shape))
-    if outcome.is_silent and not outcome.is_lost:
-        _given_up[task] = outcome.note
-    if outcome.note:
-        sentence = f"{cloth.size} × {cloth.size}, {rung.label}: {outcome.note}"
-        remarks.append(Remark(cloth.size, sentence, bool(outcome.trouble)))
-    return outcome
-
-
-_given_up: dict[tuple[str, str, int], str] = {}
+def _distances(outcome: Outcome, truth: ClothTruth, extent: float) -> dict[str, Any]:
+    """Return times, and distances from the references after the last frame that was reached."""
+    frames = len(outcome.solved)
+    seconds = np.array([frame.seconds for frame in outcome.solved])
+    positions = np.array([frame.q for frame in outcome.solved])
+    positions = positions.reshape(frames, *truth.inertial.shape)
+    row = {
+        "frames": frames,
+        "seconds": metrics.spread(seconds).median,
+        "setup": outcome.setup,
+        "diverged": diverged(positions, truth.true[:frames], extent),
+    }
+    for name, motion in (("implicit", truth.implicit), ("true", truth.true)):
+        is_near = frames and not row["diverged"]
+        end = motion[frames - 1]
+        row[name] = metrics.rms_distance(positions[-1], end) if is_near else np.nan
+    return row
 
 
 def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
@@ -235,21 +304,8 @@ def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
     return truth.first.error(positions, truth.inertial)
 
 
-def _moved(outcome: Outcome, level: Level, truth: ClothTruth, extent: float) -> tuple[float, ...]:
-    """Return a row: distances are those in the end, or as far as the motion got."""
-    frames = len(outcome.solved)
-    seconds = metrics.spread(np.array([one.seconds for one in outcome.solved])).median
-    positions = np.array([one.q for one in outcome.solved]).reshape(frames, *truth.start.shape)
-    lost = diverged(positions, truth.true[:frames], extent)
-    apart = [np.nan, np.nan]
-    if frames and not lost:
-        answers = truth.implicit[frames - 1], truth.true[frames - 1]
-        apart = [metrics.rms_distance(positions[-1], answer) for answer in answers]
-    return (level.size, frames, level.frames, seconds, outcome.setup, *apart, lost)
-
-
 def diverged(positions: np.ndarray, true: np.ndarray, extent: float = SIDE) -> bool:
-    """Return whether a particle ever is farther from where it belongs than the cloth is wide."""
+    """Return whether a particle is ever farther from its true position than the cloth is wide."""
     if not np.isfinite(positions).all():
         return True
     return bool((np.abs(positions - true) > extent).any())
@@ -268,7 +324,7 @@ def iterations_needed(solver: str, stiffness: float) -> Measured:
             break
     needed = [metrics.first_below(np.array(errors), float(decade)) for decade in DECADES]
     counts = np.array([np.nan if count is None else count for count in needed])
-    return Measured(Counted(counts, tried=len(errors) - 1, least=min(errors)))
+    return Measured(IterationCounts(counts, len(errors) - 1, min(errors)))
 
 
 def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
@@ -280,16 +336,16 @@ def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
         frequencies.append(np.sqrt(largest))
         start = State(rest + AMPLITUDE * mode, np.zeros_like(rest))
         stable = partial(is_stable, peer, system, start, rest)
-        far = _FAR * 2.0 / np.sqrt(largest)
+        implicit_step = _IMPLICIT_MULTIPLE * 2.0 / np.sqrt(largest)
         try:
-            if peer.kind == UNDECLARED and stable(far):
-                raise ArithmeticError(f"stable at {far:.2g} s, as implicit steps are")
+            if peer.kind == UNDECLARED and stable(implicit_step):
+                raise ArithmeticError(f"stable at {implicit_step:.2g} s, as implicit steps are")
             limits.append(stability_limit(stable, FRAME))
         except ArithmeticError as error:
             limits.append(np.nan)
             remarks.append(str(error))
     columns = map(np.array, (stiffnesses, limits, frequencies))
-    return Measured(Stability(*columns), {"remark": "; ".join(remarks)})
+    return Measured(StabilityLimits(*columns), {"remark": "; ".join(remarks)})
 
 
 def is_stable(
@@ -298,15 +354,17 @@ def is_stable(
     """Return whether the particles stay near their rest for many steps of length h.
 
     Raises:
-        ArithmeticError: if the solver does not get through.
+        ArithmeticError: if the solver fails.
     """
     settings = {**peer.settings, **peer.spec, "substeps": STABILITY_STEPS}
-    job = (system.arrays, start, settings, Shape(1, 1, np.inf, h * STABILITY_STEPS))
-    outcome = worker_process().perform(ClothJob(peer.module, *job, peer.entrant_name))
+    shape = Shape(1, 1, np.inf, h * STABILITY_STEPS)
+    arrays, entrant = system.arrays, peer.entrant_name
+    job = ClothJob(peer.module, arrays, start, settings, shape, entrant)
+    outcome = worker_process().perform(job)
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
-    away = np.abs(outcome.solved[-1].q - rest)
-    return bool(np.isfinite(away).all() and away.max() <= GROWTH * AMPLITUDE)
+    offsets = np.abs(outcome.solved[-1].q - rest)
+    return bool(np.isfinite(offsets).all() and offsets.max() <= GROWTH * AMPLITUDE)
 
 
 def stability_limit(stable: Callable[[float], bool], h: float) -> float:
@@ -332,46 +390,27 @@ def stability_limit(stable: Callable[[float], bool], h: float) -> float:
 
 
 def liu_2013(solver: str) -> Measured:
-    """Take steps of the cloth of the paper's size, by the paper's ten iterations or by Newton."""
+    """Take steps of a cloth of the paper's size, by the paper's ten iterations or by Newton."""
     cloth = falling_cloth(published.LIU_2013_SIZE, published.LIU_2013_STIFFNESS)
-    exact = implicit_motion(cloth, 1, published.LIU_2013_FRAME)[0]
-    x, v = cloth.start.positions, cloth.start.velocities
+    frame = published.LIU_2013_FRAME
+    exact = implicit_motion(cloth, 1, frame)[0]
     settings = {"solver": solver, **published.LIU_2013[solver].settings}
-    shape, peer = Shape(1, REPEATS, 5.0, published.LIU_2013_FRAME), registry.cloth_peers()[0]
+    shape, peer = Shape(1, REPEATS, 5.0, frame), registry.cloth_peers()[0]
     outcome = worker_process().perform(job(peer, cloth, settings, shape))
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
-    inertial = x + published.LIU_2013_FRAME * np.where(cloth.system.free[:, None], v, 0.0)
-    seconds = np.array([one.seconds for one in outcome.solved])
+    seconds = np.array([step.seconds for step in outcome.solved])
+    inertial = inertial_positions(cloth, frame)
     error = metrics.relative_error(outcome.solved[-1].q, exact, inertial)
-    return Measured(Published(seconds, error, cloth.system.particle_count))
+    return Measured(LiuFrame(seconds, error, cloth.system.particle_count))
 
 
 def job(
     peer: ClothPeer, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape
 ) -> ClothJob:
     """Return the job of moving a cloth from its start."""
-    known = (cloth.system.arrays, cloth.start, settings, shape)
-    return ClothJob(peer.module, *known, peer.entrant_name)
-
-
-def _columns(
-    kind: type[Values],
-    names: tuple[str, ...],
-    rows: list[Row],
-    remarks: list[Remark],
-    **more: list[float],
-) -> Measured:
-    """Return rows, their labels last, as arrays and facts."""
-    arrays = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
-    arrays["remark_particles"] = np.array([remark.particles for remark in remarks])
-    troubles = [remark.sentence for remark in remarks if remark.is_trouble]
-    facts = {
-        "rungs": [row[-1] for row in rows],
-        "remarks": [remark.sentence for remark in remarks],
-        "trouble": troubles[0] if troubles else "",
-    }
-    return Measured(kind(**arrays, **more), facts=facts)
+    system = cloth.system.arrays
+    return ClothJob(peer.module, system, cloth.start, settings, shape, peer.entrant_name)
 
 
 @functools.cache

@@ -1,220 +1,298 @@
 """One cloth for every solver: work against precision, motions, limits of stability."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from typing import Any
 
+import numpy as np
+
+from ...figures.chart import Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
+from ...harness import metrics
 from ...harness.record import Record
 from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
-from ...tables.columns import SOLVER, folded, greatest, least, number, text, words_in
-from ...tables.layout import Layout, source
-from ...tables.results import Results, label, listed
-from ...tables.table import Column, Summary, Table, words
+from ...tables.captions import Captions
+from ...tables.columns import words_in
+from ...tables.layout import Layout
+from ...tables.results import Results, grouped, label, listed
+from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
-from . import MISSING, TARGETS, figures, readings
+from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY, TARGETS
 from .measurement import AMPLITUDE, BISECTION, GROWTH, REPEATS, STABILITY_SIZE, STABILITY_STEPS
-from .readings import NEAR, Motion, Point, Steps, grouped
+from .readings import Point, points
 
-_CLOTH = (
-    f"A cloth of the lab’s springs without dampers, {SIDE:g} m a side and {MASS:g} kg whatever its "
-    f"particles, under {GRAVITY:g} m/s², held at two corners, {FALLING * FRAME:g} s after it was "
-    f"let go; frames of {words_in(FRAME, 'ms')}. "
+# The cells of a row by the titles of their columns, and its records.
+Row = dict[str, Any]
+CAPTIONS = Captions(
+    __file__,
+    side=f"{SIDE:g}",
+    mass=f"{MASS:g}",
+    gravity=f"{GRAVITY:g}",
+    fall=f"{FALLING * FRAME:g}",
+    frame=words_in(FRAME, "ms"),
+    repeats=str(REPEATS),
+    stability_size=str(STABILITY_SIZE),
+    amplitude=words(AMPLITUDE),
+    growth=f"{GROWTH:g}",
+    stability_steps=str(STABILITY_STEPS),
+    bisection=words(BISECTION),
+    liu_stiffness=words(int(published.LIU_2013_STIFFNESS)),
+    liu_frame=words_in(published.LIU_2013_FRAME, "ms"),
+    liu_tolerance=words(published.LIU_2013["newton"].settings["tolerance"]),
 )
-_FAIR = (
-    "Every solver works in a process of its own on one core and is timed frame by frame, without "
-    "set-up and conversions. Newton the engine computes in single precision, all others in double. "
-)
-_TRUTH = (
-    "Converged implicit Euler is our Newton in steps of a frame, at the rounding floor, and x* its "
-    "first step to 25 digits, in decimal arithmetic. The truth is the classical Runge-Kutta method "
-    "far below its limit of stability"
-)
+# A motion within this distance of the true one [m] is hard to tell from it by eye.
+NEAR = 1e-2
+# Larger errors are those of motions that diverged, and are not drawn.
+MAX_ERROR = 10.0
+ERRORS = {
+    "error": "error |x − x*| / |y − x*|",
+    "implicit": "rms distance [m]",
+    "true": "rms distance [m]",
+}
 
 
-@dataclass(frozen=True, eq=False)
-class WithMissing(Layout):
-    """A layout whose tables end with a row for each engine that is missing."""
+def work_precision(name: str, task: str, error: str, results: Results) -> Sketch | None:
+    """Show an error against the time for a frame: a curve for each solver.
 
-    def __call__(self, results: Results) -> Table:
-        """Return the table with a row for each subject and for each engine that is missing."""
-        table = super().__call__(results)
-        missing = results.all("cloth", task=MISSING)
-        texts = [{"cloth": "every cloth", "solver": r.solver, **r.notes} for r in missing]
-        rows = [tuple(row.get(column.title) for column in table.columns) for row in texts]
-        sources = (*table.sources, *map(source, missing))
-        return replace(table, rows=(*table.rows, *rows), sources=sources)
-
-
-def _time_to(target: str) -> Column:
-    def read(row: Steps) -> float | None:
-        point = row.cheapest(target)
-        return point and point.seconds
-
-    return Column(f"time to {target}", "ms", read=read, best="least")
-
-
-def _setting_to(target: str) -> Column:
-    def read(row: Steps) -> str | None:
-        point = row.cheapest(target)
-        return point and point.rung
-
-    return text(f"{target} by", read)
-
-
-def _step_summary(rows: Sequence[Steps]) -> Summary:
-    points = (
-        f"{cloth}: {listed([f'to {target} {_fastest(of, target)}' for target in TARGETS])}"
-        for cloth, of in grouped(rows, lambda row: row.first.cloth).items()
+    Each stiffness has a column, each size a row.
+    """
+    visible = [point for point in points(results, task) if _is_visible(point, error)]
+    cloths = [point for point in visible if not point.own]
+    stiffnesses = sorted({point.stiffness for point in cloths})
+    panels = [
+        Panel(
+            f"{size} × {size}, {stiffness:,.0f} N/m",
+            _curves([p for p in cloths if (p.particles, p.stiffness) == (size, stiffness)], error),
+        )
+        for size in sorted({point.particles for point in cloths})
+        for stiffness in stiffnesses
+    ]
+    own = grouped((point for point in visible if point.own), lambda point: point.own)
+    panels += [Panel(cloth, _curves(group, error)) for cloth, group in own.items()]
+    return chart_sketch(
+        Chart(
+            **CAPTIONS.figure(name),
+            panels=tuple(panels),
+            x=Axis("time for a frame [ms]", log=True),
+            y=Axis(ERRORS[error], log=True),
+            columns=len(stiffnesses) or len(panels),
+            entrants=results.entrants,
+        )
     )
-    return Summary("The fastest of all solvers in one step:", tuple(points))
 
 
-def _fastest(rows: Sequence[Steps], target: str) -> str:
-    names = [f"{p.solver}, {words_in(p.seconds, 'ms')}" for p in readings.fastest(rows, target)]
-    return " (then ".join(names) + ")" * (len(names) > 1) if names else "none"
+def _curves(visible: Sequence[Point], error: str) -> tuple[Series, ...]:
+    return tuple(
+        series(solver, [1e3 * p.seconds for p in group], [p.values[error] for p in group])
+        for solver, group in grouped(visible, lambda point: point.solver).items()
+    )
 
 
-one_step = WithMissing(
-    "Which of all solvers is soonest near the converged step?",
-    "cloth_peers_step",
-    "One step of a falling cloth by every solver",
-    subjects=readings.steps,
-    columns=(
-        text("cloth", lambda row: row.first.cloth),
-        text("solver", lambda row: row.first.solver),
-        *map(_time_to, TARGETS),
-        *least([Column("least error", read=lambda row: row.least_error)]),
-        text("remark", lambda row: row.first.remark),
-        *folded([*map(_setting_to, TARGETS), text("least by", lambda row: row.best.rung)]),
-    ),
-    shows="The error is |x − x*| / |y − x*|, what is left of the distance between the inertial "
-    "start y and the converged step x*. Explicit solvers and those that solve one linear "
-    "system do another step: their error stays, however long they take.",
-    measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to {REPEATS}; settings are those "
-    "of a ladder, of which the cheapest that suffices counts.",
+def _is_visible(point: Point, error: str) -> bool:
+    """Return whether a point reached its end, with an error that can be drawn."""
+    is_whole = "wanted" not in point.values or point.is_whole
+    return is_whole and point.seconds > 0 and 0 < point.values[error] < MAX_ERROR
+
+
+step_chart = partial(work_precision, "work_precision_step", ONE_STEP, "error")
+implicit_chart = partial(work_precision, "work_precision_implicit", MOTION, "implicit")
+truth_chart = partial(work_precision, "work_precision_truth", MOTION, "true")
+
+
+def _missing(results: Results) -> list[Row]:
+    """Return a row for each engine that is missing."""
+    records = results.all("cloth", task=MISSING)
+    return [{"cloth": "every cloth", "solver": r.solver, **r.notes} for r in records]
+
+
+def _step_rows(results: Results) -> list[Row]:
+    groups = grouped(points(results, ONE_STEP), lambda point: (point.cloth, point.solver))
+    return [*map(_step_row, groups.values()), *_missing(results)]
+
+
+def _step_row(settings: Sequence[Point]) -> Row:
+    """Return a solver's errors and times on a cloth, of the cheapest setting for each target."""
+    best = min(settings, key=lambda point: point.values["error"])
+    error, first = best.values["error"], settings[0]
+    row: Row = {
+        "points": settings,
+        "cloth": first.cloth,
+        "solver": first.solver,
+        "smallest error": "diverged" if np.isinf(error) else error,
+        "setting for the smallest error": best.rung,
+        "remark": first.remark,
+    }
+    for target in TARGETS:
+        arrivals = [point for point in settings if point.values["error"] <= float(target)]
+        if arrivals:
+            cheapest = min(arrivals, key=lambda point: point.seconds)
+            row |= {f"time to {target}": cheapest.seconds, f"setting for {target}": cheapest.rung}
+            row |= {target: cheapest}
+    return row
+
+
+def _step_summary(rows: Sequence[Row]) -> Summary:
+    measured = [row for row in rows if "points" in row]
+    sentences = [
+        f"{cloth}: {listed([f'to {target} {_fastest(group, target)}' for target in TARGETS])}"
+        for cloth, group in grouped(measured, lambda row: str(row["cloth"])).items()
+    ]
+    return Summary("Fastest solver in one step:", tuple(sentences)) if measured else NO_SUMMARY
+
+
+def _fastest(rows: Sequence[Row], target: str) -> str:
+    """Return the fastest of all solvers, and the fastest of all other engines."""
+    arrivals: list[Point] = [row[target] for row in rows if target in row]
+    arrivals.sort(key=lambda point: point.seconds)
+    rivals = [point for point in arrivals if point.engine != arrivals[0].engine]
+    leaders = [*arrivals[:1], *rivals[:1]]
+    names = [f"{point.solver}, {words_in(point.seconds, 'ms')}" for point in leaders]
+    return " (then ".join(names) + ")" * (len(names) > 1) or "none"
+
+
+one_step = Layout(
+    **CAPTIONS.of("cloth_peers_step"),
+    subjects=_step_rows,
     summary=_step_summary,
-    figures=(figures.one_step,),
+    figures=(step_chart,),
 )
 
 
-def _motion_summary(rows: Sequence[Motion]) -> Summary:
-    lost = dict.fromkeys(row.point.solver for row in rows if row.point.values["diverged"])
-    whole = grouped([row.point for row in rows if row.point.is_whole], lambda point: point.cloth)
-    sentence = f"With some settings diverged: {listed(list(lost))}." if lost else "None diverged."
-    points = [f"{cloth}: {_nearest(of)}" for cloth, of in whole.items()]
-    return Summary(f"{sentence} Nearest to the truth:", (*points, *_stable(rows)))
+def _motion_rows(results: Results) -> list[Row]:
+    limits = {
+        (record.solver, stiffness): cells
+        for record in results.all("cloth", task=STABILITY)
+        for stiffness, cells in _limits(record)
+    }
+    rows = [
+        _motion_row(point, {} if point.own else limits.get((point.solver, point.stiffness), {}))
+        for point in points(results, MOTION)
+    ]
+    return rows + _missing(results)
+
+
+def _limits(record: Record) -> Iterator[tuple[float, Row]]:
+    """Yield, by stiffness [N/m], the longest stable step and the limit of symplectic Euler [s]."""
+    columns = record.values.stiffness, record.values.limit, 2.0 / record.values.frequency
+    for stiffness, step, theory in np.transpose(columns).tolist():
+        cells = {"2 / ω": theory, "stability": record}
+        if not np.isnan(step):
+            cells |= {"longest stable step": step, "stable up to": step / theory}
+        yield stiffness, cells
+
+
+def _motion_row(point: Point, limit: Row) -> Row:
+    frame, details = point.number("seconds"), point.record.details
+    stability = limit["stability"].details.remark if limit else ""
+    return {
+        "point": point,
+        "cloth": point.cloth,
+        "solver": point.solver,
+        "setting for a frame": point.rung,
+        "distance from implicit Euler": point.number("implicit"),
+        "distance from the truth": point.number("true"),
+        "time for a frame": frame,
+        "remark": "; ".join(filter(None, (_fate(point), stability))),
+        "frames": int(point.values["frames"]),
+        "time for a simulated second": frame and metrics.ratio(frame, details.frame),
+        **limit,
+    }
+
+
+def _fate(point: Point) -> str:
+    """Return why a motion did not reach its end, "" if it did."""
+    if point.values["diverged"]:
+        return "diverged"
+    if point.is_whole:
+        return ""
+    return point.remark or f"out of time before frame {int(point.values['frames']) + 1}"
+
+
+def _motion_summary(rows: Sequence[Row]) -> Summary:
+    motions: list[Point] = [row["point"] for row in rows if "point" in row]
+    if not motions:
+        return NO_SUMMARY
+    diverged = list(dict.fromkeys(point.solver for point in motions if point.values["diverged"]))
+    sentence = f"Diverged with some settings: {listed(diverged)}." if diverged else "None diverged."
+    whole = grouped((point for point in motions if point.is_whole), lambda point: point.cloth)
+    sentences = [f"{cloth}: {_nearest(group)}" for cloth, group in whole.items()]
+    return Summary(f"{sentence} Nearest to the truth:", (*sentences, *_stable(rows)))
 
 
 def _nearest(whole: Sequence[Point]) -> str:
-    best, fast = readings.nearest(whole)
+    best = min(whole, key=lambda point: point.values["true"])
     sentence = f"{best.solver} by {best.rung}, {words(best.values['true'])} m"
-    if fast is None:
+    near = [point for point in whole if point.values["true"] <= NEAR]
+    if not near:
         return sentence
+    fastest = min(near, key=lambda point: point.seconds)
     return (
-        f"{sentence}; the fastest within {words(NEAR)} m {fast.solver} by {fast.rung}, "
-        f"{words_in(fast.seconds, 'ms')} a frame"
+        f"{sentence}; the fastest within {words(NEAR)} m {fastest.solver} by {fastest.rung}, "
+        f"{words_in(fastest.seconds, 'ms')} a frame"
     )
 
 
-def _stable(rows: Sequence[Motion]) -> Iterable[str]:
-    shares = {row.point.solver: row.limit.share for row in rows if row.limit and row.limit.step}
+def _stable(rows: Sequence[Row]) -> Iterable[str]:
+    shares = {row["solver"]: row["stable up to"] for row in rows if "stable up to" in row}
     if shares:
         names = [f"{solver} {words(share)}" for solver, share in shares.items()]
         yield f"longest stable step in units of 2 / ω: {listed(names)}"
 
 
-def _how_moved(rows: Sequence[Motion]) -> str:
-    unsure, low, high = readings.certainty(rows)
-    return (
-        f"{_CLOTH}{_FAIR}{_TRUTH}: halving its steps moves it by no more than {words(unsure)} m, "
-        f"at an observed order of {words(low)} (where the stiffest modes are hardly resolved) to "
-        f"{words(high)}. For stability a cloth of {STABILITY_SIZE} × {STABILITY_SIZE} particles "
-        f"hangs at rest and is pushed by {words(AMPLITUDE)} m along its highest mode; a step is "
-        f"stable if that has grown less than {GROWTH:g}-fold after {STABILITY_STEPS} steps. Its "
-        f"limit is found by bisection to a relative error of {words(BISECTION)}."
-    )
+def _certainty(rows: Sequence[Row]) -> dict[str, str]:
+    """Return the change of the true motions by halved steps [m], and the range of their order."""
+    records = {id(row["point"].record): row["point"].record for row in rows if "point" in row}
+    if not records:
+        return dict.fromkeys(("unsure", "low", "high"), "–")
+    orders = np.concatenate([record.values.order for record in records.values()])
+    unsure = max(float(record.values.unsure.max()) for record in records.values())
+    low, high = metrics.extent(orders)
+    return {"unsure": words(unsure), "low": words(low), "high": words(high)}
 
 
-def _number(title: str, unit: str, name: str) -> Column:
-    return Column(title, unit, read=lambda row: row.point.number(name))
-
-
-motion = WithMissing(
-    "And frame after frame, near implicit Euler and near the truth? How long may steps be?",
-    "cloth_peers_motion",
-    "A falling cloth by every solver, frame after frame",
-    subjects=readings.motions,
-    columns=(
-        text("cloth", lambda row: row.point.cloth),
-        text("solver", lambda row: row.point.solver),
-        text("a frame by", lambda row: row.point.rung),
-        *least(
-            [
-                _number("distance from implicit Euler", "m", "implicit"),
-                _number("distance from the truth", "m", "true"),
-            ]
-        ),
-        _number("time for a frame", "ms", "seconds"),
-        *greatest([Column("stable up to", "2/ω", read=lambda row: row.limit and row.limit.share)]),
-        text("remark", lambda row: row.remark),
-        *folded(
-            [
-                Column("frames", read=lambda row: int(row.point.values["frames"])),
-                Column("time for a simulated second", "s", read=lambda row: row.simulated_second),
-                Column("longest stable step", "ms", read=lambda row: row.limit and row.limit.step),
-                Column("2 / ω", "ms", read=lambda row: row.limit and row.limit.theory),
-            ]
-        ),
-    ),
-    ranked=lambda row: row.point.is_whole,
-    shows="Distances are root mean squares over the particles after the last frame. Diverged "
-    "means that a particle was farther from its true place than the cloth is wide. Symplectic "
-    "Euler is stable up to h = 2 / ω, the classical Runge-Kutta method up to 2.828 / ω; ω² is the "
-    "largest eigenvalue of M⁻¹ K of a small cloth of the same springs at rest.",
-    measured=_how_moved,
+motion = Layout(
+    **CAPTIONS.of("cloth_peers_motion", _certainty),
+    subjects=_motion_rows,
+    ranked=lambda row: "point" not in row or row["point"].is_whole,
     summary=_motion_summary,
-    figures=(figures.to_implicit_euler, figures.to_the_truth),
+    figures=(implicit_chart, truth_chart),
 )
 
 
-def _vertices(records: Sequence[Record]) -> str:
-    return words(int(records[0].values.vertices))
+def _liu_row(record: Record) -> Row:
+    frame = published.LIU_2013[record.solver]
+    return {
+        "record": record,
+        "solver": label(record.solver),
+        "setting for a frame": frame.done,
+        "published time": frame.seconds,
+        "our time": metrics.spread(record.values.seconds).median,
+        "our error": record.values.error,
+    }
 
 
-def _liu_summary(records: Sequence[Record]) -> Summary:
-    points = (
-        f"{label(record.solver)}, {published.LIU_2013[record.solver].done}: "
-        f"{words_in(readings.median_time(record), 'ms')}, published "
-        f"{words_in(published.LIU_2013[record.solver].seconds, 'ms')}; here an error of "
-        f"{words(record.values.error)} is left"
-        for record in records
+def _vertices(rows: Sequence[Row]) -> dict[str, str]:
+    return {"vertices": words(int(rows[0]["record"].values.vertices))}
+
+
+def _liu_summary(rows: Sequence[Row]) -> Summary:
+    sentences = (
+        f"{row['solver']}, {row['setting for a frame']}: {words_in(row['our time'], 'ms')} with an "
+        f"error of {words(row['our error'])}, published {words_in(row['published time'], 'ms')}"
+        for row in rows
     )
-    return Summary(f"A frame of {_vertices(records)} vertices:", tuple(points))
+    return Summary(f"A frame of {_vertices(rows)['vertices']} vertices:", tuple(sentences))
 
 
 liu_2013 = Layout(
-    "What did Liu et al. (2013) measure, and what do we?",
-    "cloth_liu_2013",
-    "The times of Liu et al. (2013), and here",
-    subjects=readings.as_published,
-    columns=(
-        SOLVER,
-        text("a frame by", lambda record: published.LIU_2013[record.solver].done),
-        Column("published", "ms", read=lambda record: published.LIU_2013[record.solver].seconds),
-        Column("here", "ms", read=readings.median_time, best="least"),
-        number("here, error left", "error"),
-    ),
-    shows="The error is |x − x*| / |y − x*| as above; 1 is no nearer than the inertial start y. "
-    "What the paper’s ten iterations leave is not known to us.",
-    measured=lambda records: (
-        "Published: 6,561 vertices; read in the abstract and captions, so springs, "
-        f"stiffness, step and machine are not known to us. Here: {_vertices(records)} particles, "
-        f"{words(int(published.LIU_2013_STIFFNESS))} N/m, one step of "
-        f"{words_in(published.LIU_2013_FRAME, 'ms')} from mid-fall, on one core; "
-        f"Newton to a residual of {words(published.LIU_2013['newton'].settings['tolerance'])}."
-    ),
+    **CAPTIONS.of("cloth_liu_2013", _vertices),
+    subjects=lambda results: [
+        _liu_row(record)
+        for record in results.all("cloth", task=LIU)
+        if record.solver in published.LIU_2013
+    ],
     summary=_liu_summary,
     compared=0,
 )
-
 
 LAYOUTS = (one_step, motion, liu_2013)

@@ -1,8 +1,8 @@
-"""What a falling cloth is held against: converged implicit Euler, and the motion itself.
+"""Reference solutions of a falling cloth: converged implicit Euler, and the true motion.
 
-Converged implicit Euler is our Newton in steps of one frame. The motion itself is the classical
-Runge-Kutta method, with h far below the limit of stability, halved twice: how fast the three come
-together is the observed order, and the last difference bounds what is left.
+Converged implicit Euler is our Newton in steps of one frame. The true motion is computed by the
+classical Runge-Kutta method, with h far below the limit of stability and halved twice: the observed
+order shows that the three converge, and the last difference bounds the remaining error.
 """
 
 import functools
@@ -18,47 +18,40 @@ from plumbob.reference.arguments import FloatArray
 from ...harness import metrics
 from ...problems.falling_cloth import FRAME, FallingCloth, explicit_substeps
 
-# Newton goes on to the rounding floor, which is above this, so that errors of 1e-8 can be measured.
-TOLERANCE = 1e-14
-MOST_ITERATIONS = 200
-# Steps of the coarsest of the three motions, for those at symplectic Euler's limit.
+# Newton's rounding floor is above this, so that errors of 1e-8 can be measured.
+TOLERANCE, MAX_ITERATIONS = 1e-14, 200
+# Steps of the coarsest of the three motions, relative to symplectic Euler's limit.
 _COARSE = 2.0
 
 
 class ClothTruth(NamedTuple):
-    """The answers, frame by frame.
+    """The reference solutions, frame by frame; positions [m] are (particle, 3)."""
 
-    Attributes:
-        start: positions before the first frame [m], (particle, 3).
-        inertial: y of the first step, where the particles would go by themselves, (particle, 3).
-        first: the end of the first step of implicit Euler, to 25 digits.
-        implicit: positions by converged implicit Euler, (frame, particle, 3).
-        true: positions of the motion itself, (frame, particle, 3).
-        order: at which the motion's steps come together.
-        unsure: rms distance between the two finest at the end [m].
-    """
-
-    start: FloatArray
-    inertial: FloatArray
-    first: ExactStep
-    implicit: FloatArray
-    true: FloatArray
-    order: float
-    unsure: float
+    inertial: FloatArray  # y of the first step, the positions without forces
+    first: ExactStep  # the end of the first step of implicit Euler, to 25 digits
+    implicit: FloatArray  # by converged implicit Euler, (frame, particle, 3)
+    true: FloatArray  # of the true motion, (frame, particle, 3)
+    order: float  # observed order of convergence of the true motion
+    unsure: float  # rms distance between the two finest motions at the end [m]
 
 
 @functools.cache
 def truth_of(cloth: FallingCloth, frames: int) -> ClothTruth:
-    """Return the answers for a cloth."""
+    """Return the reference solutions for a cloth."""
     substeps = explicit_substeps(cloth.beat, _COARSE)
     coarse, middle, fine = (true_motion(cloth, frames, n * substeps) for n in (1, 2, 4))
     unsure = metrics.rms_distance(middle[-1], fine[-1])
     order = math.log2(metrics.rms_distance(coarse[-1], middle[-1]) / unsure)
-    x, v = cloth.start.positions, cloth.start.velocities
-    inertial = x + cloth.frame * np.where(cloth.system.free[:, None], v, 0.0)
+    inertial = inertial_positions(cloth, cloth.frame)
     implicit = implicit_motion(cloth, frames, cloth.frame)
     first = exact_step(cloth.system, cloth.start, cloth.frame, implicit[0])
-    return ClothTruth(x, inertial, first, implicit, fine, order, unsure)
+    return ClothTruth(inertial, first, implicit, fine, order, unsure)
+
+
+def inertial_positions(cloth: FallingCloth, frame: float) -> FloatArray:
+    """Return the positions after a frame [s] without forces, (particle, 3)."""
+    x, v = cloth.start.positions, cloth.start.velocities
+    return x + frame * np.where(cloth.system.free[:, None], v, 0.0)
 
 
 def true_motion(cloth: FallingCloth, frames: int, substeps: int) -> FloatArray:
@@ -75,10 +68,10 @@ def implicit_motion(cloth: FallingCloth, frames: int, frame: float = FRAME) -> F
     """Return the positions by converged implicit Euler after each step of one frame.
 
     Raises:
-        ArithmeticError: if a step does not converge: there is nothing to hold others against.
+        ArithmeticError: if a step does not converge.
     """
     integrator = ImplicitEuler(
-        cloth.system, h=frame, tolerance=TOLERANCE, max_iterations=MOST_ITERATIONS
+        cloth.system, h=frame, tolerance=TOLERANCE, max_iterations=MAX_ITERATIONS
     )
     state: State = cloth.start
     positions = []

@@ -1,11 +1,13 @@
 """The records of falling cloths: work and precision, iterations, limits of stability."""
 
+import msgspec
+
 from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
 from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 
 
 class StepWork(Values, frozen=True):
-    """One step with ever more work, (rung,)."""
+    """One step at increasing cost, (rung,)."""
 
     particles: Integers1  # along a side
     seconds: Floats1
@@ -14,30 +16,30 @@ class StepWork(Values, frozen=True):
 
 
 class MotionWork(Values, frozen=True):
-    """Motions with ever more work, (rung,), and how sure the true ones are, (size,)."""
+    """Motions at increasing cost, (rung,), and the accuracy of the true motions, (size,)."""
 
     particles: Integers1  # along a side
-    frames: Integers1  # that the motion got to
-    wanted: Integers1  # frames that it was to get to
+    frames: Integers1  # number of frames reached
+    target_frames: Integers1 = msgspec.field(name="wanted")
     seconds: Floats1  # for a frame
     setup: Floats1  # time to set the solver up [s]
-    implicit: Floats1  # distance from converged implicit Euler in the end [m]
-    true: Floats1  # distance from the true motion in the end [m]
+    implicit: Floats1  # final distance from converged implicit Euler [m]
+    true: Floats1  # final distance from the true motion [m]
     diverged: Booleans1
     remark_particles: Integers1  # along a side of the cloth of each remark, (remark,)
     order: Floats1  # observed, of the true motion
-    unsure: Floats1  # by how much halving its steps moves the true motion [m]
+    unsure: Floats1  # distance by which halved steps move the true motion [m]
 
 
-class Counted(Values, frozen=True):
-    """Iterations to each of `DECADES`, NaN where those tried do not suffice; the least error."""
+class IterationCounts(Values, frozen=True):
+    """Iterations to each of `DECADES`, NaN where the iteration limit is too low."""
 
     needed: Floats1
-    tried: int
-    least: float
+    iterations: int = msgspec.field(name="tried")
+    smallest_error: float = msgspec.field(name="least")
 
 
-class Stability(Values, frozen=True):
+class StabilityLimits(Values, frozen=True):
     """The longest stable step [s] and the highest frequency [rad/s] by stiffness [N/m]."""
 
     stiffness: Floats1
@@ -45,8 +47,8 @@ class Stability(Values, frozen=True):
     frequency: Floats1
 
 
-class Published(Values, frozen=True):
-    """The cloth of Liu et al. (2013): times of a frame [s], the error left, and its particles."""
+class LiuFrame(Values, frozen=True):
+    """The cloth of Liu et al. (2013): times of a frame [s], the final error, and its particles."""
 
     seconds: Floats1
     error: float
@@ -54,18 +56,18 @@ class Published(Values, frozen=True):
 
 
 class FallDetails(Details, frozen=True):
-    """Which cloth falls, and with which settings it is solved."""
+    """The falling cloth, and the settings of its solver."""
 
     stiffness: float  # of the springs [N/m]
     frame: float  # its length [s]
     size: int = 0  # particles along a side
     cloth: str = ""  # the name of a user's cloth
     rungs: tuple[str, ...] = ()  # the settings, (rung,)
-    remarks: tuple[str, ...] = ()  # what happened, (remark,)
+    remarks: tuple[str, ...] = ()
 
 
 class ClothDetails(Details, frozen=True):
-    """Why an engine is missing, or what is to be said of its stability."""
+    """The reason why an engine is missing, or a remark on its stability."""
 
     remark: str = ""
 
@@ -73,8 +75,8 @@ class ClothDetails(Details, frozen=True):
 KINDS = {
     ONE_STEP: Kind(StepWork, FallDetails),
     MOTION: Kind(MotionWork, FallDetails),
-    NEEDED: Kind(Counted, FallDetails),
-    STABILITY: Kind(Stability, ClothDetails),
-    LIU: Kind(Published, ClothDetails),
+    NEEDED: Kind(IterationCounts, FallDetails),
+    STABILITY: Kind(StabilityLimits, ClothDetails),
+    LIU: Kind(LiuFrame, ClothDetails),
     MISSING: Kind(Values, ClothDetails),
 }

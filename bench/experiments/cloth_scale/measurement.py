@@ -1,7 +1,6 @@
 """Cloths from a thousand particles to a million: factors, solves, iterations, memory.
 
-Each cloth is measured in a process of its own, since only a process can say how much memory it ever
-had.
+Each cloth is measured in its own process, because only a process knows its peak memory.
 """
 
 import importlib.util
@@ -28,57 +27,47 @@ from ...harness.progress import announce
 from ...harness.stopwatch import time_call
 from ...harness.values import read
 from ...peers import registry
-from .values import Scaled
+from .values import FactorCosts
 
-H = 1 / 60
-STIFFNESS = 1e4
-ITERATIONS = 10
-# Particles along a side, and how long a benchmark may take [s] where the cloth is to be measured.
+H, STIFFNESS, ITERATIONS = 1 / 60, 1e4, 10
+# Particles along a side, and the shortest benchmark time [s] at which the cloth is measured.
 SIZES = {32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
-OURS = registry.SUPERNODAL.name
-LIBRARIES = tuple(library.name for library in registry.FACTORS)
-# Rounds in each of which everything is timed once: so many particles in all, within limits.
+SUPERNODAL = registry.SUPERNODAL.name
+# Rounds, each of which times all parts once: so many particles in total, within limits.
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
-# What the yardstick of memory reads again and again: more than most caches hold [bytes].
+# The plain read goes over this much memory again and again: more than most caches hold [bytes].
 STRETCH = 2**28
-# So long [s] a part may take, such as the factor of a million particles, compilation included.
+# Time limit of a part [s], such as the factor of a million particles, compilation included.
 PATIENCE = 1800.0
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every size by our own factorisation and by CHOLMOD."""
     for size, seconds in SIZES.items():
-        if scale.seconds < seconds:
-            continue
         settings: dict[str, Any] = {"particles": size * size, "h": H, "stiffness": STIFFNESS}
         settings["iterations"] = ITERATIONS
-        for library in LIBRARIES:
-            measure_it = partial(in_its_own_process, size, library)
-            yield Block("cloth_scale", f"cloth/{size}x{size}", library, measure_it, settings)
+        for library in registry.FACTORS if scale.seconds >= seconds else ():
+            measure_it = partial(in_its_own_process, size, library.name)
+            yield Block("cloth_scale", f"cloth/{size}x{size}", library.name, measure_it, settings)
 
 
 def in_its_own_process(size: int, library: str) -> Measured:
-    """Measure one cloth in a process that does nothing else; say so if there is no such library."""
-    if library != OURS and importlib.util.find_spec(library) is None:
+    """Measure one cloth in a fresh process, unless the library is missing."""
+    if library != SUPERNODAL and importlib.util.find_spec(library) is None:
         return Measured(None, {"missing": f"{library} is not installed"})
     numbers = in_a_fresh_process(PATIENCE, compiled_and_measured, size, library)
-    return Measured(read(Scaled, numbers))
+    return Measured(read(FactorCosts, numbers))
 
 
 def compiled_and_measured(size: int, library: str) -> dict[str, Any]:
-    """Return what is measured after a small cloth, for which everything is compiled."""
+    """Compile everything on a small cloth, then measure."""
     measure(min(SIZES), library)
     clear_factor_cache()
     return measure(size, library)
 
 
-def _say(size: int, library: str, what: str) -> None:
-    """Say what is being done now."""
-    announce(f"cloth/{size}x{size}, {library}: {what}")
-
-
 def billowing_cloth(size: int) -> tuple[MassSpring, State]:
-    """Return the lab's cloth, a hundred times as stiff, with two waves across it that rise."""
+    """Return the lab's cloth, a hundred times as stiff, with two rising waves across it."""
     system, flat = scenes.lab_cloth(size=size, stiffness=STIFFNESS)
     x = flat.positions.copy()
     wave = np.sin(np.pi * x[:, 0]) * np.cos(np.pi * x[:, 2])
@@ -90,24 +79,28 @@ def billowing_cloth(size: int) -> tuple[MassSpring, State]:
 
 def measure(size: int, library: str) -> dict[str, Any]:
     """Return the times [s] and the memory [bytes] of one cloth."""
-    before, say = memory(), partial(_say, size, library)
+    before = memory()
+
+    def say(part: str) -> None:
+        announce(f"cloth/{size}x{size}, {library}: {part}")
+
     say("cloth")
     system, state = billowing_cloth(size)
     rounds = int(np.clip(ROUNDS_PARTICLES // size**2, *ROUNDS))
-    if library != OURS:
-        matrix = global_matrix(system, H)
-        say("factor")
-        factor, seconds = time_call(lambda: factorize(matrix, library))
-        sides = np.array(state.positions)
-        times = in_turn({"solve": lambda: factor.solve(sides)}, rounds, say)
-        return {"factor": seconds, **times, "memory": memory(), "before": before}
-    return {"before": before, **steps(system, state, rounds, say)}
+    if library == SUPERNODAL:
+        return {"before": before, **steps(system, state, rounds, say)}
+    matrix = global_matrix(system, H)
+    say("factor")
+    factor, seconds = time_call(lambda: factorize(matrix, library))
+    sides = np.array(state.positions)
+    times = in_turn({"solve": lambda: factor.solve(sides)}, rounds, say)
+    return {"factor": seconds, **times, "memory": memory(), "before": before}
 
 
 def steps(
     system: MassSpring, state: State, rounds: int, say: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Return the times of iterations and of their parts, and the residual reached."""
+    """Return the times of iterations and of their parts, and the final residual."""
     say("matrix")
     matrix, assembly = time_call(lambda: global_matrix(system, H))
     say("factor")
@@ -118,56 +111,51 @@ def steps(
     )
     objective = integrator.objective(state)
     gradient = objective.start.gradient
-    limit = reading(2 * 8 * factor.entries + local_bytes(system))
     work = {
         "solve": lambda: factor.solve(gradient),
         "local": lambda: objective.evaluate(objective.y),
         "step": lambda: integrator.step(state),
-        "limit": limit,
+        "limit": reading(2 * 8 * factor.entries + local_bytes(system)),
     }
     times = in_turn(work, rounds, say)
-    say("factor, once more")
-    used, result = memory(), integrator.step(state)
-    twice = global_matrix(system, 2 * H)
-    _, again = time_call(lambda: factor.refactorize(twice))
-    sizes = {"entries": factor.entries, "matrix_entries": matrix.nnz, "memory": used}
-    found = {"residual": result.residual, "history": result.history.tolist()}
-    return {"assembly": assembly, "factor": seconds, "refactor": again, **times, **sizes, **found}
+    say("second factor")
+    peak, result = memory(), integrator.step(state)
+    double = global_matrix(system, 2 * H)
+    _, refactor = time_call(lambda: factor.refactorize(double))
+    sizes = {"entries": factor.entries, "matrix_entries": matrix.nnz, "memory": peak}
+    errors = {"residual": result.residual, "history": result.history.tolist()}
+    factors = {"assembly": assembly, "factor": seconds, "refactor": refactor}
+    return {**factors, **times, **sizes, **errors}
 
 
 def in_turn(
     work: dict[str, Callable[[], Any]], rounds: int, say: Callable[[str], None]
 ) -> dict[str, list[float]]:
-    """Return how long each took in each round; a first, uncounted round warms up."""
+    """Return the time of each part in each round; the first, uncounted round warms up."""
     times: dict[str, list[float]] = {name: [] for name in work}
-    for done in range(rounds + 1):
-        say(f"round {done} of {rounds}")
+    for i in range(rounds + 1):
+        say(f"round {i} of {rounds}")
         for name, call in work.items():
             times[name].append(time_call(call)[1])
     return {name: seconds[1:] for name, seconds in times.items()}
 
 
 def local_bytes(system: MassSpring) -> int:
-    """Return what a local step has to read: the springs, and six numbers of each particle's."""
+    """Return the bytes that a local step reads: the springs, and six numbers per particle."""
     arrays = system.arrays
     springs = (arrays.springs, arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only)
     return sum(array.nbytes for array in springs) + 6 * 3 * 8 * system.particle_count
 
 
 def reading(size: int) -> Callable[[], float]:
-    """Return a call that reads so many bytes, as fast as memory or the caches give them."""
+    """Return a call that reads so many bytes, as fast as memory or the caches allow."""
     numbers = np.ones(min(size // 2, STRETCH) // 8)
-    passes, rest = divmod(size // 8, len(numbers))
-
-    def run() -> float:
-        whole = sum(_total(numbers) for _ in range(passes))
-        return whole + _total(numbers[:rest])
-
-    return run
+    passes, remainder = divmod(size // 8, len(numbers))
+    return lambda: sum(_total(numbers) for _ in range(passes)) + _total(numbers[:remainder])
 
 
 def total(numbers: FloatArray) -> float:
-    """Return the sum, in whatever order is fastest."""
+    """Return the sum, in the fastest order."""
     result = 0.0
     for i in range(len(numbers)):
         result += numbers[i]
@@ -178,6 +166,6 @@ _total = Kernel(total, relaxed=True)
 
 
 def memory() -> int:
-    """Return the most memory that this process ever had [bytes]."""
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return most if sys.platform == "darwin" else 1024 * most
+    """Return the peak memory of this process [bytes]."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak

@@ -1,94 +1,89 @@
-"""What factors and steps cost as cloths grow to a million particles."""
+"""The cost of factors and steps as cloths grow to a million particles."""
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
+from typing import Any
 
+from ...harness import metrics
 from ...harness.record import Record
-from ...tables.columns import folded, least, text
+from ...peers import registry
+from ...tables.captions import Captions
 from ...tables.layout import Layout
-from ...tables.results import settings
-from ...tables.table import Column, Summary, words
-from . import readings
+from ...tables.results import grouped
+from ...tables.table import Summary, words
+
+CAPTIONS = Captions(__file__)
+LABELS = {library.name: library.label for library in registry.FACTORS}
 
 
-def _value(title: str, unit: str, name: str) -> Column:
-    return Column(title, unit, read=partial(readings.value, name=name))
+def _row(record: Record) -> dict[str, Any]:
+    """Return medians and their ratios; a cell is None where a library has no such number."""
+    medians = {name: metrics.spread(array).median for name, array in record.arrays.items()}
+    medians["particles"] = float(record.details.particles)
+    if "step" in medians:
+        medians["iteration"] = medians["step"] / record.details.iterations
+
+    def relative(name: str, divisor: str) -> float | None:
+        present = name in medians and divisor in medians
+        return metrics.ratio(medians[name], medians[divisor]) if present else None
+
+    missing = record.details.missing
+    return {
+        "record": record,
+        "particles": record.details.particles,
+        "library": LABELS.get(record.solver, record.solver) + (f": {missing}" if missing else ""),
+        "first factor": medians.get("factor"),
+        "second factor": medians.get("refactor"),
+        "solve": medians.get("solve"),
+        "peak memory": medians.get("memory"),
+        "iteration per particle": relative("iteration", "particles"),
+        "iteration relative to a plain read": relative("iteration", "limit"),
+        "final residual": medians.get("residual"),
+        "all iterations": medians.get("step"),
+        "all iterations relative to a solve": relative("step", "solve"),
+        "local step per particle": relative("local", "particles"),
+        "solve per particle": relative("solve", "particles"),
+        "solve per nonzero": relative("solve", "entries"),
+        "nonzeros of L per particle": relative("entries", "particles"),
+    }
 
 
-def _ratio(title: str, unit: str, name: str, other: str = "particles") -> Column:
-    return Column(title, unit, read=partial(readings.ratio, name=name, other=other))
+def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+    return Summary(_largest(rows), tuple(_relative_to_cholmod(rows)))
 
 
-def _summary(records: Sequence[Record]) -> Summary:
-    multiples = (
-        f"{words(particles)} particles, ours as a multiple of CHOLMOD’s: factor {words(factor)}, "
-        f"solve {words(solve)}, memory {words(memory)}"
-        for particles, (factor, solve, memory) in readings.beside_cholmod(records).items()
-    )
-    return Summary(_largest(records), tuple(multiples))
-
-
-def _largest(records: Sequence[Record]) -> str:
-    ours = [record for record in records if record.solver == readings.OURS]
-    if not ours:
+def _largest(rows: Sequence[dict[str, Any]]) -> str:
+    steps = [row for row in rows if row["all iterations"] is not None]
+    if not steps:
         return ""
-    last = max(ours, key=lambda record: record.details.particles)
+    row = max(steps, key=lambda row: int(row["particles"]))
     return (
-        f"With {words(last.details.particles)} particles {words(last.details.iterations)} "
-        f"iterations take {words(readings.value(last, 'step'))} s, as long as "
-        f"{words(readings.ratio(last, 'step', 'solve'))} solves, and leave a residual of "
-        f"{words(last.values.residual)}."
+        f"With {words(row['particles'])} particles {words(row['record'].details.iterations)} "
+        f"iterations take {words(row['all iterations'])} s, as long as "
+        f"{words(row['all iterations relative to a solve'])} solves; the residual after them is "
+        f"{words(row['final residual'])}."
     )
 
 
-def _columns(records: Sequence[Record]) -> Sequence[Column]:
-    return (
-        Column("particles", read=lambda record: record.details.particles),
-        text("by", readings.library),
-        *least(
-            [
-                _value("first factor", "s", "factor"),
-                _value("again, pattern known", "s", "refactor"),
-                _value("solve", "ms", "solve"),
-                _value("most memory", "GiB", "memory"),
-            ]
-        ),
-        _ratio("iteration", "ns/particle", "iteration"),
-        _ratio("iteration", "plain reads", "iteration", "limit"),
-        _value("final residual", "", "residual"),
-        *folded(
-            [
-                _ratio(f"{settings(records, 'iterations')} iterations", "solves", "step", "solve"),
-                _ratio("local step", "ns/particle", "local"),
-                _ratio("solve", "ns/particle", "solve"),
-                _ratio("solve", "ns/nonzero", "solve", "entries"),
-                _ratio("nonzeros of L for each", "", "entries"),
-            ]
-        ),
-    )
+def _relative_to_cholmod(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
+    measured = [row for row in rows if row["record"].values]
+    for particles, group in grouped(measured, lambda row: int(row["particles"])).items():
+        libraries = {row["record"].solver: row for row in group}
+        if libraries.keys() >= LABELS.keys():
+            supernodal, cholmod = (libraries[name] for name in LABELS)
+            factor, solve, memory = (
+                words(metrics.ratio(supernodal[title], cholmod[title]))
+                for title in ("first factor", "solve", "peak memory")
+            )
+            yield (
+                f"{words(particles)} particles, Plumbob relative to CHOLMOD: factor {factor}, "
+                f"solve {solve}, memory {memory}"
+            )
 
 
 scale = Layout(
-    "What do factors and iterations cost as the cloth grows?",
-    "cloth_scale",
-    "Factors of M + h² L and local/global iterations as the cloth grows",
-    subjects=lambda results: results.all("cloth_scale"),
-    columns=_columns,
-    shows="The first factor finds an order of elimination; another step length or stiffness "
-    "needs only the second. A solve has three right-hand sides. The memory is that of a whole "
-    "process, compiler and cloth included, but for a second factor beside the first. A plain read "
-    "is a loop over as many bytes as an iteration has to read: the factor twice, the springs, the "
-    "particles. It is a yardstick and no lower bound. As a factor outgrows a cache, its nonzeros "
-    "cost more. The residual is that after all iterations.",
-    measured=lambda records: (
-        "The lab’s cloth, with more particles, a stiffness of "
-        f"{settings(records, 'stiffness')} N/m and two waves that rise; steps "
-        f"of {settings(records, 'h')} s. Each cloth in a process of its own, "
-        "on one core but for the springs of the largest, which are summed on all; times are "
-        "medians of rounds in which everything is timed once."
-    ),
+    **CAPTIONS.of("cloth_scale"),
+    subjects=lambda results: list(map(_row, results.all("cloth_scale"))),
     summary=_summary,
 )
-
 
 LAYOUTS = (scale,)

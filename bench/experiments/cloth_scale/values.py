@@ -3,10 +3,10 @@
 from ...harness.values import Details, Floats1, Kind, Values
 
 
-class Scaled(Values, frozen=True, kw_only=True):
-    """A cloth factored by one library; what only ours measures is None for others."""
+class FactorCosts(Values, frozen=True, kw_only=True):
+    """A cloth factored by one library; CHOLMOD's has None where only ours is measured."""
 
-    before: int  # the memory before anything was made
+    before: int  # the memory before the cloth
     assembly: float | None = None
     factor: float
     refactor: float | None = None  # the time of a second factor of the same pattern
@@ -16,17 +16,17 @@ class Scaled(Values, frozen=True, kw_only=True):
     limit: Floats1 | None = None  # plain reads of as many bytes as an iteration reads
     entries: int | None = None  # nonzeros of the factor
     matrix_entries: int | None = None
-    memory: int  # the most that the process ever had
+    memory: int  # the peak of the process
     residual: float | None = None  # after all iterations of a step
-    history: Floats1 | None = None  # the residual at first and after each iteration
+    history: Floats1 | None = None  # the residual at the start and after each iteration
 
 
-class ScaledDetails(Details, frozen=True):
-    """How many particles there are and iterations a step makes, and why a library is missing."""
+class FactorDetails(Details, frozen=True):
+    """The number of particles, the iterations of a step, and why a library is missing."""
 
     particles: int
     iterations: int
     missing: str = ""
 
 
-KINDS = {"": Kind(Scaled, ScaledDetails)}
+KINDS = {"": Kind(FactorCosts, FactorDetails)}

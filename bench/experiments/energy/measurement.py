@@ -18,14 +18,12 @@ from ...harness.block import Block, Measured, Scale
 from . import DAMPINGS, SIZE
 from .values import Swing
 
-H = 1 / 60
-STEPS = 10_000
-EVERY = 10
-# Steps after which the cloth hangs well below where it began, near its rest.
+H, STEPS, EVERY = 1 / 60, 10_000, 10
+# Steps after which the cloth hangs well below its start, near its rest.
 FALLING = 120
 TOLERANCE = 1e-10
-# Of two that are the same step for step, the faster. Local/global converges in a dozen iterations
-# at this stiffness, each a hundredth of one of Newton's.
+# Of two integrators that agree step by step, the faster. Local/global converges in a dozen
+# iterations at this stiffness, each a hundredth of the cost of a Newton iteration.
 INTEGRATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
     "symplectic Euler": SIMULATORS["symplectic Euler"],
     "implicit Euler": partial(implicit, "local_global", tolerance=TOLERANCE),
@@ -37,28 +35,27 @@ INTEGRATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield every integrator, without dampers and with; the cloth is the same at every scale."""
+    """Yield every integrator, undamped and damped; the cloth is the same at every scale."""
     settings = {"h": H, "steps": STEPS, "every": EVERY, "tolerance": TOLERANCE}
-    for name in DAMPINGS:
+    for name, damping in DAMPINGS.items():
+        facts = {"title": name, "damping": damping}
         for integrator in INTEGRATORS:
             measure = partial(swing, name, integrator)
-            facts = {"title": name, "damping": DAMPINGS[name]}
             yield Block("energy", f"swing/{name}", integrator, measure, settings, facts=facts)
 
 
 def swing(name: str, integrator: str, steps: int = STEPS) -> Measured:
-    """Let the cloth swing; keep its energy above rest, over that of the start."""
+    """Let the cloth swing; keep its energy above rest, relative to the start."""
     system, start, rest = long_swing(name)
-    times, energies = energy_series(
-        INTEGRATORS[integrator], system, start, H, steps=steps, every=EVERY
-    )
+    simulation = INTEGRATORS[integrator]
+    times, energies = energy_series(simulation, system, start, H, steps=steps, every=EVERY)
     above = energies - rest
     return Measured(Swing(times, above / above[0]))
 
 
 @functools.cache
 def long_swing(name: str) -> tuple[MassSpring, State, float]:
-    """Return a small cloth, damped or not, its start, and the least energy near its fall [J]."""
+    """Return a small cloth, its start, and the minimum energy near its fall [J]."""
     system, start = scenes.lab_cloth(size=SIZE, damping=DAMPINGS[name])
     state = start
     for _ in range(FALLING):

@@ -1,69 +1,72 @@
 """What integrators do to the energy of a swinging cloth."""
 
 from collections.abc import Sequence
-from functools import partial
+from typing import Any
 
-from ...harness.record import Record
-from ...tables.columns import at, lengths_of_steps, text, titled
+from ...figures.chart import GREATER, Axis, Chart, Panel, series
+from ...figures.sketch import Sketch, chart_sketch
+from ...tables.captions import Captions
+from ...tables.columns import words_in
 from ...tables.layout import Layout
-from ...tables.results import label, settings
-from ...tables.table import Column, Summary, in_unit, words
-from . import DAMPINGS, SIZE, figures, readings
+from ...tables.results import Results, by_problem, label, settings
+from ...tables.table import Summary, words
+from . import DAMPINGS, SIZE
 
 LISTED = (100, 1_000, 10_000)
+CAPTIONS = Captions(__file__, size=str(SIZE), damping=f"{DAMPINGS['damped']:g}")
 
 
-def _summary(records: Sequence[Record]) -> Summary:
-    undamped = [record for record in records if record.details.damping == 0.0]
-    if not undamped:
-        return Summary()
-    return Summary(
-        f"Without dampers all energy should stay. After {settings(undamped, 'steps')} steps there "
-        "is left, in percent:",
-        tuple(f"{label(record.solver)}: {_range(record)}" for record in undamped),
+def energy_chart(results: Results) -> Sketch | None:
+    """Show the energy that each integrator leaves over time, undamped and damped."""
+    panels = (
+        Panel(group[0].title, tuple(series(r.solver, r.values.time, r.values.left) for r in group))
+        for group in by_problem(results.all("energy")).values()
+    )
+    return chart_sketch(
+        Chart(
+            **CAPTIONS.figure("energy"),
+            panels=tuple(panels),
+            x=Axis("time [s]", limits=(0, None)),
+            y=Axis("relative energy above rest", limits=(0, None)),
+            columns=2,
+            better=GREATER,
+            entrants=results.entrants,
+        )
     )
 
 
-def _range(record: Record) -> str:
-    shares = float(record.values.left[-1]), *readings.extent(record)
-    last, low, high = (words(in_unit(share, "%")) for share in shares)
-    return f"{last}, never less than {low} nor more than {high}"
+def _rows(results: Results) -> list[dict[str, Any]]:
+    rows = []
+    for record in results.all("energy"):
+        left, every = record.values.left, record.details.every
+        row = {"cloth": record.title, "integrator": label(record.solver), "record": record}
+        row |= {"last": float(left[-1]), "maximum": left.max(), "minimum": left.min()}
+        counts = [count for count in LISTED if count // every < left.size]
+        rows.append(row | {f"left after {words(n)} steps": left[n // every] for n in counts})
+    return rows
+
+
+def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+    undamped = [row for row in rows if row["record"].details.damping == 0.0]
+    if not undamped:
+        return Summary()
+    steps = settings((row["record"] for row in undamped), "steps")
+    points = []
+    for row in undamped:
+        last, low, high = (words_in(float(row[x]), "%") for x in ("last", "minimum", "maximum"))
+        points.append(f"{row['integrator']}: {last} (minimum {low}, maximum {high})")
+    return Summary(
+        "Without dampers the energy should stay constant. Energy left after "
+        f"{steps} steps, and its range:",
+        tuple(points),
+    )
 
 
 energy = Layout(
-    "What happens to the energy over many steps?",
-    "energy",
-    "Energy of a swinging cloth",
-    subjects=lambda results: results.all("energy"),
-    columns=(
-        titled("cloth"),
-        text("integrator", lambda record: label(record.solver)),
-        *(
-            Column(
-                f"left after {words(k)} steps",
-                "%",
-                read=partial(readings.left_after, steps=k),
-                group="left after",
-            )
-            for k in LISTED
-        ),
-        Column("greatest", "%", read=at(1, readings.extent)),
-        Column("least", "%", read=at(0, readings.extent)),
-    ),
-    shows="Energy of motion, springs and gravity above that of the cloth at rest, in percent "
-    "of the start. Without dampers all of it should stay. implicit, implicitfast, discrete "
-    "and RK4 are MuJoCo’s: discrete is one Gauss-Newton step of implicit Euler, and without "
-    "dampers implicit and implicitfast are symplectic Euler, step for step.",
-    measured=lambda records: (
-        f"The lab’s cloth of {SIZE} × {SIZE} particles let go from rest, with its damping of "
-        f"{DAMPINGS['damped']:g} N s/m and without; {settings(records, 'steps')} steps of "
-        f"{lengths_of_steps(records)} ms, of which every {settings(records, 'every')}th is looked "
-        "at. Implicit Euler by local/global iterations to a residual of "
-        f"{settings(records, 'tolerance')}."
-    ),
+    **CAPTIONS.of("energy"),
+    subjects=_rows,
     summary=_summary,
-    figures=(figures.energy,),
+    figures=(energy_chart,),
 )
-
 
 LAYOUTS = (energy,)

@@ -1,4 +1,4 @@
-"""Every solver's answer to one step of a swinging cloth, held against Newton's and certified."""
+"""Every solver's solution of one step of a heavy cloth, certified and compared with Newton's."""
 
 import copy
 import functools
@@ -10,37 +10,46 @@ import numpy as np
 
 from plumbob.crosscheck.mass_spring.exact_step import ExactStep, exact_step
 from plumbob.crosscheck.mass_spring.steps import balance_residual
-from plumbob.reference import STEP_SOLVERS
+from plumbob.reference import STEP_SOLVERS, ImplicitEuler, scenes
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.implicit_euler.certificate import Certificate, certify
 from plumbob.reference.implicit_euler.objective import Objective
 
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
-from ..cloth.measurement import TOLERANCE, integrator_of
-from ..cloth.problem import FRAME, HEAVY_STIFFNESSES, ClothSwing, mid_swing
-from .values import Certified
+from ..cloth.measurement import TOLERANCE, ClothSwing, integrator_of
+from . import FRAME, FRAMES, GRAVITY, STIFFNESSES
+from .values import CertifiedStep
 
-SUITE = "newton"
-# Iterations that are usual where steps have to be quick, and more than those of a quick solver.
+# Iterations of a solver that has to be quick; solvers allowed more than `SLOW` count as slow.
 USUAL, SLOW = 10, 1000
-# From this stiffness on [N/m] the slow solvers also start beside Newton's answer, every coordinate
-# off by about so much [m].
-STIFF, BESIDE = 1e5, 1e-6
-FROM_Y, FROM_BESIDE = "y", "beside Newton’s answer"
-# Particles a side; a scale of so many random targets is full.
-QUICK, FULL, _FULL = 10, 30, 2000
+# At this stiffness [N/m] and above slow solvers also start near Newton's solution, every coordinate
+# perturbed by about `PERTURBATION` [m].
+STIFF, PERTURBATION = 1e5, 1e-6
+FROM_Y, NEAR_NEWTON = "y", "beside Newton’s answer"
+# Particles a side, and the number of random targets of a scale that is full.
+QUICK, FULL, _FULL_TARGETS = 10, 30, 2000
+
+
+@functools.cache
+def mid_swing(stiffness: float, size: int) -> ClothSwing:
+    """Return the lab's cloth under real gravity in mid-swing, after converged frames from rest."""
+    system, state = scenes.lab_cloth(size=size, stiffness=stiffness, gravity=GRAVITY)
+    integrator = ImplicitEuler(system, h=FRAME)
+    for _ in range(FRAMES):
+        state = integrator.step(state).state
+    return ClothSwing(f"swing/k{stiffness:g}", system, state, FRAME)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield, for each stiffness, every solver's limit and ten local/global iterations."""
-    size = FULL if scale.targets >= _FULL else QUICK
-    for stiffness in HEAVY_STIFFNESSES:
-        for solver, known in registry.step_solvers().items():
-            limit = known.certified
-            yield _block(size, stiffness, solver, FROM_Y, limit)
+    """Yield, for each stiffness, every solver to its limit and ten local/global iterations."""
+    size = FULL if scale.targets >= _FULL_TARGETS else QUICK
+    for stiffness in STIFFNESSES:
+        for name, solver in registry.step_solvers().items():
+            limit = solver.certified
+            yield _block(size, stiffness, name, FROM_Y, limit)
             if stiffness >= STIFF and limit >= SLOW:
-                yield _block(size, stiffness, solver, FROM_BESIDE, limit)
+                yield _block(size, stiffness, name, NEAR_NEWTON, limit)
         yield _block(size, stiffness, "local_global", FROM_Y, USUAL)
 
 
@@ -48,79 +57,78 @@ def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> 
     settings = {"h": FRAME, "start": start, "iterations": limit, "tolerance": TOLERANCE}
     measure = partial(certified_step, size, stiffness, solver, start, limit)
     facts = {"stiffness": stiffness}
-    return Block(SUITE, f"swing/k{stiffness:g}", solver, measure, settings, size, facts)
+    return Block("newton", f"swing/k{stiffness:g}", solver, measure, settings, size, facts)
 
 
 def certified_step(size: int, stiffness: float, solver: str, start: str, limit: int) -> Measured:
-    """Solve the step; keep what is known of the answer, and how far it is from Newton's."""
+    """Solve the step; keep the certificate of the solution, and its distance to Newton's."""
     problem = mid_swing(stiffness, size)
-    newton, objective = newtons_answer(problem), Objective(problem.system, problem.start, problem.h)
-    x, iterations = (
-        _solved(problem, solver, limit)
-        if start == FROM_Y
-        else _solved_from_beside(problem, solver, limit)
-    )
-    known, here, apart = certify(objective, x), objective.evaluate(x), np.linalg.norm(x - newton.x)
-    same = known.shares_minimiser(newton.certificate, float(apart))
+    newton, objective = newton_solution(problem), _objective(problem)
+    solve = _solve_from_y if start == FROM_Y else _solve_near_newton
+    x, iterations = solve(problem, solver, limit)
+    certificate, point = certify(objective, x), objective.evaluate(x)
+    distance = float(np.linalg.norm(x - newton.x))
+    same = certificate.shares_minimiser(newton.certificate, distance)
     return Measured(
-        Certified(
+        CertifiedStep(
             size=size,
             iterations=iterations,
-            residual=known.residual,
-            at_floor=here.at_floor,
+            residual=certificate.residual,
+            at_floor=point.at_floor,
             balance=balance_residual(problem.system, problem.start, x, problem.h),
-            distance=known.distance,
-            curvature=known.curvature,
-            lipschitz=known.lipschitz,
-            newton_step=known.newton_step,
-            apart=float(apart),
+            distance=certificate.distance,
+            curvature=certificate.curvature,
+            lipschitz=certificate.lipschitz,
+            newton_step=certificate.newton_step,
+            newton_distance=distance,
             error=newton.exact.error(x, objective.y),
-            above=here.value - newton.value,
-            covered=known.covered,
+            above=point.value - newton.minimum,
+            covered=certificate.covered,
             same=same is True,
             different=same is False,
         ),
-        {"coverage": known.coverage.name, "why": known.coverage.sentence},
+        {"coverage": certificate.coverage.name, "why": certificate.coverage.sentence},
     )
 
 
-class Converged(NamedTuple):
-    """Newton's answer x, the same to 25 digits, its certificate, and g there."""
+class NewtonSolution(NamedTuple):
+    """Newton's x, the same to 25 digits, its certificate, and the minimum of g."""
 
     x: FloatArray
     exact: ExactStep
     certificate: Certificate
-    value: float
+    minimum: float
 
 
 @functools.cache
-def newtons_answer(problem: ClothSwing) -> Converged:
-    """Return what Newton's method comes to, iterated far beyond the rounding floor."""
+def newton_solution(problem: ClothSwing) -> NewtonSolution:
+    """Return the limit of Newton's method, iterated far beyond the rounding floor."""
     integrator = integrator_of(problem, tolerance=0.0, max_iterations=50)
-    x, objective = (
-        integrator.step(problem.start).state.positions,
-        Objective(problem.system, problem.start, problem.h),
-    )
+    x, objective = integrator.step(problem.start).state.positions, _objective(problem)
     exact = exact_step(problem.system, problem.start, problem.h, x)
-    return Converged(x, exact, certify(objective, x), objective.value(x))
+    return NewtonSolution(x, exact, certify(objective, x), objective.value(x))
 
 
-def _solved(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
+def _objective(problem: ClothSwing) -> Objective:
+    return Objective(problem.system, problem.start, problem.h)
+
+
+def _solve_from_y(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
     result = integrator_of(problem, solver, TOLERANCE, limit).step(problem.start)
     return result.state.positions, result.iterations
 
 
-def _solved_from_beside(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
-    """Return what the solver comes to, and after how many iterations, from beside the answer.
+def _solve_near_newton(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
+    """Return the solution from a start near Newton's, and the number of iterations.
 
     Solvers start where the objective starts; the residual stays that of the step from y.
     """
-    objective = Objective(problem.system, problem.start, problem.h)
-    moved = copy.copy(objective)
+    objective = _objective(problem)
+    perturbed = copy.copy(objective)
     noise = np.random.default_rng(20130).standard_normal(objective.y.shape)
     noise[problem.system.pinned] = 0.0
-    moved.start = objective.evaluate(newtons_answer(problem).x + BESIDE * noise)
-    iterates = STEP_SOLVERS[solver](problem.system, problem.h).iterates(moved)
+    perturbed.start = objective.evaluate(newton_solution(problem).x + PERTURBATION * noise)
+    iterates = STEP_SOLVERS[solver](problem.system, problem.h).iterates(perturbed)
     for k, iterate in enumerate(iterates):
         if k == limit or iterate.at_floor or objective.residual(iterate) <= TOLERANCE:
             break

@@ -1,26 +1,28 @@
-"""The records of one step of a heavy cloth: an answer, and what is proven of it."""
+"""The records of one step of a heavy cloth: the solution, and bounds on its error."""
+
+import msgspec
 
 from ...harness.values import Details, Kind, Values
 
 
-class Certified(Values, frozen=True):
-    """One solver's answer to the step; lengths in metres."""
+class CertifiedStep(Values, frozen=True):
+    """One solver's solution of the step; lengths in metres."""
 
     size: int  # particles along a side
     iterations: int
     residual: float
     at_floor: bool  # whether the residual is at the rounding floor
     balance: float  # the residual in MuJoCo's forces
-    distance: float  # within which a minimiser is proven to be, infinite without a bound
-    curvature: float  # the least eigenvalue of the Hessian, as far as it is proven
-    lipschitz: float  # how fast the Hessian may change
+    distance: float  # proven bound on the distance to a minimiser, infinite if there is none
+    curvature: float  # proven lower bound on the smallest eigenvalue of the Hessian
+    lipschitz: float  # Lipschitz constant of the Hessian
     newton_step: float  # its length
-    apart: float  # the distance from Newton's answer
+    newton_distance: float = msgspec.field(name="apart")  # to Newton's solution
     error: float  # |x - x*| / |y - x*|
-    above: float  # g above that of Newton's answer [kg m²]
+    above: float  # g above that of Newton's solution [kg m²]
     covered: bool  # whether there is a bound
-    same: bool  # whether it is proven to belong to Newton's minimiser
-    different: bool  # whether it is proven not to
+    same: bool  # whether it provably belongs to Newton's minimiser
+    different: bool  # whether it provably does not
 
 
 class CertifiedDetails(Details, frozen=True):
@@ -32,4 +34,4 @@ class CertifiedDetails(Details, frozen=True):
     coverage: str = ""
 
 
-KINDS = {"": Kind(Certified, CertifiedDetails)}
+KINDS = {"": Kind(CertifiedStep, CertifiedDetails)}

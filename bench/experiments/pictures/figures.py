@@ -1,39 +1,49 @@
-"""Pictures of the scenes for the report: the arm on the custom curve, and the cloth as it falls."""
+"""The arm on the custom curve and the falling cloth: as pictures, and as motions of the page."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ...figures.sketch import Sketch
-from ...tables.results import Results
-from . import ARM, CLOTH
-from .values import ClothDrawing
+from ...figures.view import ARM_VIEW, CLOTH_VIEW, seen
+from ...harness.record import Record
+from ...motion.motion import Moving, Scene
+from ...tables.captions import Captions
+from ...tables.results import Results, counted, label
+from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
+from .values import ClothDrawing, MovingCloth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
+CAPTIONS = Captions(__file__)
 # Shades of the scale of spacings: few enough to be drawn as shapes rather than as an image.
 SHADES = 40
-# Frames of the filmstrip beside each other.
+# Frames beside each other in the filmstrip.
 COLUMNS = 3
+# Motions of a kind on the page, those of entrants first: a cloth adds some 60 kB to it.
+MAX_ARMS, MAX_CLOTHS = 6, 4
+# Time in which the arm draws the curve [s].
+DRAWING = 12.0
+# A solver that may make more iterations than this converges: its label has no count.
+FEW = 50
 
 
 def arm_draws(results: Results) -> Sketch | None:
-    """Show the arm on the custom curve, before and after resampling, points by their spacing."""
+    """Show the arm on the custom curve before and after resampling, the points by their spacing."""
     records = results.all("pictures", task=ARM)
     if not records:
         return None
-    data = [
-        (record.details.evened, record.values.curve, record.values.spacing, record.values.ghosts)
-        for record in records
+    drawings = [
+        (r.details.evened, r.values.curve, r.values.spacing, r.values.ghosts) for r in records
     ]
     return Sketch(
-        "arm_draws",
-        "The lab’s arm draws the custom curve",
-        "The arm hangs from its root above; the drawing lies in the plane y = 0. Fainter poses "
-        "are earlier frames.",
-        data,
-        _draw_arms,
+        **CAPTIONS.figure("arm_draws"),
+        data=drawings,
+        draw=_draw_arms,
     )
 
 
@@ -44,23 +54,24 @@ def falling_cloth(results: Results) -> Sketch | None:
         return None
     cloth: ClothDrawing = records[0].values
     return Sketch(
-        "falling_cloth",
-        "The lab’s cloth swings from two corners",
-        "Every step converged by Newton. The pinned corners are marked.",
-        (cloth.positions, cloth.time, cloth.pinned),
-        _draw_cloths,
+        **CAPTIONS.figure("falling_cloth"),
+        data=(cloth.positions, cloth.time, cloth.pinned),
+        draw=_draw_cloths,
     )
 
 
-def _draw_arms(data: Any) -> "Figure":
+def _draw_arms(drawings: Any) -> "Figure":
     from ...figures.drawing import canvas, power
+    from ...figures.scene_drawing import draw_arm
 
-    figure, axes = canvas(5.2, len(data), sharex=True, sharey=True)
-    for ax, (evened, curve, spacing, ghosts) in zip(axes, data, strict=True):
+    figure, axes = canvas(5.2, len(drawings), sharex=True, sharey=True)
+    for ax, (evened, curve, spacing, ghosts) in zip(axes, drawings, strict=True):
         points = _points_by_spacing(ax, curve, spacing)
-        _ghosts(ax, ghosts)
+        for joints, alpha in zip(ghosts, [0.12] * (len(ghosts) - 1) + [0.9], strict=True):
+            draw_arm(ax, joints, alpha)
         ax.set_title("after resampling" if evened else "before: as it is drawn")
-        _bare(ax)
+        ax.set_aspect("equal")
+        ax.axis("off")
     bar = figure.colorbar(points, ax=axes, shrink=0.5, aspect=35, location="bottom")
     bar.ax.xaxis.set_major_formatter(power)
     bar.ax.minorticks_off()
@@ -69,15 +80,16 @@ def _draw_arms(data: Any) -> "Figure":
     return figure
 
 
-def _draw_cloths(data: Any) -> "Figure":
+def _draw_cloths(frames: Any) -> "Figure":
     from ...figures.drawing import canvas
     from ...figures.scene_drawing import draw_cloth
 
-    moments, times, pinned = data
+    moments, times, pinned = frames
     rows = -(-len(times) // COLUMNS)
     figure, axes = canvas(2.1 * rows, COLUMNS, rows, sharex=True, sharey=True)
     for ax in axes:
-        _bare(ax)
+        ax.set_aspect("equal")
+        ax.axis("off")
     for ax, positions, time in zip(axes, moments, times, strict=False):
         draw_cloth(ax, positions, pinned)
         ax.set_title(f"{time:.1f} s", fontweight="normal", loc="center")
@@ -85,13 +97,10 @@ def _draw_cloths(data: Any) -> "Figure":
 
 
 def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "ScalarMappable":
-    """Draw the points of a shade as one path, which takes a tenth of the file; return the scale."""
+    """Draw the points of a shade as one path, a tenth of the file; return the scale."""
     import matplotlib as mpl
-    import numpy as np
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
-
-    from ...figures.view import ARM_VIEW, seen
 
     scale = ScalarMappable(LogNorm(1e-4, 1), mpl.colormaps["viridis"].resampled(SHADES))
     points, shades = np.stack(seen(curve[:-1], ARM_VIEW)[:2], axis=-1), scale.to_rgba(spacing)
@@ -101,13 +110,51 @@ def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "ScalarMappable"
     return scale
 
 
-def _ghosts(ax: "Axes", ghosts: Any) -> None:
-    from ...figures.scene_drawing import draw_arm
+def arm_motion(results: Results) -> Scene | None:
+    """Return the arm on the custom curve, by each solver on record; None if there is none."""
+    records = _first(results, ARM_MOTION, MAX_ARMS)
+    if not records:
+        return None
+    return Scene(
+        **CAPTIONS.figure("arm"),
+        motions=[Moving(_arm_label(r), r.values.positions, r.values.error) for r in records],
+        seconds=DRAWING / len(records[0].values.positions),
+        view=ARM_VIEW,
+        panes=2,
+        curve=records[0].values.curve,
+    ).checked()
 
-    for joints, alpha in zip(ghosts, [0.12] * (len(ghosts) - 1) + [0.9], strict=True):
-        draw_arm(ax, joints, alpha)
+
+def cloth_motion(results: Results) -> Scene | None:
+    """Return the falling cloth by each solver on record; None if there is none."""
+    records = _first(results, CLOTH_MOTION, MAX_CLOTHS)
+    if not records:
+        return None
+    return Scene(
+        **CAPTIONS.figure("cloth"),
+        motions=[_cloth(record) for record in records],
+        seconds=records[0].details.h * records[0].details.every,
+        view=CLOTH_VIEW,
+        panes=2,
+        marked=records[0].values.pinned.tolist(),
+    ).checked()
 
 
-def _bare(ax: "Axes") -> None:
-    ax.set_aspect("equal")
-    ax.axis("off")
+def _cloth(record: Record) -> Moving:
+    motion: MovingCloth = record.values
+    count = record.details.iterations
+    iterations = "converged" if count > FEW else counted(count, "iteration")
+    rms = np.sqrt(np.mean(motion.distance**2, axis=-1))
+    name = f"{label(record.solver)}, {iterations}"
+    return Moving(name, motion.positions, rms, motion.distance)
+
+
+def _first(results: Results, task: str, maximum: int) -> Sequence[Record]:
+    """Return the records of a task that are shown: those of entrants, then in their order."""
+    records = results.all("pictures", task=task)
+    order = sorted(records, key=lambda r: (r.solver not in results.entrants, r.details.order))
+    return order[:maximum]
+
+
+def _arm_label(record: Record) -> str:
+    return label(record.solver) + (", coherent" if record.details.coherent else "")

@@ -32,7 +32,7 @@ class ClothDrawing(Values, frozen=True):
     pinned: Integers1
 
 
-class ArmMotion(Values, frozen=True):
+class MovingArm(Values, frozen=True):
     """The arm's joints [m], (frame, joint, 3), the curve, and the error of each frame [m]."""
 
     positions: Floats3
@@ -40,23 +40,23 @@ class ArmMotion(Values, frozen=True):
     error: Floats1
 
 
-class ArmMotionDetails(Details, frozen=True):
-    """Whether the motion is coherent, and its place among those that are shown."""
+class MovingArmDetails(Details, frozen=True):
+    """Whether the motion is coherent, and its position in the order."""
 
     coherent: bool
     order: int
 
 
-class ClothMotion(Values, frozen=True):
-    """A cloth's particles [m], (frame, particle, 3), how far each is off [m], the pins."""
+class MovingCloth(Values, frozen=True):
+    """A cloth's particles [m], (frame, particle, 3), the error of each [m], the pins."""
 
     positions: Floats3
     distance: Floats2
     pinned: Integers1
 
 
-class ClothMotionDetails(Details, frozen=True):
-    """The step [s], every how many of them one is kept, iterations, and the place among others."""
+class MovingClothDetails(Details, frozen=True):
+    """The step [s], the interval of recorded steps, the iteration limit, the position in order."""
 
     h: float
     every: int
@@ -67,6 +67,6 @@ class ClothMotionDetails(Details, frozen=True):
 KINDS = {
     ARM: Kind(ArmDrawing, ArmDetails),
     CLOTH: Kind(ClothDrawing),
-    ARM_MOTION: Kind(ArmMotion, ArmMotionDetails),
-    CLOTH_MOTION: Kind(ClothMotion, ClothMotionDetails),
+    ARM_MOTION: Kind(MovingArm, MovingArmDetails),
+    CLOTH_MOTION: Kind(MovingCloth, MovingClothDetails),
 }

@@ -14,101 +14,48 @@ from plumbob.reference.backend.threads import in_slices
 from ...peers import registry
 
 COMPILED, PLAIN, LIMIT = registry.COMPILED.name, registry.PLAIN.name, registry.LIMIT.name
-OURS = registry.OUR_KINEMATICS.name
 
 
-class Work(NamedTuple):
-    """What is to be timed, whoever does it.
+class TimedWork(NamedTuple):
+    """Work to be timed with every implementation."""
 
-    Attributes:
-        problem: the name in the records.
-        subject: kinematics, ik or cloth: each has a table and a figure.
-        group: what the work is done on, such as "10 balls".
-        title: how the work is written within its group.
-    """
-
-    problem: str
-    subject: str
-    group: str
-    title: str
+    problem: str  # the name in the records
+    subject: str  # kinematics, ik or cloth: each has a table and a figure
+    group: str  # the model that the work is done on, such as "10 balls"
+    title: str  # the name of the work within its group
 
     @property
     def facts(self) -> dict[str, str]:
-        """What the names say, as values."""
-        written = f"{self.group}, {self.title}"
-        return {"subject": self.subject, "group": self.group, "work": self.title, "title": written}
+        """The names, as facts of a block."""
+        title = f"{self.group}, {self.title}"
+        return {"subject": self.subject, "group": self.group, "work": self.title, "title": title}
 
 
 @dataclass(frozen=True)
 class Case:
-    """Work to be timed.
+    """Work to be timed with one implementation."""
 
-    Attributes:
-        work: what is done.
-        solver: by what.
-        prepare: sets everything up and returns the call to be timed.
-        operations: how many poses, solves or steps one call makes; times are for one.
-        moved: bytes that one call reads and writes, where it is a yardstick of memory.
-        backend: by which of the reference's backends it runs.
-        cores: on how many of them; None is all that there are.
-    """
-
-    work: Work
-    solver: str
-    prepare: Callable[[], Callable[[], Any]]
-    operations: int = 1
-    moved: int = 0
-    backend: str = "numba"
-    cores: int | None = 1
+    work: TimedWork
+    solver: str  # the implementation
+    prepare: Callable[[], Callable[[], Any]]  # sets up and returns the call to be timed
+    operations: int = 1  # poses, solves or steps of one call; times are for one
+    moved: int = 0  # bytes that one call reads and writes, for a yardstick of memory
+    backend: str = "numba"  # of the reference
+    cores: int | None = 1  # None for all
 
     @property
     def name(self) -> str:
-        """Problem and solver in one."""
+        """Problem and solver."""
         return f"{self.work.problem}, {self.solver}"
 
 
-def copying(work: Work, size: int, *, passes: int = 1, operations: int = 1) -> Case:
+def copying(work: TimedWork, size: int, *, passes: int = 1, operations: int = 1) -> Case:
     """Return a yardstick of memory: copies that read and write as many bytes, half and half.
 
-    `size` bytes are moved in each pass, so that they come from as near a cache as the work's do.
+    Each pass moves `size` bytes, so that they come from as near a cache as those of the work.
     """
     prepare = partial(_copies, size // 16, passes)
     return Case(work, LIMIT, prepare, operations, moved=size * passes)
-
-
-def streaming(
-    work: Work, read: int, written: int, *, operations: int = 1,
-    cores: int | None = 1, least: int = 0,
-) -> Case:  # fmt: skip
-    """Return a yardstick of memory: a compiled loop that reads and writes so many bytes.
-
-    A processor reads what it is about to write (write-allocate), which counts as moved. On several
-    cores the loop is cut into slices that read at least `least` bytes each.
-    """
-    prepare = partial(_streams, read // 8, written // 8, least // 8)
-    return Case(work, LIMIT, prepare, operations, read + 2 * written, cores=cores)
-
-
-def stream(source: FloatArray, sink: FloatArray) -> None:
-    """Fill a sink, longer than the source, by adding one to each number and going on with ones."""
-    for i in range(len(source)):
-        sink[i] = source[i] + 1.0
-    for i in range(len(source), len(sink)):
-        sink[i] = 1.0
-
-
-_stream = Kernel(stream)
-
-
-def _streams(read: int, written: int, least: int) -> Callable[[], Any]:
-    source, sink = np.ones(read), np.zeros(written)
-
-    def share(part: slice) -> tuple[np.ndarray, np.ndarray]:
-        return source[part], sink[part.start * written // read : part.stop * written // read]
-
-    if least == 0:
-        return partial(_stream, source, sink)
-    return partial(in_slices, _stream, read, share, least=least)
 
 
 def _copies(numbers: int, passes: int) -> Callable[[], None]:
@@ -119,3 +66,38 @@ def _copies(numbers: int, passes: int) -> Callable[[], None]:
             np.copyto(sink, source)
 
     return run
+
+
+def streaming(
+    work: TimedWork, read: int, write: int, *, operations: int = 1,
+    cores: int | None = 1, minimum: int = 0,
+) -> Case:  # fmt: skip
+    """Return a yardstick of memory: a compiled loop that reads and writes so many bytes.
+
+    A processor reads the memory that it is about to write (write-allocate), which counts as moved.
+    On several cores the loop is cut into slices that read at least `minimum` bytes each.
+    """
+    prepare = partial(_streams, read // 8, write // 8, minimum // 8)
+    return Case(work, LIMIT, prepare, operations, read + 2 * write, cores=cores)
+
+
+def stream(source: FloatArray, sink: FloatArray) -> None:
+    """Fill a sink, longer than the source: the source plus one, followed by ones."""
+    for i in range(len(source)):
+        sink[i] = source[i] + 1.0
+    for i in range(len(source), len(sink)):
+        sink[i] = 1.0
+
+
+_stream = Kernel(stream)
+
+
+def _streams(read: int, write: int, minimum: int) -> Callable[[], Any]:
+    source, sink = np.ones(read), np.zeros(write)
+
+    def share(part: slice) -> tuple[np.ndarray, np.ndarray]:
+        return source[part], sink[part.start * write // read : part.stop * write // read]
+
+    if minimum == 0:
+        return partial(_stream, source, sink)
+    return partial(in_slices, _stream, read, share, least=minimum)

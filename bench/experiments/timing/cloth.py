@@ -12,17 +12,15 @@ from plumbob.reference import ImplicitEuler, State, symplectic_euler
 from plumbob.reference.implicit_euler.factor_cache import global_factor
 from plumbob.reference.sparse import CholeskyFactor
 
-from ..cloth.measurement import MIDDLE, converged_motion, motion
-from ..cloth.problem import ClothSwing, cloth_swing
-from .case import COMPILED, PLAIN, Case, Work, copying
+from ..cloth.measurement import MIDDLE, ClothSwing, cloth_swing, converged_motion, motion
+from .case import COMPILED, PLAIN, Case, TimedWork, copying
 
 FACTORS = (1, 100)
-SUBSTEPS = 10
-ITERATIONS = 10
-# A larger cloth, whose factor no longer fits into the nearest caches.
+SUBSTEPS = ITERATIONS = 10
+# Particles along a side of a larger cloth, whose factor exceeds the nearest caches.
 LARGE = 50
 # Newton's motion of more particles than this would take longer than all the timing.
-MANY = 1000
+MANY_PARTICLES = 1000
 MUJOCO = "MuJoCo"
 
 # Sets a problem up and returns the call to be timed.
@@ -33,20 +31,21 @@ def cases() -> Iterator[Case]:
     """Yield one frame of 1/60 s by four methods, at two stiffnesses, and of a larger cloth."""
     for factor in FACTORS:
         problem = cloth_swing(factor)
-        written = f"stiffness × {factor:g}"
-        for title, (ours, theirs) in WORKS.items():
-            work = Work(f"cloth/x{factor:g}/{title}", "cloth", written, title)
-            yield Case(work, COMPILED, partial(ours, problem))
-            yield Case(work, PLAIN, partial(ours, problem), backend="python")
-            if theirs:
-                yield Case(work, MUJOCO, partial(theirs, problem))
-        work = Work(f"cloth/x{factor:g}/{LOCAL_GLOBAL}", "cloth", written, LOCAL_GLOBAL)
-        yield solving(work, problem)
-    large = cloth_swing(1, LARGE)
-    group = f"{LARGE} × {LARGE} particles"
-    work = Work(f"cloth/{group}/{LOCAL_GLOBAL}", "cloth", group, LOCAL_GLOBAL)
+        for title, (reference, engine) in WORKS.items():
+            work = _work(f"x{factor:g}", f"stiffness × {factor:g}", title)
+            yield Case(work, COMPILED, partial(reference, problem))
+            yield Case(work, PLAIN, partial(reference, problem), backend="python")
+            if engine:
+                yield Case(work, MUJOCO, partial(engine, problem))
+        yield solving(_work(f"x{factor:g}", f"stiffness × {factor:g}", LOCAL_GLOBAL), problem)
+    large, group = cloth_swing(1, LARGE), f"{LARGE} × {LARGE} particles"
+    work = _work(group, group, LOCAL_GLOBAL)
     yield Case(work, COMPILED, partial(local_global, large))
     yield solving(work, large)
+
+
+def _work(name: str, group: str, title: str) -> TimedWork:
+    return TimedWork(f"cloth/{name}/{title}", "cloth", group, title)
 
 
 def stepping(problem: ClothSwing, **settings: Any) -> Callable[[], Any]:
@@ -57,6 +56,7 @@ def stepping(problem: ClothSwing, **settings: Any) -> Callable[[], Any]:
 
 def substeps(problem: ClothSwing) -> Callable[[], Any]:
     """Return one frame of explicit substeps."""
+    start = moving(problem)
 
     def run() -> State:
         state = start
@@ -64,7 +64,6 @@ def substeps(problem: ClothSwing) -> Callable[[], Any]:
             state = symplectic_euler(problem.system, state, h=problem.h / SUBSTEPS)
         return state
 
-    start = moving(problem)
     return run
 
 
@@ -74,11 +73,11 @@ def mujoco_steps(problem: ClothSwing, integrator: str, count: int) -> Callable[[
     engine.model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     engine.write(moving(problem))
     kind = mujoco.mjtState.mjSTATE_INTEGRATION
-    saved = np.empty(mujoco.mj_stateSize(engine.model, kind))
-    mujoco.mj_getState(engine.model, engine.data, saved, kind)
+    start = np.empty(mujoco.mj_stateSize(engine.model, kind))
+    mujoco.mj_getState(engine.model, engine.data, start, kind)
 
     def run() -> MujocoMassSpring:
-        mujoco.mj_setState(engine.model, engine.data, saved, kind)
+        mujoco.mj_setState(engine.model, engine.data, start, kind)
         mujoco.mj_step(engine.model, engine.data, count)
         return engine
 
@@ -87,28 +86,25 @@ def mujoco_steps(problem: ClothSwing, integrator: str, count: int) -> Callable[[
 
 def moving(problem: ClothSwing) -> State:
     """Return a state in mid-swing; a large cloth gets there by a few iterations a step."""
-    if problem.system.particle_count > MANY:
-        integrator = ImplicitEuler(
-            problem.system, h=problem.h, solver="local_global", max_iterations=ITERATIONS
-        )
-        return motion(problem.start, MIDDLE, integrator)[-1]
-    return converged_motion(problem)[MIDDLE]
+    if problem.system.particle_count <= MANY_PARTICLES:
+        return converged_motion(problem)[MIDDLE]
+    integrator = ImplicitEuler(
+        problem.system, h=problem.h, solver="local_global", max_iterations=ITERATIONS
+    )
+    return motion(problem.start, MIDDLE, integrator)[-1]
 
 
-def solving(work: Work, problem: ClothSwing) -> Case:
-    """Return a copy of what the triangular solves read, all of L twice an iteration."""
-    return copying(work, factor_bytes(problem), passes=2 * ITERATIONS)
+def solving(work: TimedWork, problem: ClothSwing) -> Case:
+    """Return a copy of the bytes that the triangular solves read: L twice an iteration.
 
-
-def factor_bytes(problem: ClothSwing) -> int:
-    """Return the bytes of L of M + h² L: its nonzeros; a block of them shares its indices."""
+    A nonzero has eight bytes; a block of them shares its indices.
+    """
     factor = global_factor(problem.system, problem.h)
     assert isinstance(factor, CholeskyFactor)
-    return 8 * factor.entries
+    return copying(work, 8 * factor.entries, passes=2 * ITERATIONS)
 
 
 LOCAL_GLOBAL = f"implicit Euler, {ITERATIONS} local-global iterations"
-# A fixed number of local/global iterations.
 local_global: Starter = partial(
     stepping, solver="local_global", tolerance=0.0, max_iterations=ITERATIONS
 )

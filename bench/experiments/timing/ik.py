@@ -11,35 +11,42 @@ from plumbob.reference import IK_SOLVERS, solve_ik
 from ...peers import registry
 from ...peers.ik.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
 from ...problems.chains import chain_targets
-from ..chain.measurement import MAX_ITERATIONS, TOLERANCE, SolverLimits
-from .case import COMPILED, OURS, PLAIN, Case, Work
+from ..chain.measurement import MAX_ITERATIONS, TOLERANCE
+from .case import COMPILED, PLAIN, Case, TimedWork
 
 STRATA = ("near", "far")
-TARGETS = 50
 # Plain Python takes milliseconds a solve; the first targets of the same set are enough.
-FEW_TARGETS = 5
-LIMITS = SolverLimits(TOLERANCE, MAX_ITERATIONS)._asdict()
+TARGETS, FEW_TARGETS = 50, 5
+LIMITS: dict[str, Any] = {"tolerance": TOLERANCE, "max_iterations": MAX_ITERATIONS}
+# The same method as one Python loop on three kinematics.
 LOOP = "levenberg_marquardt"
+KINEMATICS: dict[str, type[SkeletonEngine] | type[ReferenceKinematics]] = {
+    registry.OUR_KINEMATICS.name: ReferenceKinematics,
+    **SKELETON_ENGINES,
+}
 
 
 def cases() -> Iterator[Case]:
-    """Yield our solvers at both speeds and as one batch, and one loop on all three kinematics."""
+    """Yield our solvers compiled, plain and as one batch, and one loop on all three kinematics."""
     for stratum in STRATA:
         for solver in IK_SOLVERS:
-            work = Work(f"ik/{stratum}/{solver}", "ik", stratum, registry.find(solver).label)
-            yield Case(work, COMPILED, partial(one_by_one, stratum, solver, TARGETS), TARGETS)
-            few = partial(one_by_one, stratum, solver, FEW_TARGETS)
-            yield Case(work, PLAIN, few, FEW_TARGETS, backend="python")
+            work = _work(stratum, solver)
+            single = partial(single_solves, stratum, solver)
+            yield Case(work, COMPILED, partial(single, TARGETS), TARGETS)
+            yield Case(work, PLAIN, partial(single, FEW_TARGETS), FEW_TARGETS, backend="python")
             calls = f"{TARGETS} targets a call"
             batch = work._replace(problem=f"{work.problem}/{calls}", title=f"{work.title}, {calls}")
-            yield Case(batch, COMPILED, partial(at_once, stratum, solver), TARGETS)
-        for name in (OURS, *SKELETON_ENGINES):
-            work = Work(f"ik/{stratum}/{LOOP}", "ik", stratum, registry.find(LOOP).label)
-            yield Case(work, name, partial(by_loop, stratum, name), TARGETS)
+            yield Case(batch, COMPILED, partial(batch_solve, stratum, solver), TARGETS)
+        for name in KINEMATICS:
+            yield Case(_work(stratum, LOOP), name, partial(loop_solves, stratum, name), TARGETS)
 
 
-def one_by_one(stratum: str, solver: str, count: int) -> Callable[[], Any]:
-    """Return a call that solves the first targets, each by a call of its own."""
+def _work(stratum: str, solver: str) -> TimedWork:
+    return TimedWork(f"ik/{stratum}/{solver}", "ik", stratum, registry.find(solver).label)
+
+
+def single_solves(stratum: str, solver: str, count: int) -> Callable[[], Any]:
+    """Return a call that solves the first targets, each by its own call."""
     problem = chain_targets(stratum, TARGETS)
     pairs = list(zip(problem.starts[:count], problem.targets[:count], strict=True))
 
@@ -50,21 +57,17 @@ def one_by_one(stratum: str, solver: str, count: int) -> Callable[[], Any]:
     return run
 
 
-def at_once(stratum: str, solver: str) -> Callable[[], Any]:
+def batch_solve(stratum: str, solver: str) -> Callable[[], Any]:
     """Return a call that solves all targets as one batch."""
     problem = chain_targets(stratum, TARGETS)
-    ask = (problem.skeleton, problem.starts, problem.targets, solver)
-    return partial(solve_ik, *ask, **LIMITS)
+    batch = (problem.skeleton, problem.starts, problem.targets, solver)
+    return partial(solve_ik, *batch, **LIMITS)
 
 
-def by_loop(stratum: str, name: str) -> Callable[[], Any]:
-    """Return a call that solves all targets by Levenberg-Marquardt on someone's kinematics."""
+def loop_solves(stratum: str, name: str) -> Callable[[], Any]:
+    """Return a call that solves all targets by Levenberg-Marquardt on named kinematics."""
     problem = chain_targets(stratum, TARGETS)
-    kinematics: dict[str, type[SkeletonEngine] | type[ReferenceKinematics]] = {
-        OURS: ReferenceKinematics,
-        **SKELETON_ENGINES,
-    }
-    engine: Any = kinematics[name](problem.skeleton)
+    engine: Any = KINEMATICS[name](problem.skeleton)
     starts = coordinates(engine, problem.starts)
     effector = problem.skeleton.joint_count - 1
 

@@ -1,10 +1,9 @@
-"""The timing: all cases that are compared, in turns, in one process that does nothing else."""
+"""The timing: the cases of a group take turns in one process that does nothing else."""
 
 import functools
 import math
 import secrets
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from functools import partial
 from timeit import Timer
 from typing import Any
@@ -21,16 +20,16 @@ from ...harness.progress import announce
 from ...peers.protocol import describe
 from . import cloth, ik, kinematics
 from .case import Case
-from .values import Timed
+from .values import RoundTimes
 
-# So long [s] a case may take.
+# Time limit of a case [s].
 PATIENCE = 1800.0
-# Cases are gone through so often, in an order by lot, so that what a machine drifts meanwhile falls
-# on all of them; nine is the least of which a median's interval leaves out the extremes.
+# Sweeps over the cases of a group, in random order, so that the drift of the machine affects all of
+# them; nine is the least number of which a median's interval leaves out the extremes.
 SWEEPS = 9
-# Rounds of a case, together.
+# Rounds of a case in all sweeps.
 ROUNDS = 200
-# A call that takes less [s] is made once more, uncounted, before each of its later sweeps, so that
+# A call shorter than this [s] is repeated once, uncounted, before each of its later sweeps, so that
 # caches are as in a loop of such calls.
 QUICK = 1e-3
 
@@ -42,7 +41,7 @@ def cases() -> tuple[Case, ...]:
 
 
 def compared(subject: str, group: str) -> list[Case]:
-    """Return the cases that are compared: all that work on the same."""
+    """Return the cases of a group, which are compared."""
     return [c for c in cases() if (c.work.subject, c.work.group) == (subject, group)]
 
 
@@ -50,99 +49,82 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """Yield a block a case; its size is the time [s] that it is measured for."""
     run = secrets.token_hex(8)
     for case in cases():
-        measure = partial(timed, run, case, scale.seconds)
-        settings, facts, size = {"operations": case.operations}, case.work.facts, scale.seconds
-        name = case.work.problem
-        block = Block("timing", name, case.solver, measure, settings, size, facts)
-        yield replace(block, budget=size)
+        measure = partial(measure_case, run, case, scale.seconds)
+        settings, seconds = {"operations": case.operations}, scale.seconds
+        yield Block("timing", case.work.problem, case.solver, measure, settings, size=seconds,
+                    facts=case.work.facts, budget=seconds)  # fmt: skip
 
 
-def timed(run: str, case: Case, seconds: float) -> Measured:
-    """Return what is measured of a case, together with all that it is compared with.
+def measure_case(run: str, case: Case, seconds: float) -> Measured:
+    """Return the rounds of a case, measured together with its group.
 
-    By how much a fixed loop varied meanwhile and a word that those measured together in a run have
-    in common are its facts.
+    Its facts are the variation of a fixed loop meanwhile, and a word that the group has in common.
 
     Raises:
         RuntimeError: if there are no rounds; the message says why.
     """
-    results = _together(run, case.work.subject, case.work.group, seconds)
-    i = compared(case.work.subject, case.work.group).index(case)
+    group = case.work.subject, case.work.group
+    results, i = _measure_group(run, *group, seconds), compared(*group).index(case)
     if trouble := results["troubles"][i]:
         raise RuntimeError(trouble)
     rounds = np.array(results["rounds"][i]) / case.operations
-    return Measured(Timed(rounds, case.moved / case.operations), facts=results["facts"])
+    return Measured(RoundTimes(rounds, case.moved / case.operations), facts=results["facts"])
 
 
-@functools.lru_cache(maxsize=1)  # blocks that are compared follow one another
-def _together(run: str, subject: str, group: str, seconds: float) -> dict[str, Any]:
-    """Return what is measured of all cases of a group."""
+@functools.lru_cache(maxsize=1)  # the blocks of a group follow one another
+def _measure_group(run: str, subject: str, group: str, seconds: float) -> dict[str, Any]:
     results = in_a_fresh_process(PATIENCE, sweep, subject, group, seconds)
     noise = metrics.relative_spread(np.array(results["paces"]))
     return {**results, "facts": {"noise": noise, "together": secrets.token_hex(4)}}
 
 
 def sweep(subject: str, group: str, seconds: float) -> dict[str, Any]:
-    """Time the cases of a group for so long each, sweep after sweep.
+    """Time each case of a group for so long [s], sweep after sweep.
 
-    Return the rounds of each [s], (sweep, round), what it raised first, and how long a fixed loop
-    took beside each measurement.
+    Return the rounds of each case [s], (sweep, round), its first exception, and the time of a fixed
+    loop beside each measurement.
     """
-    rounds = [Rounds(case, seconds) for case in compared(subject, group)]
-    lot, paces = np.random.default_rng(len(rounds)), []
+    cases = compared(subject, group)
+    timers = [_rounds(case, seconds) for case in cases]
+    rounds: list[list[list[float]]] = [[] for _ in cases]
+    troubles, paces, generator = [""] * len(cases), [], np.random.default_rng(len(cases))
     for i in range(SWEEPS):
         announce(f"{group}, sweep {i + 1} of {SWEEPS}")
-        for number in lot.permutation(len(rounds)):
+        for number in generator.permutation(len(cases)):
             paces.append(pace())
-            rounds[number].take()
-    return {
-        "rounds": [case.seconds for case in rounds],
-        "troubles": [case.trouble for case in rounds],
-        "paces": paces,
-    }
+            if troubles[number]:
+                continue
+            case = cases[number]
+            try:
+                with set_backend(case.backend), set_num_threads(case.cores):
+                    rounds[number].append(next(timers[number]))
+            except Exception as error:
+                rounds[number], troubles[number] = [], describe(error)
+    return {"rounds": rounds, "troubles": troubles, "paces": paces}
 
 
-class Rounds:
-    """The rounds of one case, whose call is prepared, compiled and counted before the first.
+def _rounds(case: Case, seconds: float) -> Iterator[list[float]]:
+    """Yield the times of one call in the rounds of each sweep [s].
 
-    Attributes:
-        seconds: of one call [s], (sweep, round); as many rounds in each sweep.
-        trouble: what the case raised first, else "".
+    The call is prepared, compiled and counted before the first.
     """
-
-    def __init__(self, case: Case, seconds: float) -> None:
-        """Take how long all rounds are to take together [s]."""
-        self.seconds: list[list[float]] = []
-        self.trouble = ""
-        self._case, self._budget = case, seconds
-        self._call: Callable[[], Any] | None = None
-
-    def take(self) -> None:
-        """Make the rounds of a sweep, unless the case raises or raised before."""
-        if self.trouble:
-            return
-        try:
-            with set_backend(self._case.backend), set_num_threads(self._case.cores):
-                self.seconds.append(self._rounds())
-        except Exception as error:
-            self.seconds, self.trouble = [], describe(error)
-
-    def _rounds(self) -> list[float]:
-        if self._call is None:
-            self._call = self._case.prepare()
-            self._call()  # may compile
-            self._timer = Timer(self._call)
-            self._loops, self._count = shape(self._timer, self._budget)
-        elif min(self.seconds[0]) < QUICK:
-            self._call()
-        return [t / self._loops for t in self._timer.repeat(self._count, self._loops)]
+    call = case.prepare()
+    call()  # may compile
+    timer = Timer(call)
+    loops, count = shape(timer, seconds)
+    first = [t / loops for t in timer.repeat(count, loops)]
+    yield first
+    while True:
+        if min(first) < QUICK:
+            call()
+        yield [t / loops for t in timer.repeat(count, loops)]
 
 
 def shape(timer: Timer, seconds: float) -> tuple[int, int]:
-    """Return how many calls make a round, and how many rounds a sweep, to take so long in all."""
-    least = seconds / ROUNDS
+    """Return the calls of a round, and the rounds of a sweep, that take so long in total."""
+    shortest = seconds / ROUNDS
     single = timer.timeit(1)
-    if single < least:
+    if single < shortest:
         single = min(timer.repeat(5, 1))
-    loops = max(1, math.ceil(least / single))
+    loops = max(1, math.ceil(shortest / single))
     return loops, max(1, int(seconds / SWEEPS / (loops * single)))

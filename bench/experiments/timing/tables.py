@@ -1,133 +1,191 @@
-"""How long forward kinematics, solves and steps take, beside the engines and a plain copy."""
+"""Times of forward kinematics, solves and steps, compared with the engines and a plain copy."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
-from ...tables.columns import at, folded, text, words_in
+import numpy as np
+
+from ...figures.chart import MARKS, Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
+from ...harness import metrics
+from ...harness.record import Record
+from ...tables.captions import Captions
+from ...tables.columns import words_in
 from ...tables.layout import Layout
-from ...tables.results import PRECISION, leaders, steadiness
-from ...tables.table import Column, Summary, words
-from . import figures, readings
-from .case import PLAIN
-from .readings import Timed
-
-COPY_SENTENCE = (
-    " A plain copy is a loop that reads and writes as many bytes, in memory as near as theirs. It "
-    "is a yardstick and no lower bound: caches may serve other work better."
+from ...tables.results import (
+    PRECISION,
+    Results,
+    by_problem,
+    grouped,
+    leaders,
+    solvers,
+    steadiness,
 )
+from ...tables.table import UNITS, Column, Summary, words
+from .case import COMPILED, LIMIT, PLAIN
+
+CAPTIONS = Captions(__file__)
+# The cells of a row by the titles of their columns, and its record.
+Row = dict[str, Any]
 
 
-def _columns(unit: str, works: Sequence[Timed]) -> tuple[Column, ...]:
-    copies = (
-        Column("times a plain copy", read=lambda timed: timed.of_copy),
-        Column("bandwidth of the copy", "GB/s", read=lambda timed: timed.bandwidth),
+def median_time(record: Record) -> float:
+    """Return the median of all rounds [s]."""
+    return metrics.timing(record.values.seconds).median
+
+
+def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
+    """Return the solvers by the medians of shared sweeps, None if they share none."""
+    sweeps = {_label(record.solver): _scores(record) for record in records}
+    groups = {record.details.together for record in records}
+    if len(groups) > 1 or len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
+        return None
+    return metrics.ranking(sweeps)
+
+
+def _label(solver: str) -> str:
+    return "Plumbob" if solver == COMPILED else solver
+
+
+def _scores(record: Record) -> metrics.Floats:
+    """Return the negative logarithm of the median of each sweep, (sweep,)."""
+    seconds = record.values.seconds
+    return -np.log(np.median(seconds, axis=-1) if seconds.ndim == 2 else seconds)
+
+
+def timing_chart(subject: str, unit: str, results: Results) -> Sketch | None:
+    """Show the medians of a subject: a row for each work, a mark for each implementation."""
+    records = results.all("timing", subject=subject)
+    works = by_problem(records)
+    by_solver = (
+        _marks(solver, [r for r in records if r.solver == solver], list(works), UNITS[unit])
+        for solver in solvers(records)
     )
-    return (
-        text("work", lambda timed: timed.record.title),
-        text("by", lambda timed: timed.record.solver),
-        Column("median", unit, read=lambda timed: timed.timing.median, best="least"),
-        Column("95 % interval of the median, ±", "%", read=lambda timed: timed.precision),
-        Column("of our compiled time", read=lambda timed: timed.of_ours),
-        text("mark", lambda timed: timed.mark),
-        *folded(
-            [
-                Column("10th percentile", unit, read=at(1, lambda timed: timed.timing)),
-                Column("90th percentile", unit, read=at(2, lambda timed: timed.timing)),
-                Column("rounds", read=lambda timed: timed.timing.rounds),
-                *(copies if any(timed.copy for timed in works) else ()),
-            ]
-        ),
+    return chart_sketch(
+        Chart(
+            **CAPTIONS.figure(f"timing_{subject}"),
+            panels=(Panel("", tuple(by_solver)),),
+            x=Axis(f"median [{unit}], log scale", log=True),
+            columns=1,
+            rows=tuple(group[0].title for group in works.values()),
+            entrants=results.entrants,
+        )
     )
 
 
-def _summary(unit: str, works: Sequence[Timed]) -> Summary:
-    """Say who takes how long for what, plain Python left out, a point for each group of works."""
-    rivals: dict[tuple[str, str], list[Timed]] = {}
-    for timed in works:
-        place = timed.record.details.group, timed.record.details.work
-        rivals.setdefault(place, []).extend([timed] * (timed.record.solver != PLAIN))
-    groups: dict[str, list[str]] = {}
-    for (group, work), of in rivals.items():
-        groups.setdefault(group, []).append(f"{work}: {_times(unit, of)}")
-    noise = readings.noise(works)
+def _marks(solver: str, records: Sequence[Record], works: list[str], scale: float) -> Series:
+    times = np.array([metrics.timing(record.values.seconds)[:3] for record in records])
+    median, low, high = scale * times.T
+    y = [works.index(record.problem) for record in records]
+    return series(solver, median, y, (low, high), form=MARKS)
+
+
+def _rows(subject: str, results: Results) -> list[Row]:
+    """Return a row for each time of a subject, except those of plain copies."""
+    records = results.all("timing", subject=subject)
+    compiled, copies = (
+        {record.problem: record for record in records if record.solver == solver}
+        for solver in (COMPILED, LIMIT)
+    )
+    return [
+        _row(record, compiled.get(record.problem), copies.get(record.problem))
+        for record in records
+        if record.solver != LIMIT
+    ]
+
+
+def _row(record: Record, compiled: Record | None, copy: Record | None) -> Row:
+    median, low, high, rounds, interval = metrics.timing(record.values.seconds)
+    half = (interval.high - interval.low) / (2.0 * median)
+    baseline = None if compiled in (None, record) else compiled
+    row = {
+        "record": record,
+        "work": record.title,
+        "implementation": record.solver,
+        "median": median,
+        "95 % interval of the median, ±": None if math.isnan(half) else half,
+        "relative to compiled": baseline and metrics.ratio(median, median_time(baseline)),
+        "remark": "noisy" if record.details.noise > PRECISION else "",
+        "10th percentile": low,
+        "90th percentile": high,
+        "rounds": rounds,
+    }
+    if copy is None:
+        return row
+    seconds = median_time(copy)
+    bandwidth = metrics.gigabytes_per_second(float(copy.values.moved), seconds)
+    ratio = metrics.ratio(median, seconds)
+    return {
+        **row,
+        "copy": copy,
+        "relative to a plain copy": ratio,
+        "bandwidth of the copy": bandwidth,
+    }
+
+
+def _columns(unit: str, rows: Sequence[Row]) -> list[Column]:
+    """Return the columns in the unit of a subject, those of copies only where there are any."""
+    return [
+        replace(column, unit=unit) if column.unit == "time" else column
+        for column in CAPTIONS.columns("timing")
+        if not rows or any(column.title in row for row in rows)
+    ]
+
+
+def _noise(rows: Sequence[Row]) -> float:
+    """Return the largest variation of a fixed loop, NaN if it is unknown."""
+    return max((row["record"].details.noise for row in rows), default=math.nan)
+
+
+def _summary(unit: str, rows: Sequence[Row]) -> Summary:
+    """Return the times of each work, a point for each group of works, without plain Python."""
+    points = []
+    for name, group in grouped(rows, lambda row: str(row["record"].details.group)).items():
+        works = grouped(group, lambda row: str(row["record"].details.work)).items()
+        sentences = [f"{work}: {_times(unit, members)}" for work, members in works]
+        points.append(f"{name} – {'; '.join(sentences)}")
+    noise = _noise(rows)
     warning = f"{steadiness(noise)} " if noise > PRECISION else ""
-    points = (f"{group} – {'; '.join(sentences)}" for group, sentences in groups.items())
-    sentence = "Medians with their 95 % interval, plain Python left out:"
+    sentence = "Medians with their 95 % interval, without plain Python:"
     return Summary(warning + sentence, tuple(points))
 
 
-def _times(unit: str, works: Sequence[Timed]) -> str:
-    times = ", ".join(f"{readings.written(t.record.solver)} {_time(t, unit)}" for t in works)
-    multiple = works[0].of_copy if works else None
-    beside = "" if multiple is None else f" ({words(multiple)} times a plain copy)"
-    return f"{times}{beside}{_first(works)}"
-
-
-def _time(timed: Timed, unit: str) -> str:
-    width = "" if timed.precision is None else f" ± {round(100 * timed.precision, 1):g} %"
-    return f"{words_in(timed.timing.median, unit)}{width}"
-
-
-def _first(works: Sequence[Timed]) -> str:
-    """Say who is first of several, or who ties."""
-    ranking = readings.ranked_by_time([timed.record for timed in works])
+def _times(unit: str, rows: Sequence[Row]) -> str:
+    """Return the times of some work, and the fastest implementation or those that tie."""
+    rivals = [row for row in rows if row["implementation"] != PLAIN]
+    times = ", ".join(_time(row, unit) for row in rivals)
+    if rivals and "copy" in rivals[0]:
+        times += f" ({words(rivals[0]['relative to a plain copy'])} times a plain copy)"
+    ranking = ranked_by_time([row["record"] for row in rivals])
     if ranking is None:
-        return " – timed apart, and not ranked" if len(works) > 1 else ""
-    return f" – first: {leaders(ranking)}"
+        return times + (" – timed separately, not ranked" if len(rivals) > 1 else "")
+    return f"{times} – first: {leaders(ranking)}"
 
 
-def _how(works: Sequence[Timed]) -> str:
-    return (
-        "One core unless all are named, after a first call that may compile; each time is a call’s "
-        "divided by what it does. All that is compared alternates in an order drawn by a seed, "
-        "sweep after sweep; the interval is of the medians of sweeps, by order statistics, and two "
-        "tie unless Fisher’s randomisation test of their differences, sweep by sweep, gives less "
-        f"than 5 %. {steadiness(readings.noise(works))}"
-    ).rstrip()
+def _time(row: Row, unit: str) -> str:
+    half = row["95 % interval of the median, ±"]
+    width = "" if half is None else f" ± {round(100 * half, 1):g} %"
+    return f"{_label(row['implementation'])} {words_in(row['median'], unit)}{width}"
 
 
-def _layout(question: str, subject: str, title: str, unit: str, shows: str) -> Layout:
+def _layout(subject: str, unit: str) -> Layout:
+    captions = CAPTIONS.of(
+        f"timing_{subject}", lambda rows: {"steadiness": steadiness(_noise(rows))}
+    )
     return Layout(
-        question,
-        f"timing_{subject}",
-        title,
-        subjects=partial(readings.timed, subject),
+        **captions,
+        subjects=partial(_rows, subject),
         columns=partial(_columns, unit),
-        shows=lambda works: shows + (COPY_SENTENCE if any(timed.copy for timed in works) else ""),
-        measured=_how,
         summary=partial(_summary, unit),
-        figures=(figures.TIMINGS[subject],),
+        figures=(partial(timing_chart, subject, unit),),
     )
 
 
-kinematics = _layout(
-    "Forward kinematics",
-    "kinematics",
-    "Time of forward kinematics, for one pose",
-    "ns",
-    "All joints’ positions and rotations. We check and normalise the quaternions given and "
-    "return arrays; an engine’s results stay inside it. The copy reads as many bytes as the "
-    "rotations given have and writes as many as positions and rotations have, by a compiled "
-    "loop into memory that is there already; its bandwidth counts that memory is read before "
-    "it is written.",
+kinematics, inverse_kinematics, cloth = LAYOUTS = (
+    _layout("kinematics", "ns"),
+    _layout("ik", "µs"),
+    _layout("cloth", "µs"),
 )
-inverse_kinematics = _layout(
-    "Inverse kinematics",
-    "ik",
-    "Time of inverse kinematics, for one solve of the ten-ball chain",
-    "µs",
-    "The same targets, random starts and tolerance as in the table of success. Beside our "
-    "Levenberg-Marquardt stands the same method as one Python loop on three kinematics.",
-)
-cloth = _layout(
-    "A step of the cloth",
-    "cloth",
-    "Time of a cloth step, for one frame",
-    "µs",
-    "MuJoCo starts from a state that it has saved, and its results stay inside it. The copy beside "
-    "local/global iterations moves what their triangular solves read: the factor’s nonzeros, twice "
-    "an iteration.",
-)
-
-
-LAYOUTS = (kinematics, inverse_kinematics, cloth)

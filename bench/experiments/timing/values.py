@@ -1,11 +1,11 @@
-"""The records of the timing: rounds, and what was done in them."""
+"""The records of the timing: rounds, and the work that they time."""
 
 import math
 
 from ...harness.values import Details, Floats2, Kind, Values
 
 
-class Timed(Values, frozen=True):
+class RoundTimes(Values, frozen=True):
     """The seconds of one operation, (sweep, round), and the bytes that it moves as a yardstick."""
 
     seconds: Floats2
@@ -13,13 +13,13 @@ class Timed(Values, frozen=True):
 
 
 class WorkDetails(Details, frozen=True):
-    """What was timed: see `case.Work`."""
+    """The timed work: see `case.TimedWork`."""
 
     subject: str
     group: str
     work: str
     noise: float = math.nan  # half the width of the middle 80 % of a fixed loop's times
-    together: str = ""  # a word that all that were timed in turns have in common
+    together: str = ""  # a word that all cases timed in turns have in common
 
 
-KINDS = {"": Kind(Timed, WorkDetails)}
+KINDS = {"": Kind(RoundTimes, WorkDetails)}

@@ -1,8 +1,8 @@
 """The child process that a Python solver lives in; it speaks the protocol of any program.
 
-The protocol moves away from standard output before the solver is loaded: what the solver prints
-goes to standard error and is told as a remark. Nothing of ours but what answers needs is loaded
-here, so that the solver meets no module of another name.
+The protocol moves away from standard output before the solver is loaded: prints of the solver go
+to standard error and become a remark. Only the modules that answers need are loaded here, so that
+the solver meets no module of ours under a name of its own.
 """
 
 import contextlib
@@ -15,9 +15,8 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Any, BinaryIO
 
 import msgspec
@@ -42,38 +41,41 @@ METHODS = ("ccd", "fabrik")
 INVERSE_KINEMATICS = "inverse_kinematics"
 # Names that a function of something else may have by chance.
 COMMON_NAMES = frozenset({"track", "resample", "energy"})
+# How much of what is printed for a request is remarked and passed on [B].
+PRINT_SHOWN, PRINT_PASSED = 200, 4096
 
 
 class OfferError(ValueError):
-    """A solver was loaded, but offers nothing that is understood; the message says why."""
+    """A solver was loaded, but offers no known task; the message says why."""
 
 
 class PythonSolver:
-    """What a Python file or object offers.
+    """The tasks that a Python file or object offers.
 
     Attributes:
         functions: by the name of a task, or of a method of inverse kinematics.
         greeting: fields of the greeting.
 
     Raises:
-        OfferError: if it offers nothing, or what it declares is not understood.
+        OfferError: if it offers no task, or its declaration is not understood.
     """
 
-    def __init__(self, found: object, name: str, declared: object) -> None:
-        if not isinstance(declared, Mapping) or not all(isinstance(one, str) for one in declared):
+    def __init__(self, source: object, name: str, declared: object) -> None:
+        if not isinstance(declared, Mapping) or not all(isinstance(key, str) for key in declared):
             raise OfferError(
                 f"PLUMBOB: expected a dict with texts as keys, got {excerpt(declared)}"
             )
         methods = declared.get("methods") or ()
         methods = methods if isinstance(methods, list | tuple) else ()
-        self.functions = _functions(found, methods)
+        self.functions = _functions(source, methods or METHODS)
         if not self.functions:
-            raise OfferError(_offers_nothing(found, name))
+            raise OfferError(_offers_nothing(source, name))
         if INVERSE_KINEMATICS not in self.functions and not methods:
-            methods = [one for one in METHODS if one in self.functions]
+            methods = [method for method in METHODS if method in self.functions]
+        tasks = {name if name in TASKS else INVERSE_KINEMATICS for name in self.functions}
         self.greeting = {
             "protocol": PROTOCOL,
-            "tasks": [task for task in TASKS if self._offers(task)],
+            "tasks": [task for task in TASKS if task in tasks],
             "name": name,
             "language": "Python",
             **({"methods": list(methods)} if methods else {}),
@@ -93,75 +95,59 @@ class PythonSolver:
             function = self.functions.get(request.inputs.get("method", ""), function)
         if function is None:
             return {"error": f"there is no function {request.task}"}
-        return _fields(call(function, TASKS[request.task], request.inputs))
-
-    def _offers(self, task: str) -> bool:
-        by_method = task == INVERSE_KINEMATICS and self.functions.keys() - TASKS.keys()
-        return task in self.functions or bool(by_method)
-
-
-def _get(found: object, name: str) -> Any:
-    return found.get(name) if isinstance(found, Mapping) else getattr(found, name, None)
+        answer = call(function, TASKS[request.task], request.inputs)
+        if not isinstance(answer, Answer):
+            return _failed(answer)
+        changed = [remark.values["name"] for remark in answer.remarks]
+        return {**answer.values, "seconds": answer.seconds, "changed": changed}
 
 
-def _functions(found: object, methods: Any) -> dict[str, Callable[..., Any]]:
-    names = [*TASKS, *(methods or METHODS)]
-    if inspect.isroutine(found) and getattr(found, "__name__", "") in names:
-        return {found.__name__: found}
-    functions = {name: _get(found, name) for name in names if isinstance(name, str)}
-    return {
-        name: function
-        for name, function in functions.items()
-        if callable(function) and _is_meant(function, name)
-    }
+def _get(source: object, name: str) -> Any:
+    return source.get(name) if isinstance(source, Mapping) else getattr(source, name, None)
+
+
+def _functions(source: object, methods: Sequence[Any]) -> dict[str, Callable[..., Any]]:
+    names = [*TASKS, *(method for method in methods if isinstance(method, str))]
+    if inspect.isroutine(source) and getattr(source, "__name__", "") in names:
+        return {source.__name__: source}
+    functions = {name: _get(source, name) for name in names}
+    return {name: f for name, f in functions.items() if callable(f) and _is_meant(f, name)}
 
 
 def _is_meant(function: Callable[..., Any], name: str) -> bool:
-    """Return whether a function is of its task; one of a common name has to take an input."""
-    if name not in COMMON_NAMES:
-        return True
-    return any(takes(function, field.name) for field in TASKS[name].inputs)
+    """Return whether a function is of its task; under a common name it has to take an input."""
+    inputs = TASKS[name].inputs if name in COMMON_NAMES else ()
+    return not inputs or any(takes(function, definition.name) for definition in inputs)
 
 
-def _offers_nothing(found: object, name: str) -> str:
-    own = _names(found)
-    namesakes = [one for one in own if one in TASKS]
-    if namesakes:
-        arguments = ", ".join(field.name for field in TASKS[namesakes[0]].inputs)
-        return f"{name}: expected {namesakes[0]} to take some of {arguments}, got others"
-    hints = ((one, did_you_mean(one, TASKS).removeprefix("; ")) for one in own[:8])
-    got = ", ".join(f"{one} ({hint})" if hint else one for one, hint in hints) or "none"
-    return f"{name}: expected functions named as some of {', '.join(TASKS)}, got {got}"
-
-
-def _names(found: object) -> list[str]:
-    """Return the names of functions and classes: of a module, of those that it defines itself."""
-    inside = {
-        str(one): _get(found, one) for one in (found if isinstance(found, Mapping) else dir(found))
-    }
-    home = found.__name__ if inspect.ismodule(found) else None
-    return [
-        name
-        for name, one in inside.items()
-        if callable(one)
-        and not name.startswith("_")
-        and home in (None, getattr(one, "__module__", home))
+def _offers_nothing(source: object, name: str) -> str:
+    """Return why no task is offered: no names of tasks, or functions that take other arguments."""
+    names = source if isinstance(source, Mapping) else dir(source)
+    home = source.__name__ if inspect.ismodule(source) else None
+    own = [
+        text
+        for text, attribute in ((str(key), _get(source, str(key))) for key in names)
+        if callable(attribute)
+        and not text.startswith("_")
+        and home in (None, getattr(attribute, "__module__", home))
     ]
-
-
-def _fields(answer: Answer | Failure) -> dict[str, Any]:
-    if isinstance(answer, Answer):
-        changed = [one.values["name"] for one in answer.remarks]
-        return {**answer.values, "seconds": answer.seconds, "changed": changed}
-    return _failed(answer)
+    for task in (text for text in own if text in TASKS):
+        arguments = ", ".join(definition.name for definition in TASKS[task].inputs)
+        return f"{name}: expected {task} to take some of {arguments}, got others"
+    hints = ((text, did_you_mean(text, TASKS).removeprefix("; ")) for text in own[:8])
+    offered = ", ".join(f"{text} ({hint})" if hint else text for text, hint in hints) or "none"
+    return f"{name}: expected functions named as some of {', '.join(TASKS)}, got {offered}"
 
 
 def _failed(failure: Failure) -> dict[str, Any]:
-    said = failure.sentence.values
-    fields: dict[str, Any] = {"error": str(said["why"]) or "no message", "kind": str(failure.kind)}
+    values = failure.sentence.values
+    fields: dict[str, Any] = {
+        "error": str(values["why"]) or "no message",
+        "kind": str(failure.kind),
+    }
     if failure.kind is FailureKind.RAISED:
-        fields |= {"exception": said["kind"]}
-        fields |= {key: said[key] for key in ("file", "line") if key in said}
+        fields |= {"exception": values["kind"]}
+        fields |= {key: values[key] for key in ("file", "line") if key in values}
     return fields
 
 
@@ -169,22 +155,23 @@ def load(spec: str) -> PythonSolver:
     """Return the solver in a Python file, file:object or module:object.
 
     Raises:
-        OfferError: if it offers nothing.
-        Exception: whatever it raises while it is loaded.
+        OfferError: if it offers no task.
+        Exception: any exception of the solver while it is loaded.
     """
     place, _, attribute = spec.partition(":")
-    is_file = place.endswith(".py")
-    module = _load_file(Path(place)) if is_file else importlib.import_module(place)
-    found: Any = module
+    path = Path(place)
+    module = _load_file(path) if path.suffix == ".py" else importlib.import_module(place)
+    source: Any = module
     for part in attribute.split(".") if attribute else ():
-        if not hasattr(found, part):
-            near = did_you_mean(part, [one for one in dir(found) if not one.startswith("_")])
+        if not hasattr(source, part):
+            names = [name for name in dir(source) if not name.startswith("_")]
+            near = did_you_mean(part, names)
             raise OfferError(f"{part}: expected something of that name in {place}, got none{near}")
-        found = getattr(found, part)
-    declared = _get(found, "PLUMBOB") or _get(module, "PLUMBOB") or {}
-    if isinstance(found, type):
-        found = found()
-    return PythonSolver(found, attribute or Path(place).name, declared)
+        source = getattr(source, part)
+    declared = _get(source, "PLUMBOB") or _get(module, "PLUMBOB") or {}
+    if isinstance(source, type):
+        source = source()
+    return PythonSolver(source, attribute or path.name, declared)
 
 
 def _load_file(path: Path) -> Any:
@@ -199,35 +186,34 @@ def _load_file(path: Path) -> Any:
 
 
 class _Prints(io.RawIOBase):
-    """What is printed: passed on to standard error, its beginning kept."""
+    """A stream that passes prints on to standard error and keeps their beginning."""
 
     def __init__(self) -> None:
-        self.first = b""
+        self.beginning = b""
 
     def writable(self) -> bool:
         return True
 
     def write(self, data: Any) -> int:
-        words = bytes(data)
-        self.first = (self.first + words[:200])[:200]
+        text = bytes(data)
+        self.beginning = (self.beginning + text[:PRINT_SHOWN])[:PRINT_SHOWN]
         with contextlib.suppress(OSError):
-            os.write(2, words[:4096])
-        return len(words)
+            os.write(2, text[:PRINT_PASSED])
+        return len(text)
 
-    def taken(self) -> dict[str, str]:
-        first, self.first = self.first, b""
-        return {"printed": first.decode(errors="replace")} if first.strip() else {}
+    def take(self) -> dict[str, str]:
+        """Return the beginning as a field of an answer, if there is any, and forget it."""
+        beginning, self.beginning = self.beginning, b""
+        return {"printed": beginning.decode(errors="replace")} if beginning.strip() else {}
 
 
 @contextlib.contextmanager
-def _moved() -> Iterator[tuple[BinaryIO, BinaryIO, _Prints]]:
-    """Yield the protocol's streams, and what is printed instead of them."""
+def _protocol_streams() -> Iterator[tuple[BinaryIO, BinaryIO, _Prints]]:
+    """Yield the streams of requests, answers and prints."""
     descriptors = take_streams()
-    requests, answers = os.fdopen(descriptors[0], "rb"), os.fdopen(descriptors[1], "wb")
     prints = _Prints()
-    stream = io.TextIOWrapper(prints, encoding="utf-8", errors="replace", write_through=True)  # type: ignore[type-var]
-    sys.stdout = stream
-    with requests, answers:
+    sys.stdout = io.TextIOWrapper(prints, encoding="utf-8", errors="replace", write_through=True)
+    with os.fdopen(descriptors[0], "rb") as requests, os.fdopen(descriptors[1], "wb") as answers:
         yield requests, answers, prints
 
 
@@ -238,18 +224,26 @@ class _Watch(threading.Thread):
         super().__init__(daemon=True)
         self._folder, self._patience = folder, patience
         self._solver = threading.get_ident()
-        self.since: float | None = None
+        self._since: float | None = None
+
+    @contextlib.contextmanager
+    def working(self) -> Iterator[None]:
+        """Watch the solver while the block lasts."""
+        self._since = time.monotonic()
+        yield
+        self._since = None
 
     def run(self) -> None:
+        """Look at the solver ten times in its patience."""
         while True:
             time.sleep(self._patience / 10)
-            since, now = self.since, time.monotonic()
+            since, now = self._since, time.monotonic()
             if since is not None and now - since > self._patience:
-                self.since = now
-                self._say(sys._current_frames().get(self._solver))
+                self._since = now
+                self._note_line()
 
-    def _say(self, frame: FrameType | None) -> None:
-        beside = Path(self._folder) / "solver.py"
+    def _note_line(self) -> None:
+        beside, frame = Path(self._folder) / "solver.py", sys._current_frames().get(self._solver)
         while frame is not None and not is_beside(Path(frame.f_code.co_filename), beside):
             frame = frame.f_back
         if frame is not None:
@@ -262,29 +256,28 @@ def serve(spec: str, folder: str, patience: float) -> None:
 
     Args:
         spec: as of `load`.
-        folder: its own one, where it finds its other modules.
-        patience: after which it is told where the solver is [s].
+        folder: that of the solver and its other modules.
+        patience: after which its line is noted on standard error [s].
     """
     faulthandler.enable(all_threads=False)
-    with _moved() as (requests, answers, prints):
+    with _protocol_streams() as (requests, answers, prints):
         sys.argv = [spec]
         if folder not in sys.path:
             sys.path.insert(0, folder)
         watch = _Watch(folder, patience)
         watch.start()
-        watch.since = time.monotonic()
-        solver, failure = _loaded(spec, folder)
-        watch.since = None
+        with watch.working():
+            solver, failure = load_safely(spec, folder)
         for line in requests:
-            watch.since = time.monotonic()
-            request = decode_request(line)
-            fields = solver.answer(request) if solver else failure
-            watch.since = None
-            answers.write(encode_answer(request.id, **{**fields, **prints.taken()}))
+            with watch.working():
+                request = decode_request(line)
+                fields = solver.answer(request) if solver else failure
+            answers.write(encode_answer(request.id, **{**fields, **prints.take()}))
             answers.flush()
 
 
-def _loaded(spec: str, folder: str) -> tuple[PythonSolver | None, dict[str, Any]]:
+def load_safely(spec: str, folder: str) -> tuple[PythonSolver | None, dict[str, Any]]:
+    """Return the solver of `load`, or the fields of an answer that says why there is none."""
     try:
         return load(spec), {}
     except OfferError as error:

@@ -1,34 +1,25 @@
-"""What a program may take, and the sentences for what becomes of one that takes more or ends."""
+"""The limits of a program, and the sentences for a program that exceeds them or ends."""
 
 import os
 import signal
-from collections.abc import Mapping
+import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
-from ...child_process import SILENT, ChildProcess, Loss
+from ...child_process import ChildProcess, Loss
 from ..contestant import Failure, FailureKind
 from ..message import shown
 from ..sentence import Sentence, sentence
 
 # How many lines of standard error are shown.
 STDERR_SHOWN = 3
-# Frames of ours, and a list that Python ends its last words with, are nothing to show.
-_OURS = (str(Path(__file__).parents[1]), 'File "<string>"', "Extension modules:")
-
-_SIGNALS: Mapping[int, Sentence] = {
-    signal.SIGSEGV: sentence("it used memory that is not its own (segmentation fault)"),
-    signal.SIGBUS: sentence("it used memory that does not exist (bus error)"),
-    signal.SIGABRT: sentence("it aborted, as after a failed assertion or an uncaught exception"),
-    signal.SIGFPE: sentence("it divided an integer by zero, or the like (SIGFPE)"),
-    signal.SIGILL: sentence("it came to an instruction that this processor does not have (SIGILL)"),
-    signal.SIGKILL: sentence("it was killed from outside, perhaps for want of memory"),
-    signal.SIGPIPE: sentence("it wrote where nobody reads (SIGPIPE)"),
-}
+# Our own frames, and a list that Python ends its last words with, are nothing to show.
+_HIDDEN = (str(Path(__file__).parents[1]), 'File "<string>"', "Extension modules:")
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
 class ProcessLimits(NamedTuple):
-    """What a program may take.
+    """The limits of a program.
 
     Attributes:
         first: for the greeting, and for the first request of each task, when it compiles [s].
@@ -53,43 +44,16 @@ LIMITS = ProcessLimits()
 class FailureError(Exception):
     """A program is of no more use; the failure says why."""
 
-    def __init__(self, kind: FailureKind, words: Sentence) -> None:
-        super().__init__(str(words))
-        self.failure = Failure(kind, words)
-
-
-_KINDS = {
-    Loss.MEMORY: FailureKind.MEMORY,
-    Loss.TOO_LONG: FailureKind.GARBAGE,
-    **dict.fromkeys(SILENT, FailureKind.HUNG),
-}
-_WORDS = {
-    Loss.MEMORY: sentence("It took more than {limit:.3g} GB of memory."),
-    Loss.TOO_LONG: sentence(
-        "It printed more than {most} bytes without an end of line, beginning with: {line}"
-    ),
-    Loss.ENDED: sentence("It ended instead of answering: {how}."),
-    Loss.TRUNCATED: sentence("It ended in the middle of a line ({line}): {how}."),
-    Loss.CLOSED: sentence("It closed its standard output, but runs on."),
-    Loss.DEAF: sentence("It closed its standard input before it had read the request."),
-    Loss.UNFINISHED: sentence(
-        "It printed {count} bytes, but no end of line within {seconds:g} s: {line}"
-    ),
-    Loss.UNREAD: sentence(
-        "It did not read the whole request of {count} bytes within {seconds:g} s."
-    ),
-    Loss.COMPUTING: sentence("It computed for {seconds:g} s without an answer."),
-    Loss.WAITING: sentence(
-        "It gave no answer within {seconds:g} s and was not computing: does it end each answer "
-        "with an end of line, and flush its output?"
-    ),
-}
+    def __init__(self, kind: FailureKind, message: Sentence) -> None:
+        super().__init__(str(message))
+        self.failure = Failure(kind, message)
 
 
 def failure_of(
     loss: Loss, process: ChildProcess, limits: ProcessLimits, patience: float
 ) -> FailureError:
     """Return why a process was lost, after so much patience [s]."""
+    entry = _TABLE["loss"][loss.name]
     part = process.partial[-400:] if loss is Loss.TRUNCATED else process.partial[:400]
     values = {
         "limit": limits.memory / 1e9,
@@ -99,10 +63,17 @@ def failure_of(
         "seconds": patience,
         "how": ending(process.code) if loss in (Loss.ENDED, Loss.TRUNCATED) else "",
     }
-    words = _WORDS[loss]._replace(values=values)
-    if loss in (Loss.MEMORY, Loss.TOO_LONG):
-        return FailureError(_KINDS[loss], words)
-    return FailureError(_KINDS.get(loss, FailureKind.CRASHED), _with_stderr(words, process))
+    message = Sentence(entry["sentence"], values)
+    if entry.get("last_words", True):
+        lines = [shown(line) for line in bytes(process.last_words).splitlines()]
+        lines = [line for line in lines if line and not any(text in line for text in _HIDDEN)]
+        if lines:
+            message = sentence(
+                "{what} Its last words on standard error: {lines}",
+                what=message,
+                lines=" / ".join(lines[-STDERR_SHOWN:]),
+            )
+    return FailureError(FailureKind(entry["kind"]), message)
 
 
 def ending(code: int) -> Sentence:
@@ -110,19 +81,9 @@ def ending(code: int) -> Sentence:
     if code >= 0:
         return sentence("exit code {code}", code=code)
     name = signal.Signals(-code).name if -code in list(signal.Signals) else str(-code)
-    return _SIGNALS.get(-code, sentence("it was ended by signal {name}", name=name))
-
-
-def _with_stderr(what: Sentence, process: ChildProcess) -> Sentence:
-    lines = [shown(line) for line in bytes(process.last_words).splitlines()]
-    lines = [line for line in lines if line and not any(ours in line for ours in _OURS)]
-    if not lines:
-        return what
-    return sentence(
-        "{what} Its last words on standard error: {lines}",
-        what=what,
-        lines=" / ".join(lines[-STDERR_SHOWN:]),
-    )
+    if name in _TABLE["signal"]:
+        return Sentence(_TABLE["signal"][name]["sentence"], {})
+    return sentence("it was ended by signal {name}", name=name)
 
 
 def not_started(program: str, error: Exception) -> FailureError:
@@ -130,22 +91,26 @@ def not_started(program: str, error: Exception) -> FailureError:
     why = str(getattr(error, "strerror", None) or error)
     match error:
         case FileNotFoundError() if Path(program).is_file() and os.sep not in program:
-            words = sentence("There is no command {program}; for the file here write ./{program}.")
-        case FileNotFoundError() if not Path(program).exists():
-            words = sentence("There is no command {program}.")
-        case PermissionError():
-            words = sentence("{program} cannot be executed: chmod +x {program}")
-        case _:
-            words = sentence(
-                "{program} cannot be started ({why}): is it built for this machine, and does a "
-                "script begin with #!?"
+            message = sentence(
+                "There is no command {program}; for the file here write ./{program}.",
+                program=program,
             )
-    words = words._replace(values={"program": program, "why": why})
-    return FailureError(FailureKind.CRASHED, words)
+        case FileNotFoundError() if not Path(program).exists():
+            message = sentence("There is no command {program}.", program=program)
+        case PermissionError():
+            message = sentence("{program} cannot be executed: chmod +x {program}", program=program)
+        case _:
+            message = sentence(
+                "{program} cannot be started ({why}): is it built for this machine, and does a "
+                "script begin with #!?",
+                program=program,
+                why=why,
+            )
+    return FailureError(FailureKind.CRASHED, message)
 
 
 def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:
-    """End a program's input, then all that still runs; return what was odd in how it left."""
+    """End a program's input, then all that still runs; return remarks on how it left."""
     has_left, strays = process.leave(patience)
     if not has_left:
         return (sentence("It does not leave when its input ends."),)
@@ -158,6 +123,7 @@ def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:
             )
         )
     if process.code:
-        how = ending(process.code)
-        remarks.append(sentence("When its input ended it did not just leave: {how}.", how=how))
+        remarks.append(
+            sentence("When its input ended it did not just leave: {how}.", how=ending(process.code))
+        )
     return tuple(remarks)

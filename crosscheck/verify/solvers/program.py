@@ -18,10 +18,10 @@ from .losses import LIMITS, FailureError, ProcessLimits, departure, failure_of, 
 
 
 class ProgramContestant:
-    """A program, started when it is first asked, and anew after a loss.
+    """A program, started for its first request, and anew after a loss.
 
     Attributes:
-        remarks: what was odd apart from the answers: how it left, what it left running.
+        remarks: on the program apart from its answers, as on processes that it left running.
     """
 
     def __init__(
@@ -35,60 +35,62 @@ class ProgramContestant:
         self._limits = limits
         self._process: ChildProcess | None = None
         self._greeting: Greeting | None = None
-        self._number = 0
-        self._warm: set[object] = set()
-        self._print: bytes | None = None
+        self._number = 0  # of the request
+        self._warm: set[object] = set()  # tasks and methods that were requested before
+        self._print: bytes | None = None  # the first line that is no answer
         self._times: ClaimedTimes
-        self._untimed: Sentence | None = None
+        self._untimed: Sentence | None = None  # why claimed times are not believed
 
     @property
     def greeting(self) -> Greeting:
-        """What it says of itself.
+        """Its description of itself.
 
         Raises:
-            NoGreetingError: if it cannot be started, or greets as nobody should.
+            NoGreetingError: if it cannot be started, or its greeting is not understood.
         """
         if self._greeting is None:
             try:
                 self._ready()
-            except FailureError as lost:
+            except FailureError as error:
                 self._lose()
-                raise NoGreetingError(lost.failure) from None
+                raise NoGreetingError(error.failure) from None
         assert self._greeting is not None
         return self._greeting
 
     def answer(self, case: Case) -> Answer | Failure:
-        """Ask it; a program that is lost is started again when the next case comes."""
+        """Send a request; a program that is lost is started again when the next case comes."""
         try:
-            process = self._ready()
-            return self._ask(process, case)
-        except FailureError as lost:
+            return self._answer(self._ready(), case)
+        except FailureError as error:
             self._lose()
-            return lost.failure
+            return error.failure
 
     def close(self) -> None:
         """End its input, then it and whatever it has started."""
         process, self._process = self._process, None
         if process is not None:
-            odd = departure(process, self._limits.leave)
-            self.remarks += tuple(one for one in odd if one not in self.remarks)
+            remarks = departure(process, self._limits.leave)
+            self.remarks += tuple(remark for remark in remarks if remark not in self.remarks)
+
+    def _lose(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.end()
 
     def _ready(self) -> ChildProcess:
+        """Return the process, started and greeted if there was none."""
         if self._process is None:
             self._number, self._warm, self._print = 0, set(), None
-            self._process = self._start()
+            memory, line = self._limits.memory, self._limits.line
+            try:
+                self._process = ChildProcess(
+                    self._command, folder=self._folder, memory=memory, longest=line
+                )
+            except (OSError, ValueError) as error:
+                raise not_started(self._command[0], error) from None
             self._greet(self._process)
             self._times = ClaimedTimes(self._process.pid)
         return self._process
-
-    def _start(self) -> ChildProcess:
-        limits = self._limits
-        try:
-            return ChildProcess(
-                self._command, folder=self._folder, memory=limits.memory, longest=limits.line
-            )
-        except (OSError, ValueError) as error:
-            raise not_started(self._command[0], error) from None
 
     def _greet(self, process: ChildProcess) -> None:
         fields, *_ = self._exchange(process, message.encode_greeting(), self._limits.first)
@@ -103,7 +105,7 @@ class ProgramContestant:
             self._print = fields["printed"].encode()
         self._greeting = self._greeting or greeting
 
-    def _ask(self, process: ChildProcess, case: Case) -> Answer | Failure:
+    def _answer(self, process: ChildProcess, case: Case) -> Answer | Failure:
         kind = (case.task, case.inputs.get("method"))
         patience = self._limits.request if kind in self._warm else self._limits.first
         self._number += 1
@@ -112,23 +114,16 @@ class ProgramContestant:
         fields, seconds, size = self._exchange(process, line, patience)
         answer = message.decode_answer(fields, TASKS[case.task], case.inputs, seconds)
         if isinstance(answer, Answer) and answer.untimed is None and answer.seconds:
-            answer = self._compared(answer, seconds, len(line) + size)
+            self._untimed = self._untimed or self._times.end(answer.seconds, len(line) + size)
+            if self._untimed is not None:
+                answer = replace(answer, seconds=seconds, untimed=self._untimed)
         if kind not in self._warm:  # it may have compiled, and started what will compute
             self._times = ClaimedTimes(process.pid)
-        self._warm.add(kind)
+            self._warm.add(kind)
         printed, self._print = self._print, None
         if isinstance(answer, Answer) and printed is not None and "printed" not in fields:
-            remarks = (*answer.remarks, message.prints(printed))
-            return replace(answer, remarks=remarks)
+            return replace(answer, remarks=(*answer.remarks, message.prints(printed)))
         return answer
-
-    def _compared(self, answer: Answer, round_trip: float, size: int) -> Answer:
-        """Return an answer, timed by its round trip once a claimed time cannot be."""
-        untimed = self._untimed or self._times.end(answer.seconds, size)
-        if untimed is None:
-            return answer
-        self._untimed = untimed
-        return replace(answer, seconds=round_trip, untimed=untimed)
 
     def _exchange(
         self, process: ChildProcess, line: bytes, patience: float
@@ -138,13 +133,13 @@ class ProgramContestant:
         process.send(line)
         for _ in range(self._limits.prints + 1):
             try:
-                answer = process.receive(start + patience - time.monotonic())
-            except LostError as lost:
-                failure = failure_of(lost.loss, process, self._limits, patience)
+                received = process.receive(start + patience - time.monotonic())
+            except LostError as error:
+                failure = failure_of(error.loss, process, self._limits, patience)
                 raise self._with_prints(failure) from None
             seconds = time.monotonic() - start
-            size += len(answer)
-            fields = self._decode(answer)
+            size += len(received)
+            fields = self._decode(received)
             if fields is not None:
                 return fields, seconds, size
         raise FailureError(
@@ -161,48 +156,35 @@ class ProgramContestant:
         try:
             fields = message.decode_object(line)
         except ValueError as error:
-            raise FailureError(
-                FailureKind.GARBAGE,
-                sentence("It answered with a broken line: {why}", why=str(error)),
-            ) from None
+            words = sentence("It answered with a broken line: {why}", why=str(error))
+            raise FailureError(FailureKind.GARBAGE, words) from None
         if fields is None or not line.lstrip(b"\xef\xbb\xbf \t").startswith(b"{"):
             self._print = self._print or line.strip() or None
-        if fields is not None and not self._is_mine(fields):
-            raise FailureError(FailureKind.GARBAGE, self._of_another(fields))
-        return fields
-
-    def _of_another(self, fields: Mapping[str, Any]) -> Sentence:
-        """Return that an answer has no id or another one."""
-        if fields.get("id") is None:
-            return sentence(
+        number = fields.get("id") if fields is not None else self._number
+        if number == self._number and not isinstance(number, bool):
+            return fields
+        if number is None:
+            words = sentence(
                 "It answered request {number} without an id: each request is answered once, with "
                 "its own id.",
                 number=self._number,
             )
-        return sentence(
-            "It answered request {number} with the id {id}: each request is answered "
-            "once, with its own id.",
-            number=self._number,
-            id=message.shown(repr(fields["id"]), 40),
-        )
+        else:
+            words = sentence(
+                "It answered request {number} with the id {id}: each request is answered "
+                "once, with its own id.",
+                number=self._number,
+                id=message.shown(repr(number), 40),
+            )
+        raise FailureError(FailureKind.GARBAGE, words)
 
-    def _is_mine(self, fields: Mapping[str, Any]) -> bool:
-        number = fields.get("id")
-        return not isinstance(number, bool) and number == self._number
-
-    def _with_prints(self, lost: FailureError) -> FailureError:
+    def _with_prints(self, error: FailureError) -> FailureError:
+        """Return a loss with an example of the program's earlier prints, if there are any."""
         if self._print is None:
-            return lost
-        return FailureError(
-            lost.failure.kind,
-            sentence(
-                "{what} Before it had printed lines that are no answers, for example: {line}",
-                what=lost.failure.sentence,
-                line=message.shown(self._print, 80),
-            ),
+            return error
+        words = sentence(
+            "{what} Before it had printed lines that are no answers, for example: {line}",
+            what=error.failure.sentence,
+            line=message.shown(self._print, 80),
         )
-
-    def _lose(self) -> None:
-        process, self._process = self._process, None
-        if process is not None:
-            process.end()
+        return FailureError(error.failure.kind, words)

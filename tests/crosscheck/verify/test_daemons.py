@@ -12,7 +12,7 @@ from hostile_programs import case, program, running
 
 from plumbob.crosscheck import process_tree
 from plumbob.crosscheck.verify.contestant import Answer
-from plumbob.crosscheck.verify.solvers import python_file
+from plumbob.crosscheck.verify.solvers import open_contestant
 
 ROOT = Path(__file__).parents[3]
 LINUX_ONLY = pytest.mark.skipif(process_tree.LIMIT is None, reason="Linux has this limit only")
@@ -128,7 +128,7 @@ def test_what_the_caller_started_is_left_alone(tmp_path):
     thread.start()
     try:
         for _ in range(5):
-            contestant = python_file.python_contestant(str(tmp_path / "solver.py"))
+            contestant = open_contestant(tmp_path / "solver.py")
             assert isinstance(contestant.answer(case(2)), Answer)
             contestant.close()
             assert contestant.remarks == ()

@@ -214,10 +214,6 @@ def test_an_edit_anywhere_in_the_module_elsewhere_changes_the_digest(edit, modul
     assert compiled.digest(doubled_elsewhere(module_of("edited", APART.replace(*edit)))) != first
 
 
-def test_a_kernel_keeps_its_defaults(backend):
-    assert compiled.Kernel(plus_default)(1.0) == 2.0
-
-
 def rounded_twice(x, y):
     return x * x - y
 

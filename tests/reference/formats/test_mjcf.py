@@ -135,16 +135,6 @@ def test_limits_and_names_are_mujocos(seed):
         np.testing.assert_allclose(ours, limits, atol=1e-15)  # one rounding of degrees
 
 
-def test_a_hinge_rotates_about_its_anchor():
-    found = character(
-        '<body name="door" pos="5 0 0"><joint name="hinge" pos="1 0 0" ref="0"/></body>'
-    )
-    assert found.articulation.names == ("world", "door/hinge", "door")
-    assert found.joints == {"hinge": 1}
-    x, _ = pose(found, "door", [np.pi / 2])
-    np.testing.assert_allclose(x, [6, -1, 0], atol=1e-15)
-
-
 def test_the_last_joint_is_the_body_where_it_can_be():
     found = character(
         '<body name="a"><joint name="x" type="slide" pos="1 1 1"/><joint/><body/></body>'
@@ -152,37 +142,6 @@ def test_the_last_joint_is_the_body_where_it_can_be():
     )
     assert found.articulation.names == ("world", "a/x", "a", "body#2", "fixed", "b")
     assert found.joints == {"x": 1, "a/hinge2": 2, "b/slide1": 5}
-
-
-def test_ref_is_where_the_file_shows_the_body():
-    found = character(
-        '<body name="a" pos="1 2 3"><joint type="slide" axis="1 0 0" ref="0.5"/>'
-        '<joint axis="0 0 1" ref="30" range="-90 90"/></body>'
-    )
-    np.testing.assert_allclose(found.home, [0.5, np.pi / 6], atol=1e-16)
-    x, R = pose(found, "a")
-    np.testing.assert_allclose(x, [1, 2, 3], atol=1e-15)
-    np.testing.assert_allclose(R, np.eye(3), atol=1e-15)
-    np.testing.assert_allclose(pose(found, "a", [0, np.pi / 6])[0], [0.5, 2, 3], atol=1e-15)
-    assert found.articulation.upper[2] == pytest.approx(np.pi / 2, abs=1e-15)
-
-
-SAME = [
-    'euler="90 0 0"',
-    'quat="3 3 0 0"',
-    'axisangle="2 0 0 90"',
-    'xyaxes="2 0 0 1 0 5"',
-    'zaxis="0 -3 0"',
-]
-
-
-@pytest.mark.parametrize("form", SAME)
-@pytest.mark.parametrize("unit", ["degree", "radian"])
-def test_all_forms_of_an_orientation_agree(form, unit):
-    if unit == "radian":
-        form = form.replace("90", repr(np.pi / 2))
-    found = character(f'<body name="a" {form}/>', f'<compiler angle="{unit}"/>')
-    np.testing.assert_allclose(pose(found, "a")[1], [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
 
 
 @pytest.mark.parametrize("form", ['zaxis="0 0 -1"', 'zaxis="1e-12 0 -1"', 'zaxis="0 0 5"'])

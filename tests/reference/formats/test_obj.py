@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plumbob.reference import scenes
 from plumbob.reference.formats import parse_obj, read_obj
 
 CORNERS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -85,17 +84,6 @@ class TestReading:
         assert read_obj(path).triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
         with pytest.raises(ValueError, match=r"cube.obj: there is no such file"):
             read_obj(tmp_path / "cube.obj")
-
-    def test_a_cloth_written_down_is_read_back(self):
-        _, state = scenes.grid_cloth(6, 5)
-        faces = scenes.grid_triangles(6, 5)
-        lines = ["v {!r} {!r} {!r}".format(*x) for x in state.positions.tolist()]
-        lines += ["f {} {} {}".format(*(corners + 1)) for corners in faces]
-        mesh = parse_obj("\n".join(lines))
-        np.testing.assert_array_equal(mesh.vertices, state.positions)
-        np.testing.assert_array_equal(mesh.triangles, faces)
-        system, _ = scenes.cloth_from_mesh(*mesh, density=0.2, bending_stiffness=1.0)
-        assert system.particle_count == 30
 
 
 class TestRefused:

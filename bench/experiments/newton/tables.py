@@ -1,0 +1,66 @@
+"""Proven distances between the solutions of one step and its minimiser."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...harness.record import Record
+from ...tables.captions import Captions
+from ...tables.layout import Layout
+from ...tables.results import counted, label, listed
+from ...tables.table import Summary, words
+from . import FRAME, FRAMES, GRAVITY
+from .values import CertifiedDetails, CertifiedStep
+
+CAPTIONS = Captions(__file__, gravity=f"{GRAVITY:g}", time=f"{FRAMES * FRAME:g}")
+
+
+def _row(record: Record) -> dict[str, Any]:
+    step: CertifiedStep = record.values
+    details: CertifiedDetails = record.details
+    minimiser = "yes" if step.same else "no" if step.different else "not proven"
+    return {
+        "record": record,
+        "stiffness": details.stiffness,
+        "solver": label(record.solver),
+        "start": details.start,
+        "iterations": step.iterations,
+        "residual": step.residual,
+        "distance to a minimiser, at most": step.distance if np.isfinite(step.distance) else None,
+        "same minimiser as Newton": minimiser,
+        "residual in MuJoCo’s forces": step.balance,
+        "bound": "yes" if step.covered else details.coverage.lower().replace("_", " "),
+        "distance to Newton’s solution": step.newton_distance,
+        "error": step.error,
+        "g above Newton’s": step.above,
+    }
+
+
+def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+    records = [row["record"] for row in rows]
+    newton = [record for record in records if record.solver == "newton"]
+    rivals = [record for record in records if record.solver != "newton"]
+    solved = sum(r.values.at_floor or r.values.residual <= r.details.tolerance for r in newton)
+    distances = [record.values.newton_distance for record in rivals if record.values.same]
+    nearby = f", at most {words(max(distances))} m from Newton’s" if distances else ""
+    return Summary(
+        f"Newton reached the tolerance or the rounding floor in {words(solved)} of "
+        f"{counted(len(newton), 'cloth')}. Of the other solvers’ "
+        f"{counted(len(rivals), 'solution')}, {words(len(distances))} are proven to belong to the "
+        f"same minimiser{nearby}."
+    )
+
+
+def _sizes(rows: Sequence[dict[str, Any]]) -> dict[str, str]:
+    sizes = sorted({int(row["record"].values.size) for row in rows})
+    return {"sizes": listed([f"{size} × {size}" for size in sizes], "or")}
+
+
+proofs = Layout(
+    **CAPTIONS.of("cloth_proofs", _sizes),
+    subjects=lambda results: list(map(_row, results.all("newton"))),
+    summary=_summary,
+)
+
+LAYOUTS = (proofs,)
