@@ -183,7 +183,7 @@ def test_nothing_is_cut_in_a_pipe(wrong, capsys):
 @pytest.mark.parametrize("language", ["en", "zh"])
 def test_cut_is_marked_and_a_larger_screen_shows_more(wrong, language):
     context = shown(language)
-    hint = context.say(sentence("Cut at …: --html FILE or | cat shows all."))
+    hint = context.say(sentence("Cut at …: use --html FILE or | cat to see all of it."))
     task = a_wrong_task(1.0, sentence("Mend this and that. " * 30))
     for tasks in ([task], [wrong.tasks[0], task]):
         report = Report(wrong.greeting, tasks, 0)

@@ -200,7 +200,9 @@ def claims(
         message = sentence("It claims to have arrived, but the effector is {error:.2g} m off.")
         yield laws.bounded("claims", distance, tolerance, "m", message)
     elif "converged" in outputs and distance <= case.inputs["tolerance"] - slack:
-        message = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
+        message = sentence(
+            "It has arrived, {error:.2g} m off, but reports that it has not.", error=distance
+        )
         yield Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", message)
     if "residual" in outputs and np.isfinite(outputs["residual"]):
         error = abs(outputs["residual"] - distance)

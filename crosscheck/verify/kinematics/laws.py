@@ -108,13 +108,13 @@ def digits(error: float, size: float) -> float:
 def _equal_answers(answer: Answer, repeat: object, size: float, greeting: Greeting) -> Finding:
     """Return whether the same request got the same answer a second time."""
     if not isinstance(repeat, Answer):
-        message = sentence("Asked again, it gave no answer.")
+        message = sentence("The repeated request got no answer.")
         return Finding("equal answers", Verdict.BROKEN, np.inf, 0.0, "", message)
     gaps = [largest_gap(a, repeat.values.get(name)) for name, a in answer.values.items()]
     tolerance = 16.0 * greeting.epsilon * max(size, 1.0)  # threads may add up in another order
     message = sentence(
-        "Asked the same again, it answers something else, {error:.2g} away: state left over, or "
-        "memory that nobody has filled."
+        "The repeated request got another answer, {error:.2g} away: state is left over, or "
+        "memory is not initialised."
     )
     return bounded("equal answers", max(gaps, default=0.0), tolerance, "", message)
 

@@ -140,8 +140,8 @@ def _unrotated(angles: FloatArray, bound: float, effector: int) -> Finding:
     joint = int(np.argmax(angles))
     law, verdict = "joints off the path", Verdict.RIGHT_BUT if joint == effector else Verdict.WRONG
     message = sentence(
-        "It rotates the effector itself by {error:.2g} rad, which brings the effector nowhere "
-        "but moves what is below."
+        "It rotates the effector itself by {error:.2g} rad, which moves the joints below it but "
+        "not the effector."
         if joint == effector
         else "It rotates joint {joint}, which is not on the path from the root to the effector."
     )

@@ -149,7 +149,7 @@ def _on_line(points: FloatArray, distances: FloatArray, line: Polyline, bound: f
     """Return whether points are on the line, or between two of its points."""
     is_cut = all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(distances > bound))
     message = sentence(
-        "Points between given ones are left out, so that corners are cut by {error:.2g} m."
+        "Points of the curve are left out, so that corners are cut by {error:.2g} m."
         if is_cut
         else "Point {index} is {error:.2g} m off the polyline.",
         index=int(np.argmax(distances)),

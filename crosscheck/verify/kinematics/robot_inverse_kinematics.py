@@ -73,8 +73,8 @@ FAULTS: Mapping[str, Misreading] = {
         lambda inputs: {"tool_position": np.zeros(3), "tool_rotation": IDENTITY},
     ),
     "orientations ignored": Misreading(
-        sentence("You leave the orientations of the joints' frames aside. A joint's frame is "
-                 "rotated in its parent's by orientations[j], before it moves."),
+        sentence("You ignore the orientations of the joints' frames. A joint's frame is rotated "
+                 "in its parent's by orientations[j], before it moves."),
         lambda inputs: {"orientations": rotation.identity(len(inputs["parents"]))},
     ),
     "axes of the parent": Misreading(
@@ -89,7 +89,7 @@ FAULTS: Mapping[str, Misreading] = {
         lambda inputs: {"target_rotation": np.roll(inputs["target_rotation"], 1)},
     ),
     POSITION_ONLY: Misreading(
-        sentence("You bring the tool to its position and leave its rotation aside."),
+        sentence("You bring the tool to its position and ignore its rotation."),
         lambda inputs: {"target_rotation": None},
     ),
 }  # fmt: skip
@@ -157,7 +157,9 @@ def _claims(
         )  # fmt: skip
         yield Finding("claims", Verdict.WRONG, distance, bound, "m", message)
     if reached and not outputs.get("converged", True):
-        message = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
+        message = sentence(
+            "It has arrived, {error:.2g} m off, but reports that it has not.", error=distance
+        )
         yield Finding("claims", Verdict.RIGHT_BUT, distance, bound, "m", message)
 
 

@@ -170,8 +170,8 @@ def _verdict(
     """Return the verdict on sweeps that are not the textbook's."""
     if others_hold and all(_has_arrived(trial, greeting) for trial in trials):
         return Verdict.RIGHT_BUT, sentence(
-            "It goes on to the target although one sweep was asked for (max_iterations 1, "
-            "tolerance 0), so that its sweeps cannot be told."
+            "It goes on to the target although one sweep was requested (max_iterations 1, "
+            "tolerance 0), so that its sweeps cannot be judged."
         )
     if others_hold and (method == "fabrik" or all(map(_ends_well, trials))):
         return Verdict.RIGHT_BUT, sentence(

@@ -103,9 +103,9 @@ def self_test(trials: Iterable["Trial"], say: Say) -> Iterator[str]:
             laws=", ".join(sorted(trial.laws)) or "0",
         ))  # fmt: skip
     yield say(
-        sentence("{n} of all did not pass.", n=len(failed))
+        sentence("{n} trials failed.", n=len(failed))
         if failed
-        else sentence("Every fault is caught and named, and nobody right is accused.")
+        else sentence("Every fault is caught and named, and no honest solver is accused.")
     )
 
 

@@ -28,7 +28,7 @@ WORDS = {
     "again": sentence("It is saved; ask it again:"),
     "cases": sentence("All cases"),
     "case": sentence("case"),
-    "found": sentence("what was found"),
+    "found": sentence("findings"),
 }
 
 

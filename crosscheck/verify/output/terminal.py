@@ -63,7 +63,8 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
     else:
         screen += [line for task in bad for line in ("", *_details(task, context, height))]
     if any(line.endswith(_ELLIPSIS) for line in screen):
-        end = [*wrapped(say(sentence("Cut at …: --html FILE or | cat shows all."))), *end]
+        hint = sentence("Cut at …: use --html FILE or | cat to see all of it.")
+        end = [*wrapped(say(hint)), *end]
     return [*screen, "", *end] if len(screen) + len(end) < height else [*screen, *end]
 
 

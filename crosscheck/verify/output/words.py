@@ -131,7 +131,7 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
     template = sentence("Next: correct {task}, rerun the saved case, then run all again.")
     if first.verdict is Verdict.BROKEN and not first.diagnosis.explained:
         template = sentence(
-            "Next: let {task} answer every case first; what it breaks on is saved above."
+            "Next: make {task} answer every case first; the case that breaks it is saved."
         )
     elif len(bad) > 1:
         template = sentence(

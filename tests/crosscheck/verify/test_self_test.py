@@ -51,5 +51,5 @@ def test_judge_that_misses_a_fault_or_accuses_an_honest_solver_does_not_pass():
     assert not any(trial.passed for trial in failed)
     listed = list(lines([missed, accepted], str))
     assert any(fault.name in line for line in listed)
-    assert listed[-1].startswith("1 of all")
+    assert listed[-1].startswith("1 trials failed")
     assert "Every fault is caught" in list(lines([accepted], str))[-1]
