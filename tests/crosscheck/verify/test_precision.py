@@ -71,14 +71,12 @@ def as_float(x):
     return np.asarray(x, dtype=np.float32).astype(float)
 
 
-# What programs make of the numbers that they print, and what is said of it.
+SINGLE = "are single-precision numbers"
+# The printed numbers of programs, and the remark about them.
 PRINTERS = {
-    "float": (as_float, "are single-precision numbers"),
-    "float, nine digits": (lambda x: printed("%.9g")(as_float(x)), "are single-precision numbers"),
-    "float, as few digits as tell it": (
-        np.vectorize(lambda x: float(str(np.float32(x))), otypes=[float]),
-        "are single-precision numbers",
-    ),
+    "float": (as_float, SINGLE),
+    "float, nine digits": (lambda x: printed("%.9g")(as_float(x)), SINGLE),
+    "float, shortest": (np.vectorize(lambda x: float(str(np.float32(x))), otypes=[float]), SINGLE),
     "cout": (printed("%g"), "have only 6 significant digits"),
     "float, cout": (lambda x: printed("%g")(as_float(x)), "have only 6 significant digits"),
     "to_string": (printed("%f"), "have only 6 significant digits"),
@@ -201,7 +199,7 @@ def test_declared_single_precision_is_right_without_a_word(task):
     assert judged(task, TASKS[task][0](None), printed("%g"), precision="single").precision
 
 
-def test_a_residual_in_single_precision_is_no_evidence():
+def test_residual_in_single_precision_is_no_evidence():
     right = ccd(None)
 
     def function(**inputs):

@@ -55,11 +55,8 @@ def test_the_committed_schema_is_what_tasks_and_greeting_say():
     hint = "run `python -m plumbob.crosscheck.verify.schema`"
     assert schema.FILE.read_text(encoding="utf-8") == schema.text(), hint
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
-
-
-def test_the_transcript_has_every_task_an_error_and_ids_in_order():
-    asked = [request["task"] for request, _ in TRANSCRIPT]
-    assert asked[: len(TASKS) + 1] == ["greeting", *TASKS]
+    tasks = [request["task"] for request, _ in TRANSCRIPT]
+    assert tasks[: len(TASKS) + 1] == ["greeting", *TASKS]
     assert [request["id"] for request, _ in TRANSCRIPT] == list(range(len(TRANSCRIPT)))
     assert any("error" in answer for _, answer in TRANSCRIPT)
 
@@ -90,20 +87,17 @@ BAD = [
 
 
 @pytest.mark.parametrize(("number", "side", "field", "value"), BAD)
-def test_the_schema_refuses_what_is_wrong(number, side, field, value):
+def test_schema_refuses_a_wrong_field(number, side, field, value):
     request, answer = copy.deepcopy(TRANSCRIPT[number])
     (request, answer)[side][field] = value
     kind = kind_of_answer(request, answer) if side else schema.request_name(request["task"])
     assert broken((request, answer)[side], kind)
 
 
-@pytest.mark.parametrize("field", ["offsets", "id", "task"])
-def test_the_schema_refuses_a_request_that_lacks(field):
-    request = {name: value for name, value in TRANSCRIPT[1][0].items() if name != field}
-    assert broken(request, schema.request_name("forward_kinematics"))
-
-
-def test_the_schema_refuses_an_answer_without_an_output_and_takes_null():
+def test_schema_refuses_a_message_that_lacks_a_field_and_takes_null():
+    request, kind = TRANSCRIPT[1][0], schema.request_name("forward_kinematics")
+    for field in ("offsets", "id", "task"):
+        assert broken({name: value for name, value in request.items() if name != field}, kind)
     kind = schema.answer_name("mass_spring_forces")
     assert broken({"id": 1, "seconds": 0.1}, kind)
     assert broken({"id": 1, "forces": [[None, 0.0, 1]]}, kind) == []

@@ -244,7 +244,7 @@ def test_a_target_s_quaternion_may_have_either_sign(robot):
         assert found.angle <= 1e-12
 
 
-# ---- what is said of a task
+# ---- reports
 
 
 def judgement(size, verdict, digits=None):
@@ -254,55 +254,46 @@ def judgement(size, verdict, digits=None):
     return CaseJudgement(case, Answer({}, 0.0), (finding,), {}, digits)
 
 
-def test_the_smallest_failure_is_shown_and_an_unexplained_one_is_of_the_worst_verdict():
-    told = [
-        judgement(1, RIGHT),
-        judgement(7, WRONG),
-        judgement(5, WRONG),
-        judgement(9, Verdict.BROKEN),
-    ]
-    assert smallest_failure(told, explained=True) is told[2]
-    assert smallest_failure(told, explained=False) is told[3]
-    assert smallest_failure(told[:3], explained=False) is told[2]
-    assert smallest_failure(told[:1], explained=False) is None
-
-
-def test_digits_are_those_of_the_worst_case():
-    told = [judgement(1, RIGHT, 12.0), judgement(2, RIGHT, 7.0), judgement(3, RIGHT)]
-    assert TaskReport("", "", told, Diagnosis()).digits == 7.0
-    assert TaskReport("", "", told[2:], Diagnosis()).digits is None
+def test_smallest_failure_has_the_worst_verdict_if_unexplained():
+    sizes = {1: RIGHT, 7: WRONG, 5: WRONG, 9: Verdict.BROKEN}
+    judgements = [judgement(size, verdict) for size, verdict in sizes.items()]
+    assert smallest_failure(judgements, explained=True) is judgements[2]
+    assert smallest_failure(judgements, explained=False) is judgements[3]
+    assert smallest_failure(judgements[:3], explained=False) is judgements[2]
+    assert smallest_failure(judgements[:1], explained=False) is None
 
 
 @pytest.mark.parametrize(
-    ("digits", "expected"),
+    ("digits", "is_single"),
     [([5.1, 8.9, 8.9], True), ([4.9, 8.0, 8.0], False), ([5.1, 9.1, 9.1], False), ([], False)],
 )
-def test_answers_are_off_by_single_precision_from_five_digits_to_nine(digits, expected):
+def test_errors_of_five_to_nine_digits_are_those_of_single_precision(digits, is_single):
     """The least decides where a fault is small in most cases, the median where it is in few."""
-    told = [judgement(1, WRONG, count) for count in (*digits, None)]
-    assert is_off_by_single(TaskReport("", "", told, Diagnosis())) is expected
+    judgements = [judgement(1, WRONG, count) for count in (*digits, None)]
+    report = TaskReport("", "", judgements, Diagnosis())
+    assert is_off_by_single(report) is is_single
+    assert report.digits == min(digits, default=None)
 
 
 @pytest.mark.parametrize("single", ["positions", "velocities"])
-def test_the_least_precise_output_is_what_all_answers_are_judged_by(rng, single):
+def test_least_precise_output_decides(rng, single):
     case = Case("", "mass_spring_step", {"positions": rng.standard_normal(30)}, "", sentence(""))
-    answer = {name: rng.standard_normal(30) for name in ("positions", "velocities")}
+    outputs = {name: rng.standard_normal(30) for name in ("positions", "velocities")}
     greeting = Greeting(1, ("mass_spring_step",))
-    whole = Exchange(case, Answer(answer, 0.0), None)
-    assert judging_greeting([whole], greeting) == (greeting, None)
-    answer = answer | {single: answer[single].astype(np.float32).astype(float)}
-    coarse, reason = judging_greeting([Exchange(case, Answer(answer, 0.0), None)], greeting)
+    exchange = Exchange(case, Answer(outputs, 0.0), None)
+    assert judging_greeting([exchange], greeting) == (greeting, None)
+    outputs[single] = outputs[single].astype(np.float32).astype(float)
+    coarse, reason = judging_greeting([exchange], greeting)
     assert coarse.epsilon == pytest.approx(2.0**-23, rel=0.1)
     assert reason is AS_SINGLE
 
 
-def test_a_fault_is_told_only_if_it_explains_more_than_no_fault_does():
+def test_fault_is_named_only_if_it_explains_more_than_no_fault():
     def match(share, *faults):
         return Match(Variant(faults, lambda case: {}), share, 0.0, [])
 
-    right, as_good, better = match(0.6), match(0.6, "a"), match(0.7, "b")
+    right, as_good, better, whole = match(0.6), match(0.6, "a"), match(0.7, "b"), match(1.0, "c")
     assert _telling([right, as_good, better]) == [better]
-    whole = match(1.0, "c")
     assert _telling([right, as_good, better, whole]) == [whole]
     perfect = right._replace(share=1.0)
     assert _telling([perfect, whole]) == [perfect, whole]
