@@ -12,7 +12,7 @@ import pytest
 from plumbob.bench.experiments.arm.tables import residuals_chart
 from plumbob.bench.experiments.chain import measurement as chain
 from plumbob.bench.experiments.chain.tables import iterations_chart
-from plumbob.bench.experiments.cloth_peers import figures as cloth_figures
+from plumbob.bench.experiments.cloth_peers import tables as cloth_tables
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess
@@ -114,7 +114,7 @@ def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
     assert bench("cloth", "--quick", *one_step, "--with", "my_cloth.py", *EXPLICIT) == 0
     for name in ("cloth_peers_step", "entered"):
         assert "My symplectic Euler" in cells(made("cloth")[name]), name
-    assert "My symplectic Euler" in drawn(cloth_figures.one_step(Results(records()))).svg
+    assert "My symplectic Euler" in drawn(cloth_tables.step_chart(Results(records()))).svg
     # The same method is the same to rounding, in every number but the times.
     ours, theirs = (
         next(one for one in records(name) if one.problem == "peers/one step/k1000")
@@ -475,7 +475,7 @@ def test_a_cloth_of_a_python_file_stands_in_the_same_tables(folder):
     )
     rows = [row[:2] for row in made("cloth")["cloth_peers_step"].rows]
     assert set(rows) == {("hammock", "My symplectic Euler"), ("hammock", "Plumbob Newton")}
-    assert "hammock" in drawn(cloth_figures.one_step(Results(records()))).svg
+    assert "hammock" in drawn(cloth_tables.step_chart(Results(records()))).svg
 
 
 OBJ = "".join(f"v {x} 0 {z}\n" for z in range(3) for x in range(3))
