@@ -78,7 +78,7 @@ INTERNAL = {
     "reference.implicit_euler.objective.Iterate.is_above": "compares what an Objective has made",
     "reference.implicit_euler.objective.global_matrix": "of a system that is checked already",
     "reference.implicit_euler.objective.effective_stiffnesses": "likewise",
-    "reference.implicit_euler.StepSolver.iterates": "a protocol",
+    "reference.implicit_euler.StepMethod.iterates": "a protocol",
     "reference.implicit_euler.StepResult": "made only by a step",
     "reference.implicit_euler.certificate.Certificate": "made only by certify",
     "reference.implicit_euler.certificate.Certificate.shares_minimiser_within": "unchecked twin",

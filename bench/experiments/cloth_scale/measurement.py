@@ -52,7 +52,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def in_its_own_process(size: int, library: str) -> Measured:
-    """Measure one cloth in a fresh process, unless the library is missing."""
+    """Measure a cloth in a fresh process, unless the library is missing."""
     if library != SUPERNODAL and importlib.util.find_spec(library) is None:
         return Measured(None, {"missing": f"{library} is not installed"})
     numbers = in_a_fresh_process(PATIENCE, compiled_and_measured, size, library)
@@ -78,7 +78,7 @@ def billowing_cloth(size: int) -> tuple[MassSpring, State]:
 
 
 def measure(size: int, library: str) -> dict[str, Any]:
-    """Return the times [s] and the memory [bytes] of one cloth."""
+    """Return the times [s] and the memory [bytes] of a cloth."""
     before = memory()
 
     def say(part: str) -> None:
