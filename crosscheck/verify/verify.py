@@ -53,16 +53,12 @@ DISCIPLINES: Mapping[str, Discipline] = {
 }
 
 
-def _silent(task: str, count: int, total: int) -> None:
-    pass
-
-
 def verify(
     contestant: Contestant,
     tasks: Sequence[str] | None = None,
     seed: int = 0,
     thorough: bool = False,
-    notify: Notify = _silent,
+    notify: Notify = lambda task, count, total: None,
 ) -> Report:
     """Try a solver at its tasks and return the report.
 
@@ -89,7 +85,7 @@ def judge_cases(
     task: str,
     method: str,
     cases: Sequence[Case],
-    notify: Notify = _silent,
+    notify: Notify = lambda task, count, total: None,
 ) -> TaskReport:
     """Ask a solver some cases of a task and judge its answers; arguments as of `verify`."""
     exchanges = list(_ask(contestant, cases, partial(notify, task)))

@@ -246,13 +246,9 @@ def _diagnosis(
         for trial in posed_trials
         if not trial.is_sweep
         and trial.case.family not in problems.DEGENERATE
-        and (trial.is_wrong or _is_late(trial))
+        and (trial.is_wrong or any(f.law == STOPS and f.verdict for f in trial.judgement.findings))
     ]
     if solves and comparison.method:
         bound = partial(sweeps.prediction_bound, greeting)
         return diagnosis_of(comparison.method, solves, solves, bound, comparison.behaviour)
     return Diagnosis(behaviour=comparison.behaviour)
-
-
-def _is_late(trial: PoseTrial) -> bool:
-    return any(finding.law == STOPS and finding.verdict for finding in trial.judgement.findings)

@@ -13,7 +13,7 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import Variant, explain
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
+from ..judgement import Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
 from . import laws, rounding
 from .polylines import Polyline
@@ -81,7 +81,13 @@ def _curves(rng: np.random.Generator) -> list[Curve]:
 
 def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Judge points by the laws of resampling; strokes may be bridged or not."""
-    judgements = [_judge(exchange, greeting) for exchange in exchanges]
+    judgements = [
+        laws.judge_case(
+            exchange, greeting, partial(_findings, exchange.case, greeting),
+            partial(_even, exchange.case),
+        )
+        for exchange in exchanges
+    ]  # fmt: skip
     pairs = zip(exchanges, judgements, strict=True)
     wrong_first = sorted(pairs, key=lambda pair: pair[1].verdict is Verdict.RIGHT)
     behaviour = _behaviour_at_strokes(exchanges, greeting)
@@ -114,13 +120,6 @@ def _distances(points: FloatArray, line: Polyline, bridged: bool) -> FloatArray:
     return np.array([line.distance(point, bridged) for point in points])
 
 
-def _judge(exchange: Exchange, greeting: Greeting) -> CaseJudgement:
-    case = exchange.case
-    return laws.judge_case(
-        exchange, greeting, partial(_findings, case, greeting), partial(_even, case)
-    )
-
-
 def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> list[Finding]:
     points = outputs.get("points")
     if points is None or not len(points):
@@ -139,7 +138,10 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
         findings.append(_count(points, case))
     if distances.max() <= bound:
         arc = line.arc_lengths(points, bound)
-        findings += [_order(arc, bound), _gaps(points, arc, case, bound)]
+        step_back = float(np.max(-np.diff(arc), initial=0.0))
+        message = sentence("The points go back along the curve, by {error:.2g} m.")
+        findings.append(laws.bounded("order", step_back, 2.0 * bound, "m", message))
+        findings.append(_gaps(points, arc, case, bound))
         if case.inputs["closed"] and len(points) > 1:
             findings.append(_closing(points, arc, line, bound))
     return findings
@@ -177,12 +179,6 @@ def _count(points: FloatArray, case: Case) -> Finding:
     is_start_repeated = case.inputs["closed"] and count == expected + 1
     verdict = Verdict.RIGHT_BUT if is_start_repeated else Verdict.WRONG
     return laws.bounded("count", abs(count - expected), 0.0, "", message, verdict=verdict)
-
-
-def _order(arc: FloatArray, bound: float) -> Finding:
-    step_back = float(np.max(-np.diff(arc), initial=0.0))
-    message = sentence("The points go back along the curve, by {error:.2g} m.")
-    return laws.bounded("order", step_back, 2.0 * bound, "m", message)
 
 
 def _gaps(points: FloatArray, arc: FloatArray, case: Case, bound: float) -> Finding:

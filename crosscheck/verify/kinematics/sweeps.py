@@ -11,8 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
-
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import difference
@@ -197,11 +195,11 @@ def _has_arrived(trial: PoseTrial, greeting: Greeting) -> bool:
 def _ends_well(trial: PoseTrial) -> bool:
     """Return whether the last joint of a sweep has brought the effector onto its line."""
     x, target, path = trial.pose.positions, trial.case.inputs["target"], trial.pose.path
-    return any(_angle(x[path[-1]] - x[j], target - x[j]) < 1e-3 for j in (path[0], path[-2]))
-
-
-def _angle(a: FloatArray, b: FloatArray) -> float:
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+    for j in (path[0], path[-2]):
+        a, b = x[path[-1]] - x[j], target - x[j]
+        if np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b) < 1e-3:
+            return True
+    return False
 
 
 def honest_variant(trials: Sequence[PoseTrial], method: str, greeting: Greeting) -> Sentence | None:

@@ -16,7 +16,7 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..sentence import sentence
 from . import laws, pose_laws, problems, rounding, skeletons, sweeps
 from .inverse_kinematics import METHODS
@@ -122,7 +122,8 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         diagnosis_of(f"track {textbook}", list(comparable.values()), wrong, bound)
         for textbook in ((method,) if method in METHODS else METHODS)
     ]
-    return report(TASK, method, judgements, max(diagnoses, key=_largest_share))
+    best = max(diagnoses, key=lambda d: max((e.share for e in d.explanations), default=0.0))
+    return report(TASK, method, judgements, best)
 
 
 def _is_wrong(judgement: CaseJudgement) -> bool:
@@ -131,10 +132,6 @@ def _is_wrong(judgement: CaseJudgement) -> bool:
         finding.verdict and finding.law in ("continuity", CONTINUES)
         for finding in judgement.findings
     )
-
-
-def _largest_share(diagnosis: Diagnosis) -> float:
-    return max((explanation.share for explanation in diagnosis.explanations), default=0.0)
 
 
 def _prediction_bound(greeting: Greeting, case: Case) -> float:

@@ -41,6 +41,7 @@ _PIECE = re.compile(
 # Marks that begin no line, and marks that end no line.
 _CLOSING, _OPENING = "，。、；：！？）》」』”’", "（《「『"
 _PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}
+_COLOURS = dict(zip(Verdict, ("green", "yellow", "yellow", "red", "red"), strict=True))
 _WIDEST = 10_000
 _PAPER = Console(**_PLAIN, width=_WIDEST, color_system=None, force_terminal=False)
 
@@ -190,11 +191,5 @@ def show(report: Report, context: Presentation) -> None:
         text = Text(line)
         for verdict, words in VERDICTS.items():
             pattern = rf"(?<=  ){re.escape(context.say(words))}(?=  )"
-            text.highlight_regex(pattern, _colour(verdict))
+            text.highlight_regex(pattern, f"bold {_COLOURS[verdict]}")
         console.print(text)
-
-
-def _colour(verdict: Verdict) -> str:
-    if verdict is Verdict.RIGHT:
-        return "bold green"
-    return "bold red" if verdict >= Verdict.WRONG else "bold yellow"
