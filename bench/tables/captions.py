@@ -17,6 +17,10 @@ class Captions:
     """The captions of an experiment's tables.
 
     Braces in a caption hold a number of the measurement, or a sentence of the part `[shared]`.
+
+    Attributes:
+        charts: what `declared_chart` takes, by name.
+        shared: the sentences of the part `[shared]`.
     """
 
     def __init__(self, module: str, **constants: str) -> None:
@@ -24,6 +28,8 @@ class Captions:
         path = Path(module).with_name("tables.toml")
         self._tables = tomllib.loads(path.read_text(encoding="utf-8"))
         self._columns = self._tables.pop("columns", {}), self._tables.pop("folded", {})
+        charts: dict[str, dict[str, Any]] = self._tables.pop("charts", {})
+        self.charts = {name: {"name": name, **chart} for name, chart in charts.items()}
         shared: dict[str, str] = self._tables.pop("shared", {})
         self.shared = {key: _on_one_line(text, constants) for key, text in shared.items()}
         self._constants = {**constants, **self.shared}

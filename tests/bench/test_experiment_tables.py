@@ -70,8 +70,10 @@ def phrases(path):
     """The strings of a file that have several words, docstrings and columns left out."""
     if path.suffix == ".toml":
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        for texts in (tables[name] for name in tables.keys() - {"columns", "folded"}):
-            yield from (" ".join(text.split()) for text in texts.values())
+        charts = tables.pop("charts", {})
+        captions = [tables[name] for name in tables.keys() - {"columns", "folded"}]
+        for texts in (*captions, *charts.values()):
+            yield from (" ".join(t.split()) for t in texts.values() if isinstance(t, str))
         return
     tree = ast.parse(path.read_text(encoding="utf-8"))
     bodies = [node.body for node in ast.walk(tree) if isinstance(getattr(node, "body", 0), list)]

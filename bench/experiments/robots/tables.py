@@ -11,27 +11,18 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import Peer, PeerEntry
-from ...problems.robots import LIMIT_TOLERANCE
-from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.entered import entered
 from ...tables.layout import Layout
 from ...tables.results import Results, counted, grouped, leaders, listed, steadiness
 from ...tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from . import REACHABLE, readings
-from .figures import FIGURES
+from .figures import CAPTIONS, FIGURES
 from .readings import OUTCOMES, STARTS, Score, title_of
 from .values import RobotDetails
 
-_CAPTIONS = Captions(
-    __file__,
-    shift=words_in(readings.SHIFT, "µs"),
-    penalty=words_in(readings.PENALTY, "ms"),
-    resamples=str(metrics.RESAMPLES),
-    limit_tolerance=words(LIMIT_TOLERANCE),
-)
 # The rule for solvers that a budget of time cut short.
-RULE = _CAPTIONS.shared["rule"]
+RULE = CAPTIONS.shared["rule"]
 # The cells of a row by the titles of their columns, and the score or the records behind them.
 Row = dict[str, Any]
 
@@ -103,7 +94,7 @@ def _robot(record: Record) -> str:
 
 
 participants = Layout(
-    **_CAPTIONS.of("participants"), subjects=_participants, summary=_participant_summary
+    **CAPTIONS.of("participants"), subjects=_participants, summary=_participant_summary
 )
 
 
@@ -185,7 +176,7 @@ def _layout(
 ) -> Layout:
     """Return a table of scores; solvers with the same robots and starts are compared."""
     return Layout(
-        **{**_CAPTIONS.of(name, _measured), **fields},
+        **{**CAPTIONS.of(name, _measured), **fields},
         subjects=lambda results: map(row, scores(results)),
         compared=2,
         ranked=lambda row: row["score"].is_ranked,
@@ -241,7 +232,7 @@ def _outcome_columns(rows: Sequence[Row]) -> list[Column]:
 
     strata = [title for title in (rows[0] if rows else ()) if title.startswith("solved, ")]
     return [
-        *_CAPTIONS.columns("robots_outcomes"),
+        *CAPTIONS.columns("robots_outcomes"),
         *(column(name, folded=not any(row[name] for row in rows)) for name in OUTCOMES),
         column("targets"),
         *(column(title, note=INTERVAL, best="greatest", folded=True) for title in strata),
