@@ -186,7 +186,7 @@ def _evaluated(job: RobotJob, targets: Targets, solves: list[Solved]) -> dict[st
     evaluation = evaluator_of(job.robot).evaluate(targets, answers, job.tolerance)
     return {
         "solved": evaluation.solved,
-        "claimed": np.array([solve.claim for solve in solves]),
+        "claims": np.array([solve.claim for solve in solves]),
         "seconds": _rounded([solve.seconds for solve in solves]),
         "position": _rounded(evaluation.position),
         "rotation": _rounded(evaluation.rotation),
