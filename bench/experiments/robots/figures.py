@@ -79,7 +79,7 @@ def _chart(
 
 
 def _share(score: Score, x: Floats, rates: Floats) -> Series:
-    """Return a share with the interval that holds the true one in 95 % of samples [%]."""
+    """Return a share with its 95 % interval [%]."""
     low, high = metrics.wilson(rates, max(1, score.total))
     return series(score.solver, x, 100 * rates, (100 * low, 100 * high))
 
@@ -97,7 +97,7 @@ class RobotMaps(NamedTuple):
 
 
 def heat_map(start: str, results: Results) -> Sketch | None:
-    """Return the map of solvers of one start and robots, in two panels; None if there are none."""
+    """Return the map of solvers of one start and robots, in two panels; None without solvers."""
     fields = fields_of(results, start)
     scores = {(s.solver, robot): s for robot, field in fields.items() for s in field}
     solvers = tuple(dict.fromkeys(solver for solver, _ in scores))

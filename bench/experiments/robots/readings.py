@@ -1,4 +1,4 @@
-"""Scores of solvers on robots: how many targets they solve, in what time.
+"""Scores of solvers on robots: the targets that they solve, and their times.
 
 A solver that a budget of time cut short is scored over all targets that it was given: those that it
 never began count as not solved. It has a mark, and is not ranked; nor is one whose record is of
@@ -43,7 +43,7 @@ class Score(NamedTuple):
         robots: their names, or a phrase.
         start: `ONE_START` or `RESTARTS`, "" if both are in one field.
         solver: as records call it.
-        records: its record of each robot, in one order for all solvers.
+        records: its record of each robot, in the same order for all solvers.
         has_same_targets: whether it was given the targets of most solvers.
         success: the ranking of the solvers by targets solved.
         time: the ranking by time for the same targets.
@@ -100,7 +100,7 @@ class Score(NamedTuple):
 
     @property
     def mean_time(self) -> float:
-        """The geometric mean of those times [s]."""
+        """The geometric mean of the penalised times [s]."""
         return float(np.exp(np.mean(np.log(self.penalised + SHIFT))) - SHIFT)
 
     @property
@@ -130,7 +130,7 @@ class Score(NamedTuple):
 
     @property
     def is_ranked(self) -> bool:
-        """Whether it attempted all of its targets, and they are those of most solvers."""
+        """Whether it attempted all of its targets, and has the same targets as most solvers."""
         return not self.limits
 
     @property
@@ -175,7 +175,7 @@ def _outcomes(record: Record) -> Counter[str]:
 
 
 def scores(results: Results, task: str = REACHABLE) -> list[Score]:
-    """Return every solver on every robot, robot by robot, those with one start first."""
+    """Return every solver on every robot, robot by robot, single starts before restarts."""
     fields = [fields_of(results, start, task) for start in STARTS]
     robots = dict.fromkeys(robot for by_robot in fields for robot in by_robot)
     return [score for robot in robots for by_robot in fields for score in by_robot.get(robot, [])]
@@ -187,7 +187,7 @@ def fields_of(results: Results, start: str, task: str = REACHABLE) -> dict[str, 
 
 
 def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score]]:
-    """Return the solvers that have solves on record: as registered, and then those unknown."""
+    """Return the solvers that have solves on record: registered ones first, in order."""
     registered = [peer.label_of(entry) for peer in registry.PEERS for entry in peer.entries]
     places = {solver: place for place, solver in enumerate(registered)}
     robots = grouped((r for r in records if "solved" in r.arrays), lambda record: record.title)
@@ -237,7 +237,7 @@ def together(robots: Collection[str], fields: dict[str, list[Score]]) -> list[Sc
 
 
 def title_of(names: Sequence[str], remaining: Sequence[str]) -> str:
-    """Return the title of a set of robots: by those left out, if these are fewer."""
+    """Return the title of a set of robots: by the remaining ones if these are fewer."""
     if len(names) == 1:
         return names[0]
     if not remaining:

@@ -51,7 +51,7 @@ def _as_peer(record: Record) -> Peer:
 
 
 def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Record]) -> Row:
-    """Return the row of a solver; `robots` has one record of each robot of all."""
+    """Return the row of a solver; `robots` holds a record of each robot of all."""
     version = str(records[0].details.version)
     names = {record.title for record in records if "solved" in record.arrays}
     robot_names = [
@@ -232,7 +232,7 @@ def _stratum(stratum: int, *scores: Score) -> metrics.Share:
 
 
 def _outcome_columns(rows: Sequence[Row]) -> list[Column]:
-    """Return a column for each outcome, folded if it never occurs, and one for each stratum."""
+    """Return the columns of outcomes, folded if they never occur, and of strata."""
 
     def column(title: str, **looks: Any) -> Column:
         return Column(title, read=lambda row: row[title], **looks)
@@ -285,7 +285,7 @@ def _unreachable_summary(rows: Sequence[Row]) -> Summary:
     count = sum(row["claims"] for row in rows)
     silent = list(dict.fromkeys(row["solver"] for row in rows if row["false successes"] is None))
     without_claims = f" These make no claims: {listed(silent)}." if silent else ""
-    sentence = "No solver that makes claims claims a target that is out of reach"
+    sentence = "No solver claims that a target out of reach is solved"
     return Summary(f"{sentence} (n = {words(count)}).{without_claims}")
 
 
