@@ -1,11 +1,11 @@
-"""The command line. Engines, the reference and matplotlib are imported inside the commands."""
+"""The command line. Commands import engines, the reference and matplotlib when they run."""
 
+import importlib.metadata
 import io
 import os
 import signal
 import sys
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,18 +30,23 @@ app = typer.Typer(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code.
 
-    A reader that has seen enough, such as `head`, ends the program without a word. The signal for
-    it stays ignored: it would also strike where a worker has ended that we are writing to. Signals
-    to end become exceptions, so that commands clean up, unless they are ignored, as under nohup.
+    A reader that closes the pipe early, such as `head`, ends the program without a message. SIGPIPE
+    stays ignored: a pipe to a worker that has ended would raise it too. Other signals that end the
+    program become exceptions, so that commands clean up, unless they are ignored, as under nohup.
     """
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _leave)
     entry_point.open_closed_streams()
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that it lacks costs no verdict
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that it lacks loses no verdict
         sys.stdout.reconfigure(errors="backslashreplace")
     interrupts: list[int] = []
-    entry_point.handle_interrupt(partial(_interrupt, interrupts))
+
+    def interrupt(number: int, _: object) -> None:
+        interrupts.append(number)
+        raise KeyboardInterrupt
+
+    entry_point.handle_interrupt(interrupt)
     try:
         code = run_command(arguments)
         sys.stdout.flush()
@@ -50,9 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (Exception, KeyboardInterrupt):
         if not interrupts:
             raise
-        code = _say_interrupted()  # a module that is interrupted as it starts raises ImportError
+        code = _say_interrupted(arguments)  # a C extension may raise ImportError instead
     entry_point.leave_at_interrupt()
-    if code == UNREAD:  # what is not yet written has nowhere to go
+    if code == UNREAD:  # the rest of the output has no reader
         for stream in (sys.stdout, sys.stderr):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     sys.exit(code)
@@ -61,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run_command(arguments: Sequence[str] | None = None) -> int:
     """Return the exit code.
 
-    0 success, 1 a check failed, 2 bad usage or input, 130 interrupted, 141 nobody reads the output.
+    0 success, 1 a check failed, 2 bad usage or input, 130 interrupted, 141 output without a reader.
     """
     try:
         code = app(arguments, prog_name="plumbob", standalone_mode=False)
@@ -69,7 +74,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         return code if isinstance(code, int) else SUCCESS
     except (KeyboardInterrupt, typer.Abort):
-        return _say_interrupted()
+        return _say_interrupted(arguments)
     except _UsageError as error:
         return _complain(error.format_message())
     except SystemExit as error:
@@ -88,31 +93,31 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
     invoke_without_command=True,
     epilog=block(
         "Examples",
-        "plumbob verify my_solver.py    is your solver right, and if not, why?",
-        "plumbob                        the main job",
-        "plumbob check                  is the reference right?",
-        "plumbob bench ik cloth         measure two suites at full length",
-        "plumbob report                 write the report again from the records",
-        "plumbob show cloth             an animation of the falling cloth",
+        ("plumbob", "check, measure quickly and write a report"),
+        ("plumbob verify my_solver.py", "judge your solver"),
+        ("plumbob check", "check the reference"),
+        ("plumbob bench ik cloth", "measure two suites at full length"),
+        ("plumbob report", "write the report again from the records"),
+        ("plumbob show cloth", "write an animation of the falling cloth"),
     ),
 )
 def plumbob(
     context: typer.Context,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Folder to write to, else report."),
+        typer.Option(
+            "--output", "-o", metavar="DIR", help="Folder to write to.  [default: report]"
+        ),
     ] = None,
     fresh: Fresh = False,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> int:
     """Validate, measure and report: skeleton kinematics and implicit mass-spring dynamics.
 
-    Without a command it does the main job: check the reference against Pinocchio and MuJoCo, run
-    the quick bench, and write report/index.html, in a few minutes.
+    Without a command: check the reference against Pinocchio and MuJoCo, run the quick bench, and
+    write report/index.html, in a few minutes.
     """
     if version:
-        import importlib.metadata
-
         print(f"plumbob {importlib.metadata.version('plumbob')}")
         raise typer.Exit
     if sys.stderr.isatty():
@@ -135,18 +140,14 @@ app.add_typer(records.app, name="records")
 
 
 def _leave(number: int, _: object) -> None:
-    """Leave by an exception; the same signal again, as from a shell, does not interrupt that."""
+    """Leave by an exception, which the same signal again, as from a shell, does not interrupt."""
     signal.signal(number, signal.SIG_IGN)
     sys.exit(128 + number)
 
 
-def _interrupt(interrupts: list[int], number: int, _: object) -> None:
-    interrupts.append(number)
-    raise KeyboardInterrupt
-
-
-def _say_interrupted() -> int:
-    return _say(entry_point.INTERRUPTION, INTERRUPTED)
+def _say_interrupted(arguments: Sequence[str] | None) -> int:
+    words = sys.argv[1:] if arguments is None else arguments
+    return _say(entry_point.interruption(words), INTERRUPTED)
 
 
 def _complain(message: str) -> int:
@@ -159,4 +160,4 @@ def _say(line: str, code: int) -> int:
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
-    return code  # on a full disk it alone says what happened
+    return code  # on a full disk the code is the only message

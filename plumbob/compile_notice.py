@@ -1,4 +1,4 @@
-"""A line on a terminal while a kernel is compiled, lest its first call seem to hang."""
+"""Print a line on a terminal while a kernel is compiled, which may take seconds."""
 
 import atexit
 import sys
@@ -14,27 +14,27 @@ _timers: dict[tuple[int, str], threading.Timer] = {}
 
 
 def install() -> None:
-    """Say on stderr, if that is a terminal, what has been compiling for a second; once a process.
+    """Print on stderr, if that is a terminal, the kernels that have compiled for a second.
 
-    The compiled version is kept on disk, so that the line comes once for each kernel.
+    Compiled kernels are stored on disk, so that the line comes once for each.
     """
     from plumbob.reference.backend.compilation import on_compile
 
     _installed.close()
-    _installed.enter_context(on_compile(_heard))
+    _installed.enter_context(on_compile(_on_compile))
 
 
-def _heard(label: str, begins: bool) -> None:
+def _on_compile(label: str, begins: bool) -> None:
     key = threading.get_ident(), label
     if not begins:
         _timers.pop(key).cancel()
     else:
-        _timers[key] = threading.Timer(DELAY, _say, [f"compiling {label}, once"])
+        _timers[key] = threading.Timer(DELAY, _print, [f"compiling {label}, once"])
         _timers[key].daemon = True
         _timers[key].start()
 
 
-def _say(line: str) -> None:
+def _print(line: str) -> None:
     if sys.stderr is not None and sys.stderr.isatty():
         sys.stderr.write(f"{line}\n")
         sys.stderr.flush()

@@ -1,13 +1,13 @@
-"""Where the command line begins, ready for Ctrl-C and closed streams before it imports the rest."""
+"""The start of the command line: handle Ctrl-C and closed streams, then import the rest."""
 
 import contextlib
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 INTERRUPTED = 130
-INTERRUPTION = "plumbob: interrupted; a bench keeps what it has finished"
 
 
 def main() -> None:
@@ -19,10 +19,17 @@ def main() -> None:
     run()
 
 
-def open_closed_streams() -> None:
-    """Open the null device in place of standard streams that are closed.
+def interruption(arguments: Sequence[str]) -> str:
+    """Return the message after Ctrl-C; a bench and the main job keep finished measurements."""
+    is_main_job = not arguments or arguments[0] in ("-o", "--output", "--fresh")
+    is_bench = is_main_job or "bench" in arguments
+    return "plumbob: interrupted" + "; finished measurements are kept" * is_bench
 
-    Their numbers would otherwise go to the next files, and all that is printed into these.
+
+def open_closed_streams() -> None:
+    """Open the null device in place of closed standard streams.
+
+    The next files would otherwise take their numbers, and receive all that is printed.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -30,17 +37,17 @@ def open_closed_streams() -> None:
 
 
 def leave_at_interrupt() -> None:
-    """Let Ctrl-C end the process at once, where there is nothing to clean up."""
+    """Let Ctrl-C end the process at once."""
     handle_interrupt(_leave)
 
 
 def handle_interrupt(handler: Any) -> None:
-    """Call a handler at Ctrl-C, unless it is ignored, as in a script's background."""
+    """Call a handler at Ctrl-C, unless it is ignored, as in the background of a script."""
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, handler)
 
 
 def _leave(*_: object) -> None:
     with contextlib.suppress(OSError):
-        os.write(2, f"{INTERRUPTION}\n".encode())
+        os.write(2, f"{interruption(sys.argv[1:])}\n".encode())
     os._exit(INTERRUPTED)

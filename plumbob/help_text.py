@@ -1,4 +1,4 @@
-"""Parts of the help that several commands share, and how it is fitted to the terminal."""
+"""Parts of the help that several commands share, fitted to the width of the terminal."""
 
 import re
 import shutil
@@ -8,72 +8,79 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-# Lines of help are no longer than this, however wide the terminal is, and no shorter than that.
+# The most letters of a line however wide the terminal is, and the fewest.
 WIDEST, NARROWEST = 80, 30
 
 _Formatter: Any = typer.Context.formatter_class
 _Context: Any = TyperCommand.context_class
 
 
-def block(title: str, *lines: str) -> str:
-    """Return lines for the end of a help text, kept as they are where they fit."""
+def block(title: str, *rows: str | tuple[str, str]) -> str:
+    """Return lines for the end of a help text; pairs of command and description are aligned."""
+    width = max((len(row[0]) for row in rows if isinstance(row, tuple)), default=0)
+    lines = (row if isinstance(row, str) else f"{row[0]:<{width}}  {row[1]}" for row in rows)
     return "\n".join(["\b", f"{title}:", *(f"  {line}" for line in lines)])
 
 
 class FittingFormatter(_Formatter):  # type: ignore[misc]
-    """What sets the help: no line is wider than the terminal, if its words are not."""
+    """A formatter of help in lines no wider than the terminal."""
 
     def __init__(self, **options: Any) -> None:
-        self.most = max(NARROWEST, shutil.get_terminal_size().columns)
-        super().__init__(**{**options, "width": min(self.most, WIDEST) - 2})
+        self.columns = max(NARROWEST, shutil.get_terminal_size().columns)
+        super().__init__(**{**options, "width": min(self.columns, WIDEST) - 2})
 
     def write_usage(self, prog: str, args: str = "", prefix: str | None = None) -> None:
-        """Write the line of usage, every argument in one pair of brackets or in none."""
+        """Write the line of usage, each argument in at most a pair of brackets."""
         args = re.sub(r"\[\[(.*?)\]\]", r"[\1]", re.sub(r"\{(.*?)(\.\.\.)?\}", r"\1", args))
         super().write_usage(prog, args, prefix)
 
     def write_dl(self, rows: Any, col_max: int = 30, col_spacing: int = 2) -> None:
-        """Write options and what they do; in a narrow terminal below each other."""
-        named = [(_without_type(name), text) for name, text in rows]
-        super().write_dl(named, min(col_max, self.most // 3), col_spacing)
+        """Write options and their descriptions; in a narrow terminal below each other."""
+        rows = [(_without_type(name), text) for name, text in rows]
+        super().write_dl(rows, min(col_max, self.columns // 3), col_spacing)
 
     def getvalue(self) -> str:
         """Return the help, lines that are too wide continued in the next."""
         lines = super().getvalue().splitlines()
-        return "".join(f"{part}\n" for line in lines for part in fitted(line, self.most))
+        return "".join(f"{part}\n" for line in lines for part in fitted(line, self.columns))
 
 
 def _without_type(name: str) -> str:
-    """Return an argument without a type of Python, or an option with a word in its place."""
+    """Return an argument without its Python type, or an option with a word in place of it."""
     if not name.startswith("-"):
         return re.sub(r" <[^>]*>$", "", name)
-    return re.sub(r"<([^>]*)>$", lambda found: "N" if "int" in found[1] else "NAME", name)
+    return re.sub(r"<([^>]*)>$", lambda match: "N" if "int" in match[1] else "NAME", name)
 
 
 def fitted(line: str, width: int) -> list[str]:
-    """Return a line, or several of no more letters: words behind a gap stay below each other."""
+    """Return a line in lines of at most this width, with text after a gap kept in its column."""
     if len(line) <= width:
         return [line]
-    begin = len(line) - len(line.lstrip())
+    indent = len(line) - len(line.lstrip())
     gap = re.match(r" *\S.*?  +(?=\S)", line)
-    hang = gap.end() if gap and gap.end() <= width // 2 else begin + 4
-    options: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
-    head = line[: gap.end()] if gap and gap.end() <= width // 2 else line[:begin]
-    if gap and gap.end() > width // 2:
-        line = re.sub(r"(?<=\S)  +", "  ", line)
+    if gap and gap.end() <= width // 2:
+        head, hang = line[: gap.end()], gap.end()
+    else:
+        head, hang = line[:indent], indent + 4
+        line = head + re.sub(r"  +", "  ", line[indent:])
     return textwrap.wrap(
-        line[len(head) :], width, initial_indent=head, subsequent_indent=" " * hang, **options
+        line[len(head) :],
+        width,
+        initial_indent=head,
+        subsequent_indent=" " * hang,
+        break_long_words=False,
+        break_on_hyphens=False,
     )
 
 
 class FittingContext(_Context):  # type: ignore[misc]
-    """A context whose help fits the terminal."""
+    """A context with help that fits the terminal."""
 
     formatter_class = FittingFormatter
 
 
 class Command(TyperCommand):
-    """A command whose help fits the terminal."""
+    """A command with help that fits the terminal."""
 
     context_class = FittingContext
 
@@ -83,7 +90,7 @@ class Command(TyperCommand):
 
 
 class Group(TyperGroup):
-    """A group of commands whose help fits the terminal."""
+    """A group of commands with help that fits the terminal."""
 
     context_class = FittingContext
 

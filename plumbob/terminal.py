@@ -1,4 +1,4 @@
-"""The terminal: tables as text, the bar of a long run."""
+"""Print tables and progress on the terminal."""
 
 import contextlib
 import shutil
@@ -14,29 +14,29 @@ if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table
     from plumbob.crosscheck.verdict import ClaimVerdict
 
-# In a pipe no line is broken: each row and each sentence stands in one.
+# The width of a pipe: each row and each sentence is one line.
 IN_A_PIPE = 10**6
-# After so long [s] a pipe gets its first line on progress, then ever more seldom.
+# Seconds until a pipe gets its first line on progress, and the longest pause between lines.
 PAUSE, LONGEST_PAUSE = 10.0, 60.0
 
 
 def width() -> int:
-    """Return how many letters a line may have: the terminal's, or in a pipe any."""
+    """Return the width of the terminal; practically unlimited in a pipe."""
     return shutil.get_terminal_size((IN_A_PIPE, 24)).columns
 
 
 def print_tables(suites: Sequence[str], output: Path) -> None:
-    """Print the tables with numbers that come from these suites."""
+    """Print the tables of these suites that have numbers."""
     from plumbob.bench.report.sections import tables
     from plumbob.bench.tables.table import is_blank
 
-    for made in tables(_results(suites, output), suites):
-        if not is_blank(made):
-            print_aligned(made, f"plumbob report {output} --table {made.name}")
+    for table in tables(_results(suites, output), suites):
+        if not is_blank(table):
+            print_aligned(table, f"plumbob report {output} --table {table.name}")
 
 
 def print_ending(suites: Sequence[str], output: Path) -> None:
-    """Print what a bench of these suites came to, in about eight lines."""
+    """Print the summary of a bench of these suites, in about eight lines."""
     from plumbob.bench.report.outcome import ending
 
     print("\n".join(ending(_results(suites, output), suites, width())))
@@ -51,7 +51,7 @@ def _results(suites: Sequence[str], output: Path) -> "Results":
 
 
 def print_summary(table: "Table") -> None:
-    """Print what a table is called and says."""
+    """Print title and summary of a table."""
     from plumbob.bench.tables.aligned import filled
 
     print()
@@ -62,7 +62,7 @@ def print_summary(table: "Table") -> None:
 
 
 def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe") -> None:
-    """Print a table with what it says, as wide as the terminal; say what shows columns left out."""
+    """Print title, summary and rows of a table, and how to see the columns that do not fit."""
     from plumbob.bench.tables.aligned import filled
     from plumbob.reference.arguments import name_list
 
@@ -74,27 +74,27 @@ def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe")
 
 
 def print_lines(table: "Table") -> list[str]:
-    """Print the lines of a table; return the headings of the columns that had no place."""
+    """Print the rows of a table; return the headings of the columns that do not fit."""
     from rich.console import Console
 
     from plumbob.bench.tables.aligned import aligned
 
-    made = aligned(table, width())
+    lines, _, left_out = aligned(table, width())
     console = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
-    for line in made.lines:
+    for line in lines:
         console.print(line)
-    return made.left_out
+    return left_out
 
 
-def print_outcome(written: "Report") -> None:
-    """Print what a report came to, in ten lines."""
+def print_outcome(report: "Report") -> None:
+    """Print the summary of a report, in ten lines."""
     from plumbob.bench.report.outcome import outcome
 
-    print("\n".join(outcome(written, width())), flush=True)
+    print("\n".join(outcome(report, width())), flush=True)
 
 
 def print_verdicts(verdicts: Sequence["ClaimVerdict"]) -> None:
-    """Print a row for each verdict, then why claims were missed and how many held."""
+    """Print a row for each claim, the reasons of missed claims, and how many hold."""
     from plumbob.bench.harness.metrics import ratio
     from plumbob.bench.tables.table import Column, Table, cells
 
@@ -114,10 +114,10 @@ def print_verdicts(verdicts: Sequence["ClaimVerdict"]) -> None:
 
 
 def progress() -> Any:
-    """Return a progress bar on a terminal, and nothing to see in a pipe.
+    """Return a progress bar, invisible in a pipe.
 
-    Bar, count and time left keep their place at any width; what is being done takes the rest. The
-    field "kept" of its task counts steps that took no time.
+    The description takes the space that bar, count and time left do not need. The field "kept" of
+    its task counts steps that took no time.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn
@@ -129,12 +129,13 @@ def progress() -> Any:
             return Text(time_left(task.elapsed, task.completed, task.total, task.fields))
 
     console = Console(stderr=True)
-    rigid, rest = Column(no_wrap=True), Column(no_wrap=True, overflow="ellipsis", ratio=1)
+    rigid = Column(no_wrap=True)
+    flexible = Column(no_wrap=True, overflow="ellipsis", ratio=1)
     return Progress(
         BarColumn(max(4, min(24, console.width // 6 - 1)), table_column=rigid.copy()),
         MofNCompleteColumn(table_column=rigid.copy()),
         TimeLeft(table_column=rigid.copy()),
-        TextColumn("{task.description}", markup=False, table_column=rest),
+        TextColumn("{task.description}", markup=False, table_column=flexible),
         console=console,
         transient=True,
         expand=True,
@@ -145,7 +146,7 @@ def progress() -> Any:
 
 @contextlib.contextmanager
 def lines_in_a_pipe(bar: Any) -> Iterator[None]:
-    """Print how far a bar is, now and then, where standard error is no terminal."""
+    """Print the state of a progress bar now and then, where standard error is no terminal."""
     end = threading.Event()
 
     def report() -> None:
@@ -168,14 +169,14 @@ def lines_in_a_pipe(bar: Any) -> Iterator[None]:
 def time_left(
     elapsed: float | None, completed: float, total: float | None, fields: Mapping[str, Any]
 ) -> str:
-    """Return how long the rest takes if it goes on as it went: "1:05 left".
+    """Return the remaining time at the average pace so far: "1:05 left".
 
-    "?" before a hundredth is done, for the first calls compile.
+    "? left" before a hundredth is complete, since the first calls compile.
     """
-    done = completed - fields.get("kept", 0)
-    if not elapsed or total is None or done <= 0.01 * total:
+    steps = completed - fields.get("kept", 0)
+    if not elapsed or total is None or steps <= 0.01 * total:
         return "? left"
-    minutes, seconds = divmod(round(elapsed / done * (total - completed)), 60)
+    minutes, seconds = divmod(round(elapsed / steps * (total - completed)), 60)
     hours, minutes = divmod(minutes, 60)
     clock = f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
     return f"{clock} left"

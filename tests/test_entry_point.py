@@ -22,7 +22,7 @@ AS_IN_C = (
     STRIKE.replace("\nos", "\ntry:\n    os") + "except BaseException:\n    raise ImportError\n"
 )
 AT_EXIT = "import atexit, os, signal\natexit.register(os.kill, os.getpid(), signal.SIGINT)\n"
-INTERRUPTION = "plumbob: interrupted; a bench keeps what it has finished\n"
+INTERRUPTION = "plumbob: interrupted\n"
 
 
 def run(arguments, folder, **options):

@@ -127,7 +127,7 @@ def _common_motions(pair: Pair, old: np.ndarray, new: np.ndarray) -> tuple[np.nd
 
 
 def _compare_array(key: RowKey, name: str, pair: Pair) -> RowChange:
-    """Return the change of one array of answers."""
+    """Return the change of an array of answers."""
     old, new = _common_motions(pair, *_common_targets(pair.old.arrays[name], pair.new.arrays[name]))
     if old.shape != new.shape:
         why = f"shape {old.shape}, now {new.shape}"

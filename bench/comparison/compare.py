@@ -132,7 +132,7 @@ def failing(rows: Iterable[RowChange], limits: Mapping[str, float]) -> list[RowC
 
 
 def headline(comparison: RunComparison, failed: Sequence[RowChange]) -> str:
-    """Return the result in one sentence."""
+    """Return the result in a sentence."""
     if failed:
         return f"STOP: {counted(len(failed), 'row')} beyond the limits of --fail"
     bad = (ChangeVerdict.LESS_RIGHT, ChangeVerdict.SLOWER)

@@ -28,7 +28,7 @@ class RecordedRun(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Medians of a quantity of one row over the runs, NaN where it was not measured."""
+    """Medians of a quantity of a row over the runs, NaN where it was not measured."""
 
     problem: str
     solver: str

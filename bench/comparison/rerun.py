@@ -97,7 +97,7 @@ def clone_root(folder: Path) -> Path:
 
 @contextlib.contextmanager
 def _temporary_folder() -> Iterator[Path]:
-    """Yield a locked folder; remove folders of this user whose process was killed."""
+    """Yield a locked folder; remove folders of this user after their process was killed."""
     for old in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/old"):
         with contextlib.suppress(OSError):
             status = old.parent.lstat()
@@ -128,7 +128,7 @@ def _check_out(root: Path, revision: str, folder: Path) -> None:
 
 
 class Revision:
-    """A process that measures blocks of one revision, by the sources in a folder."""
+    """A process that measures blocks of a revision, by the sources in a folder."""
 
     def __init__(self, folder: Path, plan: Plan) -> None:
         program = [sys.executable, "-P", revision_process.__file__]
@@ -159,7 +159,7 @@ class Revision:
 
 
 class _Bench(NamedTuple):
-    """The folders of both revisions, the plan, and what shows its progress."""
+    """The folders of both revisions, the plan, and a function that shows progress."""
 
     folders: tuple[Path, Path]
     plan: Plan
@@ -184,8 +184,8 @@ def _measure(bench: _Bench) -> RunComparison:
     count = max(map(len, times.values()), default=0)
     ratios = _ratios(times)
     if decided := _decided(ratios):
-        again = bench._replace(plan=bench.plan._replace(seed=bench.plan.seed + 1, pairs=count))
-        repeated = _measure_times(again, {key: pairs[key] for key, _ in decided})
+        second = bench._replace(plan=bench.plan._replace(seed=bench.plan.seed + 1, pairs=count))
+        repeated = _measure_times(second, {key: pairs[key] for key, _ in decided})
         ratios |= _confirmed(decided, _ratios(repeated))
     rows = worst_first([*changes, *row_changes(pairs, ratios)])
     return RunComparison(rows, _drift(times, count), METHOD.format(pairs=count), is_rerun=True)
@@ -211,18 +211,18 @@ def _measure_answers(bench: _Bench) -> list[dict[RowKey, Record]]:
 
 def _measure_times(bench: _Bench, rows: Mapping[RowKey, Pair]) -> TimePairs:
     """Return pairs of median times of each time of each row, in random order."""
-    timed = [pair for pair in rows.values() if all(map(_median_times, pair))]
-    needed = pairs_needed(sum(len(_median_times(pair.old)) for pair in timed))
-    count = (bench.plan.pairs or needed) if timed else 0
+    clocked = [pair for pair in rows.values() if all(map(_median_times, pair))]
+    needed = pairs_needed(sum(len(_median_times(pair.old)) for pair in clocked))
+    count = (bench.plan.pairs or needed) if clocked else 0
     rng = np.random.default_rng(bench.plan.seed)
     times: TimePairs = {}
     for i in range(count):
-        bench.tell(f"pair {i + 1} of {count}, {len(timed)} rows")
+        bench.tell(f"pair {i + 1} of {count}, {len(clocked)} rows")
         with bench.processes(_random_order(rng)) as revisions:
             for revision in revisions:
                 revision.blocks()
-            for j in rng.permutation(len(timed)):
-                pair = timed[j]
+            for j in rng.permutation(len(clocked)):
+                pair = clocked[j]
                 order = _random_order(rng)
                 medians = {k: _median_times(revisions[k].measure(pair[k].key)) for k in order}
                 for name in medians[0].keys() & medians[1].keys():
@@ -261,7 +261,7 @@ def _decided(ratios: TimeRatios) -> TimeRatios:
 
 
 def _confirmed(first: TimeRatios, second: TimeRatios) -> TimeRatios:
-    """Return the second ratios of what was decided twice alike; the others count as chance.
+    """Return the second ratios of times decided twice alike; the others count as chance.
 
     The second estimate is unbiased: it was not selected for its size.
     """

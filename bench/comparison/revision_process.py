@@ -1,4 +1,4 @@
-"""Measure blocks of the revision in a folder, one for each line of standard input.
+"""Measure blocks of the revision in a folder, for each line of standard input.
 
 A program of its own, run by path: it imports the bench of any revision, and uses only what the
 bench has had since its first records.

@@ -1,4 +1,4 @@
-"""Rows of a comparison: the records that two runs have of one problem, solver and settings."""
+"""Rows of a comparison: the records that two runs have of the same problem, solver and settings."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -48,14 +48,14 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True)
 class RowChange:
-    """Difference of one quantity of a row between two runs.
+    """Difference of a quantity of a row between two runs.
 
     Attributes:
         key: suite, problem, solver, and settings as JSON without the version.
         quantity: the array that decided; "" for the whole record.
         verdict: of this quantity.
         change: relative size of the difference, for sorting.
-        why: one sentence.
+        why: a sentence.
         ratio: of the new to the old time, where times are compared.
     """
 

@@ -97,8 +97,8 @@ def ratio_of_pairs(old: Floats, new: Floats) -> TimeRatio:
     means = np.sort((differences[first] + differences[second]) / 2)
     nonzero = differences[differences != 0]
     chance = stats.wilcoxon(nonzero, method="exact").pvalue if len(nonzero) else 1.0
-    cut = _signed_rank_quantile(len(differences))
-    low, high = (means[cut], means[-1 - cut]) if cut >= 0 else (-math.inf, math.inf)
+    margin = _signed_rank_quantile(len(differences))
+    low, high = (means[margin], means[-1 - margin]) if margin >= 0 else (-math.inf, math.inf)
     return _from_logs(float(np.median(means)), low, high, float(chance))
 
 
@@ -116,14 +116,14 @@ def _signed_rank_quantile(count: int) -> int:
 
 
 def pairs_needed(rows: int) -> int:
-    """Return how many pairs can decide one of so many rows though a few pairs disagree."""
+    """Return how many pairs can decide a row of so many though a few pairs disagree."""
     return math.ceil(math.log2(2 * max(rows, 1) / ERROR_RATE)) + 6
 
 
 def machine_drift(rows: Mapping[RowKey, Pair]) -> Drift:
     """Return the drift between two runs, by the larger of two estimates.
 
-    One is by solvers whose code did not change, such as engines and copies of memory; the other by
+    The first is by solvers with unchanged code, like engines and copies of memory; the second by
     the fixed loop that is timed beside every record.
     """
     estimates = [*_drift_by_controls(rows), *_drift_by_fixed_loop(rows)]

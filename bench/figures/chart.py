@@ -110,7 +110,7 @@ class Chart:
     Attributes:
         name: the stem of its files.
         title: heading.
-        shows: a sentence on what the chart shows.
+        shows: a sentence on its contents.
         panels: row by row.
         x, y: axes of all panels.
         columns: number of panels beside each other.
@@ -162,7 +162,7 @@ class Chart:
 
     @property
     def caption(self) -> str:
-        """The sentence on what the chart shows, and the names of the grey solvers."""
+        """The sentence on its contents, and the names of the grey solvers."""
         if not self.unlabelled:
             return self.shows
         names = "; ".join(map(label, self.unlabelled))
@@ -238,14 +238,14 @@ def looks(names: Sequence[str]) -> Mapping[str, Look]:
     Solvers with a style of their own choose first.
     """
     styled = [name for name in names if registry.find(name).style is not registry.OTHER]
-    taken: dict[str, Look] = {}
+    assigned: dict[str, Look] = {}
     for name in dict.fromkeys([*styled, *names]):
-        taken[name] = next(look for look in _preferred(name) if look not in taken.values())
-    return taken
+        assigned[name] = next(look for look in _preferred(name) if look not in assigned.values())
+    return assigned
 
 
 def _preferred(name: str) -> tuple[Look, ...]:
-    """Return all looks, first that of the solver's own colour, else one drawn from its name."""
+    """Return all looks, first that of the solver's own colour, else by a hash of its name."""
     colours = [look.colour for look in LOOKS]
     own = registry.find(name).style.colour
     first = colours.index(own) if own in colours else zlib.crc32(name.encode()) % len(LOOKS)
@@ -260,7 +260,6 @@ def declared_chart(
     `fields` are those of `Chart` that are not declared, or differ.
     """
     chart = {"panels": tuple(panels), "entrants": entrants, **declared, **fields}
-    chart["shows"] = " ".join(chart["shows"].split())
     for name in ("x", "y"):
         axis = {"limits": (None, None), **chart.get(name, {})}
         chart[name] = Axis(**{**axis, "limits": tuple(axis["limits"])})

@@ -1,6 +1,6 @@
 """The common style of all figures, and the drawing of charts.
 
-Colours are those of `style.COLOURS`, which the dark page replaces by its own. Solvers differ in
+Colours are from `style.COLOURS`, which the dark page replaces by its own. Solvers differ in
 line and marker as well as in colour.
 """
 
@@ -157,7 +157,7 @@ def _style(look: Look, marks: bool) -> dict[str, Any]:
 
 
 class _ChartDrawer:
-    """Draws the panels of one chart."""
+    """Draws the panels of a chart."""
 
     def __init__(self, chart: Chart, columns: int) -> None:
         self._chart, self._looks = chart, looks(chart.labelled)
@@ -180,7 +180,7 @@ class _ChartDrawer:
         return [Line2D([], [], **style) for style in entries.values()], list(entries)
 
     def draw(self, ax: Axes, panel: Panel) -> None:
-        """Draw the curves of a panel: the grey ones below."""
+        """Draw the curves of a panel: grey curves below."""
         for curve in sorted(panel.series, key=lambda curve: curve.solver in self._looks):
             draw = self._draw_marks if self._chart.rows else self._draw_line
             for artist in draw(
@@ -211,7 +211,7 @@ class _ChartDrawer:
         return list(ax.plot(curve.x, curve.y, **style))
 
     def _draw_marks(self, ax: Axes, curve: Series, style: dict[str, Any]) -> list[Line2D]:
-        """Draw marks in their rows, each labelled solver a little below the one before."""
+        """Draw marks in their rows, each labelled solver a little below the last."""
         x, y = curve.x, curve.y
         is_labelled = curve.solver in self._looks
         if is_labelled:
@@ -286,7 +286,7 @@ def _plain(x: float, _: float = 0) -> str:
 
 
 def power(x: float, _: float = 0) -> str:
-    """Return a power of ten with a raised exponent in letters of one size, legible as text."""
+    """Return a power of ten with a raised exponent in letters of equal size, legible as text."""
     exponent = np.floor(np.log10(x) + 1e-9)
     factor = f"{x / 10**exponent:.3g}·".removeprefix("1·")
     return f"{factor}10" + f"{exponent:.0f}".translate(_RAISED)

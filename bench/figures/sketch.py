@@ -45,7 +45,7 @@ class Sketch:
     Attributes:
         name: the stem of its files.
         title: heading.
-        shows: a sentence on what the figure shows.
+        shows: a sentence on its contents.
         data: of the figure: arrays, words, numbers, and tuples of such.
         draw: returns the figure of the data; imports matplotlib only then.
     """
@@ -125,8 +125,10 @@ def _update(digest: Any, value: Any) -> None:
         digest.update(f"{type(value).__name__}:{value!r};".encode())
 
 
-def chart_sketch(chart: "Chart") -> Sketch:
-    """Return the sketch of a chart."""
+def chart_sketch(chart: "Chart") -> Sketch | None:
+    """Return the sketch of a chart, None if the chart has no curves."""
+    if not any(panel.series for panel in chart.panels):
+        return None
     return Sketch(chart.name, chart.title, chart.caption, chart, _draw_chart)
 
 

@@ -56,7 +56,7 @@ def _shorter_tag(tag: str) -> str:
 
 
 def _with_classes(text: str, prefix: str) -> str:
-    """Return an SVG whose repeated styles are classes, declared once behind its first tag."""
+    """Return an SVG with repeated styles as classes, declared behind its first tag."""
     text = re.sub(r' clip-path="([^"]*)" style="', r' style="clip-path:\1;', text)
     counts = Counter(re.findall(r' style="([^"]*)"', text))
     repeated = [style for style, count in counts.items() if count > 1]

@@ -1,7 +1,7 @@
 """Motions to be played on a page: an arm on its curve, cloths beside each other, errors in colour.
 
 A scene becomes HTML that contains its data, quantised to 16 bits; `SCRIPT` plays all scenes of a
-page without any request. Errors are those measured, not read off the drawing.
+page without any request. Errors are measured, not read off the drawing.
 """
 
 import base64
@@ -37,7 +37,7 @@ _MAX_COORDINATE, _MAX_SHADE = 65535, 255
 
 
 class Moving(NamedTuple):
-    """The motion of one solver.
+    """The motion of a solver.
 
     Attributes:
         label: name of the solver.
@@ -53,13 +53,13 @@ class Moving(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """Motions of one or more solvers with the same frames.
+    """Motions of solvers with the same frames.
 
     Attributes:
         name: within the page.
         title: heading.
-        shows: a sentence on what the scene shows.
-        motions: by solver; the first ones are shown first.
+        shows: a sentence on its contents.
+        motions: by solver; the first are shown first.
         seconds: from frame to frame [s].
         measure: name of the error, such as "distance to the target".
         view: azimuth and height of the camera [rad].
@@ -172,7 +172,7 @@ def data_of(scene: Scene) -> dict[str, Any]:
 
 
 def _packed(points: Floats, low: Floats, size: float) -> str:
-    """Return coordinates as 16 bits each, little-endian, those that are not finite as 0."""
+    """Return coordinates as 16 bits each, little-endian, non-finite values as 0."""
     with np.errstate(invalid="ignore"):
         scaled = np.nan_to_num(np.round((np.asarray(points) - low) / size * _MAX_COORDINATE))
     return base64.b64encode(np.clip(scaled, 0, _MAX_COORDINATE).astype("<u2").tobytes()).decode()

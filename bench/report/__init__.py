@@ -1,1 +1,1 @@
-"""From records to tables, figures and one page, without measuring anything."""
+"""From records to tables, figures and a page, without measuring anything."""

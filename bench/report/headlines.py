@@ -26,6 +26,11 @@ from .standings import Headline, of_finishers, solved, speed, standings
 MAX_NAMED = 2
 SUBJECTS = {"kinematics": "Forward kinematics", "ik": "Inverse kinematics", "cloth": "Cloth step"}
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
+# What the scales of a run mean.
+_SCALES = {
+    "quick": "Quick run: few targets and rounds",
+    "full": "Full run: all targets and rounds",
+}
 # Median times by problem and solver [s].
 Times = Mapping[str, Mapping[str, float]]
 
@@ -74,23 +79,26 @@ def headlines(results: Results) -> list[Headline]:
 
 
 def scale(results: Results) -> str:
-    """Return the scale of the run: "Quick run: 20 targets a stratum", "" if unknown."""
+    """Return the scale of the records: "Quick run: 20 targets a stratum", "" if unknown."""
     names = dict.fromkeys(r.notes.get("scale", "") for r in results.all(FINISHED))
     name = listed(list(filter(None, names)))
     records = results.all("ik", task=REACHABLE)
     counts = {int(r.size) // max(1, len(r.details.strata)) for r in records} - {0}
     targets = listed([words(count) for count in sorted(counts)], "or")
     run = f"{name} run".strip().capitalize()
-    return f"{run}: {targets} targets a stratum" if targets else run if name else ""
+    if targets:
+        return f"{run}: {targets} targets a stratum"
+    mixture = "Some suites were measured quickly, others at full length"
+    return _SCALES.get(name, mixture) if name else ""
 
 
 def absent(results: Results) -> list[str]:
     """Return the peers that were asked and took no part."""
     records = results.all("ik", task=REACHABLE)
-    asked = {record.solver for record in records}
+    requested = {record.solver for record in records}
     present = {record.solver for record in records if "solved" in record.arrays}
     peers = _recorded_names()
-    solvers = [peer for peer, names in peers.items() if names & asked and not names & present]
+    solvers = [peer for peer, names in peers.items() if names & requested and not names & present]
     packages = {record.solver for record in results.all("cloth", task=MISSING)}
     engines = [peer.engine for peer in registry.cloth_peers() if peer.package in packages]
     return [*solvers, *(f"{engine} (cloth)" for engine in dict.fromkeys(engines))]
@@ -98,8 +106,10 @@ def absent(results: Results) -> list[str]:
 
 def not_asked(results: Results) -> list[str]:
     """Return the peers without records, where there are records of others."""
-    asked = {record.solver for record in results.all("ik", task=REACHABLE)}
-    solvers = [peer for peer, names in _recorded_names().items() if asked and not names & asked]
+    requested = {record.solver for record in results.all("ik", task=REACHABLE)}
+    solvers = [
+        peer for peer, names in _recorded_names().items() if requested and not names & requested
+    ]
     present = {registry.find(point.solver).engine for point in points(results, ONE_STEP)}
     engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers())
     cloth = [f"{engine} (cloth)" for engine in engines if present and engine not in present]
@@ -113,7 +123,7 @@ def _recorded_names() -> dict[str, set[str]]:
 
 
 def _robot_headlines(results: Results, start: str) -> Iterator[Headline]:
-    """Yield the solver that solves the most and the fastest one, on the robots most can solve."""
+    """Yield the solver that solves the most, and the fastest, on the robots most can solve."""
     fields = fields_of(results, start)
     sets: dict[str, dict[str, Score]] = {}
     for score in over_sets(fields):
@@ -145,7 +155,7 @@ def _robot_headlines(results: Results, start: str) -> Iterator[Headline]:
 
 
 def _leaders(names: Sequence[str]) -> str:
-    """Return the one leader, or those that tie."""
+    """Return the leader, or the solvers that tie."""
     if len(names) <= 1:
         return "".join(names)
     return f"Tie: {listed(names) if len(names) <= MAX_NAMED else f'{len(names)} solvers'}"
@@ -164,9 +174,9 @@ def _cloth_headlines(results: Results) -> Iterator[Headline]:
             fastest[step.cloth][engines[step.solver]] = step.values["seconds"]
     arrivals = Counter(solver for solvers in times.values() for solver in solvers)
     if arrivals and len(engines) > 1:
-        most = max(arrivals.values())
-        leaders = [solver for solver in engines if arrivals[solver] == most]
-        detail = f"to {SOLVED} on {most} of {counted(len(times), 'cloth')} in time"
+        maximum = max(arrivals.values())
+        leaders = [solver for solver in engines if arrivals[solver] == maximum]
+        detail = f"to {SOLVED} on {maximum} of {counted(len(times), 'cloth')} in time"
         yield Headline("cloth", "Most steps solved", _leaders(leaders), detail, "cloth_peers_step")
     if count > 1 and (answer := _most_often_first("cloth", fastest, engines=count)):
         yield Headline("cloth", f"Fastest to {SOLVED}", *answer, "cloth_peers_step")
@@ -191,32 +201,32 @@ def _timing_headlines(results: Results, subject: str) -> Iterator[Headline]:
 def _most_often_first(
     noun: str, times: Times, ties: Collection[str] = (), engines: int = 0
 ) -> tuple[str, str] | None:
-    """Return the solver that is fastest on most problems, and by which factors; None if nobody is.
+    """Return the solver that is fastest on most problems and by which factors, None without any.
 
-    Nobody is first on a problem with a tie. With a number of engines, the detail counts those that
-    nobody else solved in time.
+    A problem with a tie has no first. With a number of engines, the detail counts the problems
+    that no other engine solved in time.
     """
     ranked = {name: sorted(times[name].items(), key=lambda pair: pair[1]) for name in times}
     ranked = {name: order for name, order in ranked.items() if order}
     if not ranked:
         return None
-    won = [order for name, order in ranked.items() if name not in ties]
-    if not won:
+    wins = [order for name, order in ranked.items() if name not in ties]
+    if not wins:
         leaders = [solver for solver, _ in next(iter(ranked.values()))]
         return _leaders(leaders), f"too near to tell on {counted(len(ranked), noun)}"
-    firsts = Counter(order[0][0] for order in won)
-    most = max(firsts.values())
-    leaders = [solver for solver, count in firsts.items() if count == most]
+    firsts = Counter(order[0][0] for order in wins)
+    maximum = max(firsts.values())
+    leaders = [solver for solver, count in firsts.items() if count == maximum]
     total = counted(len(times), noun)
     if len(leaders) > 1:
-        return _leaders(leaders), f"each on {most} of {total}"
-    won = [order for order in won if order[0][0] == leaders[0]]
-    factors = [order[1][1] / order[0][1] for order in won if len(order) > 1]
+        return _leaders(leaders), f"each on {maximum} of {total}"
+    wins = [order for order in wins if order[0][0] == leaders[0]]
+    factors = [order[1][1] / order[0][1] for order in wins if len(order) > 1]
     sentences = []
     if factors:
         span = "–".join(dict.fromkeys(map(words, metrics.extent(np.array(factors)))))
         sentences.append(f"{span} times faster than the next on {len(factors)} of {total}")
-    if unopposed := len(won) - len(factors):
+    if unopposed := len(wins) - len(factors):
         only = f"the only one of {engines} engines to get there in time"
         sentences.append(f"{only} on {unopposed} of {total}")
     return leaders[0], listed(sentences)

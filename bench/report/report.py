@@ -1,4 +1,4 @@
-"""Write the report: tables in three formats, figures, and one page that needs no other file."""
+"""Write the report: tables in three formats, figures, and a page that needs no other file."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -56,7 +56,7 @@ def write(folder: Path) -> Report:
 
 
 def _drawings(results: Results, folder: Path) -> tuple[dict[Figure, Drawing], list[str]]:
-    """Return the figures, unchanged ones from the folder, and sentences on those that failed."""
+    """Return the figures, unchanged figures from the folder, and sentences on failures."""
     drawings: dict[Figure, Drawing] = {}
     sentences: list[str] = []
     for figure in all_figures():

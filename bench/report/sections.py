@@ -56,7 +56,7 @@ MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
 
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:
-    """Return the tables of an experiment, imported only now; empty if another one shows them."""
+    """Return the tables of an experiment, imported only now; empty if it has none."""
     name = f"{experiment.package}.tables"
     if importlib.util.find_spec(name) is None:
         return ()

@@ -28,7 +28,7 @@ MAX_CLOTHS = 3
 
 
 class Headline(NamedTuple):
-    """An answer in one line, with a detail and the name of its table.
+    """An answer in a line, with a detail and the name of its table.
 
     For a solver of the user's the chapter is empty, the question its name and task, the answer its
     rank.
@@ -68,7 +68,7 @@ def _failures(results: Results, suite: str) -> Iterator[Headline]:
 
 
 def _target_ranks(task: str, table: str, fields: dict[str, list[Score]]) -> Iterator[Headline]:
-    """Yield the ranks of solvers among those that finished the same targets."""
+    """Yield the ranks of solvers among the solvers that finished the same targets."""
     scores = [score for field in fields.values() for score in field]
     for solver in dict.fromkeys(s.solver for s in scores if s.records[0].facts.get("entrant")):
         problems = {score.robots for score in scores if score.solver == solver}
@@ -147,7 +147,7 @@ def _cloth_ranks(task: str, error: str, phrase: str, field: Sequence[Point]) -> 
 
 
 def _cloth_rank(field: Sequence[Point], solver: str, error: str, phrase: str) -> tuple[int, str]:
-    """Return a solver's rank, and its error and time relative to those with an error as small."""
+    """Return a solver's rank, and its error and time relative to solvers with an error as small."""
     errors = np.array([float(f"{point.values[error]:.2e}") for point in field])  # as displayed
     seconds = np.array([point.values["seconds"] for point in field])
     solvers = np.array([point.solver for point in field])

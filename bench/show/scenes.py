@@ -43,7 +43,7 @@ Progress = Callable[[int, int], None]
 
 
 class ArmMotion(NamedTuple):
-    """An arm, its first pose, the points of its curve, one a frame, and its motion."""
+    """An arm, its first pose, the points of its curve, a point a frame, and its motion."""
 
     skeleton: Skeleton
     rest: FloatArray
@@ -190,5 +190,5 @@ def cloth_scene(
 
 
 def _labels(motions: Sequence[Moving]) -> str:
-    """Return the names of two solvers beside each other, "" of one."""
+    """Return the names of two solvers beside each other, "" for a single solver."""
     return f": {motions[0].label} beside {motions[1].label}" if len(motions) > 1 else ""

@@ -37,7 +37,7 @@ class YourSolver:
         """Open the solver.
 
         Raises:
-            ValueError: if there is no such solver, or it does not say what it offers.
+            ValueError: if there is no solver, or it does not describe itself.
         """
         self.address = " ".join(words)
         self._contestant: Contestant = open_contestant(words[0] if len(words) == 1 else words)

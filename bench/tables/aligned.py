@@ -49,8 +49,8 @@ def aligned(table: Table, width: int) -> AlignedTable:
 def _fitting(table: Table, width: int) -> tuple[list[int], list[float]]:
     """Return the columns that fit, and the lowest width of each.
 
-    The columns that name a row always stay, and one more; folded ones never do. The others are left
-    out from the right, those in which a cell is best last.
+    The columns that name a row always stay, and another; folded columns never do. The others are
+    left out from the right, columns with best cells last.
     """
     names = naming(table)
     for part in _PARTS:
@@ -80,7 +80,7 @@ def _lowest_width(table: Table, j: int, part: int) -> float:
 
 
 def _natural_width(table: Table, j: int) -> int:
-    """Return the width of the cells in one line, and of a heading over numbers in two."""
+    """Return the width of the cells in a line, and of a heading over numbers in two."""
     widest = max((cell_len(words(row[j])) for row in table.rows), default=0)
     tokens = table.columns[j].heading.split()
     if table.columns[j].words or not tokens:

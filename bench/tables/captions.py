@@ -1,4 +1,4 @@
-"""Titles, captions and columns of tables: prose in `tables.toml`, beside the tables' module."""
+"""Titles, captions and columns of tables and figures, from the file `tables.toml` of a folder."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -17,10 +17,6 @@ class Captions:
     """The captions of an experiment's tables.
 
     Braces in a caption hold a number of the measurement, or a sentence of the part `[shared]`.
-
-    Attributes:
-        charts: what `declared_chart` takes, by name.
-        shared: the sentences of the part `[shared]`.
     """
 
     def __init__(self, module: str, **constants: str) -> None:
@@ -28,8 +24,7 @@ class Captions:
         path = Path(module).with_name("tables.toml")
         self._tables = tomllib.loads(path.read_text(encoding="utf-8"))
         self._columns = self._tables.pop("columns", {}), self._tables.pop("folded", {})
-        charts: dict[str, dict[str, Any]] = self._tables.pop("charts", {})
-        self.charts = {name: {"name": name, **chart} for name, chart in charts.items()}
+        self._figures = self._tables.pop("figures", {})
         shared: dict[str, str] = self._tables.pop("shared", {})
         self.shared = {key: _on_one_line(text, constants) for key, text in shared.items()}
         self._constants = {**constants, **self.shared}
@@ -60,6 +55,14 @@ class Captions:
             return _on_one_line(how, {**self._constants, **written, **numbers})
 
         return {"name": name, **captions, "measured": sentence}
+
+    def figure(self, name: str) -> dict[str, Any]:
+        """Return the name, title, caption and axes of a chart, a sketch or a scene."""
+        fields = {
+            key: _on_one_line(field, self._constants) if isinstance(field, str) else field
+            for key, field in self._figures[name].items()
+        }
+        return {"name": name, **fields}
 
     def columns(self, name: str) -> tuple[Column, ...]:
         """Return the columns of a table; each shows the cell that a row has under its title."""

@@ -22,7 +22,7 @@ def titled(title: str) -> Column:
 
 
 def number(title: str, name: str = "", unit: str = "") -> Column:
-    """Return the column of one number of a record, empty where a record has none."""
+    """Return the column of a number of a record, empty where a record has none."""
     return Column(title, unit, read=lambda record: record.arrays.get(name or title))
 
 

@@ -177,7 +177,7 @@ def _fits(columns: Sequence[_TexColumn], width: float, size: int) -> bool:
 def _split(
     table: Table, columns: Sequence[_TexColumn], width: float, size: int
 ) -> list[list[_TexColumn]]:
-    """Return the columns in parts that fit, each begun by those that name a row."""
+    """Return the columns in parts that fit, each begun by the columns that name a row."""
     count = min(naming(table), len(columns) - 1)
     for letters in _WORD_PARTS:
         for column in columns:
@@ -243,7 +243,7 @@ class _TexPart:
         return [*lines, " & ".join(titles) + r" \\"]
 
     def rows(self) -> list[str]:
-        """Return the rows; a first cell that repeats the one above it is left empty."""
+        """Return the rows; a first cell that repeats the cell above it is left empty."""
         lines: list[str] = []
         firsts = [row[0] for row in self.table.rows]
         is_grouped = len(set(firsts)) < len(firsts)
@@ -257,7 +257,7 @@ class _TexPart:
 
 
 def _float(table: Table, parts: Sequence[_TexPart], name: str) -> list[str]:
-    """Return a table that stands on one page, its parts below one another."""
+    """Return a table that stands on a single page, its parts below one another."""
     body = [rf"\begin{{{name}}}", r"\centering", _SKIP, _NUMBERS, _caption(table)]
     body += _setting(parts[0].size)
     for i, part in enumerate(parts):
@@ -272,7 +272,7 @@ def _float(table: Table, parts: Sequence[_TexPart], name: str) -> list[str]:
 
 
 def _long(table: Table, parts: Sequence[_TexPart], width: float) -> list[str]:
-    """Return a table that breaks over pages, which needs a document of one column."""
+    """Return a table that breaks over pages, which needs a single-column document."""
     body = ["% breaks over pages: stands where there is one column of text", "{", _NUMBERS]
     body += [*_setting(parts[0].size), rf"\setlength{{\LTcapwidth}}{{{width:.1f}pt}}"]
     for i, part in enumerate(parts):

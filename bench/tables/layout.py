@@ -31,11 +31,11 @@ class Layout:
         title: its heading.
         subjects: of the rows, such as records.
         columns: of the table, or a function that makes them from all subjects.
-        shows: one sentence on what the table shows, or a function of all subjects.
-        measured: one sentence on how the numbers were measured, or a function of all subjects.
+        shows: a sentence on the contents, or a function of all subjects.
+        measured: a sentence on how the numbers were measured, or a function of all subjects.
         summary: of the numbers, called with all subjects if there are any.
         figures: beside the table.
-        compared: rows are compared whose first so many cells agree; 0: all are.
+        compared: rows with so many equal first cells are compared; 0: all are.
         ranked: whether a subject may be best in its group.
         optional: whether an empty table is no omission.
     """

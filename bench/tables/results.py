@@ -26,8 +26,8 @@ class Results:
 
     Attributes:
         every: all records.
-        records: those with numbers.
-        failed: those that could not be measured.
+        records: records with numbers.
+        failed: records that could not be measured.
     """
 
     def __init__(self, records: Iterable[Record]) -> None:
@@ -42,7 +42,7 @@ class Results:
         return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
 
     def all(self, suite: str, failed: bool = False, **facts: Any) -> list[Record]:
-        """Return a suite's records with these facts or settings; failed ones only on demand."""
+        """Return a suite's records with these facts or settings; failed records only on demand."""
         records = [*self.records, *self.failed] if failed else self.records
         return [record for record in records if record.suite == suite and _has(record, facts)]
 
@@ -53,12 +53,12 @@ class Results:
 
 
 def _has(record: Record, facts: dict[str, Any]) -> bool:
-    known = {**record.settings, **record.facts}
-    return all(known.get(name) == fact for name, fact in facts.items())
+    properties = {**record.settings, **record.facts}
+    return all(properties.get(name) == fact for name, fact in facts.items())
 
 
 def printable(record: Record) -> Record:
-    """Return a record whose words are safe to print anywhere."""
+    """Return a record with words that are safe to print anywhere."""
     names = ("suite", "problem", "solver", "settings", "notes", "stamp", "facts")
     return replace(record, **{name: all_visible(getattr(record, name)) for name in names})
 

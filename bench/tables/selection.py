@@ -26,10 +26,10 @@ _MAX_LISTED = 12
 def selected(
     table: Table, columns: Sequence[str] = (), rows: Sequence[str] = (), order: str = ""
 ) -> Table:
-    """Return a table with some columns and rows, in the order of one of its columns.
+    """Return a table with some columns and rows, in the order of a column.
 
-    The best cells are those of the remaining rows, by all columns of the table. The summary is of
-    all rows, and so left out without one of them.
+    The best cells are the best of the remaining rows, by all columns of the table. The summary is
+    of all rows, and so left out if a row is.
 
     Raises:
         ValueError: if there is no such column, a filter is malformed, or no row passes.
@@ -91,20 +91,20 @@ def _test(table: Table, text: str) -> tuple[int, Callable[[Cell], bool]]:
             "--rows: expected COLUMN and one of = != ~ !~ < > <= >= and a value, such as "
             f"solver=Newton, got {text!r}"
         )
-    name, sign, wanted = (part.strip() for part in match.groups())
+    name, sign, target = (part.strip() for part in match.groups())
     (column,) = column_numbers(table, name, "--rows", several=False)
     if sign not in _COMPARE:
-        return column, lambda cell: _matches(words(cell), sign, wanted)
-    bound, compare = _number(wanted), _COMPARE[sign]
+        return column, lambda cell: _matches(words(cell), sign, target)
+    bound, compare = _number(target), _COMPARE[sign]
     if bound is None:
-        raise ValueError(f"--rows: expected a number behind {name}{sign}, got {wanted!r}")
+        raise ValueError(f"--rows: expected a number behind {name}{sign}, got {target!r}")
     return column, lambda cell: (x := _number(cell)) is not None and compare(x, bound)
 
 
-def _matches(text: str, sign: str, wanted: str) -> bool:
-    """Return whether a text is the wanted one or, with a tilde, contains it; "!" negates."""
-    text, wanted = _plain(text), _plain(wanted)
-    return (wanted in text if "~" in sign else wanted == text) != sign.startswith("!")
+def _matches(text: str, sign: str, target: str) -> bool:
+    """Return whether a text equals the target or, with a tilde, contains it; "!" negates."""
+    text, target = _plain(text), _plain(target)
+    return (target in text if "~" in sign else target == text) != sign.startswith("!")
 
 
 def _plain(text: str) -> str:
@@ -142,13 +142,13 @@ def column_numbers(
     Raises:
         ValueError: if there is no such column; the message offers the nearest.
     """
-    if _NUMBERS.fullmatch(text.strip()) and _named(table, text) is None:
+    if _NUMBERS.fullmatch(text.strip()) and _column_of(table, text) is None:
         return _by_number(table, text, option)
     parts = text.split(",")
     numbers: list[int] = []
     while parts:
         for count in range(len(parts), 0, -1):  # a heading may contain commas: the longest counts
-            number = _named(table, ",".join(parts[:count]))
+            number = _column_of(table, ",".join(parts[:count]))
             if number is not None:
                 break
         if number is None or (numbers and not several):
@@ -158,8 +158,8 @@ def column_numbers(
     return numbers
 
 
-def _named(table: Table, name: str) -> int | None:
-    """Return the one column of this heading, or else of this title."""
+def _column_of(table: Table, name: str) -> int | None:
+    """Return the only column of this heading, or else of this title."""
     for attribute in ("heading", "titled", "title"):
         texts = [_plain(getattr(column, attribute)) for column in table.columns]
         if texts.count(_plain(name)) == 1:

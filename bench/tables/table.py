@@ -99,7 +99,7 @@ class Source(NamedTuple):
 
     @property
     def command(self) -> str:
-        """The command that measures the row again, "" where nothing was measured.
+        """The command that measures the row again, "" without measurements.
 
         It measures the whole suite where a row has many problems or solvers.
         """
@@ -123,11 +123,11 @@ class Table:
         name: the stem of its files.
         title: its heading.
         columns: with distinct headings; the first names the row.
-        rows: the cells; None where nothing was measured.
-        shows: one sentence on what the table shows.
-        measured: one sentence on how the numbers were measured.
+        rows: the cells; None without measurements.
+        shows: a sentence on the contents.
+        measured: a sentence on how the numbers were measured.
         summary: generated from the numbers.
-        compared: rows are compared whose first so many cells agree; 0: all are.
+        compared: rows with so many equal first cells are compared; 0: all are.
         unranked: numbers of rows that are never best, such as those of a solver cut short.
         sources: the measurements behind each row; empty if unknown.
         provenance: number of samples, machine and versions.
@@ -172,7 +172,7 @@ def best_cells(table: Table) -> set[tuple[int, int]]:
     """Return row and column of each cell that is best among the rows it is compared with.
 
     Ties are all best: shares whose intervals overlap with that of the best, numbers that are
-    written alike. A cell that nothing is compared with is not best.
+    written alike. A cell without rivals is not best.
     """
     if table.best is not None:
         return set(table.best)
@@ -213,7 +213,7 @@ def _ties(cell: Cell, best: Cell) -> bool:
 
 
 def without_empty(table: Table) -> Table:
-    """Return a table without empty columns, such as remarks that no row has."""
+    """Return a table without empty columns."""
     count = len(table.columns)
     filled = [j for j in range(count) if any(words(row[j]) for row in table.rows)]
     filled = filled or list(range(count))

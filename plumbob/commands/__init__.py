@@ -1,1 +1,1 @@
-"""The commands: what each is asked and what it prints; the work is done elsewhere."""
+"""The commands: their options and output; the work is done elsewhere."""

@@ -9,88 +9,83 @@ import typer
 
 from ..help_text import block
 from ..terminal import print_aligned, width
-from .options import MISSED, SUCCESS, known
+from .options import FAILED, SUCCESS, OptionalFile, Texts, known, write_text
 
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import RunComparison
 
-_File = Path | None
-_Words = list[str] | None
-Folders = Annotated[
-    list[Path] | None, typer.Argument(metavar="[OLD NEW]", help="Two folders with records.")
-]
-Fail = Annotated[
-    str, typer.Option(metavar="LIMITS", help="Exit 1 beyond these: accuracy,time:10%,gone.")
-]
-Rerun = Annotated[
-    str,
-    typer.Option(metavar="REV", help="In a clone of Plumbob, measure this revision beside ours."),
-]
-Suites = Annotated[_Words, typer.Option("--suite", help="With --rerun: only these suites.")]
-Only = Annotated[
-    _Words,
-    typer.Option(metavar="TEXT", help="With --rerun: problems or solvers that contain it."),
-]
-Pairs = Annotated[
-    int, typer.Option(min=0, help="With --rerun: pairs of each; 0 for as many as rows need.")
-]
-Markdown = Annotated[
-    _File, typer.Option(metavar="FILE", help="Write a comment for a pull request.")
-]
-Json = Annotated[_File, typer.Option(metavar="FILE", help="Write every row.")]
-
-
-def compare(
-    folders: Folders = None,
-    fail: Fail = "",
-    rerun: Rerun = "",
-    suites: Suites = None,
-    only: Only = None,
-    pairs: Pairs = 0,
-    markdown: Markdown = None,
-    json: Json = None,
-) -> int:
-    """Say what got faster, slower, more or less right between two runs or revisions.
-
-    Answers are compared to the bit, times by intervals. What lies within the machine's drift is
-    undecided; --rerun REV decides it. Exit code 1 if --fail stops at a row.
-    """
-    from plumbob.bench.comparison import compare as comparison
-
-    limit = comparison.gate_limits(fail)
-    two = list(folders or [])
-    if rerun and not two:
-        made = _side_by_side(rerun, suites or ["timing"], only or [], pairs)
-        old, new = rerun, "the working copy"
-    elif len(two) == 2 and not rerun:
-        made = _of_folders(*two)
-        old, new = map(str, two)
-    else:
-        raise ValueError(f"compare: expected OLD and NEW, or --rerun REV, got {len(two)} folders")
-    stopped = comparison.failing(made.rows, limit)
-    print("\n".join(comparison.summary(made, stopped, width())))
-    if markdown:
-        from plumbob.bench.tables import writers
-
-        _write(markdown, writers.markdown(comparison.table(made, stopped, old, new)))
-    if json:
-        _write(json, comparison.as_json(made, stopped, old, new))
-    return MISSED if stopped else SUCCESS
-
-
 COMPARE_EXAMPLES = block(
     "Examples",
-    "plumbob compare before after                     two folders of records",
+    ("plumbob compare before after", "two folders of records"),
     "plumbob compare before after --fail accuracy,time:10% --markdown comment.md",
-    "plumbob compare --rerun main --only ccd          measured side by side, in a clone",
+    ("plumbob compare --rerun main --only ccd", "two revisions side by side"),
+)
+HISTORY_EXAMPLES = block(
+    "Examples",
+    ("plumbob history runs/*", "times, the largest change first"),
+    "plumbob history runs/* --only ccd --quantity iterations -o iterations.svg",
 )
 
 
-def _of_folders(old: Path, new: Path) -> "RunComparison":
-    from plumbob.bench.comparison.compare import compare as compare_records
-    from plumbob.bench.harness.record import on_record
+def compare(
+    folders: Annotated[
+        list[Path] | None, typer.Argument(metavar="[OLD NEW]", help="Two folders of records.")
+    ] = None,
+    *,
+    fail: Annotated[
+        str,
+        typer.Option(
+            metavar="LIMITS", help="Exit 1 beyond limits, such as accuracy,time:10%,gone."
+        ),
+    ] = "",
+    rerun: Annotated[
+        str,
+        typer.Option(metavar="REV", help="Measure a revision beside the working copy, in a clone."),
+    ] = "",
+    suites: Annotated[
+        Texts, typer.Option("--suite", metavar="NAME", help="With --rerun: measure this suite.")
+    ] = None,
+    only: Annotated[
+        Texts,
+        typer.Option(metavar="TEXT", help="With --rerun: problems or solvers with this text."),
+    ] = None,
+    pairs: Annotated[
+        int, typer.Option(min=0, help="With --rerun: number of pairs; 0 for as many as needed.")
+    ] = 0,
+    markdown: Annotated[
+        OptionalFile, typer.Option(metavar="FILE", help="Write a comment for a pull request.")
+    ] = None,
+    json: Annotated[
+        OptionalFile, typer.Option(metavar="FILE", help="Write all rows as JSON.")
+    ] = None,
+) -> int:
+    """Compare two runs or revisions: faster, slower, more or less accurate.
 
-    return compare_records(*(on_record(folder, typed=False).records for folder in (old, new)))
+    Answers are compared to the bit, times by confidence intervals. Differences within the drift of
+    the machine are undecided; --rerun REV decides them. Exit code 1 if a row fails --fail.
+    """
+    from plumbob.bench.comparison import compare as comparison
+    from plumbob.bench.harness.record import on_record
+    from plumbob.bench.tables.writers import markdown as as_markdown
+
+    limits = comparison.gate_limits(fail)
+    paths = list(folders or [])
+    if rerun and not paths:
+        rows = _side_by_side(rerun, suites or ["timing"], only or [], pairs)
+        old, new = rerun, "the working copy"
+    elif len(paths) == 2 and not rerun:
+        rows = comparison.compare(*(on_record(folder, typed=False).records for folder in paths))
+        old, new = map(str, paths)
+    else:
+        got = f"{len(paths)} folder{'' if len(paths) == 1 else 's'}"
+        raise ValueError(f"compare: expected OLD and NEW, or --rerun REV, got {got}")
+    failed = comparison.failing(rows.rows, limits)
+    print("\n".join(comparison.summary(rows, failed, width())))
+    if markdown:
+        write_text(markdown, as_markdown(comparison.table(rows, failed, old, new)))
+    if json:
+        write_text(json, comparison.as_json(rows, failed, old, new))
+    return FAILED if failed else SUCCESS
 
 
 def _side_by_side(
@@ -99,47 +94,33 @@ def _side_by_side(
     from plumbob.bench.comparison.rerun import Plan, clone_root, rerun
     from plumbob.bench.experiments import SUITES
 
-    plan = Plan(
-        revision, tuple(known("suite", name, SUITES) for name in suites), tuple(words), pairs
-    )
-    return rerun(
-        plan, clone_root(Path.cwd()), partial(print, "plumbob:", file=sys.stderr, flush=True)
-    )
+    names = tuple(known("suite", name, SUITES) for name in suites)
+    tell = partial(print, "plumbob:", file=sys.stderr, flush=True)
+    return rerun(Plan(revision, names, tuple(words), pairs), clone_root(Path.cwd()), tell)
 
 
 def history(
     folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Folders of records.")],
-    quantity: Annotated[str, typer.Option(help="An array of the records.")] = "seconds",
+    *,
+    quantity: Annotated[
+        str, typer.Option(metavar="NAME", help="Array of the records.")
+    ] = "seconds",
     only: Annotated[
-        list[str] | None, typer.Option(metavar="TEXT", help="Problems or solvers that contain it.")
+        Texts, typer.Option(metavar="TEXT", help="Problems or solvers with this text; repeatable.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw it: an .svg.")
+        OptionalFile,
+        typer.Option("--output", "-o", metavar="FILE", help="Write a figure, an .svg."),
     ] = None,
 ) -> int:
-    """Show a quantity over many runs, the greatest change first."""
-    from plumbob.bench.comparison import history as past
+    """Show a quantity over many runs, the largest change first."""
+    from plumbob.bench.comparison import history as course
 
     if output and output.suffix != ".svg":
         raise ValueError(f"--output: expected a file that ends with .svg, got {output}")
-    runs = past.read_runs(folders)
-    made = past.courses(runs, quantity, only or [])
-    print_aligned(past.table(runs, made, quantity))
+    runs = course.read_runs(folders)
+    rows = course.courses(runs, quantity, only or [])
+    print_aligned(course.table(runs, rows, quantity))
     if output:
-        _write(output, past.draw(runs, made, quantity))
+        write_text(output, course.draw(runs, rows, quantity))
     return SUCCESS
-
-
-HISTORY_EXAMPLES = block(
-    "Examples",
-    "plumbob history runs/*                           times, the greatest change first",
-    "plumbob history runs/* --only ccd --quantity iterations -o iterations.svg",
-)
-
-
-def _write(path: Path, text: str) -> None:
-    from plumbob.bench.harness.record import check_regular
-
-    check_regular(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")

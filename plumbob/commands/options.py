@@ -1,6 +1,7 @@
-"""What several commands share: their exit codes, options, and checks of what is asked for."""
+"""Exit codes and options that several commands share, and checks of arguments."""
 
 import difflib
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
@@ -10,23 +11,23 @@ import typer
 from ..entry_point import INTERRUPTED as INTERRUPTED
 
 REPORT = Path("report")
-SUCCESS, MISSED, MISUSED, UNREAD = 0, 1, 2, 141
+SUCCESS, FAILED, MISUSED, UNREAD = 0, 1, 2, 141
 
+Texts = list[str] | None
+OptionalFile = Path | None
 Output = Annotated[
-    Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of records and report.")
+    Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of the records and report.")
 ]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Forget what is on record; measure anew.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Delete the records and measure again.")]
 
 
 def writable(folder: Path) -> None:
-    """Make the folder if need be.
+    """Make a folder if necessary.
 
     Raises:
-        OSError: naming it, if nothing can be written there.
-        ValueError: if it is something else than a folder.
+        OSError: if the folder is not writable.
+        ValueError: if it is not a folder.
     """
-    import tempfile
-
     from plumbob.bench.harness.record import check_folder
 
     check_folder(folder)
@@ -36,6 +37,15 @@ def writable(folder: Path) -> None:
             pass
     except OSError as error:
         raise OSError(error.errno, "cannot write here", str(folder)) from None
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file, and make its folder if necessary."""
+    from plumbob.bench.harness.record import check_regular
+
+    check_regular(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
 
 
 def known(kind: str, name: str, valid: Iterable[str]) -> str:

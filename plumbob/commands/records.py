@@ -1,4 +1,4 @@
-"""The command `records`: list, merge and drop what is on record."""
+"""The command `records`: list, merge and drop records."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -7,115 +7,112 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..help_text import Command, Group, block
-from .options import REPORT, SUCCESS
+from .options import REPORT, SUCCESS, Texts
 
 if TYPE_CHECKING:
     from plumbob.bench.harness.record import Key, Record
     from plumbob.bench.tables.table import Table
 
 app = typer.Typer(cls=Group, rich_markup_mode=None)
+LIST = "plumbob records list report"
+MERGE = "plumbob records merge laptop desktop --into both"
+DROP = 'plumbob records drop --solver "My solver"'
 
-Folder = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="A folder of records.")]
-Suites = Annotated[list[str] | None, typer.Option("--suite", help="Of these suites.")]
-Solvers = Annotated[list[str] | None, typer.Option("--solver", help="Of these solvers.")]
-Problems = Annotated[list[str] | None, typer.Option("--problem", help="On these problems.")]
-Failed = Annotated[bool, typer.Option("--failed", help="That could not be measured.")]
+Folder = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Folder of the records.")]
+Suites = Annotated[Texts, typer.Option("--suite", metavar="NAME", help="Only this suite.")]
+Solvers = Annotated[Texts, typer.Option("--solver", metavar="NAME", help="Only this solver.")]
+Problems = Annotated[Texts, typer.Option("--problem", metavar="NAME", help="Only this problem.")]
+Failed = Annotated[bool, typer.Option("--failed", help="Only failed measurements.")]
 Superseded = Annotated[
-    bool, typer.Option("--superseded", help="Under settings that are no longer asked for.")
+    bool, typer.Option("--superseded", help="Only records with outdated settings.")
 ]
 
 
-@app.callback(
-    epilog=block(
-        "Examples",
-        "plumbob records list",
-        "plumbob records merge laptop desktop --into both",
-        'plumbob records drop --solver "My solver"',
-    )
-)
+@app.callback(epilog=block("Examples", LIST, MERGE, DROP))
 def records() -> None:
-    """List, merge or drop what is on record; nothing else ever removes a record."""
+    """List, merge or drop records; no other command removes any, except --fresh."""
 
 
-@app.command("list", cls=Command, epilog=block("Examples", "plumbob records list report"))
+@app.command("list", cls=Command, epilog=block("Examples", LIST))
 def list_records(
     folder: Folder = REPORT,
+    *,
     suites: Suites = None,
     solvers: Solvers = None,
     problems: Problems = None,
     failed: Failed = False,
     superseded: Superseded = False,
 ) -> int:
-    """Count what is on record, by suite and solver, and where it was measured."""
+    """Count the records by suite and solver, and list the machines."""
     from plumbob.bench.harness.record import FINISHED
     from plumbob.bench.tables.results import printable
 
     from ..terminal import print_aligned
 
-    wanted = _selection(suites, solvers, problems, failed, superseded)
+    matches = _filter(suites, solvers, problems, failed, superseded)
     measured = (record for record in _read(folder) if record.suite != FINISHED)
-    found = [printable(record) for record in measured if wanted(record)]
-    print_aligned(_table(folder, found))
+    print_aligned(_table(folder, [printable(record) for record in measured if matches(record)]))
     return SUCCESS
 
 
-@app.command(
-    "merge",
-    cls=Command,
-    epilog=block("Examples", "plumbob records merge laptop desktop --into both"),
-)
+@app.command("merge", cls=Command, epilog=block("Examples", MERGE))
 def merge(
     folders: Annotated[
         list[Path], typer.Argument(metavar="FOLDER...", help="Folders to take records from.")
     ],
-    into: Annotated[Path, typer.Option("--into", metavar="DIR", help="The folder to add to.")],
+    into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder to add to.")],
 ) -> int:
     """Add the records of folders to another; of two of the same measurement the later counts.
 
-    One that failed never takes the place of one that did not. The folders stay as they are.
+    A failed measurement never replaces a successful one. The folders are not changed.
     """
     from plumbob.bench.harness.folder_lock import locked
     from plumbob.bench.harness.record import RecordFile, check_folder
 
-    given = [record for folder in folders for record in _read(folder)]
+    candidates = [record for folder in folders for record in _read(folder)]
     check_folder(into)
     with locked(into):
         file = RecordFile(into)
         present = {record.key: record for record in file.read(typed=False).records}
-        added = _newer(present, given)
+        added: dict[Key, Record] = {}
+        for record in candidates:
+            other = added.get(record.key, present.get(record.key))
+            if other is None or _rank(record) > _rank(other):
+                added[record.key] = record
         if added:
             file.append(added.values())
     replaced = len(added.keys() & present.keys())
     print(f"{len(added)} added to {into}, {replaced} of them in place of earlier ones; "
-          f"{len(given) - len(added)} left, for {into} has them or later ones")  # fmt: skip
-    if len(places := _machines({**present, **added}.values())) > 1:
-        print(f"{into} now holds times of {len(places)} machines: {'; '.join(sorted(places))}")
+          f"{len(candidates) - len(added)} left out: {into} has them or later ones")  # fmt: skip
+    if len(machines := _machines({**present, **added}.values())) > 1:
+        print(f"{into} now holds times of {len(machines)} machines: {'; '.join(sorted(machines))}")
     return SUCCESS
 
 
-@app.command(
-    "drop", cls=Command, epilog=block("Examples", 'plumbob records drop --solver "My solver"')
-)
+@app.command("drop", cls=Command, epilog=block("Examples", DROP))
 def drop(
     folder: Folder = REPORT,
+    *,
     suites: Suites = None,
     solvers: Solvers = None,
     problems: Problems = None,
     failed: Failed = False,
     superseded: Superseded = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would go.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the number of records, and keep them.")
+    ] = False,
 ) -> int:
-    """Remove records for good: those that fit all that is given."""
+    """Remove the records that match all options, for good."""
     from plumbob.bench.harness.folder_lock import locked
     from plumbob.bench.harness.record import RecordFile
 
     if not (suites or solvers or problems or failed or superseded):
         raise ValueError("drop: expected --suite, --solver, --problem, --failed or --superseded")
-    wanted = _selection(suites, solvers, problems, failed, superseded)
-    count = sum(map(wanted, _read(folder)))
+    matches = _filter(suites, solvers, problems, failed, superseded)
+    count = sum(map(matches, _read(folder)))
     if not dry_run and count:
         with locked(folder):
-            RecordFile(folder).drop(wanted)
+            RecordFile(folder).drop(matches)
     print(f"{count} {'would be ' if dry_run else ''}dropped from {folder}")
     return SUCCESS
 
@@ -126,32 +123,17 @@ def _read(folder: Path) -> "list[Record]":
     return on_record(folder, typed=False).records
 
 
-def _selection(
-    suites: list[str] | None, solvers: list[str] | None, problems: list[str] | None,
-    failed: bool, superseded: bool,
-) -> "Callable[[Record], bool]":  # fmt: skip
-    """Return whether a record fits all that is given."""
-    names = {"suite": suites, "solver": solvers, "problem": problems}
-    given = {name: values for name, values in names.items() if values}
-
-    def wanted(record: "Record") -> bool:
-        return (
-            all(getattr(record, name) in values for name, values in given.items())
-            and (bool(record.failed) or not failed)
-            and (record.superseded or not superseded)
-        )
-
-    return wanted
-
-
-def _newer(present: "dict[Key, Record]", given: "Iterable[Record]") -> "dict[Key, Record]":
-    """Return the records that are later than those of their key, or measured where it failed."""
-    added: dict[Key, Record] = {}
-    for record in given:
-        other = added.get(record.key, present.get(record.key))
-        if other is None or _rank(record) > _rank(other):
-            added[record.key] = record
-    return added
+def _filter(
+    suites: Texts, solvers: Texts, problems: Texts, failed: bool, superseded: bool
+) -> "Callable[[Record], bool]":
+    """Return a function that tells whether a record matches all options."""
+    return lambda record: (
+        (not suites or record.suite in suites)
+        and (not solvers or record.solver in solvers)
+        and (not problems or record.problem in problems)
+        and (bool(record.failed) or not failed)
+        and (record.superseded or not superseded)
+    )
 
 
 def _rank(record: "Record") -> tuple[bool, str]:
@@ -159,7 +141,7 @@ def _rank(record: "Record") -> tuple[bool, str]:
 
 
 def _machines(records: "Iterable[Record]") -> set[str]:
-    """Return the machines that records were measured on, in words."""
+    """Return the machines on which records were measured."""
     from plumbob.bench.tables.results import counted
     from plumbob.bench.text import visible
 
@@ -170,8 +152,9 @@ def _machines(records: "Iterable[Record]") -> set[str]:
 
 
 def _table(folder: Path, records: "list[Record]") -> "Table":
-    """Return a row for each suite and solver."""
+    """Return a table with a row for each suite and solver."""
     from plumbob.bench.tables.columns import text
+    from plumbob.bench.tables.results import counted
     from plumbob.bench.tables.table import Column, Summary, Table, cells
 
     groups: dict[tuple[str, str], list[Record]] = {}
@@ -186,7 +169,7 @@ def _table(folder: Path, records: "list[Record]") -> "Table":
         text("latest", lambda group: max(record.when for record in group)),
         text("commits", lambda group: ", ".join(sorted({r.commit for r in group} - {""}))),
     )
-    places = "; ".join(sorted(_machines(records)))
-    summary = Summary(f"{len(records)} records, measured on {places or 'no machine'}")
+    machines = "; ".join(sorted(_machines(records))) or "no machine"
+    summary = Summary(f"{counted(len(records), 'record')}, measured on {machines}")
     rows = cells(columns, groups.values())
     return Table("records", f"Records in {folder}", columns, rows, summary=summary)

@@ -9,7 +9,7 @@ from plumbob.bench.text import visible
 
 from ..help_text import block
 from ..terminal import print_lines, print_outcome
-from .options import REPORT, SUCCESS, known
+from .options import REPORT, SUCCESS, OptionalFile, Texts, known
 
 if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table
@@ -17,56 +17,47 @@ if TYPE_CHECKING:
 EXAMPLES = block(
     "Examples",
     "plumbob report",
-    "plumbob report --output results/laptop",
+    "plumbob report results/laptop",
     "plumbob report --list",
     "plumbob report --table cloth_dampers --list",
-    "plumbob report --table cloth_dampers --format tex --width column -o dampers.tex",
-    "plumbob report --table accuracy --columns 'solver, within tolerance' --rows 'problem~circle'",
+    "plumbob report --table cloth_dampers --format tex -o dampers.tex",
+    "plumbob report --table accuracy --columns 'solver, within tolerance'",
+    "plumbob report --table accuracy --rows 'problem~circle' --sort solver",
 )
 FORMATS = ("md", "tex", "csv", "html")
 
 
-Folder = Annotated[
-    Path | None, typer.Argument(metavar="[FOLDER]", help="Folder of records, else report.")
-]
-Target = Annotated[
-    Path | None,
-    typer.Option(
-        "--output", "-o", metavar="PATH", help="The folder as well; with --table, a file."
-    ),
-]
-Name = Annotated[str, typer.Option("--table", metavar="NAME", help="Print one table; see --list.")]
-Form = Annotated[
-    str, typer.Option("--format", metavar="FORM", help=f"Of the table: {', '.join(FORMATS)}.")
-]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option("--columns", metavar="COLUMNS", help="Headings or numbers: 'solver, 3-5'."),
-]
-Rows = Annotated[
-    list[str] | None,
-    typer.Option("--rows", metavar="FILTER", help="solver=Newton, robot~UR, 'median<10' ..."),
-]
-Order = Annotated[str, typer.Option("--sort", metavar="COLUMN", help="The best or least first.")]
-Width = Annotated[
-    str,
-    typer.Option(
-        "--width", metavar="LENGTH", help="Of LaTeX: column, page, or a length such as 120mm."
-    ),
-]
-Listing = Annotated[bool, typer.Option("--list", help="List tables; with --table, its columns.")]
-
-
 def report(  # noqa: PLR0913 -- one parameter an option
-    folder: Folder = None,
-    output: Target = None,
-    name: Name = "",
-    form: Form = "md",
-    columns: Columns = None,
-    rows: Rows = None,
-    order: Order = "",
-    width: Width = "page",
-    names: Listing = False,
+    folder: Annotated[
+        OptionalFile,
+        typer.Argument(metavar="[FOLDER]", help="Folder of the records.  [default: report]"),
+    ] = None,
+    *,
+    output: Annotated[
+        OptionalFile,
+        typer.Option("--output", "-o", metavar="PATH", help="The folder; with --table, a file."),
+    ] = None,
+    name: Annotated[
+        str, typer.Option("--table", metavar="NAME", help="Print one table; see --list.")
+    ] = "",
+    form: Annotated[
+        str, typer.Option("--format", metavar="FORMAT", help=f"Format: {', '.join(FORMATS)}.")
+    ] = "md",
+    columns: Annotated[
+        Texts, typer.Option(metavar="COLUMNS", help="Headings or numbers, such as 'solver, 3-5'.")
+    ] = None,
+    rows: Annotated[
+        Texts, typer.Option(metavar="FILTER", help="Rows: solver=Newton, robot~UR, 'median<10' ...")
+    ] = None,
+    order: Annotated[
+        str, typer.Option("--sort", metavar="COLUMN", help="Sort rows, the best or least first.")
+    ] = "",
+    width: Annotated[
+        str, typer.Option(metavar="LENGTH", help="Width of LaTeX: column, page, or such as 120mm.")
+    ] = "page",
+    names: Annotated[
+        bool, typer.Option("--list", help="List the tables; with --table, its columns.")
+    ] = False,
 ) -> int:
     """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records.
 
@@ -76,26 +67,24 @@ def report(  # noqa: PLR0913 -- one parameter an option
     if not name and not names:
         if columns or rows or order:
             raise ValueError("--columns, --rows and --sort: expected --table, which they are of")
-        return write_report(_folder(folder, output))
+        if folder and output:
+            raise ValueError(f"--output: expected --table, or no folder but this; got {folder} too")
+        return write_report(folder or output or REPORT)
+    tables = _tables(folder or REPORT)
     if not name:
-        return _list_tables(folder or REPORT)
-    table = _table(folder or REPORT, name)
+        return _list_tables(tables)
+    by_name = {table.name: table for table in tables}
+    table = by_name[known("table", name, by_name)]
     if names:
         return _list_columns(table)
-    from plumbob.bench.tables.selection import selected
+    from plumbob.bench.tables import selection
 
-    text = _written(selected(table, columns or [], rows or [], order), form, width)
-    return _put(text, output)
-
-
-def _folder(folder: Path | None, output: Path | None) -> Path:
-    if folder and output:
-        raise ValueError(f"--output: expected --table, or no folder but this; got {folder} too")
-    return folder or output or REPORT
+    table = selection.selected(table, columns or [], rows or [], order)
+    return _write(_formatted(table, form, width), output)
 
 
 def write_report(output: Path) -> int:
-    """Write the report and say what it found, what is missing and where it is."""
+    """Write the report and print its summary."""
     from plumbob.bench.report.report import write
 
     print_outcome(write(output))
@@ -103,24 +92,14 @@ def write_report(output: Path) -> int:
 
 
 def _tables(folder: Path) -> list["Table"]:
-    """Return the tables of a folder's records.
-
-    Raises:
-        ValueError: if there are no records.
-    """
+    """Return the tables of a folder's records."""
     from plumbob.bench.report.sections import tables
     from plumbob.bench.tables.results import results_of
 
-    results, _ = results_of(folder)
-    return tables(results)
+    return tables(results_of(folder)[0])
 
 
-def _table(folder: Path, name: str) -> "Table":
-    of_name = {table.name: table for table in _tables(folder)}
-    return of_name[known("table", name, of_name)]
-
-
-def _list_tables(folder: Path) -> int:
+def _list_tables(tables: list["Table"]) -> int:
     from plumbob.bench.tables.columns import text
     from plumbob.bench.tables.table import Column, Table, cells
 
@@ -130,28 +109,32 @@ def _list_tables(folder: Path) -> int:
         Column("rows", read=lambda table: len(table.rows)),
         Column("columns", read=lambda table: len(table.columns)),
     )
-    print_lines(Table("tables", "", columns, cells(columns, _tables(folder))))
+    print_lines(Table("tables", "", columns, cells(columns, tables)))
     return SUCCESS
 
 
 def _list_columns(table: "Table") -> int:
     for number, column in enumerate(table.columns, 1):
-        best, folded = f"{column.best} is best" * bool(column.best), "folded" * column.folded
-        about = ", ".join(filter(None, (best, folded)))
+        marks = (f"{column.best} is best" * bool(column.best), "folded" * column.folded)
+        about = ", ".join(filter(None, marks))
         print(f"{number} {column.heading}" + (f" ({about})" if about else ""))
     return SUCCESS
 
 
-def _written(table: "Table", form: str, width: str) -> str:
+def _formatted(table: "Table", form: str, width: str) -> str:
+    from plumbob.bench.tables import writers
     from plumbob.bench.tables.latex import latex
-    from plumbob.bench.tables.writers import comma_separated, html_fragment, markdown
 
-    forms = {"md": markdown, "csv": comma_separated, "html": html_fragment}
-    return latex(table, width) if form == "tex" else forms[form](table)
+    if form == "tex":
+        return latex(table, width)
+    formats = {
+        "md": writers.markdown, "csv": writers.comma_separated, "html": writers.html_fragment
+    }  # fmt: skip
+    return formats[form](table)
 
 
-def _put(text: str, output: Path | None) -> int:
-    """Write a text to standard output, or to a file."""
+def _write(text: str, output: Path | None) -> int:
+    """Write a text to standard output or a file."""
     from plumbob.bench.harness.record import check_regular
 
     if output is None:

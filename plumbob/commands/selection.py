@@ -1,6 +1,7 @@
-"""Which solvers, problems and robots a command line means, by names that may be parts of names."""
+"""Select solvers, problems and robots by the names that a user gives, which may be abbreviated."""
 
 import difflib
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,110 +10,134 @@ from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
 from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
 from plumbob.bench.harness.block import Block, Choice, Scale
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import opening, registry
 from plumbob.bench.peers.entrant import Entrant
+from plumbob.bench.problems import files
 from plumbob.bench.problems.own import OwnProblem
+from plumbob.bench.text import visible
 from plumbob.reference.arguments import name_list
 
 # The tasks whose problems are robots.
-OF_ROBOTS = (REACHABLE, UNREACHABLE, TRAC_IK, TOOLBOX)
-# Names that a message lists.
-_LISTED = 12
+ROBOT_TASKS = (REACHABLE, UNREACHABLE, TRAC_IK, TOOLBOX)
+# The most names that a message lists.
+_MAX_LISTED = 12
 
 
-class Wanted(NamedTuple):
-    """What a command line asks for.
+class Request(NamedTuple):
+    """The options on solvers and problems.
 
     Attributes:
-        solvers, problems, robots: by name; all if none.
-        targets: random targets a problem, if not those of the scale.
+        entrants: solvers of the user, as given to --with.
+        program: of the user, behind --.
+        solvers, problems, robots: by name; all if empty. Problems may be files.
+        targets: random targets a problem, if not as in the scale.
+        effector: link of the user's models that reaches the target.
+        pins: rule for the pins of the user's cloths.
     """
 
+    entrants: Sequence[str] = ()
+    program: Sequence[str] = ()
     solvers: Sequence[str] = ()
     problems: Sequence[str] = ()
     robots: Sequence[str] = ()
     targets: int | None = None
+    effector: str | None = None
+    pins: str | None = None
+
+
+def choose(suites: Sequence[str], scale: str, request: Request) -> Choice:
+    """Return the measurements that a user asks for, after opening the user's solvers and problems.
+
+    Raises:
+        ValueError: if a solver or problem cannot be opened, or a name is unknown.
+    """
+    entries = opening.addresses(request.entrants, request.program)
+    entrants = opening.opened(entries, suites)
+    installed = opening.opened_where_possible(opening.installed(), suites, entrants)
+    for entrant in installed:
+        if isinstance(entrant, str):
+            print(f"plumbob: {visible(entrant)}", file=sys.stderr)
+        else:
+            entrants.append(entrant)
+    own, names = files.read(request.problems, suites, request.effector, request.pins)
+    size = scale_of(scale, request.targets, entrants, own)
+    if not any((request.solvers, names, request.robots)):
+        return Choice(scale, size, is_partial=request.targets is not None)
+    every = [block for suite in suites for block in blocks(suite, size)]
+    solvers = _recorded("solver", request.solvers, every, _solver_names)
+    problems = _recorded("problem", names, every, _problem_names)
+    problems += _recorded("robot", request.robots, every, _robot_names)
+    choice = Choice(scale, size, tuple(solvers), tuple(problems), is_partial=True)
+    if not any(map(choice.takes, every)):
+        names_text = " and ".join(filter(None, map(name_list, (names, request.robots))))
+        raise ValueError(
+            f"solver: expected one that is asked {names_text or 'something'} in "
+            f"{', '.join(suites)}, got {name_list(request.solvers)}; "
+            f"`plumbob bench {suites[0]} --list` lists all"
+        )
+    return choice
 
 
 def scale_of(
     name: str, targets: int | None, entrants: Sequence[Entrant], problems: Sequence[OwnProblem]
 ) -> Scale:
-    """Return a scale with the user's solvers, problems and number of targets.
-
-    Raises:
-        ValueError: if the number is none.
-    """
+    """Return a scale with the user's solvers, problems and number of targets."""
     if targets is not None and targets < 1:
         raise ValueError(f"targets: expected 1 or more, got {targets}")
-    scale = replace(SCALES[name], entrants=tuple(entrants), problems=tuple(problems))
-    return replace(scale, targets=targets or scale.targets)
+    scale = SCALES[name]
+    return replace(
+        scale,
+        entrants=tuple(entrants),
+        problems=tuple(problems),
+        targets=targets or scale.targets,
+    )
 
 
-def choose(suites: Sequence[str], name: str, scale: Scale, wanted: Wanted) -> Choice:
-    """Return what is to be measured.
-
-    Raises:
-        ValueError: if a name means nothing; the message offers the nearest.
-    """
-    if not any((wanted.solvers, wanted.problems, wanted.robots)):
-        return Choice(name, scale, is_partial=wanted.targets is not None)
-    every = [block for suite in suites for block in blocks(suite, scale)]
-    solvers = _meant("solver", wanted.solvers, every, _solver_names)
-    problems = _meant("problem", wanted.problems, every, _problem_names)
-    problems += _meant("robot", wanted.robots, every, _robot_names)
-    choice = Choice(name, scale, tuple(solvers), tuple(problems), is_partial=True)
-    if not any(map(choice.takes, every)):
-        asked = " and ".join(filter(None, map(name_list, (wanted.problems, wanted.robots))))
-        raise ValueError(
-            f"solver: expected one that is asked {asked or 'something'} in {', '.join(suites)}, "
-            f"got {name_list(wanted.solvers)}; `plumbob bench {suites[0]} --list` lists all"
-        )
-    return choice
-
-
-# Each returns the name in records, and the names that stand for it on the command line.
 def _solver_names(block: Block) -> tuple[str, list[str]]:
-    """Return a solver's names: in records, in tables, and without what distinguishes its rows."""
+    """Return a solver's name in records, and its names: also in tables, and before the comma."""
     solver = block.solver
     return solver, [solver, registry.find(solver).label, solver.partition(", ")[0]]
 
 
 def _problem_names(block: Block) -> tuple[str, list[str]]:
-    """Return a problem's name, its title, and the family before the stroke."""
+    """Return a problem's name in records, and its names: also its title and families."""
     problem, title = block.problem, str(block.facts.get("title", block.problem))
     parts = problem.split("/")
     return problem, [problem, title, *("/".join(parts[:i]) for i in range(1, len(parts)))]
 
 
 def _robot_names(block: Block) -> tuple[str, list[str]]:
+    """Return a problem's name in records, and the name of its robot if any."""
     robot = block.problem.rpartition("/")[2]
-    is_robot = block.facts.get("task") in OF_ROBOTS and robot != "all"
+    is_robot = block.facts.get("task") in ROBOT_TASKS and robot != "all"
     return block.problem, [robot] if is_robot else []
 
 
-def _meant(
-    kind: str, words: Sequence[str], every: Iterable[Block],
+def _recorded(
+    kind: str,
+    words: Sequence[str],
+    every: Iterable[Block],
     read: Callable[[Block], tuple[str, list[str]]],
-) -> list[str]:  # fmt: skip
-    """Return the names in records, one or several each, that words stand for."""
-    names: dict[str, list[str]] = {}
-    for recorded, called in map(read, every):
-        for name in called:
-            names.setdefault(name, []).append(recorded)
-    simple = {name.casefold(): name for name in reversed(names)}
-    meant: list[str] = []
+) -> list[str]:
+    """Return the names in records, one or several each, of the words of a user."""
+    recorded: dict[str, list[str]] = {}
+    for name, aliases in map(read, every):
+        for alias in aliases:
+            recorded.setdefault(alias, []).append(name)
+    folded = {alias.casefold(): alias for alias in reversed(recorded)}
+    names: list[str] = []
     for word in words:
-        name = word if word in names else simple.get(word.casefold(), "")
-        if not name:
-            raise ValueError(f"unknown {kind} {word!r}: {_hint(word, simple)}")
-        meant += names[name]
-    return list(dict.fromkeys(meant))
+        alias = word if word in recorded else folded.get(word.casefold(), "")
+        if not alias:
+            raise ValueError(f"unknown {kind} {word!r}: {_hint(word, folded)}")
+        names += recorded[alias]
+    return list(dict.fromkeys(names))
 
 
-def _hint(word: str, simple: dict[str, str]) -> str:
-    near = difflib.get_close_matches(word.casefold(), simple, n=1, cutoff=0.5)
+def _hint(word: str, folded: dict[str, str]) -> str:
+    near = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.5)
     if near:
-        return f"did you mean {simple[near[0]]!r}?"
-    listed = sorted(set(simple.values()))
-    more = f" and {len(listed) - _LISTED} more; see --list" if len(listed) > _LISTED else ""
-    return f"expected one of {name_list(listed[:_LISTED])}{more}" if listed else "there is none"
+        return f"did you mean {folded[near[0]]!r}?"
+    names = sorted(set(folded.values()))
+    more = f" and {len(names) - _MAX_LISTED} more; see --list" if len(names) > _MAX_LISTED else ""
+    return f"expected one of {name_list(names[:_MAX_LISTED])}{more}" if names else "there is none"

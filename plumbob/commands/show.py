@@ -1,8 +1,6 @@
-"""The command `show`: the arm drawing a curve or the cloth, by our solvers and by yours."""
+"""The command `show`: the arm drawing a curve or the cloth, by Plumbob's solvers and the user's."""
 
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -10,11 +8,8 @@ from plumbob.bench.text import visible
 
 from ..help_text import block
 from ..terminal import progress
-from .options import REPORT, SUCCESS, known, writable
-from .verify import PROGRAM
-
-if TYPE_CHECKING:
-    from plumbob.bench.show.your_solver import YourSolver
+from .options import REPORT, SUCCESS, OptionalFile, known, writable
+from .verify import program_of
 
 EXAMPLES = block(
     "Examples",
@@ -22,7 +17,7 @@ EXAMPLES = block(
     "plumbob show heart --solver fabrik",
     "plumbob show star --output star.svg",
     "plumbob show heart --coherent --output heart.bvh",
-    "plumbob show heart --with my_ik.py -o heart.html     yours beside ours, to be played",
+    "plumbob show heart --with my_ik.py -o heart.html",
     "plumbob show cloth -o cloth.gif -- ./my_solver --flag",
 )
 
@@ -31,33 +26,44 @@ def show(
     context: typer.Context,
     scene: Annotated[
         str | None,
-        typer.Argument(metavar="SCENE", help="arm, cloth, or a curve that the arm draws."),
+        typer.Argument(metavar="SCENE", help="arm, cloth, or the curve that the arm draws."),
     ] = None,
+    *,
     file: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="A .gif, .svg, .html or .bvh."),
+        OptionalFile,
+        typer.Option(
+            "--output", "-o", metavar="FILE", help="File ending in .gif, .svg, .html or .bvh."
+        ),
     ] = None,
     solver: Annotated[
-        str | None, typer.Option(help="For an arm fabrik, ccd, ...; for the cloth newton, ...")
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Plumbob's solver: fabrik, ccd, ...; of the cloth newton, ..."
+        ),
     ] = None,
     coherent: Annotated[
         bool, typer.Option("--coherent", help="Let the arm move as smoothly as it can, in a loop.")
     ] = False,
     yours: Annotated[
         str | None,
-        typer.Option("--with", metavar="SOLVER", help="Yours, my_ik.py; or -- and a program."),
+        typer.Option(
+            "--with", metavar="SOLVER", help="Your solver, my_ik.py; or -- and a program."
+        ),
     ] = None,
 ) -> int:
     """Write an animation, a picture or a page of the arm drawing a curve, or of the cloth.
 
-    With a solver of yours it moves beside ours, and errors are in colour. The arm's motion can also
-    be written as BVH, which animation programs open.
+    Your solver moves beside Plumbob's, with errors in colour. The motion of the arm can also be
+    written as BVH, which animation programs open.
     """
     from plumbob.bench.harness.record import check_regular
-    from plumbob.bench.show.scenes import SCENES
+    from plumbob.bench.show.scenes import SCENES, write
     from plumbob.bench.show.your_solver import YourSolver
 
-    words = _words(yours, context.meta.get(PROGRAM, ()))
+    program = program_of(context)
+    if yours is not None and program:
+        raise ValueError("with: expected one solver, got --with and a program behind --")
+    words = program if yours is None else [yours]
     if scene is None and not words:
         raise ValueError(f"SCENE: expected one of {', '.join(SCENES)}, got none")
     if scene is not None:
@@ -68,30 +74,15 @@ def show(
         path = file or REPORT / f"{name}.gif"
         check_regular(path)
         writable(path.parent)
-        _write(name, path, solver, coherent, entrant)
+        with progress() as bar:
+            task = bar.add_task(name, total=None)
+
+            def update(frame: int, total: int) -> None:
+                bar.update(task, completed=frame, total=total)
+
+            write(name, path, solver, update, coherent, entrant)
     finally:
         if entrant:
             entrant.close()
     print(visible(str(path)))
     return SUCCESS
-
-
-def _words(yours: str | None, program: Any) -> list[str]:
-    """Return the words that mean a solver: a file, or what stands behind --."""
-    if yours is not None and program:
-        raise ValueError("with: expected one solver, got --with and a program behind --")
-    return [yours] if yours is not None else list(program)[1:]
-
-
-def _write(
-    name: str, path: Path, solver: str | None, coherent: bool, yours: "YourSolver | None"
-) -> None:
-    from plumbob.bench.show.scenes import write
-
-    with progress() as bar:
-        task = bar.add_task(name, total=None)
-        write(name, path, solver, partial(_drawn, bar, task), coherent, yours)
-
-
-def _drawn(bar: Any, task: Any, done: int, total: int) -> None:
-    bar.update(task, completed=done, total=total)

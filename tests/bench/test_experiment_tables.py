@@ -70,9 +70,8 @@ def phrases(path):
     """The strings of a file that have several words, docstrings and columns left out."""
     if path.suffix == ".toml":
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        charts = tables.pop("charts", {})
-        captions = [tables[name] for name in tables.keys() - {"columns", "folded"}]
-        for texts in (*captions, *charts.values()):
+        parts = [tables[name] for name in tables.keys() - {"columns", "folded", "figures"}]
+        for texts in [*parts, *tables.get("figures", {}).values()]:
             yield from (" ".join(t.split()) for t in texts.values() if isinstance(t, str))
         return
     tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -157,7 +157,7 @@ def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder, mo
     assert headings[: len(SUITES)] == list(SUITES)
     assert len(lines) <= 5 * len(SUITES) + 1
     assert max(map(len, lines)) <= 100
-    assert lines[-1] == "All problems and solvers of one: plumbob bench SUITE --list"
+    assert lines[-1] == "All problems and solvers of a suite: plumbob bench SUITE --list"
     assert "joint positions, Pinocchio; " in "\n".join(lines)
     assert "joint positions, Pinocchio joint" not in "\n".join(lines)
 

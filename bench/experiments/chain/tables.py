@@ -140,7 +140,7 @@ def iterations_chart(results: Results) -> Sketch | None:
     """Show the share of the targets that is reached within so many iterations, by stratum."""
     groups = ([r for r in group if reported_iterations(r).size] for group in histories(results))
     panels = [Panel(group[0].title, tuple(map(_reached, group))) for group in groups if group]
-    chart = dict(_CAPTIONS.charts["iterations"])
+    chart = _CAPTIONS.figure("iterations")
     chart["shows"] += " Entrants claim their iterations." * bool(results.entrants)
     return declared_chart(chart, panels, results.entrants)
 

@@ -119,7 +119,7 @@ def jitter_chart(results: Results) -> Sketch | None:
             spans.append(series(record.solver, angles, [row] * len(angles), form=SPAN))
     rows = tuple(str(records[0].details.curve) for records in curves.values())
     panels = [Panel("", tuple(spans))] if spans else []
-    return declared_chart(_CAPTIONS.charts["jitter"], panels, results.entrants, rows=rows)
+    return declared_chart(_CAPTIONS.figure("jitter"), panels, results.entrants, rows=rows)
 
 
 jitter = Layout(

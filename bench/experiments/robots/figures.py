@@ -72,7 +72,7 @@ def _chart(
         curves = zip(field, rates(field, x), strict=True)
         panels.append(Panel(robot, tuple(_share(score, x, curve) for score, curve in curves)))
     start = next((score.start for field in fields.values() for score in field), "")
-    chart = dict(CAPTIONS.charts[name])
+    chart = CAPTIONS.figure(name)
     chart["name"] = f"{name}_{start.replace(' ', '_')}"
     chart["title"] = f"Robots, {start}: {chart['title']}"
     return declared_chart(chart, panels, results.entrants)

@@ -1,1 +1,1 @@
-"""The page of the report: one HTML file from a template that escapes its texts."""
+"""The page of the report: an HTML file from a template that escapes its texts."""

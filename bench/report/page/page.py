@@ -135,12 +135,12 @@ def _chapter(section: Section, contents: Contents) -> Chapter:
     figure = next((drawing for drawing in every if drawing.name == section.figure), None)
     main, folds = None, []
     for layout in layouts:
-        beside = [drawing for drawing in drawings[layout] if drawing is not figure]
+        figures = [drawing for drawing in drawings[layout] if drawing is not figure]
         table = contents.tables[layout]
         if layout.name == section.main:
-            main = page_table(layout.question, table, beside, MAX_COLUMNS)
+            main = page_table(layout.question, table, figures, MAX_COLUMNS)
         else:
-            folds.append(page_table(layout.question, table, beside))
+            folds.append(page_table(layout.question, table, figures))
     unmeasured, suites = [], []
     for experiment in section.experiments:
         for layout in offered(experiment):

@@ -58,7 +58,7 @@ class PageTable(NamedTuple):
         heads: headings of the columns.
         rows: its rows.
         best: "best" if some cells are best, "ties" if some of them tie, else "".
-        gist: its message in one line.
+        gist: its message in a line.
         drawings: figures beside it.
     """
 
@@ -107,7 +107,7 @@ def page_table(
 
 
 def gist(summary: Summary) -> str:
-    """Return a summary in one line: of a list only the first point."""
+    """Return a summary in a line: of a list only the first point."""
     if not summary.sentence.endswith(":") or not summary.points:
         return summary.sentence
     return f"{summary.sentence} {summary.points[0]}" + ("; …" if len(summary.points) > 1 else "")
@@ -130,7 +130,7 @@ def _names_solvers(table: Table, j: int) -> bool:
 
 
 def _rows(table: Table, heads: Sequence[PageHead], best: set[tuple[int, int]]) -> list[PageRow]:
-    """Return the rows; a first cell that repeats the one above it is marked."""
+    """Return the rows; a first cell that repeats the cell above it is marked."""
     ties = Counter((table.rows[i][: table.compared], j) for i, j in best)
     rows: list[PageRow] = []
     addresses = Counter[str]()

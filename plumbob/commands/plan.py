@@ -1,0 +1,183 @@
+"""List problems and solvers of the bench, and the work and time of a run."""
+
+import re
+import textwrap
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import zip_longest
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+from plumbob.bench.experiments import SUITES, blocks
+from plumbob.bench.harness import run
+from plumbob.bench.harness.block import Block, Choice
+from plumbob.bench.harness.executors import THIS_PROCESS
+from plumbob.bench.harness.measure import block_key, not_asked, not_installed
+from plumbob.bench.harness.record import Key, Record, RecordFile
+from plumbob.bench.peers import registry
+from plumbob.bench.tables.results import counted
+
+from ..terminal import width
+
+NOT_INSTALLED = "not installed"
+# Names of problems or solvers in the list of all suites, and lines for them.
+_MAX_NAMES, _MAX_LINES = 6, 2
+_PACKAGES = {registry.PLUMBOB: "plumbob", registry.PINOCCHIO: "pin", registry.MUJOCO: "mujoco"}
+OWN_RECORD, OTHER_RECORDS, BUDGET = "its own record", "records of others", "budgets"
+UNKNOWN = "unknown"
+
+
+def listed(suites: Sequence[str], choice: Choice) -> Iterator[str]:
+    """Yield lines with all problems and solvers of a suite, or a summary of several suites."""
+    for suite in suites:
+        selection = list(filter(choice.takes, blocks(suite, choice.scale)))
+        problems, solvers = _problems(selection), _solvers(selection)
+        yield f"{suite}: {SUITES[suite]}"
+        if len(suites) == 1:
+            yield from ("", "problems", *_aligned(problems.items()))
+            yield from ("", "solvers", *_aligned(solvers))
+        else:
+            yield from _in_short("problem", problems)
+            yield from _in_short("solver", [name for name, *_ in solvers])
+    if len(suites) > 1:
+        yield "All problems and solvers of a suite: plumbob bench SUITE --list"
+
+
+def _problems(selection: Iterable[Block]) -> dict[str, str]:
+    """Return the titles of problems by their names, "" for a title that repeats the name."""
+    return {
+        block.problem: _unless_repeated(block.problem, str(block.facts.get("title", "")))
+        for block in selection
+        if not _measures(block, not_installed, not_asked)
+    }
+
+
+def _solvers(selection: Iterable[Block]) -> list[tuple[str, str, str]]:
+    """Return name, different label and version of each solver, missing solvers last."""
+    by_solver = {block.solver: block for block in selection}
+    missing = {name for name, block in by_solver.items() if _measures(block, not_installed)}
+    names = [*(name for name in by_solver if name not in missing), *sorted(missing)]
+    return [
+        (
+            name,
+            _unless_repeated(name, registry.find(name).label),
+            NOT_INSTALLED if name in missing else _version(by_solver[name]),
+        )
+        for name in names
+    ]
+
+
+def _unless_repeated(name: str, title: str) -> str:
+    """Return a title, "" if the name ends with the same words."""
+    plain_name, plain_title = (
+        re.sub(r"[\W_]+", " ", text).casefold().strip() for text in (name, title)
+    )
+    return "" if plain_name.endswith(plain_title) else title
+
+
+def _measures(block: Block, *functions: Callable[..., Any]) -> bool:
+    """Return whether a block is measured by a given function."""
+    return isinstance(block.measure, partial) and block.measure.func in functions
+
+
+def _version(block: Block) -> str:
+    """Return the version of a block's solver: its own, or that of its engine."""
+    version = block.settings.get("version")
+    if block.facts.get("entrant") is True:
+        return ", ".join(str(part) for part in (version, "entered", block.facts["door"]) if part)
+    package = _PACKAGES.get(registry.find(block.solver).engine, "")
+    return str(version or (registry.version(package) if package else ""))
+
+
+def _aligned(rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    """Yield rows as lines with aligned columns."""
+    rows = list(rows)
+    widths = [max(map(len, column)) for column in zip_longest(*rows, fillvalue="")]
+    for row in rows:
+        padded = (f"{cell:<{wide}}" for cell, wide in zip(row, widths, strict=True) if wide)
+        yield "  " + "  ".join(padded).rstrip()
+
+
+def _in_short(noun: str, names: Iterable[str]) -> Iterator[str]:
+    """Yield the number of names, and the first of them or of their families."""
+    names = list(names)
+    families = list(dict.fromkeys(name.partition("/")[0] for name in names))
+    for count in range(_MAX_NAMES, 0, -1):
+        more = f" and {len(families) - count} more" if len(families) > count else ""
+        text = f"  {counted(len(names), noun)}: {'; '.join(families[:count])}{more}"
+        lines = textwrap.wrap(text, width(), subsequent_indent="    ")
+        if len(lines) <= _MAX_LINES:
+            break
+    yield from lines
+
+
+class Step(NamedTuple):
+    """A block to be measured, the reason if again, its time [s], and the source of that."""
+
+    block: Block
+    reason: str
+    seconds: float
+    source: str
+
+
+def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
+    """Return lines on the work and time of a run."""
+    present = {record.key: record for record in RecordFile(folder).read().records}
+    selection = [b for suite in suites for b in filter(choice.takes, blocks(suite, choice.scale))]
+    reasons = [run.why_again(block, present, THIS_PROCESS) for block in selection]
+    steps = [
+        Step(block, reason, *_estimate(block, present))
+        for block, reason in zip(selection, reasons, strict=True)
+        if reason is not None
+    ]
+    lines = [f"{len(steps)} to measure, {len(selection) - len(steps)} kept as on record"]
+    by_solver: dict[tuple[str, str], list[Step]] = {}
+    for step in steps:
+        by_solver.setdefault((step.block.suite, step.block.solver), []).append(step)
+    for (suite, solver), group in by_solver.items():
+        repeats = Counter(step.reason for step in group if step.reason)
+        whys = "".join(f"; again {count}, for {reason}" for reason, count in repeats.items())
+        time = duration(sum(step.seconds for step in group))
+        lines.append(f"  {suite}: {solver}: {len(group)}, about {time}{whys}")
+    return [*lines, _total(steps)]
+
+
+def _estimate(block: Block, present: Mapping[Key, Record]) -> tuple[float, str]:
+    """Return the expected seconds of a block, and the source of the estimate."""
+    own = present.get(block_key(block))
+    if own is not None and own.seconds > 0.0 and not own.failed:
+        return _scaled_time(own, block), OWN_RECORD
+    times = [
+        _scaled_time(record, block)
+        for record in present.values()
+        if (record.suite, record.problem) == (block.suite, block.problem) and record.seconds > 0.0
+    ]
+    if times:
+        return median(times), OTHER_RECORDS
+    return block.budget, BUDGET if block.budget else UNKNOWN
+
+
+def _scaled_time(record: Record, block: Block) -> float:
+    """Return the seconds of a record, in proportion to the size of a block."""
+    return record.seconds * (block.size / record.size if block.size and record.size else 1.0)
+
+
+def _total(steps: Sequence[Step]) -> str:
+    if not steps:
+        return "Nothing would be measured"
+    sources = Counter(step.source for step in steps)
+    unknown = sources.pop(UNKNOWN, 0)
+    listed = ", ".join(f"{count} from {source}" for source, count in sources.items())
+    listed = listed or "no estimate"
+    listed += f"; {unknown} without an estimate" if unknown else ""
+    total = duration(sum(step.seconds for step in steps))
+    return f"About {total} in all ({listed}), without compilation"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in seconds, minutes or hours: "12 s"."""
+    if seconds < 90.0:
+        return f"{seconds:.2g} s" if seconds < 10.0 else f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
