@@ -148,10 +148,15 @@ def test_nobody_leads_among_those_that_were_timed_apart(make):
     assert asked(apart, "Forward kinematics", "speed").detail == "too near to tell on 1 case"
 
 
-def test_plain_python_and_the_limit_are_no_rivals(make):
+def test_without_rivals_there_is_no_headline(make):
+    """Plain Python and the memory bound are no rivals of Plumbob."""
     names = (registry.PLAIN.name, registry.LIMIT_NAME, "Plumbob, compiled")
-    records = [make.timed(name, 1e-7) for name in names]
-    assert headlines.headlines(Results(records)) == []
+    for records in (
+        [make.timed(name, 1e-7) for name in names],
+        [make.worked("Plumbob Newton", error=(1e-3, 1e-9))],
+    ):
+        assert headlines.headlines(Results(records)) == []
+    assert headlines.overview(Results([])) == (None, [], "", [], [])
 
 
 def test_a_cloth_is_solved_by_who_arrives_and_first_by_its_engine(make):
@@ -174,11 +179,6 @@ def test_a_cloth_is_solved_by_who_arrives_and_first_by_its_engine(make):
         "4.00 times faster than the next on 1 of 2 cloths and the only one of 2 engines to get "
         "there in time on 1 of 2 cloths"
     )
-
-
-def test_an_engine_without_rivals_is_not_called_the_fastest(make):
-    records = [make.worked("Plumbob Newton", error=(1e-3, 1e-9))]
-    assert headlines.headlines(Results(records)) == []
 
 
 def test_a_cloth_solver_of_the_user_leads_under_its_own_name(make):
@@ -219,10 +219,6 @@ def test_the_scale_says_how_many_targets(make):
     assert headlines.scale(Results([quick, raced(make, "a", 1)])) == (
         "Quick run: 100 targets a stratum")  # fmt: skip
     assert headlines.scale(Results([])) == ""
-
-
-def test_nothing_measured_gives_no_headline():
-    assert headlines.overview(Results([])) == (None, [], "", [], [])
 
 
 def test_a_paired_ratio_holds_the_factor_and_a_single_pair_leaves_it_open():
