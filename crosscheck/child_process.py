@@ -1,9 +1,9 @@
 """A program in a process of its own: it may crash, hang or send garbage without harming others.
 
-Pipes are read and written as they allow, so that neither a program that does not read nor one that
-prints without end blocks anything. Memory is limited by watching what is resident: limits of the
-address space (RLIMIT_AS, RLIMIT_DATA) would forbid programs that reserve far more than they use,
-as Java, JavaScript, compiled Python and every program under a sanitizer do.
+Pipes are read and written without blocking, whether a program does not read or prints without end.
+Memory is limited by checks of the resident memory: limits of the address space (RLIMIT_AS,
+RLIMIT_DATA) would forbid programs that reserve far more than they use, as Java, JavaScript,
+compiled Python and every program under a sanitizer do.
 """
 
 import contextlib
@@ -323,7 +323,7 @@ class ChildProcess:
         return last - first
 
     def _ended(self) -> LostError:
-        """Return the error of a program whose output has ended."""
+        """Return the error of a program that closed its output."""
         has_ended = self._ends_within(GRACE)
         for _ in range(8):  # more than the pipe of its last words holds
             self._pump(0.0)
@@ -411,7 +411,7 @@ def connect() -> tuple[Connection, Connection]:
 
 
 class CallProcess:
-    """A process that performs calls one by one; it starts at the first one and after a loss."""
+    """A process that performs calls one by one; it starts at the first call and after a loss."""
 
     def __init__(self, prepare: Callable[[], object], patience: float) -> None:
         """Set the first call of each process, and the limit of processor time of a call [s]."""

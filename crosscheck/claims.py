@@ -15,7 +15,7 @@ from .verdict import Claim, ClaimVerdict, check_claim, each_case
 
 
 def skeleton_claims(engine: str) -> list[Claim]:
-    """Return the claims about kinematics against one engine."""
+    """Return the claims about kinematics against an engine."""
     poses = "forward_kinematics on random chains and trees of 2 to 50 joints"
     joints = f"{engine}'s ball joints, matched by name"
     local = f"local_from_global of the rotations {engine} computes"

@@ -36,7 +36,7 @@ def joint_rotations(engine: str, case: int) -> Comparison:
 
 
 def back_to_local(engine: str, case: int) -> Comparison:
-    """Compare the local rotations that we derive from an engine's global ones with its input."""
+    """Compare the local rotations derived from an engine's global rotations with its input."""
     skeleton, local = _skeleton_and_rotations(case)
     derived = local_from_global(skeleton, _engine_pose(engine, case).rotations)
     return _compare_rotations(derived, local)

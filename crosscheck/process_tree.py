@@ -1,7 +1,7 @@
 """Find, measure and kill the processes that a program has started.
 
 A program's tree is its process group and session, its descendants and, on Linux, the processes with
-its marker, which finds those that fork twice and leave the session. The marker is a limit of
+its marker, even if they fork twice and leave the session. The marker is a limit of
 real-time computing: processes inherit limits through every fork, setsid and exec, and a limit of
 tens of thousands of years has no effect.
 """

@@ -20,7 +20,7 @@ ALIKE = ("stiffnesses", "dampings")
 
 
 def generator(quantity: str, case: int) -> np.random.Generator:
-    """Return the random numbers of one quantity of a case, independent of all others."""
+    """Return the random numbers of a quantity of a case, independent of all others."""
     whole = arguments.integer("case", case, least=0)
     return np.random.default_rng([20130, *quantity.encode(), whole])
 
@@ -123,7 +123,7 @@ def _resolved(quantity: str, case: int, **options: Any) -> StepProblem:
 def oscillator(case: int) -> tuple[MassSpring, State, float]:
     """Return an oscillator at a random phase and a step h [s], with h omega from 0.01 to 1.
 
-    It is one particle on a spring without a rest length, pinned at the origin.
+    It is a particle on a spring without a rest length, pinned at the origin.
     """
     rng = generator("oscillator", case)
     mass, stiffness = rng.uniform(0.2, 2.0), 10.0 ** rng.uniform(1.0, 3.0)

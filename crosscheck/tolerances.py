@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 
-class Tolerance(NamedTuple):
+class ClaimTolerance(NamedTuple):
     """The largest difference allowed between two correct results, and the reason for it."""
 
     value: float  # relative to the scale of the comparison
@@ -13,5 +13,5 @@ class Tolerance(NamedTuple):
 
 
 _FIELDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-TOLERANCES = {name: Tolerance(**fields) for name, fields in _FIELDS.items()}
+TOLERANCES = {name: ClaimTolerance(**fields) for name, fields in _FIELDS.items()}
 POSITION, ROTATION, JACOBIAN = (TOLERANCES[n] for n in ("position", "rotation", "jacobian"))

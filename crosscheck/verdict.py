@@ -9,7 +9,7 @@ import numpy as np
 from plumbob.reference import arguments
 from plumbob.reference.arguments import FloatArray
 
-from .tolerances import Tolerance
+from .tolerances import ClaimTolerance
 
 # Least distance of our quantity from its baseline, relative to the scale. It exceeds all tolerances
 # by far, so that a comparison of two results at rest proves nothing.
@@ -17,7 +17,7 @@ LEAST_DISPLACEMENT = 1e-4
 
 
 class Comparison(NamedTuple):
-    """One case: a quantity computed by the reference and independently, of any shape."""
+    """A case: a quantity computed by the reference and independently, of any shape."""
 
     actual: FloatArray  # by the reference
     expected: FloatArray  # by the independent computation
@@ -27,13 +27,13 @@ class Comparison(NamedTuple):
 
 @dataclass(frozen=True)
 class Claim:
-    """A quantity of the reference equals an independent one, in every case, to a tolerance."""
+    """A quantity of the reference equals its counterpart, in every case, to a tolerance."""
 
     name: str  # unique, for tables and the command line
     quantity: str  # what the reference computes
     counterpart: str  # what it is compared with
     compare: Callable[[int], Iterable[Comparison]]  # yields those of the first n cases
-    tolerance: Tolerance  # the largest difference allowed, with its reason
+    tolerance: ClaimTolerance  # the largest difference allowed, with its reason
     cases: int  # number of cases in a full check
 
 

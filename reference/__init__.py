@@ -1,4 +1,4 @@
-"""What is the right answer: readable, validated kinematics and mass-spring dynamics."""
+"""Right answers: readable, validated kinematics and mass-spring dynamics."""
 
 from . import rotation, scenes
 from .articulation import Articulation, Mimic

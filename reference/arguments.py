@@ -1,8 +1,8 @@
-"""Checks of arguments: each returns the value, or raises a ValueError that names the argument.
+"""Checks of arguments: return the value, or raise a ValueError that names the argument.
 
 One rule bounds all magnitudes: no number is beyond 1e75, and a size, which is a number that may not
 be negative, is 0 or at least 1e-75. `array`, `sizes` and `number` keep it; only a caller that
-checks the numbers itself, such as a kernel, may take them from `floats`. No copy that does not fit
+checks the numbers itself, a kernel say, may take them from `floats`. No copy that does not fit
 into memory is made; a boolean is no number and no integer.
 """
 
@@ -37,18 +37,26 @@ KINDS = {"b": "booleans", "c": "complex numbers", "O": "objects", "U": "text", "
 LARGEST_INTEGER = 2**63 - 1
 
 
-def array(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
-    """Return a finite, C-contiguous, writable float64 array whose last axes are `trailing`.
+def array(name: str, value: ArrayLike, *trailing: int | str, kind: str = "numbers") -> FloatArray:
+    """Return a finite, C-contiguous, writable float64 array with `trailing` as its last axes.
 
     An int in `trailing` is a length, a word stands for any length; a leading "..." allows batch
     axes. A value that fits already is returned itself, and must then not be written to.
     """
-    return _bounded("numbers", name, value, *trailing)
+    result = floats(name, value, *trailing)
+    largest = np.abs(result).max(initial=0.0)
+    if largest <= LARGEST_COORDINATE:
+        return result
+    if not np.isfinite(result).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
+        raise ValueError(f"{name}: expected finite numbers, got {result[index]} at index {index}")
+    number, bound = distinct_texts(largest, LARGEST_COORDINATE)
+    raise ValueError(f"{name}: expected {kind} of at most {bound}, got {number}")
 
 
 def coordinates(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
     """Return the same as `array`; the error speaks of coordinates."""
-    return _bounded("coordinates", name, value, *trailing)
+    return array(name, value, *trailing, kind="coordinates")
 
 
 def sizes(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
@@ -131,7 +139,7 @@ def count(name: str, value: Any, *, least: int) -> int:
 
 
 def lengths(name: str, value: Sequence[Any], width: int) -> tuple[int, ...]:
-    """Return the leading axes, of 0 or more, of an array whose last axis has a width."""
+    """Return the leading axes, of 0 or more, of an array that ends with an axis of a width."""
     axes = tuple(integer(name, length, least=0) for length in value)
     if len(axes) > LARGEST_RANK or math.prod(max(n, 1) for n in (*axes, width)) > LARGEST_ARRAY:
         raise ValueError(
@@ -157,7 +165,7 @@ def indices(
 
 
 def flags(name: str, value: ArrayLike, count: int) -> BoolArray:
-    """Return booleans, shape (count,); a single one stands for all."""
+    """Return booleans, shape (count,), spread where a single boolean stands for all."""
     booleans = _converted(name, value)
     if booleans.dtype != bool:
         raise ValueError(f"{name}: expected booleans, got {booleans.dtype} values")
@@ -181,7 +189,7 @@ def text(name: str, value: Any) -> str:
 
 
 def sequence(name: str, value: Any, count: int, owner: str) -> tuple[Any, ...]:
-    """Return a sequence of `count` elements, one an owner, as a tuple."""
+    """Return a sequence of `count` elements as a tuple; `owner` of an element is for the error."""
     is_list = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     is_sequence = is_list or (isinstance(value, np.ndarray) and value.ndim > 0)
     if not is_sequence or len(value) != count:
@@ -191,14 +199,14 @@ def sequence(name: str, value: Any, count: int, owner: str) -> tuple[Any, ...]:
 
 
 def choice(name: str, value: Any, valid: Mapping[str, Any] | Sequence[str]) -> str:
-    """Return the value if it is one of the valid names."""
+    """Return the value if it is a valid name."""
     if not isinstance(value, str) or value not in valid:
         raise ValueError(f"{name}: expected one of {name_list(valid)}, got {shown(value)}")
     return value
 
 
 def name_list(names: Iterable[str]) -> str:
-    """Return names with commas between them, all quoted where one has a comma of its own."""
+    """Return names with commas between them, all quoted if any has a comma of its own."""
     texts = list(names)
     return ", ".join(map(repr, texts) if any("," in text for text in texts) else texts)
 
@@ -209,11 +217,6 @@ def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
         article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
         raise ValueError(f"{name}: expected {article} {kind.__name__}, got {type(value).__name__}")
     return value
-
-
-def generator(name: str, value: Any) -> np.random.Generator:
-    """Return the value if it is a generator of random numbers."""
-    return instance(name, value, np.random.Generator)
 
 
 def broadcast(
@@ -267,7 +270,7 @@ def frozen(values: np.ndarray) -> np.ndarray:
 
 
 class KeepsReadOnly:
-    """A model whose copies and pickles have the same arrays read-only."""
+    """A model with read-only arrays, also in copies and pickles."""
 
     def __getstate__(self) -> tuple[dict[str, Any], list[str]]:
         values = vars(self)
@@ -312,18 +315,6 @@ def distinct_texts(number: float, bound: float, least: int = 6) -> tuple[str, st
     """Write a number and its bound, for a message, with as many digits as tell them apart."""
     digits = digits_apart(number, bound, least)
     return f"{number:.{digits}g}", f"{bound:.{digits}g}"
-
-
-def _bounded(kind: str, name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
-    result = floats(name, value, *trailing)
-    largest = np.abs(result).max(initial=0.0)
-    if largest <= LARGEST_COORDINATE:
-        return result
-    if not np.isfinite(result).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
-        raise ValueError(f"{name}: expected finite numbers, got {result[index]} at index {index}")
-    number, bound = distinct_texts(largest, LARGEST_COORDINATE)
-    raise ValueError(f"{name}: expected {kind} of at most {bound}, got {number}")
 
 
 def _converted(name: str, value: Any) -> np.ndarray:

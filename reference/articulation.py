@@ -3,14 +3,13 @@
 A joint's frame sits in its parent's at an offset and a rotation, its *frame*. Its coordinates move
 it from there: a hinge rotates about its axis and a slide moves along it, a ball rotates by a unit
 quaternion, a free joint does both, a fixed one stays. A mimic joint is a hinge or a slide
-whose coordinate is that of another one, times a multiplier, plus a shift.
+that moves with a leader: its coordinate times a multiplier, plus a shift.
 """
 
 import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,19 +49,9 @@ from .quaternion import (
 )
 from .skeleton import Skeleton, checked_skeleton
 
-
-class Joint(IntEnum):
-    """The kinds of joints."""
-
-    FIXED = 0
-    HINGE = 1
-    SLIDE = 2
-    BALL = 3
-    FREE = 4
-
-
-FIXED, HINGE, SLIDE, BALL, FREE = (int(kind) for kind in Joint)
-KINDS = tuple(kind.name.lower() for kind in Joint)
+# The kinds of joints, by the numbers that the kernels read.
+KINDS = "fixed", "hinge", "slide", "ball", "free"
+FIXED, HINGE, SLIDE, BALL, FREE = range(5)
 # The number of coordinates and of degrees of freedom of each kind.
 WIDTHS = np.array([0, 1, 1, 4, 7])
 FREEDOMS = np.array([0, 1, 1, 3, 6])
@@ -120,7 +109,7 @@ class Articulation(KeepsReadOnly):
         kinds: each joint's kind, one of "fixed", "hinge", "slide", "ball", "free".
         frames: each joint's rotation in its parent's frame where its coordinates are zero, (joint,
             4).
-        axes: unit axes of hinges and slides, and those about which balls twist, (joint, 3).
+        axes: unit axes of hinges and slides, and twist axes of balls, (joint, 3).
         lower: least coordinate of hinges and slides, least twist of balls, (joint,).
         upper: greatest of the same.
         cones: greatest tilt of the axis of a ball [rad], (joint,).
@@ -155,7 +144,7 @@ class Articulation(KeepsReadOnly):
         """Check and copy; a single value holds for all joints.
 
         Args:
-            skeleton: the tree; the offsets are those of the joints' frames.
+            skeleton: the tree; its offsets lead to the joints' frames.
             kinds: of each joint.
             axes: any length but zero.
             frames: unit quaternions.
@@ -170,7 +159,10 @@ class Articulation(KeepsReadOnly):
                 no hinge or slide.
         """
         count = checked_skeleton(skeleton).joint_count
-        names = _checked_kinds(kinds, count)
+        if isinstance(kinds, str):
+            kinds = (kinds,) * count
+        names = arguments.sequence("kinds", kinds, count, "a joint")
+        names = tuple(arguments.choice("kinds", kind, KINDS) for kind in names)
         numbers = np.array([KINDS.index(kind) for kind in names])
         bounds = _checked_limits(lower, upper, numbers)
         leaders = _checked_mimics({} if mimics is None else mimics, skeleton, names)
@@ -190,7 +182,7 @@ class Articulation(KeepsReadOnly):
 
     @functools.cached_property
     def joint_count(self) -> int:
-        """Number of joints, fixed ones and the root included."""
+        """Number of joints, fixed joints and the root included."""
         return self.skeleton.joint_count
 
     @property
@@ -247,7 +239,7 @@ class Articulation(KeepsReadOnly):
         Without limits a hinge is drawn from all angles, a slide or a free joint from within a
         metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
         """
-        arguments.generator("rng", rng)
+        arguments.instance("rng", rng, np.random.Generator)
         shape = arguments.lengths("shape", shape, self.coordinate_count)
         q = np.empty((math.prod(shape), self.coordinate_count))
         for j in self._leading:
@@ -311,7 +303,7 @@ class Articulation(KeepsReadOnly):
 
 
 def one_batch(values: np.ndarray, axes: int = 1) -> np.ndarray:
-    """Return a view with all leading axes but the last `axes` joined into one."""
+    """Return a view with all leading axes joined, but for the last `axes`."""
     return values.reshape(math.prod(values.shape[:-axes]), *values.shape[-axes:])
 
 
@@ -367,7 +359,7 @@ def clamp_ball(Q, axis, lower, upper, cone):
 
 
 def clamp_joint(joints, j, q):
-    """Bring the coordinates of one joint within its limits."""
+    """Bring the coordinates of a joint within its limits."""
     kind, at = joints["kind"][j], joints["coordinate"][j]
     if joints["leader"][j] != j:
         return
@@ -414,7 +406,7 @@ def ball_coordinate(joints, j):
 
 
 def joint_in_world(joints, j, q, positions, rotations):
-    """Return a joint's position and rotation in the world, given those of its parent."""
+    """Return a joint's position and rotation in the world, from its parent's."""
     x, R = joint_transform(joints, j, q)
     parent = joints["parent"][j]
     if parent >= 0:
@@ -425,7 +417,7 @@ def joint_in_world(joints, j, q, positions, rotations):
 
 
 def articulated_pose(joints, q, positions, rotations):
-    """Fill global positions (joint, 3) and rotations (joint, 4) of one q."""
+    """Fill global positions (joint, 3) and rotations (joint, 4) from q."""
     for j in range(len(joints)):
         x, R = joint_in_world(joints, j, q, positions, rotations)
         store_vector(positions, j, x)
@@ -464,15 +456,8 @@ _locals = Kernel(_locals_batch)
 _forward = Kernel(_forward_batch, label="forward_kinematics of articulations")
 
 
-def _checked_kinds(kinds: str | Sequence[str], count: int) -> tuple[str, ...]:
-    if isinstance(kinds, str):
-        kinds = (kinds,) * count
-    kinds = arguments.sequence("kinds", kinds, count, "a joint")
-    return tuple(arguments.choice("kinds", kind, KINDS) for kind in kinds)
-
-
 def _per_joint(name: str, values: FloatArray, count: int, *axes: int) -> FloatArray:
-    """Return values, (joint, *axes), of which one may stand for all joints."""
+    """Return values, (joint, *axes), spread where a single value stands for all."""
     batch = values.shape[: values.ndim - len(axes)]
     if batch not in ((), (count,)):
         raise ValueError(f"{name}: expected one, or one for each of {count} joints, got {batch}")
@@ -511,7 +496,7 @@ def _checked_limits(
 
 
 def _checked_bound(name: str, value: ArrayLike, count: int) -> FloatArray:
-    """Return numbers, one a joint, of which any may be infinite."""
+    """Return numbers, finite or infinite, (joint,)."""
     bounds = _per_joint(name, arguments.floats(name, value, "..."), count)
     if np.isnan(bounds).any():
         raise ValueError(f"{name}: expected numbers or infinity, got NaN")
@@ -577,7 +562,7 @@ def number_coordinates(joints: RecordArray) -> IndexArray:
 
 
 def _drawn(rng: np.random.Generator, joints: Articulation, j: int, count: int) -> FloatArray:
-    """Return random coordinates of one joint, (count, width)."""
+    """Return random coordinates of a joint, (count, width)."""
     kind, lower, upper = joints.kinds[j], joints.lower[j], joints.upper[j]
     if kind in ("hinge", "slide"):
         interval = _interval(lower, upper, np.pi if kind == "hinge" else 1.0)
@@ -596,7 +581,7 @@ def _drawn(rng: np.random.Generator, joints: Articulation, j: int, count: int) -
 
 
 def _interval(lower: float, upper: float, span: float) -> tuple[float, float]:
-    """Return the limits; a missing one is a span from the other one, or from zero."""
+    """Return the limits; a missing limit is a span from the other limit, or from zero."""
     if np.isinf(lower) and np.isinf(upper):
         return -span, span
     if np.isinf(lower):

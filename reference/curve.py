@@ -1,7 +1,7 @@
 """Named curves for an effector to draw, and resampling to an even spacing.
 
 A named curve takes a count of samples, a positive integer, else it raises a ValueError. It lies in
-the plane y = 0 [m]; the closed ones do not repeat their first point.
+the plane y = 0 [m]; closed curves do not repeat their first point.
 """
 
 from collections.abc import Callable
@@ -75,7 +75,7 @@ def resample(
 ) -> FloatArray:
     """Return the curve with distances between neighbours from min_spacing to max_spacing.
 
-    Drop points that are too close to the last one kept, divide wide gaps evenly, and keep both
+    Drop points that are too close to the last kept point, divide wide gaps evenly, and keep both
     ends. Only the two ends remain if they are closer than min_spacing to each other and no point of
     the curve is min_spacing away from both.
 
@@ -112,8 +112,8 @@ def resample(
 def select_spaced(points, min_spacing, selection):
     """Store the indices of both ends and of points min_spacing apart; return their count.
 
-    Choose points greedily, then drop the last ones until the end of the curve is far enough from
-    the last. If none remains between the ends, take a point far enough from both.
+    Choose points greedily, then drop the last of them until the end of the curve is far enough from
+    them. If none remains between the ends, take a point far enough from both.
     """
     last = len(points) - 1
     count = 1
@@ -148,7 +148,7 @@ _select = Kernel(select_spaced)
 
 
 def _divide_gaps(points: FloatArray, gaps: FloatArray, max_spacing: float) -> FloatArray:
-    """Return the points with evenly spaced ones added in gaps wider than max_spacing."""
+    """Return the points, with evenly spaced points in gaps wider than max_spacing."""
     if len(points) == 1:
         return points
     pieces = np.maximum(np.ceil(gaps / max_spacing), 1).astype(np.int64)

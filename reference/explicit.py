@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import LARGEST_COORDINATE, FloatArray, number
-from .mass_spring import MassSpring, State, checked_state, constant_forces, pin_targets
-from .springs import pulls
+from .mass_spring import MassSpring, State, checked_state, constant_forces, pin_targets, pulls
 
 
 def symplectic_euler(
@@ -22,7 +21,7 @@ def symplectic_euler(
 ) -> State:
     """Return the state a time h [s] later: v' = v + h M^-1 f(x, v), then x' = x + h v'.
 
-    Arguments and errors are those of `ImplicitEuler.step`. It is stable for h below about 2 over
+    Arguments and errors are as for `ImplicitEuler.step`. It is stable for h below about 2 over
     the highest angular frequency.
 
     Raises:
@@ -44,7 +43,7 @@ def runge_kutta(
 ) -> State:
     """Return the state a time h [s] later by the classical Runge-Kutta method of order 4.
 
-    Arguments and errors are those of `symplectic_euler`; the external forces stay through the step.
+    Arguments and errors are as for `symplectic_euler`; the external forces stay through the step.
     """
     h = number("h", h, above=0)
     constant = constant_forces(system, external_forces)
@@ -66,7 +65,7 @@ def runge_kutta(
 def _accelerations(
     system: MassSpring, x: FloatArray, v: FloatArray, constant: FloatArray
 ) -> FloatArray:
-    """Return M^-1 f [m/s²], zero at the pins, f the constant forces plus those of springs."""
+    """Return M^-1 f [m/s²], zero at the pins, f the forces, constant and of springs."""
     total, free = constant + pulls(x, v, system.arrays), system.free
     result = np.zeros_like(total)
     result[free] = total[free] / system.masses[free, None]

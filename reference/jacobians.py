@@ -58,22 +58,23 @@ def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = Non
     taken at its origin, along the axes of the world. The effector is a joint by name or index; by
     default as for `solve_ik`.
     """
-    model, coordinates = _coordinates("q", articulation, q)
-    joint = effector_of(checked_model(articulation), effector)
-    return _jacobians(model, np.array([joint]), coordinates)[..., 0, :, :]
+    joint = effector_of(checked_model(articulation, "articulation"), effector)
+    return jacobians(articulation, q, [joint])[..., 0, :, :]
 
 
 def jacobians(articulation: Model, q: ArrayLike, joints: ArrayLike | None = None) -> FloatArray:
-    """Return the Jacobians of all joints, or those of `joints` only, (..., joint, 6, freedom)."""
+    """Return the Jacobians of all joints, or of `joints` only, (..., joint, 6, freedom)."""
     model, coordinates = _coordinates("q", articulation, q)
     count = model.joint_count
     effectors = np.arange(count) if joints is None else joints
     effectors = arguments.indices("joints", effectors, "joint", least=0, below=count)
-    return _jacobians(model, effectors, coordinates)
+    J = np.zeros((*coordinates.shape[:-1], len(effectors), 6, model.freedom_count))
+    _fill(model.joints, effectors, one_batch(coordinates), one_batch(J, 3))
+    return J
 
 
 def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
-    """Return q, in its own shape, moved by the velocity v for one second, limits not regarded."""
+    """Return q, in its own shape, moved by the velocity v for a second, regardless of limits."""
     model, start = _coordinates("q", articulation, q)
     step = arguments.coordinates("v", v, "...", model.freedom_count)
     start, step = arguments.together("v", start, step)
@@ -83,7 +84,7 @@ def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
 
 
 def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
-    """Return the velocity that leads from q0 to q1 in one second, (..., freedom).
+    """Return the velocity that leads from q0 to q1 in a second, (..., freedom).
 
     It is the inverse of `integrate`: rotations go through the smaller angle, at most pi.
     """
@@ -109,7 +110,7 @@ def frame_of(joints, j, rotations):
 
 
 def motion(joints, j, i, rotations, length):
-    """Return the angular velocity [rad] and the linear one [m] by the i-th freedom of joint j.
+    """Return the angular [rad] and linear [m] velocity by the i-th freedom of joint j.
 
     A mimic joint's freedom is its leader's; a free joint's translations come first. `rotations` are
     those of all joints in the world, and a unit of a translation is `length` [m].
@@ -155,7 +156,7 @@ def fill_jacobian(joints, effector, positions, rotations, J):
 
 
 def move_joint(joints, j, v, q):
-    """Move the coordinates of one joint by its velocity, for one second."""
+    """Move the coordinates of a joint by its velocity, for a second."""
     kind, at, first = joints["kind"][j], joints["coordinate"][j], joints["freedom"][j]
     if kind == FIXED or joints["leader"][j] != j:
         return
@@ -175,7 +176,7 @@ def rotate_ball(q, at, v):
 
 
 def joint_difference(joints, j, q1, q0, v):
-    """Fill the velocity that takes one joint from q0 to q1."""
+    """Fill the velocity that takes a joint from q0 to q1."""
     kind, at, first = joints["kind"][j], joints["coordinate"][j], joints["freedom"][j]
     if kind == FIXED or joints["leader"][j] != j:
         return
@@ -220,12 +221,6 @@ def _difference_batch(joints, q1, q0, v):
 _fill = Kernel(_jacobians_batch, label="jacobian")
 _integrate = Kernel(_integrate_batch)
 _difference = Kernel(_difference_batch)
-
-
-def _jacobians(model: Articulation, effectors: np.ndarray, q: FloatArray) -> FloatArray:
-    J = np.zeros((*q.shape[:-1], len(effectors), 6, model.freedom_count))
-    _fill(model.joints, effectors, one_batch(q), one_batch(J, 3))
-    return J
 
 
 def _coordinates(name: str, articulation: Model, q: ArrayLike) -> tuple[Articulation, FloatArray]:

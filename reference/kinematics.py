@@ -67,9 +67,9 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
 
 
 def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
-    """Return local rotations, (..., joint, 4), from global ones: Q = R_parent* R.
+    """Return local rotations, (..., joint, 4), of global rotations: Q = R_parent* R.
 
-    The root's are R. Errors are those of `forward_kinematics`.
+    The root's are R. Errors are as for `forward_kinematics`.
     """
     tree = checked_skeleton(skeleton).arrays
     poses = arguments.floats("rotations", rotations, "...", len(tree.parents), 4)
@@ -91,7 +91,7 @@ def _in_slices(kernel: Kernel, tree: SkeletonArrays, *poses: FloatArray) -> bool
 
 
 def forward_pose(parents, offsets, local, positions, rotations):
-    """Fill positions (joint, 3) and rotations (joint, 4) of one pose from unit quaternions."""
+    """Fill positions (joint, 3) and rotations (joint, 4) of a pose from unit quaternions."""
     x, R = load_vector(offsets, 0), load_unit(local, 0)
     store_position(positions, 0, x)
     store_rotation(rotations, 0, R)
@@ -105,7 +105,7 @@ def forward_pose(parents, offsets, local, positions, rotations):
 
 
 def local_pose(parents, rotations, local):
-    """Fill local rotations (joint, 4) of one pose from global unit quaternions."""
+    """Fill local rotations (joint, 4) of a pose from global unit quaternions."""
     store_rotation(local, 0, load_unit(rotations, 0))
     for j in range(1, len(parents)):
         R_parent = load_unit(rotations, parents[j])

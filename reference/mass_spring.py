@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
+from numpy import uint64 as at
 from numpy.typing import ArrayLike
 
 from .arguments import (
@@ -42,15 +43,11 @@ from .arguments import (
 )
 from .backend.compiled import Kernel
 from .backend.partition import LARGE, Regions, cut
+from .quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 from .sparse.assembly import BlockSum
-from .springs import (
-    blocks,
-    pulls,
-    spring_lengths,
-    spring_rest_vectors,
-    spring_stretches,
-    sum_springs,
-)
+
+# Ends closer than this [m] count as coincident: the square of their distance would be subnormal.
+COINCIDENT = 1e-150
 
 
 class SystemArrays(NamedTuple):
@@ -108,14 +105,16 @@ class MassSpring(KeepsReadOnly):
         gravity: ArrayLike = (0.0, -9.81, 0.0),
         tension_only: ArrayLike = False,
     ) -> None:
-        """Check and copy the system; a property of springs may be one value for all of them.
+        """Check and copy the system; a property of springs may be a single number.
 
         Raises:
             ValueError: if a shape is wrong, a number is negative, not finite, beyond 1e75 or below
                 1e-75 but not 0, an index is out of range, a spring joins a particle to itself, or
                 a free particle has no mass.
         """
-        mass = _masses(masses)
+        mass = sizes("masses", masses, "particle").copy()
+        if len(mass) == 0:
+            raise ValueError("masses: expected at least one particle, got none")
         ends = _springs(springs, len(mass))
         self._store(
             SystemArrays(
@@ -169,7 +168,7 @@ class MassSpring(KeepsReadOnly):
 
     @property
     def particle_count(self) -> int:
-        """Number of particles, the pinned ones included."""
+        """Number of particles, pinned or free."""
         return len(self.arrays.masses)
 
     @functools.cached_property
@@ -186,7 +185,7 @@ class MassSpring(KeepsReadOnly):
 
     @functools.cached_property
     def regions(self) -> Regions | None:
-        """The partition of a large system for sums over several threads; None for a small one."""
+        """The partition of a large system for sums over threads; None for a small system."""
         large = len(self.arrays.springs) >= LARGE
         return cut(self.arrays.springs, self.particle_count) if large else None
 
@@ -214,7 +213,7 @@ class MassSpring(KeepsReadOnly):
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class State(KeepsReadOnly):
-    """Positions and velocities of the particles at one instant.
+    """Positions and velocities of the particles at an instant.
 
     Attributes:
         positions: [m], shape (particle, 3).
@@ -254,7 +253,7 @@ class Derivation(NamedTuple):
 
 
 def derivation(system: MassSpring) -> Derivation:
-    """Return A, S, L and J of the system, pinned particles treated as free ones."""
+    """Return A, S, L and J of the system, pinned particles treated as free."""
     A, K = incidence(system), scipy.sparse.diags_array(system.stiffnesses, format="csc")
     S = scipy.sparse.eye_array(len(system.springs), format="csc")
     return Derivation(A=A, S=S, L=A @ K @ A.T, J=A @ K @ S.T)
@@ -282,7 +281,7 @@ def lengths(system: MassSpring, positions: ArrayLike) -> FloatArray:
 
 
 def stretches(system: MassSpring, positions: ArrayLike) -> FloatArray:
-    """Return l - r of each spring [m], shape (spring,), zero for a slack tension-only one."""
+    """Return l - r of each spring [m], shape (spring,), zero for a slack tension-only spring."""
     return _stretches(_positions(system, positions), system.arrays)
 
 
@@ -293,7 +292,7 @@ def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
 
 
 def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
-    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over those not slack."""
+    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over all that are not slack."""
     stretch = stretches(system, positions)
     return float(np.sum(0.5 * system.stiffnesses * stretch**2))
 
@@ -385,6 +384,107 @@ def pin_targets(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
     return coordinates("pin_positions", pin_positions, len(system.pinned), 3)
 
 
+def spring_pulls(x, v, system):
+    """Return the forces of springs and dampers on each particle, shape (particle, 3)."""
+    total = np.zeros(x.shape)
+    for s in range(len(system.springs)):
+        i, j = system.springs[s, 0], system.springs[s, 1]
+        length, u = spring_frame(x, i, j)
+        rate = dot(subtract(load_vector(v, i), load_vector(v, j)), u)
+        stretch = spring_stretch(length, system.rest_lengths[s], system.tension_only[s])
+        pull = scale(system.stiffnesses[s] * stretch + system.dampings[s] * rate, u)
+        store_vector(total, i, subtract(load_vector(total, i), pull))
+        store_vector(total, j, add(load_vector(total, j), pull))
+    return total
+
+
+def stiffness_blocks(x, system, geometric):
+    """Return the 3 x 3 stiffness of each spring, zero if slack; see `mass_spring.spring_blocks`."""
+    blocks = np.zeros((len(system.springs), 3, 3))
+    for s in range(len(system.springs)):
+        i, j = system.springs[s, 0], system.springs[s, 1]
+        length, u = spring_frame(x, i, j)
+        if is_slack(length, system.rest_lengths[s], system.tension_only[s]):
+            continue
+        k, transverse = system.stiffnesses[s], 0.0
+        if geometric:
+            transverse = k * transverse_share(length, system.rest_lengths[s])
+        for a in range(3):
+            blocks[s, a, a] = transverse
+            for b in range(3):
+                blocks[s, a, b] += (k - transverse) * (u[a] * u[b])
+    return blocks
+
+
+def transverse_share(length, rest_length):
+    """Return 1 - r/l; where the ends coincide, 1 if the rest length is zero and 0 otherwise."""
+    if length >= COINCIDENT:
+        return 1.0 - rest_length / length
+    return 1.0 if rest_length == 0.0 else 0.0
+
+
+def spring_lengths(x, springs):
+    """Return the length of every spring, shape (spring,)."""
+    lengths = np.empty(len(springs))
+    for s in range(len(springs)):
+        lengths[s], _ = spring_frame(x, springs[s, 0], springs[s, 1])
+    return lengths
+
+
+def sum_springs(springs, rest_lengths, stiffnesses, sums):
+    """Add k r and 2 k of every spring to the sums of both its particles, (particle, 2)."""
+    for s in range(len(springs)):
+        k = stiffnesses[s]
+        for end in range(2):
+            i = at(springs[s, end])
+            sums[i, 0] += k * rest_lengths[s]
+            sums[i, 1] += 2.0 * k
+
+
+def spring_stretches(x, system):
+    """Return l - r of every spring, 0 if slack, shape (spring,)."""
+    stretches = np.empty(len(system.springs))
+    for s in range(len(system.springs)):
+        length, _ = spring_frame(x, system.springs[s, 0], system.springs[s, 1])
+        stretches[s] = spring_stretch(length, system.rest_lengths[s], system.tension_only[s])
+    return stretches
+
+
+def spring_rest_vectors(x, system):
+    """Return d of every spring, shape (spring, 3); see `mass_spring.rest_vectors`."""
+    vectors = np.empty((len(system.springs), 3))
+    for s in range(len(system.springs)):
+        length, u = spring_frame(x, system.springs[s, 0], system.springs[s, 1])
+        rest_length = system.rest_lengths[s]
+        if is_slack(length, rest_length, system.tension_only[s]):
+            rest_length = length
+        store_vector(vectors, s, scale(rest_length, u))
+    return vectors
+
+
+def spring_stretch(length, rest_length, tension_only):
+    """Return l - r, or 0 for a slack spring."""
+    stretch = length - rest_length
+    return 0.0 if tension_only and stretch < 0.0 else stretch
+
+
+def is_slack(length, rest_length, tension_only):
+    """Return whether a spring is slack: tension-only, with a rest length, and no longer than it."""
+    return tension_only and rest_length > 0.0 and length <= rest_length
+
+
+def spring_frame(x, i, j):
+    """Return the length and the direction from particle j to i; (1, 0, 0) where they coincide."""
+    p = subtract(load_vector(x, i), load_vector(x, j))
+    length = norm(p)
+    s = 1.0 / max(length, COINCIDENT)
+    if length < COINCIDENT:
+        p, s = (1.0, 0.0, 0.0), 1.0
+    return length, scale(s, p)
+
+
+pulls = Kernel(spring_pulls)
+blocks = Kernel(stiffness_blocks)
 _lengths = Kernel(spring_lengths)
 _sums = Kernel(sum_springs)
 _stretches = Kernel(spring_stretches)
@@ -397,13 +497,6 @@ def _system(system: MassSpring) -> MassSpring:
 
 def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
     return coordinates("positions", positions, _system(system).particle_count, 3)
-
-
-def _masses(masses: ArrayLike) -> FloatArray:
-    mass = sizes("masses", masses, "particle").copy()
-    if len(mass) == 0:
-        raise ValueError("masses: expected at least one particle, got none")
-    return mass
 
 
 def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:

@@ -22,7 +22,7 @@ class Outcome(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """The outcome in one sentence."""
+        """The outcome as a sentence."""
         return _SENTENCES[self]
 
     @property

@@ -33,14 +33,14 @@ def load_vector(p, j, k=0):
     return p[j, k], p[j, k + 1], p[j, k + 2]
 
 
-def store_quaternion(q, j, value):
+def store_quaternion(q, j, quaternion):
     """Write a tuple into row j of an array (joint, 4)."""
-    q[j, 0], q[j, 1], q[j, 2], q[j, 3] = value
+    q[j, 0], q[j, 1], q[j, 2], q[j, 3] = quaternion
 
 
-def store_vector(p, j, value):
+def store_vector(p, j, vector):
     """Write a tuple into row j of an array (joint, 3)."""
-    p[j, 0], p[j, 1], p[j, 2] = value
+    p[j, 0], p[j, 1], p[j, 2] = vector
 
 
 def load_quaternion_from(q, k):
@@ -48,9 +48,9 @@ def load_quaternion_from(q, k):
     return q[k], q[k + 1], q[k + 2], q[k + 3]
 
 
-def store_quaternion_to(q, k, value):
+def store_quaternion_to(q, k, quaternion):
     """Write a tuple into four entries of an array from the k-th on."""
-    q[k], q[k + 1], q[k + 2], q[k + 3] = value
+    q[k], q[k + 1], q[k + 2], q[k + 3] = quaternion
 
 
 def add(a, b):
@@ -138,9 +138,9 @@ def made_unit(q):
     return (s * w, s * x, s * y, s * z), within(e - t * t, 2.0 * t)
 
 
-def within(value, bound):
-    """Return whether |value| <= bound; NaN is not."""
-    return abs(value) <= bound
+def within(number, bound):
+    """Return whether |number| <= bound; NaN is not."""
+    return abs(number) <= bound
 
 
 def perpendicular(a):

@@ -26,7 +26,7 @@ def identity(*shape: int) -> FloatArray:
 
 def random(rng: np.random.Generator, *shape: int) -> FloatArray:
     """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors."""
-    rng = arguments.generator("rng", rng)
+    rng = arguments.instance("rng", rng, np.random.Generator)
     q = rng.standard_normal((*arguments.lengths("shape", shape, 4), 4))
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
@@ -58,7 +58,7 @@ def normalise(quaternions: ArrayLike, name: str = "quaternions") -> tuple[FloatA
 
 
 def check_unit(name: str, lengths: FloatArray) -> None:
-    """Raise a ValueError that names the first length further than 1e-6 from one."""
+    """Raise a ValueError that names the first length further than 1e-6 from 1."""
     wrong = np.abs(lengths - 1.0) > UNIT_TOLERANCE
     if wrong.any():
         index = tuple(int(i) for i in np.argwhere(wrong)[0])
@@ -70,9 +70,7 @@ def check_unit(name: str, lengths: FloatArray) -> None:
 
 def multiply(a: ArrayLike, b: ArrayLike) -> FloatArray:
     """Return the products a b, (..., 4)."""
-    a, b = arguments.together(
-        "b", arguments.array("a", a, "...", 4), arguments.array("b", b, "...", 4)
-    )
+    a, b = _pair("a", a, 4, "b", b, 4)
     return _stack(quaternion.multiply(_parts(a), _parts(b)))
 
 
@@ -83,9 +81,7 @@ def conjugate(q: ArrayLike) -> FloatArray:
 
 def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
     """Return the vectors v, (..., 3), rotated by unit quaternions q, (..., 4)."""
-    q, v = arguments.together(
-        "v", arguments.array("q", q, "...", 4), arguments.array("v", v, "...", 3)
-    )
+    q, v = _pair("q", q, 4, "v", v, 3)
     return _stack(quaternion.rotate(_parts(q), _parts(v)))
 
 
@@ -95,29 +91,18 @@ def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Antiparallel directions are rotated by pi about a fixed axis perpendicular to a; a zero vector
     has no direction and gives the identity.
     """
-    a, b = arguments.together(
-        "b", arguments.array("a", a, "...", 3), arguments.array("b", b, "...", 3)
-    )
-    a, b = _scaled(a), _scaled(b)
-    result = np.empty((*a.shape[:-1], 4))
-    _between(_rows(a), _rows(b), result.reshape(-1, 4))
-    return result
+    a, b = _pair("a", a, 3, "b", b, 3)
+    return _mapped(_between, 4, _scaled(a), _scaled(b))
 
 
 def exponential(v: ArrayLike) -> FloatArray:
     """Return the rotations by |v| radians about v, (..., 3), as (..., 4)."""
-    v = arguments.array("v", v, "...", 3)
-    result = np.empty((*v.shape[:-1], 4))
-    _exponential(_rows(v), result.reshape(-1, 4))
-    return result
+    return _mapped(_exponential, 4, arguments.array("v", v, "...", 3))
 
 
 def logarithm(q: ArrayLike) -> FloatArray:
     """Return the rotation vectors [rad], (..., 3), at most pi long, of rotations (..., 4)."""
-    q = unit("q", q)
-    result = np.empty((*q.shape[:-1], 3))
-    _logarithm(_rows(q), result.reshape(-1, 3))
-    return result
+    return _mapped(_logarithm, 3, unit("q", q))
 
 
 def angle(a: ArrayLike, b: ArrayLike) -> FloatArray:
@@ -150,7 +135,7 @@ def from_matrix(matrix: ArrayLike) -> FloatArray:
 
 
 def _quaternion_form(R: FloatArray) -> FloatArray:
-    """Return K, (..., 4, 4), whose quadratic form q^T K q is largest at R's quaternion."""
+    """Return K, (..., 4, 4), with a quadratic form q^T K q that is largest at R's quaternion."""
     K = np.empty((*R.shape[:-2], 4, 4))
     K[..., 0, 0] = np.trace(R, axis1=-2, axis2=-1)
     K[..., 0, 1] = R[..., 2, 1] - R[..., 1, 2]
@@ -167,6 +152,14 @@ def _scaled(v: FloatArray) -> FloatArray:
     return np.ldexp(v, -exponents)
 
 
+def _pair(
+    first: str, a: ArrayLike, m: int, second: str, b: ArrayLike, n: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return two named arguments, (..., m) and (..., n), with the same leading axes."""
+    checked = arguments.array(first, a, "...", m), arguments.array(second, b, "...", n)
+    return arguments.together(second, *checked)
+
+
 def _parts(values: FloatArray) -> tuple[FloatArray, ...]:
     return tuple(np.moveaxis(values, -1, 0))
 
@@ -175,8 +168,12 @@ def _stack(parts: tuple[FloatArray, ...]) -> FloatArray:
     return np.stack(parts, axis=-1)
 
 
-def _rows(values: FloatArray) -> FloatArray:
-    return np.array(values.reshape(-1, values.shape[-1]))
+def _mapped(kernel: Kernel, width: int, *vectors: FloatArray) -> FloatArray:
+    """Return the results of a kernel, (..., width), for rows of vectors."""
+    result = np.empty((*vectors[0].shape[:-1], width))
+    rows = [np.array(values.reshape(-1, values.shape[-1])) for values in vectors]
+    kernel(*rows, result.reshape(-1, width))
+    return result
 
 
 def _between_rows(a, b, result):

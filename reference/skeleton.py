@@ -45,7 +45,7 @@ class Skeleton(KeepsReadOnly):
         """Check and copy the tree.
 
         Raises:
-            ValueError: if there is no root or more than one, a parent does not precede its child,
+            ValueError: if there is not exactly a single root, a parent does not precede its child,
                 an offset is not finite, or a name is missing, empty or used twice.
         """
         arrays = SkeletonArrays(*_checked_tree(parents, offsets))
@@ -73,7 +73,7 @@ class Skeleton(KeepsReadOnly):
         """Return the index of a joint given by name or index; negative indices count from the end.
 
         Raises:
-            ValueError: if there is no such joint; it speaks of the argument named.
+            ValueError: if the joint does not exist; it names `argument`.
         """
         count = self.joint_count
         if type(joint) is int and -count <= joint < count:

@@ -14,13 +14,15 @@ from .articulation import Articulation
 from .inverse_kinematics.problem import (
     CheckedTarget,
     IKSolution,
+    Settings,
     Target,
     are_targets,
     check_numbers,
+    checked_settings,
     checked_targets,
+    default_solver,
 )
 from .inverse_kinematics.reduce import prepare
-from .inverse_kinematics.settings import Settings, checked_settings, default_solver
 from .inverse_kinematics.solve import balls, batch_shape, solve_checked, target_rows
 from .model import Model, checked_model
 from .outcome import Outcome
@@ -46,7 +48,7 @@ def track(
     max_iterations: int | None = None,
     record: bool = False,
 ) -> IKSolution:
-    """Return the poses in which the effector follows a curve, one frame for each of its points.
+    """Return the poses in which the effector follows a curve, a frame for each of its points.
 
     A coherent motion is a smooth trajectory (`trajectory/`): solved frame by frame first, then in
     all frames together, until no small change lowers the sum of the squared displacements between
@@ -64,7 +66,7 @@ def track(
         start: the first pose: local rotations, shape (joint, 4), identities if None; of an
             Articulation coordinates, (coordinate,), neutral ones if None.
         effector: the joint that follows, by index or name; by default as for `solve_ik`.
-        warm: start each frame from the last one's solution, which keeps neighbouring frames alike;
+        warm: start each frame from the solution before it, which keeps neighbouring frames alike;
             if False, each starts from `start`, and the joints may jump from frame to frame.
         coherent: make the motion a smooth trajectory, its first pose as free as the others.
         closed: count the displacement from the last frame to the first as well, so that the motion
@@ -75,8 +77,8 @@ def track(
         record: keep the residuals of the iterations of single frames in `history`.
 
     Returns:
-        IKSolution with the frames as leading axis. The iterations of a coherent motion are those of
-        both solves of each frame and those over all frames.
+        IKSolution with the frames as leading axis. A coherent motion counts the iterations of both
+        solves of each frame and over all frames.
 
     Raises:
         ValueError: as `solve_ik` does, and if the curve is not of that shape or has no points, or a

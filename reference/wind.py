@@ -37,7 +37,7 @@ def wind_forces(
     only for steps that are short compared with the time in which drag stops a particle.
 
     Args:
-        state: positions and velocities; those of pins count too.
+        state: positions and velocities, also of pins.
         triangles: indices of particles, shape (triangle, 3), in either orientation.
         wind: velocity of the air [m/s], shape (3,), or (particle, 3) if it differs.
         density: of the air [kg/m³].
@@ -80,7 +80,7 @@ def triangle_forces(x, w, triangles, drag, lift):
 
 
 def plate_force(normal, w, drag, lift):
-    """Return drag plus lift on a triangle whose area is half the length of its normal.
+    """Return drag plus lift on a triangle, its area half the length of its normal.
 
     The coefficients contain the factor density/2.
     """

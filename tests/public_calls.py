@@ -78,7 +78,7 @@ INTERNAL = {
     "reference.implicit_euler.objective.Iterate.is_above": "compares what an Objective has made",
     "reference.implicit_euler.objective.global_matrix": "of a system that is checked already",
     "reference.implicit_euler.objective.effective_stiffnesses": "likewise",
-    "reference.implicit_euler.StepSolver.iterates": "a protocol",
+    "reference.implicit_euler.StepMethod.iterates": "a protocol",
     "reference.implicit_euler.StepResult": "made only by a step",
     "reference.implicit_euler.certificate.Certificate": "made only by certify",
     "reference.implicit_euler.certificate.Certificate.shares_minimiser_within": "unchecked twin",
@@ -160,16 +160,23 @@ def _parts(path, thing):
 
 @functools.cache
 def calls():
-    """Return the valid calls by the names of the functions; what follows a comma is a variant."""
+    """Return the valid calls by the names of the functions; a variant follows a comma."""
     table = {}
-    for part in (
-        _rotations(), _curves(), _skeletons(), _articulations(), _derivatives(), _solves(),
-        _systems(), _steps(), _scenes(), _files(), _matrices(), _settings(), _samples(),
-        _trees_of_numbers(), _systems_of_numbers(),
+    for section in (
+        _rotations, _curves, _skeletons, _articulations, _derivatives, _solves, _systems, _steps,
+        _scenes, _files, _matrices, _settings, _samples, _trees_of_numbers, _systems_of_numbers,
     ):  # fmt: skip
-        assert not table.keys() & part.keys()
-        table |= part
+        for name, call in section():
+            assert name not in table
+            table[name] = call
     return table
+
+
+def entry(function, arguments, variant="", of=None, **laws):
+    """Return a call and its name, that of the public function `of` where a wrapper is called."""
+    public = of or function
+    name = f"{public.__module__}.{public.__qualname__}".removeprefix("plumbob.")
+    return name + (f", {variant}" if variant else ""), Call(function, arguments, **laws)
 
 
 RNG = functools.partial(np.random.default_rng, 9)
@@ -200,70 +207,50 @@ def system():
 def _rotations():
     q, p = rotation.random(RNG(), 6), rotation.random(np.random.default_rng(1), 6)
     v, w = RNG().uniform(-1.0, 1.0, (2, 6, 3))
-    r = "reference.rotation."
-    table = {
-        "identity": Call(lambda shape: rotation.identity(2, shape), {"shape": 3}),
-        "random": Call(lambda rng, shape: rotation.random(rng, 2, shape),
-                       {"rng": np.random.default_rng(0), "shape": 3}),
-        "unit": Call(lambda q: rotation.unit("q", q), {"q": q}, free="q"),
-        "multiply": Call(rotation.multiply, {"a": q, "b": p}, free="a b"),
-        "conjugate": Call(rotation.conjugate, {"q": q}, free="q"),
-        "rotate": Call(rotation.rotate, {"q": q, "v": v}, free="q v"),
-        "between": Call(rotation.between, {"a": v, "b": w}, free="a b"),
-        "exponential": Call(rotation.exponential, {"v": v}, free="v"),
-        "logarithm": Call(rotation.logarithm, {"q": q}, free="q"),
-        "angle": Call(rotation.angle, {"a": q, "b": p}, free="a b"),
-        "to_matrix": Call(rotation.to_matrix, {"q": q}, free="q"),
-        "from_matrix": Call(rotation.from_matrix, {"matrix": rotation.to_matrix(q)}, free="matrix"),
-    }  # fmt: skip
-    table["normalise"] = Call(rotation.normalise, {"quaternions": q}, free="quaternions")
-    return {r + name: call for name, call in table.items()}
+    yield entry(lambda shape: rotation.identity(2, shape), {"shape": 3}, of=rotation.identity)
+    yield entry(lambda rng, shape: rotation.random(rng, 2, shape),
+                {"rng": np.random.default_rng(0), "shape": 3}, of=rotation.random)  # fmt: skip
+    yield entry(lambda q: rotation.unit("q", q), {"q": q}, of=rotation.unit, free="q")
+    yield entry(rotation.from_matrix, {"matrix": rotation.to_matrix(q)}, free="matrix")
+    yield entry(rotation.normalise, {"quaternions": q}, free="quaternions")
+    yield entry(rotation.rotate, {"q": q, "v": v}, free="q v")
+    yield entry(rotation.exponential, {"v": v}, free="v")
+    for function in (rotation.conjugate, rotation.logarithm, rotation.to_matrix):
+        yield entry(function, {"q": q}, free="q")
+    for function, a, b in (
+        (rotation.multiply, q, p), (rotation.angle, q, p), (rotation.between, v, w)
+    ):  # fmt: skip
+        yield entry(function, {"a": a, "b": b}, free="a b")
 
 
 def _curves():
-    c = "reference.curve."
-    table = {
-        c + name: Call(getattr(curve, name), {"count": 12})
-        for name in ("circle", "square", "heart", "triangle", "star", "plumb_bob")
-    }
+    for name in ("circle", "square", "heart", "triangle", "star", "plumb_bob"):
+        yield entry(getattr(curve, name), {"count": 12})
     spacing = {"min_spacing": 0.01, "max_spacing": 0.05, "closed": True}
-    return table | {
-        c + "resample": Call(curve.resample, {"curve": curve.circle(30), **spacing}, free="curve")
-    }
+    yield entry(curve.resample, {"curve": curve.circle(30), **spacing}, free="curve")
 
 
 def _skeletons():
     model, local = tree(), rotation.random(RNG(), 5, 6)
     turned = kinematics.forward_kinematics(model, local).rotations
-    s, k = "reference.skeleton.Skeleton", "reference.kinematics."
-    built = {"parents": model.parents, "offsets": model.offsets, "names": list("uvwxyz")}
-    return {
-        s: Call(Skeleton, built),
-        s + ".index": Call(model.index, {"joint": "b", "argument": "joint"}),
-        s + ".path": Call(model.path, {"effector": 2}),
-        s + ".reach": Call(model.reach, {"effector": "f"}),
-        k + "forward_kinematics": Call(
-            reference.forward_kinematics,
-            {"skeleton": model, "local_rotations": local}, free="local_rotations", names="q",
-        ),
-        k + "local_from_global": Call(
-            reference.local_from_global,
-            {"skeleton": model, "rotations": turned}, free="rotations",
-        ),
-        k + "forward_kinematics, one": Call(
-            reference.forward_kinematics,
-            {"skeleton": model, "local_rotations": local[0]}, free="local_rotations", names="q",
-        ),
-        k + "forward_kinematics, robot": Call(
-            reference.forward_kinematics,
-            {"skeleton": robot(), "local_rotations": robot().random(RNG(), 5)},
-            free="local_rotations", names="q",
-        ),
-    }  # fmt: skip
+    yield entry(
+        Skeleton, {"parents": model.parents, "offsets": model.offsets, "names": list("uvwxyz")}
+    )
+    yield entry(model.index, {"joint": "b", "argument": "joint"})
+    yield entry(model.path, {"effector": 2})
+    yield entry(model.reach, {"effector": "f"})
+    for variant, some, q in (
+        ("", model, local), ("one", model, local[0]), ("robot", robot(), robot().random(RNG(), 5))
+    ):  # fmt: skip
+        given = {"skeleton": some, "local_rotations": q}
+        yield entry(reference.forward_kinematics, given, variant, free="local_rotations", names="q")
+    yield entry(
+        reference.local_from_global, {"skeleton": model, "rotations": turned}, free="rotations"
+    )
 
 
 def _articulations():
-    model, a = robot(), "reference.articulation.Articulation"
+    model = robot()
     q = model.random(RNG(), 5)
     built = {
         "skeleton": tree(), "kinds": list(model.kinds), "axes": np.array(model.axes),
@@ -280,114 +267,90 @@ def _articulations():
         mimics = {j: Mimic(j - 1, multiplier, shift) for j in range(1, 9)}
         return Articulation(joints, "slide", mimics=mimics)
 
-    table = {
-        a: Call(Articulation, built, infinite="lower upper cones",
-                single="axes frames lower upper cones"),
-        a + ", mimics": Call(mimics, {"leader": 1, "multiplier": 2.0, "shift": 0.5},
-                             names="mimics"),
-        a + ", chain of mimics": Call(chain, {"multiplier": 2.0, "shift": 0.5}, names="mimics"),
-        a + ".index": Call(model.index, {"joint": "b", "argument": "joint"}),
-        a + ".coordinates_of": Call(model.coordinates_of, {"joint": 3}),
-        a + ".freedoms_of": Call(model.freedoms_of, {"joint": 3}),
-        a + ".neutral": Call(model.neutral, {}),
-        a + ".zero": Call(model.zero, {}),
-        a + ".random": Call(lambda rng, shape: model.random(rng, 2, shape),
-                            {"rng": np.random.default_rng(0), "shape": 3}),
-        a + ".within_limits": Call(model.within_limits, {"q": q, "tolerance": 1e-9}, free="q"),
-    }  # fmt: skip
-    for name in ("clamp", "local_transforms", "forward"):
-        table[f"{a}.{name}"] = Call(getattr(model, name), {"q": q}, free="q")
-    return table
+    gear, named = {"multiplier": 2.0, "shift": 0.5}, {"of": Articulation, "names": "mimics"}
+    single = "axes frames lower upper cones"
+    yield entry(Articulation, built, infinite="lower upper cones", single=single)
+    yield entry(mimics, {"leader": 1, **gear}, "mimics", **named)
+    yield entry(chain, gear, "chain of mimics", **named)
+    yield entry(model.index, {"joint": "b", "argument": "joint"})
+    yield entry(model.coordinates_of, {"joint": 3})
+    yield entry(model.freedoms_of, {"joint": 3})
+    yield entry(model.neutral, {})
+    yield entry(model.zero, {})
+    yield entry(lambda rng, shape: model.random(rng, 2, shape),
+                {"rng": np.random.default_rng(0), "shape": 3}, of=model.random)  # fmt: skip
+    yield entry(model.within_limits, {"q": q, "tolerance": 1e-9}, free="q")
+    for function in (model.clamp, model.local_transforms, model.forward):
+        yield entry(function, {"q": q}, free="q")
 
 
 def _derivatives():
-    model, balls, d = robot(), tree(), "reference.jacobians."
+    model, local = robot(), rotation.random(RNG(), 5, 6)
     q, q0 = model.random(RNG(), 2, 5)
-    v = RNG().uniform(-1.0, 1.0, (5, model.freedom_count))
-    local = rotation.random(RNG(), 5, 6)
-    given = {"articulation": model, "q": q}
-    return {
-        d + "jacobian": Call(differential.jacobian, {**given, "effector": "f"}, free="q"),
-        d + "jacobian, balls": Call(
-            differential.jacobian, {"articulation": balls, "q": local, "effector": -1}, free="q"
-        ),
-        d + "jacobians": Call(differential.jacobians, {**given, "joints": [2, 0]}, free="q"),
-        d + "integrate": Call(differential.integrate, {**given, "v": v}, free="q v"),
-        d + "difference": Call(
-            differential.difference, {"articulation": model, "q1": q, "q0": q0}, free="q1 q0"
-        ),
-    }
+    v, jacobian = RNG().uniform(-1.0, 1.0, (5, model.freedom_count)), differential.jacobian
+    given, balls = {"articulation": model, "q": q}, {"articulation": tree(), "q": local}
+    yield entry(jacobian, {**given, "effector": "f"}, free="q")
+    yield entry(jacobian, {**balls, "effector": -1}, "balls", free="q")
+    yield entry(differential.jacobians, {**given, "joints": [2, 0]}, free="q")
+    yield entry(differential.integrate, {**given, "v": v}, free="q v")
+    ends = {"articulation": model, "q1": q, "q0": q0}
+    yield entry(differential.difference, ends, free="q1 q0")
 
 
 def _solves():
-    model, balls = robot(), tree()
+    model, balls, solve = robot(), tree(), reference.solve_ik
     local, q = rotation.random(RNG(), 6), model.random(RNG())
-    points = RNG().uniform(-0.5, 0.5, (4, 3))
-    rotations = rotation.random(RNG(), 4)
-    numbers = {"tolerance": 1e-4, "tolerance_rotation": 1e-4, "max_iterations": 4}
-    settings = {"solver": "ccd", "effector": "f", **numbers}
+    points, rotations = RNG().uniform(-0.5, 0.5, (4, 3)), rotation.random(RNG(), 4)
+    tolerances = {"tolerance": 1e-4, "tolerance_rotation": 1e-4}
+    settings = {"solver": "ccd", "effector": "f", **tolerances, "max_iterations": 4}
+    once = {"restarts": 0, "seed": 3, "record": False}
     drawn = {"restarts": 1, "seed": 3, "record": True}
-    i, t = "reference.inverse_kinematics.solve_ik", "reference.tracking.track"
-    j = "reference.judging.pose.judge_pose"
 
     def posed(position, rotation, effector, weight):
         target = Target(position, rotation, effector, weight), Target([0.1, 0.2, 0.3], None, "c")
-        return reference.solve_ik(model, q, target, "levenberg_marquardt", max_iterations=4)
+        return solve(model, q, target, "levenberg_marquardt", max_iterations=4)
 
     def one_pose(position, rotation, effector, weight):
         target = Target(position, rotation, effector, weight)
-        return reference.solve_ik(model, q, target, "levenberg_marquardt", max_iterations=4)
+        return solve(model, q, target, "levenberg_marquardt", max_iterations=4)
 
     def follow(position, rotation, weight):
         target = Target(position, rotation, "f", weight)
         return reference.track(model, [target], "levenberg_marquardt", q, max_iterations=4)
 
-    target = {"position": points[0], "rotation": rotations[0], "effector": "f", "weight": 2.0}
-    targets = {"position": points, "rotation": rotations, "weight": 2.0}
-    table = {
-        i: Call(reference.solve_ik,
-                {"skeleton": balls, "local_rotations": local, "target": points[0], **settings,
-                 "restarts": 0, "seed": 3, "record": False},
-                free="local_rotations target", names="q effector"),
-        i + ", batch": Call(reference.solve_ik,
-                            {"skeleton": balls, "local_rotations": np.tile(local, (4, 1, 1)),
-                             "target": points, **settings, **drawn},
-                            free="local_rotations target", names="q effector"),
-        i + ", robot": Call(reference.solve_ik,
-                            {"skeleton": model, "local_rotations": q, "target": points, **settings,
-                             **drawn},
-                            free="local_rotations target", names="q effector"),
-        i + ", poses": Call(posed, target, free="position rotation", names="target"),
-        i + ", pose": Call(one_pose, target, free="position rotation", names="target"),
-        t: Call(reference.track,
-                {"skeleton": balls, "curve": points, "start": local, **settings, "warm": True,
-                 "coherent": True, "closed": True, "record": True},
-                free="curve", names="q effector", raises=(FloatingPointError,)),
-        t + ", poses": Call(follow, targets, free="position rotation",
-                            names="target curve"),
-    }  # fmt: skip
-    place = reference.forward_kinematics(balls, local).positions
-    judged = {"target": points[0], "effector": "f", "tolerance": 1e-4, "tolerance_rotation": 1e-4}
-    table |= {
-        j: Call(reference.judge_pose,
-                {"model": balls, "pose": local, "positions": place, **judged},
-                names="local_rotations q"),
-        j + ", robot": Call(reference.judge_pose, {"model": model, "pose": q, **judged},
-                             names="q local_rotations"),
-    }  # fmt: skip
+    laws = {"free": "local_rotations target", "names": "q effector"}
+    for variant, some, start, target, options in (
+        ("", balls, local, points[0], once),
+        ("batch", balls, np.tile(local, (4, 1, 1)), points, drawn),
+        ("robot", model, q, points, drawn),
+    ):
+        given = {"skeleton": some, "local_rotations": start, "target": target}
+        yield entry(solve, given | settings | options, variant, **laws)
+    given = {"skeleton": balls, "local_rotations": local, "target": points[0]}
     for solver in inverse_kinematics.IK_SOLVERS:
-        table[f"{i}, {solver}"] = Call(
-            reference.solve_ik,
-            {"skeleton": balls, "local_rotations": local, "target": points[0], "solver": solver,
-             "max_iterations": 4}, free="local_rotations target", names="q effector",
-        )  # fmt: skip
-    return table
+        yield entry(solve, given | {"solver": solver, "max_iterations": 4}, solver, **laws)
+    target = {"position": points[0], "rotation": rotations[0], "effector": "f", "weight": 2.0}
+    yield entry(posed, target, "poses", solve, free="position rotation", names="target")
+    yield entry(one_pose, target, "pose", solve, free="position rotation", names="target")
+    motion = {"warm": True, "coherent": True, "closed": True, "record": True}
+    yield entry(
+        reference.track, {"skeleton": balls, "curve": points, "start": local, **settings, **motion},
+        free="curve", names="q effector", raises=(FloatingPointError,),
+    )  # fmt: skip
+    targets = {"position": points, "rotation": rotations, "weight": 2.0}
+    free, names = "position rotation", "target curve"
+    yield entry(follow, targets, "poses", reference.track, free=free, names=names)
+    place = reference.forward_kinematics(balls, local).positions
+    judged, names = {"target": points[0], "effector": "f", **tolerances}, "local_rotations q"
+    given = {"model": balls, "pose": local, "positions": place, **judged}
+    yield entry(reference.judge_pose, given, names=names)
+    yield entry(reference.judge_pose, {"model": model, "pose": q, **judged}, "robot", names=names)
 
 
 def _systems():
     model, state = system()
-    x, m = state.positions, "reference.mass_spring."
-    outer = RNG().uniform(-1.0, 1.0, (5, 3))
+    outer, m = RNG().uniform(-1.0, 1.0, (5, 3)), mass_spring
+    at, moving = {"system": model, "positions": state.positions}, {"system": model, "state": state}
     per_spring = {
         "rest_lengths": np.full(7, 0.9), "stiffnesses": np.full(7, 50.0),
         "dampings": np.full(7, 0.5), "tension_only": np.zeros(7, bool),
@@ -396,76 +359,52 @@ def _systems():
         "masses": np.array(model.masses), "springs": np.array(model.springs), **per_spring,
         "pinned": np.array([0, 2]), "gravity": np.array([0.0, -9.81, 1.0]),
     }  # fmt: skip
-    table = {
-        "MassSpring": Call(MassSpring, built, single=" ".join(per_spring), free="masses pinned"),
-        "State": Call(State, {"positions": x, "velocities": outer}),
-        "spring_blocks": Call(
-            mass_spring.spring_blocks, {"system": model, "positions": x, "geometric": False}
-        ),
-        "derivation": Call(mass_spring.derivation, {"system": model}),
-        "incidence": Call(mass_spring.incidence, {"system": model}),
-        "kinetic_energy": Call(mass_spring.kinetic_energy, {"system": model, "state": state}),
-        "damper_forces": Call(mass_spring.damper_forces, {"system": model, "state": state}),
-        "forces": Call(mass_spring.forces,
-                       {"system": model, "state": state, "external_forces": outer}),
-    }  # fmt: skip
-    for name in ("rest_vectors", "lengths", "stretches", "potential_energy", "spring_energy",
-                 "spring_forces", "stiffness_matrix", "damping_matrix"):  # fmt: skip
-        table[name] = Call(getattr(mass_spring, name), {"system": model, "positions": x})
-    moved = {"state": state, "triangles": np.array([[0, 1, 2], [2, 3, 4]]), "wind": outer,
+    yield entry(MassSpring, built, single=" ".join(per_spring), free="masses pinned")
+    yield entry(State, {"positions": state.positions, "velocities": outer})
+    yield entry(m.spring_blocks, {**at, "geometric": False})
+    yield entry(m.derivation, {"system": model})
+    yield entry(m.incidence, {"system": model})
+    yield entry(m.kinetic_energy, moving)
+    yield entry(m.damper_forces, moving)
+    yield entry(m.forces, {**moving, "external_forces": outer})
+    for function in (m.rest_vectors, m.lengths, m.stretches, m.potential_energy, m.spring_energy,
+                     m.spring_forces, m.stiffness_matrix, m.damping_matrix):  # fmt: skip
+        yield entry(function, at)
+    blown = {"state": state, "triangles": np.array([[0, 1, 2], [2, 3, 4]]), "wind": outer,
              "density": 1.2, "drag": 1.0, "lift": 0.5}  # fmt: skip
-    blown = Call(reference.wind_forces, moved, single="wind", free="triangles",
-                 raises=(FloatingPointError,))  # fmt: skip
-    return {m + name: call for name, call in table.items()} | {"reference.wind.wind_forces": blown}
+    raises = (FloatingPointError,)
+    yield entry(reference.wind_forces, blown, single="wind", free="triangles", raises=raises)
 
 
 def _steps():
     model, state = system()
-    x = state.positions
-    outer, pins = RNG().uniform(-1.0, 1.0, (5, 3)), np.array([[0.1, 0.0, 0.0]])
-    moved = {"state": state, "external_forces": outer, "pin_positions": pins}
-    explicit_step = {"system": model, **moved, "h": 0.01}
+    x, outer = state.positions, RNG().uniform(-1.0, 1.0, (5, 3))
+    moved = {"state": state, "external_forces": outer, "pin_positions": np.array([[0.1, 0, 0]])}
+    stepped = {"system": model, **moved, "h": 0.01}
     euler = ImplicitEuler(model, h=0.01, max_iterations=5)
-    g = euler.objective(state)
-    result = euler.step(state)
+    g, result = euler.objective(state), euler.step(state)
     proof = euler.certify(state, result)
-    o, e = (
-        "reference.implicit_euler.objective.Objective",
-        "reference.implicit_euler.ImplicitEuler",
-    )
 
     def iterates(state, external_forces, pin_positions):
         return list(itertools.islice(euler.iterates(state, external_forces, pin_positions), 2))
 
-    table = {
-        f"reference.explicit.{name}": Call(getattr(reference, name), explicit_step,
-                                           raises=(FloatingPointError,))
-        for name in ("symplectic_euler", "runge_kutta")
-    }  # fmt: skip
-    table |= {
-        f"{o}.{name}": Call(getattr(g, name), {"positions": x})
-        for name in ("evaluate", "value", "gradient", "rest_vectors")
-    }
-    return table | {
-        e: Call(ImplicitEuler, {"system": model, "h": 0.01, "solver": "newton",
-                                "tolerance": 1e-10, "max_iterations": 5}),
-        e + ".step": Call(euler.step, moved),
-        e + ".objective": Call(euler.objective, moved),
-        e + ".certify": Call(euler.certify, {**moved, "result": result}, names="positions"),
-        e + ".iterates": Call(iterates, moved),
-        o: Call(objective.Objective, {"system": model, **moved, "h": 0.01, "start": "x_n"}),
-        "reference.judging.step.judge_step": Call(
-            reference.judge_step,
-            {"system": model, **moved, "h": 0.01, "positions": x, "velocities": outer},
-        ),
-        o + ".residual": Call(g.residual, {"iterate": g.start}),
-        o + ".hessian": Call(g.hessian, {"positions": x, "geometric": True}),
-        o + ".quadratic_form": Call(g.quadratic_form, {"positions": x, "d": g.rest_vectors(x)}),
-        "reference.implicit_euler.certificate.certify": Call(
-            certificate.certify, {"objective": g, "positions": x}),
-        "reference.implicit_euler.certificate.Certificate.shares_minimiser": Call(
-            proof.shares_minimiser, {"other": proof, "apart": 0.1}),
-    }  # fmt: skip
+    for function in (reference.symplectic_euler, reference.runge_kutta):
+        yield entry(function, stepped, raises=(FloatingPointError,))
+    for function in (g.evaluate, g.value, g.gradient, g.rest_vectors):
+        yield entry(function, {"positions": x})
+    options = {"solver": "newton", "tolerance": 1e-10, "max_iterations": 5}
+    yield entry(ImplicitEuler, {"system": model, "h": 0.01, **options})
+    yield entry(euler.step, moved)
+    yield entry(euler.objective, moved)
+    yield entry(euler.certify, {**moved, "result": result}, names="positions")
+    yield entry(iterates, moved, of=euler.iterates)
+    yield entry(objective.Objective, {**stepped, "start": "x_n"})
+    yield entry(reference.judge_step, {**stepped, "positions": x, "velocities": outer})
+    yield entry(g.residual, {"iterate": g.start})
+    yield entry(g.hessian, {"positions": x, "geometric": True})
+    yield entry(g.quadratic_form, {"positions": x, "d": g.rest_vectors(x)})
+    yield entry(certificate.certify, {"objective": g, "positions": x})
+    yield entry(proof.shares_minimiser, {"other": proof, "apart": 0.1})
 
 
 def _scenes():
@@ -474,35 +413,26 @@ def _scenes():
     grid = {"rows": 3, "columns": 4, "spacing": 0.2, "height": 1.5, "mass": 1.0, **elastic}
     mesh = {"vertices": vertices, "triangles": np.array([[0, 1, 2], [0, 2, 3]]), **elastic,
             "bending_stiffness": 1.0, "tension_only": True, "pinned": np.array([0, 1])}  # fmt: skip
-    s = "reference.scenes."
-    return {
-        s + "grids.lab_cloth": Call(
-            scenes.lab_cloth, {"size": 3, "side": 2.0, "height": 1.5, "mass": 1.0, **elastic},
-            names="spacing positions"),
-        s + "grids.grid_cloth": Call(
-            scenes.grid_cloth, {**grid, "shear_stiffness": 10.0, "bending_stiffness": 5.0,
-                                "tension_only": False, "pinned": np.array([0, 3])},
-            free="pinned", names="positions"),
-        s + "grids.grid_triangles": Call(scenes.grid_triangles, {"rows": 3, "columns": 4}),
-        s + "grids.net": Call(scenes.net, grid, names="positions"),
-        s + "grids.lattice": Call(
-            scenes.lattice, {"counts": (3, 2, 2), "spacing": 0.1, "mass": 0.1, **elastic},
-            names="positions"),
-        s + "grids.hanging_rope": Call(
-            scenes.hanging_rope,
-            {"particles": 4, "length": 1.0, "mass": 0.1, **elastic, "tension_only": True}),
-        s + "meshes.cloth_from_mesh": Call(
-            scenes.cloth_from_mesh, {**mesh, "density": 0.3}, free="triangles pinned",
-            names="mass masses"),
-        s + "meshes.cloth_from_mesh, mass": Call(
-            scenes.cloth_from_mesh, {**mesh, "mass": 0.3}, free="vertices triangles pinned",
-            names="density"),
-        s + "networks.random_network": Call(
-            scenes.random_network, {"seed": 3, "particles": 6, "pinned": 1, "damping": 1.0,
-                                    "tension_only": 0.5}, names="dampings"),
-        s + "skeletons.lab_arm": Call(scenes.lab_arm, {}),
-        s + "skeletons.ball_chain": Call(scenes.ball_chain, {"links": 3, "link_length": 0.1}),
-    }  # fmt: skip
+    lab = {"size": 3, "side": 2.0, "height": 1.5, "mass": 1.0, **elastic}
+    cloth = {**grid, "shear_stiffness": 10.0, "bending_stiffness": 5.0, "tension_only": False,
+             "pinned": np.array([0, 3])}  # fmt: skip
+    blocks = {"counts": (3, 2, 2), "spacing": 0.1, "mass": 0.1, **elastic}
+    rope = {"particles": 4, "length": 1.0, "mass": 0.1, **elastic, "tension_only": True}
+    network = {"seed": 3, "particles": 6, "pinned": 1, "damping": 1.0, "tension_only": 0.5}
+    yield entry(scenes.lab_cloth, lab, names="spacing positions")
+    yield entry(scenes.grid_cloth, cloth, free="pinned", names="positions")
+    yield entry(scenes.grid_triangles, {"rows": 3, "columns": 4})
+    yield entry(scenes.net, grid, names="positions")
+    yield entry(scenes.lattice, blocks, names="positions")
+    yield entry(scenes.hanging_rope, rope)
+    for variant, key, free, names in (
+        ("", "density", "triangles pinned", "mass masses"),
+        ("mass", "mass", "vertices triangles pinned", "density"),
+    ):
+        yield entry(scenes.cloth_from_mesh, {**mesh, key: 0.3}, variant, free=free, names=names)
+    yield entry(scenes.random_network, network, names="dampings")
+    yield entry(scenes.lab_arm, {})
+    yield entry(scenes.ball_chain, {"links": 3, "link_length": 0.1})
 
 
 def _trees_of_numbers():
@@ -537,14 +467,9 @@ def _trees_of_numbers():
     balls = {"offsets": np.array(tree().offsets)}
     model, local = robot(), rotation.random(RNG(), 6)
     parts = {
-        **balls,
-        "axes": np.array(model.axes),
-        "lower": np.full(6, -1.0),
-        "upper": np.full(6, 1.5),
-        "cones": np.full(6, 2.0),
-        "multiplier": 0.5,
-        "shift": 0.1,
-    }
+        **balls, "axes": np.array(model.axes), "lower": np.full(6, -1.0), "upper": np.full(6, 1.5),
+        "cones": np.full(6, 2.0), "multiplier": 0.5, "shift": 0.1,
+    }  # fmt: skip
     q, q0 = model.random(RNG(), 2, 3)
     points, turns = RNG().uniform(-0.5, 0.5, (4, 3)), rotation.random(RNG(), 4)
     v = RNG().uniform(-1.0, 1.0, (3, model.freedom_count))
@@ -555,62 +480,50 @@ def _trees_of_numbers():
     judged = functools.partial(reference.judge_pose, effector="f")
     posed = {"position": points[0], "rotation": turns[0], "weight": 2.0}
     place = reference.forward_kinematics(tree(), local).positions
-    table = {
-        "kinematics.forward_kinematics": (
-            reference.forward_kinematics,
-            {"local_rotations": local},
-            {"local_rotations": q},
-        ),
-        "jacobians.jacobians": (differential.jacobians, {"q": local}, {"q": q}),
-        "jacobians.integrate": (differential.integrate, None, {"q": q, "v": v}),
-        "jacobians.difference": (differential.difference, None, {"q1": q, "q0": q0}),
-        "tracking.track": (smooth, {"curve": points, **tolerances}, {"curve": points}),
-        "judging.pose.judge_pose": (
-            judged,
-            {"pose": local, "target": points[0], "positions": place},
-            {"pose": q[0], "target": points[0], "positions": place},
-        ),
-        "formats.bvh.writer.format": (bvh.format, {"local_rotations": local[None]}, None),
-        "articulation.Articulation.random": (drawn, None, {}),
-    }
+    target = {"target": points[0], "positions": place}
+    # functions, their arguments for a tree of balls, and for a robot
+    table = [
+        (reference.forward_kinematics, "", None, {"local_rotations": local},
+         {"local_rotations": q}),
+        (differential.jacobians, "", None, {"q": local}, {"q": q}),
+        (differential.integrate, "", None, None, {"q": q, "v": v}),
+        (differential.difference, "", None, None, {"q1": q, "q0": q0}),
+        (smooth, "", reference.track, {"curve": points, **tolerances}, {"curve": points}),
+        (judged, "", reference.judge_pose, {"pose": local, **target}, {"pose": q[0], **target}),
+        (bvh.format, "", None, {"local_rotations": local[None]}, None),
+        (drawn, "", Articulation.random, None, {}),
+    ]  # fmt: skip
     for solver in inverse_kinematics.IK_SOLVERS:
         solve = functools.partial(reference.solve_ik, solver=solver, max_iterations=8, restarts=1)
         given = {"local_rotations": local, "target": points[0], **tolerances}
-        table[f"inverse_kinematics.solve_ik, {solver}"] = solve, given, None
-        table[f"inverse_kinematics.solve_ik, {solver} poses"] = (
-            functools.partial(reached, solver=solver),
-            None,
-            posed | tolerances,
-        )
-    given = {
+        table.append((solve, f"{solver}, ", reference.solve_ik, given, None))
+        solve = functools.partial(reached, solver=solver)
+        table.append((solve, f"{solver} poses, ", reference.solve_ik, None, posed | tolerances))
+    laws = {
         "names": "q local_rotations target mimics names effector parents",
         "free": "local_rotations q q0 q1 v curve target position rotation",
     }
     limited = {"single": "axes lower upper cones", "infinite": "lower upper cones"}
-    made = {}
-    for name, (function, of_tree, of_model) in table.items():
-        key, raises = "reference." + name, (FloatingPointError,) * (function is smooth)
+    for function, variant, public, of_tree, of_model in table:
+        public, raises = public or function, (FloatingPointError,) * (function is smooth)
         if of_tree is not None:
-            made[key + ", numbers"] = Call(
-                of_balls(function), balls | of_tree, raises=raises, **given
-            )
+            given, call = balls | of_tree, of_balls(function)
+            yield entry(call, given, variant + "numbers", public, raises=raises, **laws)
         if of_model is not None:
-            made[key + ", robot of numbers"] = Call(
-                of_robot(function), parts | of_model, raises=raises, **given, **limited
+            given, variant = parts | of_model, variant + "robot of numbers"
+            yield entry(
+                of_robot(function), given, variant, public, raises=raises, **laws, **limited
             )
-    return made
 
 
 def _systems_of_numbers():
     """Return calls whose arguments are the numbers of a system and its state as well."""
     model, state = system()
     parts = {
-        "masses": np.array(model.masses),
-        "rest_lengths": np.full(7, 0.9),
-        "stiffnesses": np.full(7, 50.0),
-        "dampings": np.full(7, 0.5),
+        "masses": np.array(model.masses), "rest_lengths": np.full(7, 0.9),
+        "stiffnesses": np.full(7, 50.0), "dampings": np.full(7, 0.5),
         "gravity": np.array([0.0, -9.81, 1.0]),
-    }
+    }  # fmt: skip
     moving = {"positions": np.array(state.positions), "velocities": np.array(state.velocities)}
     loads = {
         "external_forces": RNG().uniform(-1.0, 1.0, (5, 3)),
@@ -620,14 +533,8 @@ def _systems_of_numbers():
     def of_system(function):
         def call(gravity, positions, velocities, **given):
             values = {name: given.pop(name) for name in parts if name != "gravity"}
-            made = MassSpring(
-                values.pop("masses"),
-                model.springs,
-                **values,
-                pinned=[0],
-                gravity=gravity,
-                tension_only=model.tension_only,
-            )
+            values |= {"pinned": [0], "gravity": gravity, "tension_only": model.tension_only}
+            made = MassSpring(springs=model.springs, **values)
             return function(made, State(positions, velocities), **given)
 
         return call
@@ -643,17 +550,12 @@ def _systems_of_numbers():
         return ImplicitEuler(made, h=h).certify(state, state.positions, **loads)
 
     def measured(made, state):
-        x = state.positions
-        return [
-            mass_spring.potential_energy(made, x),
-            mass_spring.kinetic_energy(made, state),
-            mass_spring.damper_forces(made, state),
-            mass_spring.stiffness_matrix(made, x),
-            mass_spring.damping_matrix(made, x),
-            mass_spring.rest_vectors(made, x),
-            mass_spring.stretches(made, x),
-            mass_spring.derivation(made),
-        ]
+        m, x = mass_spring, state.positions
+        of_positions = (m.potential_energy, m.stiffness_matrix, m.damping_matrix, m.rest_vectors,
+                        m.stretches)  # fmt: skip
+        values = [function(made, x) for function in of_positions]
+        return [*values, m.kinetic_energy(made, state), m.damper_forces(made, state),
+                m.derivation(made)]  # fmt: skip
 
     def judged(made, state, h, result, **loads):
         return reference.judge_step(made, state, h, result, state.velocities, **loads)
@@ -662,38 +564,27 @@ def _systems_of_numbers():
         g = ImplicitEuler(made, h=h).objective(state, **loads)
         x = state.positions
         residual = min(g.residual(g.evaluate(x)), 1e308)  # infinite where g overflows
-        return [
-            g.evaluate(x),
-            residual,
-            g.hessian(x),
-            g.quadratic_form(x, g.rest_vectors(x)),
-        ]
+        return [g.evaluate(x), residual, g.hessian(x), g.quadratic_form(x, g.rest_vectors(x))]
 
     timed = loads | {"h": 0.01}
-    table = {
-        "mass_spring.forces": (mass_spring.forces, {"external_forces": loads["external_forces"]}),
-        "mass_spring.potential_energy": (measured, {}),
-        "explicit.symplectic_euler": (reference.symplectic_euler, timed),
-        "explicit.runge_kutta": (reference.runge_kutta, timed),
-        "implicit_euler.certificate.certify": (certified, timed),
-        "implicit_euler.objective.Objective.evaluate": (formed, timed),
-        "judging.step.judge_step": (judged, timed | {"result": moving["positions"] + 0.01}),
-    }
+    table = [
+        (mass_spring.forces, None, "", {"external_forces": loads["external_forces"]}),
+        (measured, mass_spring.potential_energy, "", {}),
+        (reference.symplectic_euler, None, "", timed),
+        (reference.runge_kutta, None, "", timed),
+        (certified, certificate.certify, "", timed),
+        (formed, objective.Objective.evaluate, "", timed),
+        (judged, reference.judge_step, "", timed | {"result": moving["positions"] + 0.01}),
+    ]
     for solver in implicit_euler.STEP_SOLVERS:
-        table[f"implicit_euler.ImplicitEuler.step, {solver}"] = (
-            stepped(solver),
-            timed | {"tolerance": 1e-10},
-        )
-    return {
-        f"reference.{name}, numbers": Call(
-            of_system(function),
-            parts | moving | given,
-            single="rest_lengths stiffnesses dampings",
-            names="state springs",
-            raises=(FloatingPointError,),
-        )
-        for name, (function, given) in table.items()
-    }
+        given = timed | {"tolerance": 1e-10}
+        table.append((stepped(solver), ImplicitEuler.step, f"{solver}, ", given))
+    single = "rest_lengths stiffnesses dampings"
+    for function, public, variant, given in table:
+        yield entry(
+            of_system(function), parts | moving | given, variant + "numbers", public or function,
+            single=single, names="state springs", raises=(FloatingPointError,),
+        )  # fmt: skip
 
 
 IT = "it"  # stands for a path
@@ -711,10 +602,9 @@ def _files():
     shifts = np.tile(model.offsets, (4, 1, 1)) * np.arange(1.0, 5.0)[:, None, None]
     moved = {"skeleton": model, "local_rotations": local, "frame_time": 0.02, "offsets": shifts,
              "order": "ZXY"}  # fmt: skip
-    f = "reference.formats."
 
-    def named(function, text, **options):
-        """Return a call by path, IT being that of a file with the text."""
+    def of_file(function, text, **options):
+        """Return an entry of a call by path, IT being that of a file with the text."""
 
         def from_file(path, **given):
             with tempfile.NamedTemporaryFile("w", suffix=".txt") as file:
@@ -722,7 +612,7 @@ def _files():
                 file.flush()
                 return function(file.name if path is IT else path, **given)
 
-        return Call(from_file, {"path": IT, **options}, names="text")
+        return entry(from_file, {"path": IT, **options}, of=function, names="text")
 
     def posed(skeleton, local_rotations, offsets):
         return bvh.Motion(skeleton, local_rotations, 0.02, offsets).pose()
@@ -732,56 +622,34 @@ def _files():
             bvh.write(Path(folder, "it.bvh") if path is IT else path, **given)
 
     pose = {name: moved[name] for name in ("skeleton", "local_rotations", "offsets")}
-    return {
-        f + "bvh.reader.Motion.pose": Call(posed, pose),
-        f + "bvh.reader.read": named(bvh.read, text),
-        f + "bvh.reader.parse": Call(bvh.parse, {"text": text}, names="BVH"),
-        f + "bvh.writer.format": Call(bvh.format, moved, free="local_rotations"),
-        f + "bvh.writer.format, robot": Call(
-            bvh.format, {"skeleton": robots, "local_rotations": robots.random(RNG(), 4)},
-            free="local_rotations"),
-        f + "bvh.writer.write": Call(written, {"path": IT, **moved}, free="local_rotations",
-                                     raises=(OSError,)),
-        f + "mjcf.read": named(mjcf.read, MJCF),
-        f + "mjcf.parse": Call(mjcf.parse, {"text": MJCF}, names="MJCF"),
-        f + "urdf.read": named(urdf.read, URDF, mimic=True),
-        f + "urdf.parse": Call(urdf.parse, {"text": URDF, "mimic": True}, names="URDF"),
-        f + "obj.read_obj": named(obj.read_obj, OBJ),
-        f + "obj.parse_obj": Call(obj.parse_obj, {"text": OBJ, "name": "text"}, names="x"),
-    }  # fmt: skip
+    yield entry(posed, pose, of=bvh.Motion.pose)
+    yield of_file(bvh.read, text)
+    yield entry(bvh.parse, {"text": text}, names="BVH")
+    yield entry(bvh.format, moved, free="local_rotations")
+    given = {"skeleton": robots, "local_rotations": robots.random(RNG(), 4)}
+    yield entry(bvh.format, given, "robot", free="local_rotations")
+    raises, given = (OSError,), {"path": IT, **moved}
+    yield entry(written, given, of=bvh.write, free="local_rotations", raises=raises)
+    yield of_file(mjcf.read, MJCF)
+    yield entry(mjcf.parse, {"text": MJCF}, names="MJCF")
+    yield of_file(urdf.read, URDF, mimic=True)
+    yield entry(urdf.parse, {"text": URDF, "mimic": True}, names="URDF")
+    yield of_file(obj.read_obj, OBJ)
+    yield entry(obj.parse_obj, {"text": OBJ, "name": "text"}, names="x")
 
 
 def _matrices():
     A = scipy.sparse.csc_array(np.diag([4.0, 5.0, 6.0, 7.0]) + np.ones((4, 4)))
     b = np.arange(4.0)
     factor = cholesky.CholeskyFactor(A)
-    c, library = (
-        "reference.sparse.factor.CholeskyFactor",
-        "reference.sparse.linear_solver.",
-    )
-    lu = linear_solver.SuperLUFactor(A)
-    table = {
-        library + "factorize": Call(
-            linear_solver.factorize, {"matrix": A, "library": "supernodal"}),
-        library + "SuperLUFactor": Call(linear_solver.SuperLUFactor, {"matrix": A}),
-        library + "SuperLUFactor.solve": Call(lu.solve, {"b": b}, passed_on="b"),
-        library + "SuperLUFactor.refactorize": Call(lu.refactorize, {"matrix": A}),
-        c: Call(cholesky.CholeskyFactor, {"matrix": A, "pattern": None}),
-        c + ".refactorize": Call(factor.refactorize, {"matrix": A}),
-        c + ".solve": Call(factor.solve, {"b": b}, passed_on="b"),
-        c + ".lower": Call(factor.lower, {}),
-    }  # fmt: skip
-    with_cholespy = _cholespy_calls(A, b)
-    return table | {library + "CholespyFactor" + name: call for name, call in with_cholespy.items()}
-
-
-def _cholespy_calls(A, b):
-    factor = linear_solver.CholespyFactor(A)
-    return {
-        "": Call(linear_solver.CholespyFactor, {"matrix": A}),
-        ".solve": Call(factor.solve, {"b": b}, passed_on="b"),
-        ".refactorize": Call(factor.refactorize, {"matrix": A}),
-    }
+    yield entry(linear_solver.factorize, {"matrix": A, "library": "supernodal"})
+    yield entry(cholesky.CholeskyFactor, {"matrix": A, "pattern": None})
+    yield entry(factor.lower, {})
+    for kind in (linear_solver.SuperLUFactor, linear_solver.CholespyFactor):
+        yield entry(kind, {"matrix": A})
+    for solver in (factor, linear_solver.SuperLUFactor(A), linear_solver.CholespyFactor(A)):
+        yield entry(solver.solve, {"b": b}, passed_on="b")
+        yield entry(solver.refactorize, {"matrix": A})
 
 
 def _settings():
@@ -792,35 +660,22 @@ def _settings():
 
         return call
 
-    compiled, threads = "reference.backend.compiled.", "reference.backend.threads."
-    backends = {
-        "set_backend": Call(within(reference.set_backend), {"name": "python"}, names="backend"),
-    }
-    counts = {
-        "set_num_threads": Call(within(reference.set_num_threads), {"count": 1}),
-    }
-    return {compiled + name: call for name, call in backends.items()} | {
-        threads + name: call for name, call in counts.items()
-    }
+    backend, threads = reference.set_backend, reference.set_num_threads
+    yield entry(within(backend), {"name": "python"}, of=backend, names="backend")
+    yield entry(within(threads), {"count": 1}, of=threads)
 
 
 def _samples():
-    s = "crosscheck.samples."
-    tree = samples.skeleton(3)
     claim = verdict.Claim("a", "b", "c", _compared, POSITION, 1)
-    table = {
-        s + name: Call(getattr(samples, name), {"case": 0})
-        for name in ("skeleton", "reach", "uniform", "smooth", "unpinned", "drifting", "oscillator",
-                     "line")
-    }  # fmt: skip
-    return table | {
-        s + "network": Call(samples.network, {"case": 0, "damped": True}),
-        s + "local_rotations": Call(
-            lambda case, skeleton, batch: samples.local_rotations(case, skeleton, batch),
-            {"case": 0, "skeleton": tree, "batch": 2}, names="shape"),
-        s + "highest_rate": Call(samples.highest_rate, {"system": system()[0]}),
-        "crosscheck.verdict.check_claim": Call(verdict.check_claim, {"claim": claim, "cases": 1}),
-    }  # fmt: skip
+    for name in ("skeleton", "reach", "uniform", "smooth", "unpinned", "drifting", "oscillator",
+                 "line"):  # fmt: skip
+        yield entry(getattr(samples, name), {"case": 0})
+    yield entry(samples.network, {"case": 0, "damped": True})
+    given = {"case": 0, "skeleton": samples.skeleton(3), "batch": 2}
+    yield entry(lambda case, skeleton, batch: samples.local_rotations(case, skeleton, batch),
+                given, of=samples.local_rotations, names="shape")  # fmt: skip
+    yield entry(samples.highest_rate, {"system": system()[0]})
+    yield entry(verdict.check_claim, {"claim": claim, "cases": 1})
 
 
 def _compared(cases):

@@ -125,8 +125,10 @@ def _update(digest: Any, value: Any) -> None:
         digest.update(f"{type(value).__name__}:{value!r};".encode())
 
 
-def chart_sketch(chart: "Chart") -> Sketch:
-    """Return the sketch of a chart."""
+def chart_sketch(chart: "Chart") -> Sketch | None:
+    """Return the sketch of a chart, None if the chart has no curves."""
+    if not any(panel.series for panel in chart.panels):
+        return None
     return Sketch(chart.name, chart.title, chart.caption, chart, _draw_chart)
 
 

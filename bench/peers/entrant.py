@@ -19,7 +19,7 @@ class Entrant:
     Attributes:
         name: its own, or the user's name for it.
         door: its address as the user gave it.
-        spec: what opens it.
+        spec: the argument that opens it.
         version: its own; "" if it states none.
         commit: of its sources, and whether they were changed since; "" outside of git.
         digest: twelve hex digits over its sources.

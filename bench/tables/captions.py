@@ -1,4 +1,4 @@
-"""Titles, captions and columns of tables: prose in `tables.toml`, beside the tables' module."""
+"""Titles, captions and columns of tables and figures, from the file `tables.toml` of a folder."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -24,6 +24,7 @@ class Captions:
         path = Path(module).with_name("tables.toml")
         self._tables = tomllib.loads(path.read_text(encoding="utf-8"))
         self._columns = self._tables.pop("columns", {}), self._tables.pop("folded", {})
+        self._figures = self._tables.pop("figures", {})
         shared: dict[str, str] = self._tables.pop("shared", {})
         self.shared = {key: _on_one_line(text, constants) for key, text in shared.items()}
         self._constants = {**constants, **self.shared}
@@ -54,6 +55,11 @@ class Captions:
             return _on_one_line(how, {**self._constants, **written, **numbers})
 
         return {"name": name, **captions, "measured": sentence}
+
+    def figure(self, name: str) -> dict[str, Any]:
+        """Return the name, title and caption of a chart, a sketch or a scene."""
+        texts = self._figures[name].items()
+        return {"name": name, **{key: _on_one_line(text, self._constants) for key, text in texts}}
 
     def columns(self, name: str) -> tuple[Column, ...]:
         """Return the columns of a table; each shows the cell that a row has under its title."""

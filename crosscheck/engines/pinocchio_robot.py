@@ -54,7 +54,8 @@ class PinocchioRobot(RobotEngine):
                 raise ValueError("there is no link in it")
             self.model = pinocchio.buildModelFromUrdf(str(path), mimic=mimic)
         else:
-            self.model = _mjcf(path, root)
+            _check_mjcf(root)
+            self.model = pinocchio.buildModelFromMJCF(str(path))
         self.data = self.model.createData()
         frames = enumerate(self.model.frames)
         self.links = {f.name: i for i, f in frames if f.type == pinocchio.FrameType.BODY}
@@ -118,19 +119,12 @@ def _check_freedoms(root: ElementTree.Element) -> None:
         raise ValueError(f"it takes 64 n³ bytes for n freedoms: {limit}")
 
 
-def _mjcf(path: Path, root: ElementTree.Element) -> pinocchio.Model:
-    """Return the model of an MJCF file.
-
-    Raises:
-        ValueError: if Pinocchio would read a part twice or crash.
-        RuntimeError: if Pinocchio refuses it.
-        LookupError: if Pinocchio does not find something, such as a class.
-    """
+def _check_mjcf(root: ElementTree.Element) -> None:
+    """Raise a ValueError if Pinocchio would read a part twice or crash."""
     if len(root.findall("worldbody")) > 1:
         raise ValueError("it reads the first of several <worldbody> again for each")
     if any(joint.get("name") == WORLD for joint in (*root.iter("joint"), *root.iter("freejoint"))):
         raise ValueError(f"{WORLD} is its own name of the world, and here that of a joint")
-    return pinocchio.buildModelFromMJCF(str(path))
 
 
 def _pinocchio_coordinates(q: FloatArray, nq: int) -> FloatArray:

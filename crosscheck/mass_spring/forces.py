@@ -82,7 +82,7 @@ def point_kinetic(case: int) -> Comparison:
 
 
 def flex_forces(case: int) -> Comparison:
-    """Compare the forces of springs and dampers with those of the edges of a flex."""
+    """Compare the forces of springs and dampers with the edges of a flex."""
     system, state, _, _ = samples.uniform(case)
     actual = spring_forces(system, state.positions) + damper_forces(system, state)
     engine = flex(case)

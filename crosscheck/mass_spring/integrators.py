@@ -30,18 +30,18 @@ def explicit(
     system: MassSpring,
     h: float,
 ) -> Simulation:
-    """Return the simulation by one of our explicit integrators."""
+    """Return the simulation by an explicit integrator of ours."""
     return _repeated(lambda state, loads: step(system, state, h, loads))
 
 
 def implicit(solver: str, system: MassSpring, h: float, *, tolerance: float = 1e-13) -> Simulation:
-    """Return the simulation by implicit Euler with one of its solvers."""
+    """Return the simulation by implicit Euler and a solver."""
     integrator = ImplicitEuler(system, h=h, solver=solver, tolerance=tolerance)
     return _repeated(lambda state, loads: integrator.step(state, loads).state)
 
 
 def mujoco(integrator: str, system: MassSpring, h: float) -> Simulation:
-    """Return the simulation by one of MuJoCo's integrators."""
+    """Return the simulation by an integrator of MuJoCo."""
     engine = MujocoMassSpring(system, h=h, integrator=integrator)
     return lambda state, loads, steps: engine.step(state, loads, steps=steps)
 
@@ -67,17 +67,17 @@ SIMULATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
 }
 
 
-def compare_long_runs(ours: str, counterpart: str, steps: int, case: int) -> Comparison:
+def compare_long_runs(integrator: str, counterpart: str, steps: int, case: int) -> Comparison:
     """Compare the states after many steps of two integrators of the same method."""
     system, state, external, h = samples.smooth(case)
     actual, expected = (
-        SIMULATORS[name](system, h)(state, external, steps) for name in (ours, counterpart)
+        SIMULATORS[name](system, h)(state, external, steps) for name in (integrator, counterpart)
     )
     return compare_states(actual, expected, state)
 
 
 def joint_chains(case: int) -> Comparison:
-    """Compare 100 steps of implicit Euler with those of nested slides and of nested hinges.
+    """Compare 100 steps of implicit Euler with nested slides and nested hinges.
 
     On a line springs are linear and MuJoCo's discrete equals implicit Euler. Positions and
     velocities are relative to the largest of each.
@@ -112,7 +112,7 @@ def energy_series(
     """Return the energy at the start and after every `every` steps.
 
     Args:
-        integrator: one of `SIMULATORS`, or a function of the same form.
+        integrator: a value of `SIMULATORS` or a similar function.
         system: particles and springs, without external forces.
         state: the initial state.
         h: the step [s].

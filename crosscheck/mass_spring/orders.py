@@ -1,4 +1,4 @@
-"""Laws of many steps: orders of convergence in h, and what the integrators conserve or dissipate.
+"""Laws of many steps: orders of convergence in h, conserved quantities and dissipation.
 
 Each simulation starts from a problem of `samples`; a refinement divides its h.
 """
@@ -20,20 +20,20 @@ REFINEMENT = 8
 
 
 def orders_to_the_limit(names: Sequence[str], order: int, truth: str, case: int) -> Comparison:
-    """Compare the orders of convergence to an accurate solution with the expected one."""
+    """Compare the orders of convergence to an accurate solution with the expected order."""
     limit = _end_positions(case, truth, REFINEMENT)
     errors = [[_end_positions(case, name, k) - limit for k in (1, 2)] for name in names]
     return _compare_orders(errors, order)
 
 
 def orders_to_each_other(first: str, second: str, order: int, case: int) -> Comparison:
-    """Compare the order of the difference between two integrators with the expected one."""
+    """Compare the order of the difference between two integrators with the expected order."""
     differences = [_end_positions(case, first, k) - _end_positions(case, second, k) for k in (1, 2)]
     return _compare_orders([differences], order)
 
 
 def angular_momentum_orders(name: str, order: int, case: int) -> Comparison:
-    """Compare the order in h of the error of the angular momentum with the expected one."""
+    """Compare the order in h of the error of the angular momentum with the expected order."""
     errors = []
     for refinement in (1, 2):
         system, state, end = _simulate(samples.drifting, case, name, refinement)
@@ -74,7 +74,7 @@ def angular_momenta(names: Sequence[str], case: int) -> Comparison:
 
 
 def scalar_spring_energies(case: int) -> Comparison:
-    """Compare the ratio of the energies of one spring after and before n steps of implicit Euler.
+    """Compare the ratio of the energies of a spring after and before n steps of implicit Euler.
 
     It is (1 + h² omega²)^-n for a spring of rest length zero, whose force is linear in x.
     """
@@ -110,7 +110,7 @@ def _end_positions(case: int, name: str, refinement: int) -> FloatArray:
 
 
 def _compare_orders(errors: Sequence[Sequence[FloatArray]], order: int) -> Comparison:
-    """Compare the orders of convergence, from the errors for h and for h/2, with one order."""
+    """Compare the orders of convergence, from the errors for h and h/2, with an order."""
     norms = np.array([[np.linalg.norm(error) for error in pair] for pair in errors])
     observed = np.log2(norms[:, 0] / norms[:, 1])
     return Comparison(observed, np.full_like(observed, order), np.zeros_like(observed), scale=1.0)

@@ -26,7 +26,7 @@ def explicit_steps(integrator: str, case: int) -> Comparison:
 
 
 def flex_steps(case: int) -> Comparison:
-    """Compare the state after one step of symplectic Euler with MuJoCo's Euler on a flex."""
+    """Compare the state after a step of symplectic Euler with MuJoCo's Euler on a flex."""
     system, state, external, h = samples.uniform(case)
     end = symplectic_euler(system, state, h, external)
     return compare_states(end, flex(case).step(state, external), state)
@@ -41,7 +41,7 @@ def damper_steps(integrator: str, case: int) -> Comparison:
 
 
 def gauss_newton_steps(case: int, *, damped: bool) -> Comparison:
-    """Compare the state after one Gauss-Newton step with one of MuJoCo's discrete."""
+    """Compare the state after a Gauss-Newton step with MuJoCo's discrete."""
     system, state, external, h = samples.network(case, damped=damped)
     end = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
     return _compare_with("discrete", case, end, damped=damped)
@@ -101,7 +101,7 @@ def damper_blocks(system: MassSpring, state: State) -> FloatArray:
 
 
 def compare_states(actual: State, expected: State, start: State) -> Comparison:
-    """Compare all positions and velocities, relative to the largest expected ones."""
+    """Compare all positions and velocities, relative to the largest expected."""
     scales = [[[np.abs(expected.positions).max()]], [[np.abs(expected.velocities).max()]]]
     actual_rows, expected_rows, start_rows = (
         np.stack([state.positions, state.velocities]) / scales
@@ -140,7 +140,7 @@ def _forces_at_end(
 
     Springs and gravity are MuJoCo's at x. The damper of the step is -c (l(x) - l_n)/h, a tendon of
     stiffness c/h and rest length l_n in MuJoCo, with l_n its own length of the spring at x_n.
-    MuJoCo's damper at the velocity (x - x_n)/h is another one: it takes the component of the
+    MuJoCo's damper at the velocity (x - x_n)/h differs: it takes the component of the
     velocity along the spring at x, which is not zero for a spring that only rotates.
 
     Returns:

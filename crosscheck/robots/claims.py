@@ -19,7 +19,7 @@ QUANTITIES = {
 
 
 def robot_claims(family: str, engine: str) -> list[Claim]:
-    """Return the claims about one family of files against one engine."""
+    """Return the claims about a family of files against an engine."""
     return [
         Claim(
             f"{family[:-1]} {name}, {engine}",

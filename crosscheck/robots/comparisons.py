@@ -131,7 +131,7 @@ def compare(quantity: Quantity, family: str, engine: str, cases: int) -> Iterato
 
 
 class Differences(NamedTuple):
-    """The largest differences in one model."""
+    """The largest differences in a model."""
 
     positions: float  # relative to the extent of the links
     rotations: float  # of matrices

@@ -35,11 +35,11 @@ UNREAD, REFUSED, NEITHER, CRASHED = "not read", "not read by us", "read by neith
 
 
 class FileReading(NamedTuple):
-    """The comparison of the reference and an engine on one file.
+    """The comparison of the reference and an engine on a file.
 
     The outcome is AGREES or DIFFERS if both read it, DEVIATES if they differ for a known reason;
     UNREAD if only the engine does not read it, REFUSED if only the reference does not, NEITHER if
-    both do not; CRASHED if the process crashed or took too long. The difference is the largest one
+    both do not; CRASHED if the process crashed or took too long. The difference is the largest
     of positions and linear velocities, relative to the extent of the links, and of rotation
     matrices and angular velocities; None unless both read it.
     """
@@ -212,7 +212,7 @@ def _with_causes(
 
 
 def _without_settings(file: ModelFile, folder: Path) -> ModelFile:
-    """Return a copy, in a folder, of an MJCF file and those that it includes without `SETTINGS`."""
+    """Return a copy, in a folder, of an MJCF file and its includes without `SETTINGS`."""
     top, main = file.root.resolve(), file.path.parent.resolve() / file.path.name
     for path in (main, *_includes(file)):
         root = xml_root(path)
@@ -243,6 +243,6 @@ def _includes(file: ModelFile) -> list[Path]:
 
 
 def _one_line(error: object, file: ModelFile) -> str:
-    """Return a message as one line, without the folder of the file."""
+    """Return a message as a single line, without the folder of the file."""
     message = str(error).replace(f"{file.path}", file.path.name)
     return " ".join(message.split())[:300]

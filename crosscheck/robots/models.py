@@ -57,7 +57,7 @@ class RobotFile(NamedTuple):
 
 @functools.cache
 def models(family: str) -> tuple[RobotFile, ...]:
-    """Return all models of a family, those of packages that are not installed left out."""
+    """Return all models of a family in the installed packages."""
     roots = [root for package in PACKAGES[family] if (root := folder(package))]
     return tuple(RobotFile(name, root / name) for root in roots for name in _names(family, root))
 

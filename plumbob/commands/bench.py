@@ -36,7 +36,7 @@ from .verify import program_of
 
 if TYPE_CHECKING:
     from plumbob.bench.harness.block import Choice
-    from plumbob.bench.harness.executor import Executor
+    from plumbob.bench.harness.executors import Executor
     from plumbob.bench.harness.run import Event
 
 QUICK, FULL = "quick", "full"
@@ -168,7 +168,7 @@ def run_suites(
     reasons: dict[str, list[str]] = {}
     for event in events:
         if event.state == run.FAILED:
-            reasons.setdefault(event.message, []).append(f"{event.suite}: {event.what}")
+            reasons.setdefault(event.message, []).append(f"{event.suite}: {event.subject}")
     failures = [
         f"{first}{f' and {len(more)} more' if more else ''}: {reason}"
         for reason, (first, *more) in reasons.items()
@@ -183,7 +183,7 @@ def _run_with_progress(
     suites: Sequence[str], scale: "str | Choice", output: Path, executor: "Executor | None"
 ) -> "list[Event]":
     from plumbob.bench.harness import run
-    from plumbob.bench.harness.executor import THIS_PROCESS
+    from plumbob.bench.harness.executors import THIS_PROCESS
 
     events: list[Event] = []
     with progress() as bar, lines_in_a_pipe(bar):
@@ -194,7 +194,7 @@ def _run_with_progress(
                 events.append(event)
                 counts[event.state] += 1
                 advance = event.state in (run.KEPT, run.MEASURED, run.FAILED)
-                description = visible(f"{event.suite}: {event.what}")
+                description = visible(f"{event.suite}: {event.subject}")
                 bar.update(task, description=description, advance=advance, kept=counts[run.KEPT])
     return events
 
@@ -208,10 +208,10 @@ def _listener(bar: Any, task: Any, events: "Sequence[Event]") -> Callable[[Progr
 
     def listen(step: Progress) -> None:
         if step.state != TROUBLE:
-            bar.update(task, description=visible(step.what))
-        elif step.what not in solvers:
-            solvers.add(step.what)
-            place = events[-1].what if events else step.what
+            bar.update(task, description=visible(step.subject))
+        elif step.subject not in solvers:
+            solvers.add(step.subject)
+            place = events[-1].subject if events else step.subject
             print(visible(f"{place}: {step.message}"), file=sys.stderr, flush=True)
 
     return listen

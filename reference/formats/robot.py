@@ -27,7 +27,7 @@ class Robot(NamedTuple):
     home: FloatArray  # the coordinates of the configuration in the file, (coordinate,)
 
 
-class Link(NamedTuple):
+class RobotLink(NamedTuple):
     """A joint of an articulation, as read from a file; see `Articulation` for the fields.
 
     Its offset [m] and frame are in the frame of its parent, an index among the links, -1 of the
@@ -55,7 +55,7 @@ def upright(axis: Vector) -> Quaternion:
 
 def assemble(
     origin: str,
-    links: list[Link],
+    links: list[RobotLink],
     joints: dict[str, int],
     mimics: Mapping[int | str, Mimic] | None = None,
 ) -> Robot:

@@ -16,7 +16,7 @@ from ..arguments import LARGEST_COORDINATE, distinct_texts
 from ..articulation import Mimic
 from ..quaternion import exponential, multiply, rotate
 from . import xml
-from .robot import INFINITY, ORIGIN, Link, Robot, Vector, assemble, upright
+from .robot import INFINITY, ORIGIN, Robot, RobotLink, Vector, assemble, upright
 from .source import warn
 from .xml import Element
 
@@ -80,7 +80,7 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
     below = _joints_below(root, joints)
     base = _base(root, joints, below)
     follows = arguments.boolean("mimic", mimic)
-    links, link_index, joint_index = [Link(base, -1)], {base: 0}, {}
+    links, link_index, joint_index = [RobotLink(base, -1)], {base: 0}, {}
     waiting = below[base][::-1]
     while waiting:
         joint = waiting.pop()
@@ -142,7 +142,7 @@ def _base(root: Element, joints: Mapping[str, _Joint], links: Mapping[str, list[
     return bases[0]
 
 
-def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list[Link]:
+def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list[RobotLink]:
     """Return the links that a joint becomes, numbered from `number` on."""
     origin = joint.element.single("origin")
     offset = origin.numbers("xyz", ORIGIN) if origin else ORIGIN
@@ -150,17 +150,17 @@ def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list
     pitch_roll = multiply(exponential((0.0, pitch, 0.0)), exponential((roll, 0.0, 0.0)))
     frame = multiply(exponential((0.0, 0.0, yaw)), pitch_roll)
     if joint.type in ("fixed", "floating"):
-        return [Link(joint.child, parent, offset, frame, KINDS[joint.type])]
+        return [RobotLink(joint.child, parent, offset, frame, KINDS[joint.type])]
     axis = _axis(joint.element)
     if joint.type == "planar":
         plane = upright(axis)
         return [
-            Link(f"{joint.name} x", parent, offset, frame, "slide", rotate(plane, X)),
-            Link(f"{joint.name} y", number, kind="slide", axis=rotate(plane, Y)),
-            Link(joint.child, number + 1, kind="hinge", axis=axis),
+            RobotLink(f"{joint.name} x", parent, offset, frame, "slide", rotate(plane, X)),
+            RobotLink(f"{joint.name} y", number, kind="slide", axis=rotate(plane, Y)),
+            RobotLink(joint.child, number + 1, kind="hinge", axis=axis),
         ]
     limits = _limits(joint, crossed_limits)
-    return [Link(joint.child, parent, offset, frame, KINDS[joint.type], axis, *limits)]
+    return [RobotLink(joint.child, parent, offset, frame, KINDS[joint.type], axis, *limits)]
 
 
 def _axis(element: Element) -> Vector:

@@ -33,9 +33,9 @@ from numpy.typing import ArrayLike
 
 from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, instance, number
 from ..backend.compiled import Kernel
+from ..mass_spring import spring_lengths
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor, factorize
-from ..springs import spring_lengths
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
+from ..mass_spring import blocks
 from ..quaternion import add, load_vector, scale, store_vector, subtract
-from ..springs import blocks
 from .factor_cache import GlobalMatrixSolver
 from .line_search import line_search
 from .objective import Iterate, Objective

@@ -33,13 +33,13 @@ from ..backend.threads import in_slices
 from ..mass_spring import (
     MassSpring,
     State,
+    blocks,
     checked_state,
     constant_forces,
     derivation,
     pin_targets,
     rest_vectors,
 )
-from ..springs import blocks
 from .terms import (
     EPS,
     SUM_ROUNDING,

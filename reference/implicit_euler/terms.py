@@ -8,8 +8,8 @@ import math
 import numpy as np
 from numpy import uint64 as at
 
+from ..mass_spring import spring_frame, spring_stretch
 from ..quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
-from ..springs import spring_frame, spring_stretch
 
 # Bound on the rounding error of the gradient, relative to the norm of the terms that it sums.
 EPS = float(np.finfo(float).eps)

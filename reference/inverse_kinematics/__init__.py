@@ -12,8 +12,15 @@ from numpy.typing import ArrayLike
 
 from ..model import Model, checked_model
 from ..outcome import Outcome
-from .problem import IKSolution, Target, checked_targets
-from .settings import IK_SOLVERS, RESTARTS, checked_settings, default_solver
+from .problem import (
+    IK_SOLVERS,
+    RESTARTS,
+    IKSolution,
+    Target,
+    checked_settings,
+    checked_targets,
+    default_solver,
+)
 from .solve import solve_checked, solve_plain
 
 __all__ = ["IK_SOLVERS", "RESTARTS", "IKSolution", "Outcome", "Target", "solve_ik"]
@@ -37,16 +44,15 @@ def solve_ik(
 
     The root of a Skeleton rotates but does not move. Joints that move no effector keep their
     rotation, as does an effector whose own rotation is free. A pose is always returned; `outcome`
-    says how the solve ended. A start that is stuck, such as a straight chain whose target lies on
-    its own line, is first bent, always alike. Limits are kept; a start outside of them is brought
-    within.
+    says how the solve ended. A start that is stuck, like a straight chain collinear with its
+    target, is first bent, always alike. Limits are kept; a start outside of them is brought within.
 
     Restarts never make a solution worse: a target reached with fewer is reached with more, else the
-    merit is no greater than with fewer, or than that of one attempt of (1 + restarts)
+    merit is no greater than with fewer, or than that of a single attempt of (1 + restarts)
     `max_iterations`. An attempt that was given up early is finished if no other reaches the target,
     and the first goes on for as many iterations as all may make: up to (1 + 2 restarts)
     `max_iterations` in all, for one position on a Skeleton (2 + 3 restarts). Attempts at a target
-    proven out of reach end as soon as one is as near as geometry allows.
+    proven out of reach end at the least distance that geometry allows.
 
     Args:
         skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot
@@ -54,10 +60,10 @@ def solve_ik(
         local_rotations: the start, unit quaternions, shape (..., joint, 4); of an Articulation its
             coordinates q, (..., coordinate).
         target: global position [m], shape (..., 3), a Target, or several for several effectors.
-            Leading axes broadcast with those of the start: a batch.
+            Leading axes broadcast with the start's: a batch.
         solver: a name in IK_SOLVERS; by default FABRIK for one position on a Skeleton, else
             Levenberg-Marquardt.
-        effector: the joint that is to reach a position given without one, by index or name. By
+        effector: the joint that is to reach a bare position, by index or name. By
             default the last joint of a Skeleton, and the only tip of an Articulation.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
@@ -65,7 +71,7 @@ def solve_ik(
             out of reach, so that most solves settle.
         restarts: how many further attempts to make from random poses, until one reaches the target.
             By default 20 where the solver is the default Levenberg-Marquardt, else 0.
-        seed: of those poses.
+        seed: of the random poses.
         record: keep the residuals of all iterations in `history`.
 
     Raises:

@@ -86,8 +86,8 @@ def damped_step(mechanism, data, system, damping):
     """Fill the step that minimises |e - J q|^2 + damping |q|^2 within the limits.
 
     A freedom that the step would take beyond its limit becomes active: it goes to the limit, its
-    effect is taken from e, and the others are solved for again. One that would then rather step
-    back is released.
+    effect is taken from e, and the others are solved for again. An active freedom that would
+    then rather step back is released.
     """
     clear(system.active)
     clear(system.step)
@@ -104,7 +104,7 @@ def damped_step(mechanism, data, system, damping):
 
 
 def far_damping(mechanism, target, data, system, damping):
-    """Return the damping [m²] towards a target proven out of reach, `damping` towards any other.
+    """Return the damping [m²] towards a target proven out of reach, else `damping`.
 
     The Hessian of |e|²/2 has second derivatives of the effectors too, up to the reach times |e|,
     which J' J leaves out. With a damping too small for them steps swing about the nearest pose for
@@ -160,10 +160,16 @@ def release(system):
 
 
 def transposed_step(mechanism, data, system):
-    """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without what limits stop."""
+    """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without the freedoms that limits stop."""
     clear(system.active)
     for _ in range(len(system.step) + 1):
-        square, moved = along_gradient(system)
+        clear(system.z)
+        for k in range(len(system.step)):
+            if system.active[k] == 0.0:
+                system.step[k] = inner(system.J[k], system.e)
+                for i in range(len(system.z)):
+                    system.z[i] += system.step[k] * system.J[k, i]
+        square, moved = inner(system.e, system.z), inner(system.z, system.z)
         for k in range(len(system.step)):
             if system.active[k] == 0.0 and moved > 0.0:
                 system.step[k] *= square / moved
@@ -171,17 +177,6 @@ def transposed_step(mechanism, data, system):
                 system.step[k] = 0.0
         if not stop_at_limits(mechanism, data, system):
             return
-
-
-def along_gradient(system):
-    """Fill the step J' e and z = J J' e over the freedoms not active; return <e, z> and |z|^2."""
-    clear(system.z)
-    for k in range(len(system.step)):
-        if system.active[k] == 0.0:
-            system.step[k] = inner(system.J[k], system.e)
-            for i in range(len(system.z)):
-                system.z[i] += system.step[k] * system.J[k, i]
-    return inner(system.e, system.z), inner(system.z, system.z)
 
 
 def stop_at_limits(mechanism, data, system):

@@ -80,8 +80,8 @@ def pointing(joint, effector, target):
 def ccd_update(state, target):
     """Move each joint, from the effectors to the root, to bring all effectors below it nearest.
 
-    A joint rotates all below it as one body: Wahba's problem, for a hinge about its axis. A
-    hinge or slide stops at its limit; a ball whose limits leave only worse rotations stays.
+    A joint rotates all below it as a body: Wahba's problem, for a hinge about its axis. A hinge or
+    slide stops at its limit; a ball stays if its limits leave only worse rotations.
     """
     mechanism, data, work = state.mechanism, state.data, state.workspace
     joints = mechanism.joints
@@ -94,7 +94,7 @@ def ccd_update(state, target):
 
 
 def update_joint(mechanism, target, data, work, j):
-    """Give one joint its best coordinates; the effectors follow, the joints below do not yet."""
+    """Give a joint its best coordinates; the effectors follow, the joints below do not yet."""
     joints, q, kind = mechanism.joints, data.q, mechanism.joints["kind"][j]
     axis = axis_of(joints, j, load_quaternion(data.rotations, j))
     if kind == SLIDE:
@@ -153,7 +153,7 @@ def rotate_within_limits(mechanism, target, data, work, j, M):
 
 
 def unlimited_rotation(mechanism, target, data, work, j, M):
-    """Return the best rotation of joint j without limits, for one position the shortest one."""
+    """Return the best rotation of joint j without limits, for a single position the shortest."""
     count, arm, direction = 0, ZERO, ZERO
     x = load_vector(data.positions, j)
     for e in range(len(mechanism.effectors)):

@@ -83,7 +83,7 @@ def update_positions(chain):
 def rotate_links(chain):
     """Rotate every joint so that its link points at the next joint's position.
 
-    The shortest arc from the link's direction to the new one multiplies the global rotation from
+    The shortest arc from the link's old to its new direction multiplies the global rotation from
     the left, so that the joint keeps its twist about the link.
     """
     for k in range(len(chain.lengths)):
@@ -94,7 +94,7 @@ def rotate_links(chain):
 
 
 def store_local(chain, path, local):
-    """Write the chain's local rotations over those of (joint, 4); the effector keeps its own."""
+    """Write the chain's local rotations to their rows of (joint, 4); the effector keeps its own."""
     store_quaternion(local, path[0], load_quaternion(chain.rotations, 0))
     for k in range(1, len(chain.lengths)):
         R_parent = load_quaternion(chain.rotations, k - 1)
@@ -131,13 +131,8 @@ def is_beyond_reach(chain, d):
     return d >= chain.reach - rounding(chain, d)
 
 
-def is_inside_inner_radius(chain, d):
-    """Return whether a target at distance d is the inner radius, to rounding, or less."""
-    return d <= 2.0 * chain.longest - chain.reach + rounding(chain, d)
-
-
 def drawn_near(chain, target, beyond):
-    """Return the target, drawn to within a distance of what the effector can reach [m]."""
+    """Return the target, drawn to within a distance of the effector's reachable points [m]."""
     root = load_vector(chain.positions, 0)
     direction = subtract(target, root)
     d = norm(direction)
@@ -169,7 +164,7 @@ def is_collinear(chain, target):
 
 
 def bend(chain):
-    """Bend all joints alike, the root too, about one fixed axis across the chain."""
+    """Bend all joints alike, the root too, about a fixed axis across the chain."""
     n = len(chain.lengths)
     direction = (0.0, 0.0, 0.0)
     for k in range(n):

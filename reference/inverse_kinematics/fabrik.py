@@ -2,8 +2,8 @@
 
 The backward pass gives each joint a backward position. On mechanisms the forward pass rotates and
 translates joints instead of moving points, each to bring its children nearest to their backward
-positions: a hinge about its axis, a ball within its limits, one rotation for all children of a
-branch, a free joint as one body. The remaining distances are the residual.
+positions: a hinge about its axis, a ball within its limits, a single rotation for all children of
+a branch, a free joint as a body. The remaining distances are the residual.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ from ..quaternion import (
     store_vector,
     subtract,
 )
-from .chain import is_beyond_reach, is_inside_inner_radius, root_distance
+from .chain import is_beyond_reach, root_distance, rounding
 from .mechanism import (
     move_by,
     rotate_to,
@@ -53,7 +53,7 @@ def fabrik_sweep(chain, target):
     d = root_distance(chain, target)
     if is_beyond_reach(chain, d):
         lay_on_line(chain, target, 1.0)
-    elif is_inside_inner_radius(chain, d):
+    elif d <= 2.0 * chain.longest - chain.reach + rounding(chain, d):  # in the inner radius
         lay_on_line(chain, target, -1.0)
     else:
         reach_backward(chain, target)
@@ -151,7 +151,7 @@ def backward_from_target(mechanism, target, data, e, j):
 
 
 def add_backward(backward, j, weight, x):
-    """Add a weighted position to the sum of those for a joint."""
+    """Add a weighted position to a joint's sum."""
     total = add(load_vector(backward["position"], j), scale(weight, x))
     store_vector(backward["position"], j, total)
     backward["weight"][j] += weight
@@ -169,7 +169,7 @@ def update_joint_pose(joints, data, backward, j):
 
 
 def forward_joint(mechanism, target, data, work, j):
-    """Move one joint, its parent in place, to bring its children nearest to backward positions."""
+    """Move a joint, its parent in place, to bring its children nearest to backward positions."""
     joints, q, kind = mechanism.joints, data.q, mechanism.joints["kind"][j]
     R, x = load_quaternion(data.rotations, j), load_vector(data.positions, j)
     if kind == FREE and work.backward["weight"][j] > 0.0:
@@ -192,7 +192,7 @@ def forward_joint(mechanism, target, data, work, j):
 
 
 def forward_free(mechanism, target, data, work, j):
-    """Move a free joint as one body to bring the joints below nearest to their backward positions.
+    """Move a free joint as a body to bring the joints below nearest to their backward positions.
 
     The centre of the arms goes to the centre of their backward positions, and the rotation is the
     best about it (Horn 1987): a joint that first went to its own backward position and then rotated
@@ -214,7 +214,7 @@ def forward_free(mechanism, target, data, work, j):
 
 
 def forward_rotation(mechanism, target, data, work, j):
-    """Return the rotation of joint j that brings adjacent points nearest, of one the shortest."""
+    """Return the rotation of joint j that brings adjacent points nearest, for one the shortest."""
     backward, joints = work.backward, len(mechanism.joints)
     count, arm, to = 0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):
@@ -290,7 +290,7 @@ def effector_below(mechanism, data, e, j):
 
 
 def joint_arms(mechanism, data, backward, c, j):
-    """Return the vectors from joint j to one below and to its backward position [m]."""
+    """Return the vectors from joint j to a joint below and to its backward position [m]."""
     x, R = joint_transform(mechanism.joints, c, data.q)
     arm, _ = pose_below(mechanism.joints, data, j, mechanism.joints["parent"][c], x, R)
     return arm, subtract(load_vector(backward["position"], c), load_vector(data.positions, j))

@@ -1,8 +1,8 @@
 """The joints that move some effector, and its position by them: for the general solvers.
 
-Chains of unlimited balls with one position to reach have `chain.py` to themselves. Everything else
-is a mechanism: joints of all kinds with limits, several effectors, positions and rotations. Fixed
-joints are merged into the ones below them. See `reduce.py` for how one is made.
+Chains of unlimited balls with a single position to reach have `chain.py`. All other problems are
+mechanisms: joints of all kinds with limits, several effectors, positions and rotations. Fixed
+joints are merged into the joints below them. See `reduce.py` for how one is made.
 """
 
 import math
@@ -175,9 +175,9 @@ def errors(mechanism, target, data, e):
 def residuals(state, target):
     """Return the largest distance [m] and angle [rad] from effector to target, their sum, a bound.
 
-    The sum [m] is of all distances, and of all angles times the lever: it shows the progress of one
+    The sum [m] is of all distances, and of all angles times the lever: it shows the progress of an
     effector while another, further from its target, stays. No effector is further above its own
-    least distance than the bound [m] is above the largest of those.
+    least distance than the bound [m] is above the largest of the least distances.
     """
     mechanism, data = state.mechanism, state.data
     largest, largest_angle, total, largest_bound, excess = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -201,7 +201,7 @@ def merit_of(state, target):
 
 
 def weighted_square(mechanism, weight, distance, angle):
-    """Return the share of one effector in the square of the merit [m²]."""
+    """Return the share of an effector in the square of the merit [m²]."""
     lever = LEVER * mechanism.reach
     return weight * (distance * distance + lever * lever * angle * angle)
 
@@ -215,7 +215,7 @@ def least_residual(mechanism, target):
 
 
 def least_distance(mechanism, target, e):
-    """Return a lower bound of the distance from one effector to its target over all poses [m].
+    """Return a lower bound of the distance from an effector to its target over all poses [m].
 
     Links and the travel of slides reach no further than their sum. Distances and sums of lengths
     are known to a few roundings for each joint.

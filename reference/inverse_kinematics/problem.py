@@ -1,6 +1,8 @@
-"""The targets of a solver and its solution."""
+"""The targets of a solve, its settings and its solution; the solvers by name."""
 
+import functools
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
@@ -9,9 +11,19 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, IndexArray
 from ..articulation import Articulation
+from ..backend.compiled import Kernel
 from ..model import effector_of
 from ..outcome import Outcome
 from ..skeleton import Skeleton
+from .restarts import Limits
+from .solve_chain import ON_CHAINS
+from .solve_mechanism import ON_MECHANISMS
+
+# The defaults of `solve_ik`: iterations of an attempt, the same towards a target out of reach, and
+# restarts where the solver is left to us and is not FABRIK.
+MAX_ITERATIONS, FAR_ITERATIONS, RESTARTS = 100, 2000, 20
+# All integers up to this are floats.
+LARGEST_COUNT = 2**53
 
 
 class _TargetFields(NamedTuple):
@@ -28,7 +40,7 @@ class Target(_TargetFields):
         position: global position [m], shape (3,), or (..., 3) for a batch.
         rotation: global rotation, shape (4,) or (..., 4); None if it is free.
         effector: the joint, by index or name; None for the default of `solve_ik`.
-        weight: of its squared error among those of other targets.
+        weight: of its squared error, relative to other targets.
     """
 
     __slots__ = ()
@@ -66,8 +78,8 @@ class IKSolution(NamedTuple):
             weight (distance² + (lever angle)²), the heaviest weight taken as 1, the angle only
             where the rotation is not free, the lever half the reach.
         excess: `residual` less a lower bound by geometry [m]: the distance beyond all links and
-            slides, and on a Skeleton with one position also that to the inner radius which the
-            longest link leaves; else 0.
+            slides, and on a Skeleton with a single position also inside the inner radius that
+            the longest link leaves; else 0.
     """
 
     local_rotations: FloatArray
@@ -91,7 +103,7 @@ class CheckedTarget(NamedTuple):
     weight: float  # greater than zero
 
     def mapped(self, change: Callable[[FloatArray], FloatArray]) -> "CheckedTarget":
-        """Return the target with its position and its rotation, if it has one, changed."""
+        """Return the target with its position and any rotation changed."""
         Q = None if self.rotation is None else change(self.rotation)
         return self._replace(position=change(self.position), rotation=Q)
 
@@ -102,8 +114,8 @@ def checked_targets(
     """Return the targets of all effectors, their numbers not yet checked.
 
     Raises:
-        ValueError: if it is no position or target; if there is no such joint, two targets are for
-            the same one, or target and argument name different ones.
+        ValueError: if it is no position or target; if a joint does not exist, two targets are for
+            the same joint, or target and argument name different joints.
     """
     if isinstance(target, Target):
         return [_checked(model, target, effector)]
@@ -150,3 +162,77 @@ def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:
             target = target._replace(rotation=rotation.unit("rotation", target.rotation))
         checked.append(target)
     return checked
+
+
+class IKSolver(NamedTuple):
+    """A solver's two kernels; its pickle holds the name."""
+
+    name: str  # in IK_SOLVERS
+    chain: Kernel  # for one position to reach by a chain of unlimited balls
+    mechanism: Kernel  # for all other problems
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _solver, (self.name,)
+
+
+def _solver(name: str) -> IKSolver:
+    return IK_SOLVERS[name]
+
+
+IK_SOLVERS = {name: IKSolver(name, ON_CHAINS[name], ON_MECHANISMS[name]) for name in ON_CHAINS}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a solve, checked."""
+
+    solver: IKSolver  # its kernels
+    limits: Limits  # what the solve may leave and take
+    seed: int  # of the restarts
+    record: bool  # whether to keep the residuals of all iterations
+
+    @functools.cached_property
+    def numbers(self) -> FloatArray:
+        """The limits as an array, as kernels take them."""
+        return np.array(self.limits, dtype=np.float64)
+
+
+def default_solver(model: Any, target: Any) -> tuple[str, int]:
+    """Return the solver and the restarts that suit a model and its target."""
+    target = target[0] if are_targets(target) and len(target) == 1 else target
+    oriented = isinstance(target, Target) and target.rotation is not None
+    if isinstance(model, Skeleton) and not (oriented or are_targets(target)):
+        return "fabrik", 0
+    return "levenberg_marquardt", RESTARTS
+
+
+def checked_settings(*arguments: Any) -> Settings:
+    """Return the settings, recent settings from a cache."""
+    try:
+        return _cached_settings(*arguments)
+    except TypeError:  # some argument has no hash, and so is no number or name
+        return _settings(*arguments)
+
+
+def _settings(
+    solver: Any, tolerance: Any, tolerance_rotation: Any, max_iterations: Any,
+    restarts: Any, seed: Any, record: bool, chained: bool = False,
+) -> Settings:  # fmt: skip
+    within_reach, out_of_reach = MAX_ITERATIONS, FAR_ITERATIONS
+    if max_iterations is not None:
+        count = arguments.integer("max_iterations", max_iterations, least=0)
+        within_reach = out_of_reach = min(count, LARGEST_COUNT)
+    kernels = IK_SOLVERS[arguments.choice("solver", solver, IK_SOLVERS)]
+    limits = Limits(
+        arguments.number("tolerance", tolerance, least=0.0),
+        arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
+        within_reach,
+        out_of_reach,
+        arguments.count("restarts", restarts, least=0),
+        chained,
+    )
+    seed = arguments.integer("seed", seed, least=0)
+    return Settings(kernels, limits, seed, arguments.boolean("record", record))
+
+
+_cached_settings = functools.lru_cache(maxsize=64, typed=True)(_settings)

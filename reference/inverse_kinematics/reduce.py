@@ -90,7 +90,7 @@ def _mechanism(
 def _moving(
     articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
 ) -> IndexArray:
-    """Return the joints that move on the paths to the effectors, and those that they follow.
+    """Return the joints that move on the paths to the effectors, and their leaders.
 
     An effector's own ball or hinge rotates it, but does not move it.
     """
@@ -104,7 +104,7 @@ def _moving(
 
 
 def _merged(whole: RecordArray, joint: int, number: dict[int, int]) -> tuple[int, Any, Any]:
-    """Return the nearest moving joint above, and this joint's frame in the frame of that one."""
+    """Return the nearest moving joint above, and this joint's frame in its frame."""
     x, R = load_vector(whole["offset"], joint), load_quaternion(whole["frame"], joint)
     j = int(whole["parent"][joint])
     while j >= 0 and j not in number:
@@ -154,7 +154,7 @@ def _moving_joints(
 def _adjacent(joints: RecordArray, ends: RecordArray, margin: float) -> BoolArray:
     """Return which joints and effectors each joint is the last above them to move.
 
-    A point on a hinge's axis or in a ball's centre stays, and the next ones down are adjacent.
+    A point on a hinge's axis or in a ball's centre stays, and the next joints down are adjacent.
     """
     count = len(joints)
     adjacent = np.zeros((count, count + len(ends)), dtype=bool)

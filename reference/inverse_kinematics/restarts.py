@@ -1,14 +1,12 @@
-"""The two loops of every solver: the iterations of one attempt, and attempts from further starts.
+"""The two loops of every solver: iterations of an attempt, and attempts from further starts.
 
 They work on the state of a chain of unlimited balls (`solve_chain.py`) or of a mechanism
-(`solve_mechanism.py`), through its `Operations`. Both states have a `row` of numbers: what an
+(`solve_mechanism.py`), through its `Operations`. Both states have a `row` of numbers that an
 attempt continues from.
 """
 
 import math
 from typing import NamedTuple
-
-import numpy as np
 
 from ..arguments import FloatArray
 from ..backend.digest import PythonKernel
@@ -31,7 +29,7 @@ RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = rang
 
 
 class Operations(NamedTuple):
-    """What the loops do to a state, a kernel each."""
+    """The operations of the loops on a state, a kernel each."""
 
     update: PythonKernel  # (state, target): make one iteration of a solver
     # (state, target): return the largest distance [m] and angle [rad] from effector to target, the
@@ -47,7 +45,7 @@ class Operations(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What a solve may leave and take."""
+    """The tolerances and numbers of iterations of a solve."""
 
     tolerance: float  # distance that counts as reached [m]
     tolerance_rotation: float  # angle that does [rad]
@@ -58,7 +56,7 @@ class Limits(NamedTuple):
 
 
 class Criteria(NamedTuple):
-    """When an attempt at one target ends."""
+    """The end criteria of attempts at a target."""
 
     # at most this far from the target counts as reached [m], some of it left for the rounding of
     # the final pose
@@ -66,13 +64,6 @@ class Criteria(NamedTuple):
     angle: float  # the same for rotations [rad]
     margin: float  # an error that changes by no more has stalled [m]
     max_iterations: int  # of each attempt
-
-
-class Attempts(NamedTuple):
-    """How far the attempts at one target have come."""
-
-    saved: FloatArray  # rows of the state, one an attempt and in the last row the best end of one
-    progress: FloatArray  # see the columns above, (attempt + 1, 4); the last row is not used
 
 
 class Result(NamedTuple):
@@ -89,33 +80,31 @@ class Result(NamedTuple):
 
 
 def limits_of(numbers):
-    """Return Limits from their numbers in one array, which comes in faster from Python."""
+    """Return Limits from an array of their numbers, which comes in faster from Python."""
     return Limits(
         numbers[0], numbers[1], int(numbers[2]), int(numbers[3]), int(numbers[4]), numbers[5] > 0.0
     )
 
 
-def new_attempts(count, state):
-    """Return room for so many attempts, not filled."""
-    return Attempts(np.empty((count + 1, len(state.row))), np.empty((count + 1, WAIT + 1)))
-
-
-def solve_with_restarts(operations, state, attempts, target, limits, criteria, history):
-    """Attempt from the start, then from random configurations, until one reaches the target.
+def solve_with_restarts(operations, state, saved, progress, target, limits, criteria, history):
+    """Attempt from the start, then from random configurations, until the target is reached.
 
     While others may follow, an attempt at a target in reach is given up early. If none reaches it,
-    all are finished, and the first makes as many iterations as all of them may: its ends after one
-    attempt's iterations, two and so on count as attempts too. So the result is the best of more
-    than what one start gives, or fewer restarts, and can be no worse.
+    all are finished, and the first makes as many iterations as all of them may: its ends after each
+    attempt's number of iterations count as attempts too. So the result is no worse than
+    from a single start, or with fewer restarts.
 
-    Saves the best attempt in the last row of `attempts.saved`.
+    The rows of `saved`, a row of the state each, and of `progress`, see the columns above, are of
+    attempts; their last rows are spare. The best attempt is saved in the last row.
 
     Returns:
         The iterations of all attempts, and whether the best of them stalled.
     """
-    saved, progress = attempts
     random = len(progress) - 2
-    reset(progress, PATIENCE if random > 0 and criteria.distance <= limits.tolerance else INFINITY)
+    patience = PATIENCE if random > 0 and criteria.distance <= limits.tolerance else INFINITY
+    for i in range(random + 1):
+        row = progress[i]
+        row[COUNT], row[STATE], row[COST], row[WAIT] = 0.0, LIMITED, INFINITY, patience
     distance, _, _, _ = operations.error(state, target)
     store_if_inside(history, 0, distance)
     perturbed = operations.perturb(state, target, criteria, progress[0])
@@ -147,13 +136,6 @@ def solve_with_restarts(operations, state, attempts, target, limits, criteria, h
             copy_row(saved[k], state.row)
             operations.place(state)
     return count, ending <= STALLED
-
-
-def reset(progress, patience):
-    """Set all attempts to the state before their first iteration."""
-    for k in range(len(progress) - 1):
-        row = progress[k]
-        row[COUNT], row[STATE], row[COST], row[WAIT] = 0.0, LIMITED, INFINITY, patience
 
 
 def solve_once(operations, state, target, criteria, attempt, limit, history, earlier):
@@ -195,7 +177,7 @@ def solve_once(operations, state, target, criteria, attempt, limit, history, ear
 def is_better(attempt, best):
     """Return whether an attempt is finished and better than the best [m].
 
-    One that was given up becomes more patient.
+    An attempt that was given up becomes more patient.
     """
     if attempt[STATE] == GIVEN_UP:
         attempt[WAIT] *= MORE_PATIENT
@@ -216,13 +198,13 @@ def most_promising(progress):
 
 
 def copy_row(source, target):
-    """Copy one row of numbers into another."""
+    """Copy a row of numbers into another."""
     for k in range(len(source)):
         target[k] = source[k]
 
 
 def store_if_inside(row, i, value):
-    """Write entry i of a row that has one."""
+    """Write entry i of a row, if there is one."""
     if i < len(row):
         row[i] = value
 

@@ -1,11 +1,11 @@
 """From arguments to the kernels of a solver, and from their results to a solution.
 
-`solve_checked` accepts anything. For one start and one target it takes as long as the kernel, a
+`solve_checked` accepts anything. For a single start and target it takes as long as the kernel, a
 third of a call on a chain of ten balls; `solve_plain` does the same in fewer steps for float64
 arrays of the right shape, and leaves all else to it.
 """
 
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,6 @@ from ..arguments import (
     LARGEST_COORDINATE,
     SMALLEST_POSITIVE,
     FloatArray,
-    IndexArray,
     RecordArray,
     frozen,
 )
@@ -28,10 +27,9 @@ from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
 from .mechanism import TARGET
-from .problem import CheckedTarget, IKSolution, Target, check_numbers
+from .problem import CheckedTarget, IKSolution, Settings, Target, check_numbers
 from .reduce import prepare
 from .restarts import FIGURES, ITERATIONS, MERIT, OUTCOME, Result
-from .settings import Settings
 
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
 SLICE_ON_CHAINS, SLICE_ON_MECHANISMS = 128, 16
@@ -47,7 +45,7 @@ NAMES = (int, str, type(None))
 def solve_plain(
     model: Any, start: Any, target: Any, effector: Any, settings: Settings
 ) -> IKSolution | None:
-    """Return the solution for one start and one target, or None.
+    """Return the solution for a single start and target, or None.
 
     None where the arguments are no float64 arrays of the right shape, or not valid.
     """
@@ -108,11 +106,11 @@ def solve_checked(
 ) -> IKSolution:
     """Return the solution for targets that are checked but for their numbers.
 
-    If the settings are chained, each solve starts from the one before.
+    If the settings are chained, each solve starts from the solution before.
 
     Raises:
         ValueError: that names a number which a kernel has refused.
-        FloatingPointError: if it is of a frame from which the next one starts.
+        FloatingPointError: if a frame is wrong from which the next frame starts.
     """
     is_skeleton, name = isinstance(model, Skeleton), coordinates_name(model)
     shape = (model.joint_count, 4) if isinstance(model, Skeleton) else (model.coordinate_count,)
@@ -127,7 +125,17 @@ def solve_checked(
         rows = target_rows(targets, batch)
     result = _run_checked(model, starts, targets, rows, settings)
     if result is None:
-        _raise_invalid(model, start, targets, settings)
+        check_numbers(targets)
+        if isinstance(model, Articulation):
+            model.checked(name, start)
+        else:
+            rotation.unit(name, start)
+        if settings.limits.chained:
+            limit = f"{LARGEST_COORDINATE:g}"
+            raise FloatingPointError(f"track: a frame left the numbers up to {limit}")
+        raise ValueError(
+            f"{name}: expected quaternions within 1e-6 of unit length, got one just off"
+        )
     if on_chain and settings.limits.restarts:
         rows = target_rows(targets, batch)
         result = _restarted(model, starts, targets, rows, result, settings)
@@ -175,7 +183,7 @@ def run(
 ) -> tuple[FloatArray, ...]:
     """Return the fields of Result as a kernel fills them; none if some number is not valid.
 
-    `arrays` are those of the model that the kernel reads. The starts are rows, (target, ...), or
+    `arrays` are the model's that the kernel reads. The starts are rows, (target, ...), or
     one for all targets; the targets are positions [m], (target, 3), of a mechanism records TARGET,
     (target, effector). `coordinates` is how many a solution on a mechanism has, None on a chain.
     """
@@ -183,7 +191,14 @@ def run(
     local, positions = np.empty((n, joints, 4)), np.empty((n, joints, 3))
     figures = np.empty((n, len(FIGURES)))
     if settings.record:
-        history = _new_history(n, 1 if coordinates is None else 2, settings)
+        rounds = settings.limits.restarts * (1 if coordinates is None else 2) + 1
+        columns = rounds * max(settings.limits.max_iterations, settings.limits.far_iterations)
+        if n * columns > LARGEST_HISTORY:
+            raise ValueError(
+                f"max_iterations: expected at most {LARGEST_HISTORY:,} residuals to record, got "
+                f"{n} times {columns}"
+            )
+        history = np.empty((n, columns + 1))
     rows: tuple[np.ndarray, ...]
     if coordinates is None:
         q, slice_length = local, SLICE_ON_CHAINS
@@ -203,24 +218,6 @@ def run(
     return (local, positions, figures, history, q) if valid else ()
 
 
-def _raise_invalid(
-    model: Skeleton | Articulation,
-    start: ArrayLike,
-    targets: list[CheckedTarget],
-    settings: Settings,
-) -> NoReturn:
-    """Raise an error that names the number which a kernel has refused."""
-    check_numbers(targets)
-    name = coordinates_name(model)
-    if isinstance(model, Articulation):
-        model.checked(name, start)
-    else:
-        rotation.unit(name, start)
-    if settings.limits.chained:
-        raise FloatingPointError(f"track: a frame left the numbers up to {LARGEST_COORDINATE:g}")
-    raise ValueError(f"{name}: expected quaternions within 1e-6 of unit length, got one just off")
-
-
 def balls(skeleton: Skeleton) -> Articulation:
     """Return the skeleton as an Articulation of unlimited balls, made once and kept by it."""
     cache = skeleton.__dict__
@@ -230,7 +227,7 @@ def balls(skeleton: Skeleton) -> Articulation:
 
 
 def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> RecordArray:
-    """Return targets as records TARGET, (target, effector), the largest weight one."""
+    """Return targets as records TARGET, (target, effector), the largest weight 1."""
     count, heaviest = len(targets), max([target.weight for target in targets])
     rows = np.empty((*batch, count), TARGET)
     for e, target in enumerate(targets):
@@ -255,22 +252,10 @@ def batch_shape(
 
 
 def _rows(starts: FloatArray, batch: tuple[int, ...], axes: int) -> FloatArray:
-    """Return the starts as rows: one for each target of a batch, or one for all."""
+    """Return the starts as rows: a row for each target of a batch, or a single row."""
     if starts.ndim == axes:
         return starts[None]
     return one_batch(arguments.spread(starts, (*batch, *starts.shape[-axes:])), axes)
-
-
-def _new_history(targets: int, rounds: int, settings: Settings) -> FloatArray:
-    """Return rows for the residuals of all iterations that attempts may make."""
-    limits = settings.limits
-    columns = (rounds * limits.restarts + 1) * max(limits.max_iterations, limits.far_iterations)
-    if targets * columns > LARGEST_HISTORY:
-        raise ValueError(
-            f"max_iterations: expected at most {LARGEST_HISTORY:,} residuals to record, got "
-            f"{targets} times {columns}"
-        )
-    return np.empty((targets, columns + 1))
 
 
 def _restarted(
@@ -283,8 +268,8 @@ def _restarted(
 ) -> Result:
     """Return the better of first results and restarts, where a target in reach is not reached.
 
-    One start on a chain of unlimited balls has already had the iterations of all attempts. Towards
-    a target out of reach it has one nearest point to come to, and no start comes to another.
+    A start on a chain of unlimited balls has already had the iterations of all attempts. Towards a
+    target out of reach every start comes to the same nearest point.
     """
     unsolved = np.flatnonzero(~np.isin(first.figures[:, OUTCOME], FINAL_OUTCOMES))
     if not len(unsolved):
@@ -292,8 +277,13 @@ def _restarted(
     starts = starts[unsolved] if len(starts) > 1 else starts
     more = _run_checked(skeleton, starts, targets, rows[unsolved], settings)
     assert more is not None, "both kernels accept the same starts and targets"
-    history = _appended(first, more, unsolved) if settings.record else first.history
-    iterations = first.figures[unsolved, ITERATIONS] + more.figures[:, ITERATIONS]
+    history, counts = first.history, first.figures[unsolved, ITERATIONS].astype(np.int64)
+    if settings.record:  # the residuals of the first results, then those of their restarts
+        columns = np.empty((len(history), more.history.shape[1] - 1))
+        history = np.concatenate([history, columns], axis=1)
+        for row, count, residuals in zip(unsolved, counts, more.history, strict=True):
+            history[row, count + 1 : count + len(residuals)] = residuals[1:]
+    iterations = counts + more.figures[:, ITERATIONS]
     is_better = (more.figures[:, OUTCOME] == Outcome.CONVERGED) | (
         more.figures[:, MERIT] < first.figures[unsolved, MERIT]
     )
@@ -302,17 +292,6 @@ def _restarted(
         values[better] = replacements[is_better]
     first.figures[unsolved, ITERATIONS] = iterations
     return first._replace(history=history)
-
-
-def _appended(first: Result, more: Result, unsolved: IndexArray) -> FloatArray:
-    """Return the residuals of first results and then those of their restarts."""
-    columns = first.history.shape[1] + more.history.shape[1] - 1
-    history = np.empty((len(first.history), columns))
-    history[:, : first.history.shape[1]] = first.history
-    counts = first.figures[unsolved, ITERATIONS].astype(np.int64)
-    for row, count, residuals in zip(unsolved, counts, more.history, strict=True):
-        history[row, count + 1 : count + len(residuals)] = residuals[1:]
-    return history
 
 
 def _solution(result: Result, batch: tuple[int, ...], settings: Settings) -> IKSolution:

@@ -1,4 +1,4 @@
-"""One position to reach by a chain of unlimited balls: what the loops of `restarts.py` work on.
+"""A single position to reach by a chain of unlimited balls, for the loops of `restarts.py`.
 
 The textbook forms of the solvers on a chain are four times faster than on a mechanism.
 """
@@ -32,12 +32,12 @@ from .jacobian_methods import (
 from .restarts import (
     COUNT,
     OUTCOME,
+    WAIT,
     Criteria,
     Operations,
     copy_row,
     fill_figures,
     limits_of,
-    new_attempts,
     outcome_of,
     solve_with_restarts,
 )
@@ -48,28 +48,28 @@ def solve_chains(
 ):
     """Solve target after target; return whether all starts and targets were valid.
 
-    Arrays come one by one, since tuples of them take longer from Python: those of the skeleton, the
-    joints from the root to the effector, the numbers of Limits, local rotations to start from,
-    (start, joint, 4), which the targets use one after the other, global positions [m], (target, 3),
+    Arrays come separately, since tuples of them take longer from Python: the skeleton's, the joints
+    from the root to the effector, the numbers of Limits, local rotations to start from, (start,
+    joint, 4), used by the targets in turn, global positions [m], (target, 3),
     and the fields of Result but its coordinates.
     """
     limits = limits_of(numbers)
     chain = new_chain(offsets, path)
-    attempts = new_attempts(1, chain)
+    saved, progress = np.empty((2, len(chain.row))), np.empty((2, WAIT + 1))
     rotations = np.empty((len(parents), 4))
     for i in range(len(targets)):
         pose, target = local[i], load_vector(targets, i)
         start = local[i - 1] if limits.chained and i > 0 else starts[i % len(starts)]
-        if not (normalise(start, pose) and largest(target) <= LARGEST_COORDINATE):
+        if not (normalise(start, pose) and is_within(target, LARGEST_COORDINATE)):
             return False
         pose_chain(chain, path, pose)
         d = root_distance(chain, target)
         criteria, past = chain_criteria(chain, d, limits), history[i % len(history)]
         iterations, stalled = solve_with_restarts(
-            operations, chain, attempts, target, limits, criteria, past
+            operations, chain, saved, progress, target, limits, criteria, past
         )
         if iterations > 0:
-            copy_row(attempts.saved[-1], chain.row)
+            copy_row(saved[-1], chain.row)
             rotate_links(chain)
             store_local(chain, path, pose)
         forward_pose(parents, offsets, pose, positions[i], rotations)
@@ -82,10 +82,9 @@ def solve_chains(
     return True
 
 
-def largest(v):
-    """Return the largest magnitude of a vector's components, NaN if it has one."""
-    x, y, z = abs(v[0]), abs(v[1]), abs(v[2])
-    return x + y + z if x + y + z != x + y + z else max(x, y, z)
+def is_within(v, bound):
+    """Return whether no component of a vector is beyond a bound, or NaN."""
+    return abs(v[0]) <= bound and abs(v[1]) <= bound and abs(v[2]) <= bound
 
 
 def chain_criteria(chain, d, limits):

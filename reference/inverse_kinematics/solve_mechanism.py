@@ -1,4 +1,4 @@
-"""Any targets of any mechanism: what the loops of `restarts.py` work on."""
+"""Any targets of any mechanism, for the loops of `restarts.py`."""
 
 import math
 from typing import NamedTuple
@@ -8,6 +8,7 @@ import numpy as np
 from ..arguments import LARGEST_COORDINATE, FloatArray, RecordArray
 from ..articulation import (
     BALL,
+    FIXED,
     FREE,
     HINGE,
     articulated_pose,
@@ -60,12 +61,12 @@ from .restarts import (
     OUTCOME,
     STALLED,
     STATE,
+    WAIT,
     Criteria,
     Operations,
     copy_row,
     fill_figures,
     limits_of,
-    new_attempts,
     outcome_of,
     solve_with_restarts,
 )
@@ -107,11 +108,11 @@ def solve_mechanisms(
 ):  # fmt: skip
     """Solve target after target; return whether all starts and targets were valid.
 
-    Arrays come one by one, since tuples of them take longer from Python: the joints of the
+    Arrays come separately, since tuples of them take longer from Python: the joints of the
     articulation, the fields of Mechanism, the restarts of MechanismState and their effectors, the
-    numbers of Limits, coordinates of the articulation to start from, (start, coordinate), which the
-    targets use one after the other, targets, records TARGET, (target, effector), whose rotations
-    are made unit, and the fields of Result.
+    numbers of Limits, coordinates of the articulation to start from, (start, coordinate), used by
+    the targets in turn, targets, records TARGET, (target, effector), to be made unit here, and the
+    fields of Result.
     """
     limits = limits_of(numbers)
     mechanism = Mechanism(
@@ -122,7 +123,8 @@ def solve_mechanisms(
         mechanism, data, data.state, new_workspace(mechanism), restarts, restart_frames,
         np.empty(len(restarts)),
     )  # fmt: skip
-    attempts = new_attempts(len(restarts) + 1, state)
+    count = len(restarts) + 2
+    saved, progress = np.empty((count, len(state.row))), np.empty((count, WAIT + 1))
     rotations = np.empty((len(joints), 4))
     for i in range(len(targets)):
         q, target = coordinates[i], targets[i]
@@ -130,13 +132,17 @@ def solve_mechanisms(
         copy_row(coordinates[i - 1] if chained else starts[i % len(starts)], q)
         if not (normalise_start(joints, q) and normalise_target(target)):
             return False
-        begin(state, q)
+        gather(mechanism, q, data.q)
+        clear(data.far_step)
+        for j in range(len(own_joints)):
+            clamp_joint(own_joints, j, data.q)
+        update_forward_kinematics(mechanism, data)
         bound = least_residual(mechanism, target)
         criteria, past = mechanism_criteria(mechanism, bound, limits), history[i % len(history)]
         iterations, stalled = solve_with_restarts(
-            operations, state, attempts, target, limits, criteria, past
+            operations, state, saved, progress, target, limits, criteria, past
         )
-        scatter(mechanism, attempts.saved[-1], q)
+        scatter(mechanism, saved[-1], q)
         articulated_pose(joints, q, positions[i], rotations)
         for j in range(len(joints)):
             _, Q = joint_transform(joints, j, q)
@@ -167,15 +173,6 @@ def normalise_target(target):
         store_quaternion(target["rotation"], e, Q)
         valid &= unit
     return valid
-
-
-def begin(state, q):
-    """Bring a mechanism to coordinates of the articulation, within their limits."""
-    gather(state.mechanism, q, state.data.q)
-    clear(state.data.far_step)
-    for j in range(len(state.mechanism.joints)):
-        clamp_joint(state.mechanism.joints, j, state.data.q)
-    update_forward_kinematics(state.mechanism, state.data)
 
 
 def mechanism_criteria(mechanism, bound, limits):
@@ -211,27 +208,21 @@ def errors_of_pose(mechanism, target, positions, rotations):
 
 
 def perturb_mechanism(state, _target, _criteria, first):
-    """Bend a mechanism that stalled at once, away from its target: all joints share one angle."""
-    mechanism, q, count = state.mechanism, state.data.q, len(state.mechanism.joints)
-    missed_target = first[COST] > POSITION_ROUNDING * mechanism.reach
+    """Bend a mechanism that stalled at once, away from its target: all joints share an angle."""
+    mechanism, q, angle = state.mechanism, state.data.q, BEND / max(len(state.mechanism.joints), 1)
+    joints, missed_target = mechanism.joints, first[COST] > POSITION_ROUNDING * mechanism.reach
     if not (first[STATE] == STALLED and first[COUNT] < STUCK and missed_target):
         return False
-    for j in range(count):
-        if mechanism.joints["leader"][j] == j:
-            perturb_joint(mechanism.joints, q, j, BEND / count)
+    for j in range(len(joints)):
+        kind = joints["kind"][j] if joints["leader"][j] == j else FIXED
+        if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
+            move_by(joints, q, j, -angle)
+        elif kind in (BALL, FREE):
+            bend = rotation_about(PERTURBATION_AXIS, angle)
+            store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), bend)))
+            clamp_joint(joints, j, q)
     update_forward_kinematics(mechanism, state.data)
     return True
-
-
-def perturb_joint(joints, q, j, angle):
-    """Rotate a joint by an angle [rad], always alike, within its limits."""
-    kind = joints["kind"][j]
-    if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
-        move_by(joints, q, j, -angle)
-    elif kind in (BALL, FREE):
-        bend = rotation_about(PERTURBATION_AXIS, angle)
-        store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), bend)))
-        clamp_joint(joints, j, q)
 
 
 def place_mechanism(state):
@@ -240,7 +231,7 @@ def place_mechanism(state):
 
 
 def draw_mechanism(state, target, n):
-    """Bring the mechanism to the random configuration whose effectors are n-th nearest."""
+    """Bring the mechanism to the random configuration with the n-th nearest effectors."""
     if n == 1:
         rank_restarts(state, target)
     take_nearest(state, state.data.q)

@@ -2,7 +2,7 @@
 
 To rotate vectors a onto b, weighted, maximise the sum of w b . S a = tr(S M'), M the sum of w b a'.
 For a quaternion q of S that is q' K q with Davenport's symmetric 4 x 4 matrix K (Horn 1987), so
-that q is its eigenvector of the largest eigenvalue; about one axis it is an angle.
+that q is its eigenvector of the largest eigenvalue; about a fixed axis it is an angle.
 """
 
 import math

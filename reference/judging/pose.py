@@ -112,10 +112,11 @@ def judge_pose(
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion has no length,
-            there is no such effector, or a pose is missing where it is needed.
+            an effector does not exist, or a pose is missing where it is needed.
     """
     model = checked_model(model, "model")
     targets = check_numbers(checked_targets(model, target, effector))
+    _check_single(targets)
     tree = model if isinstance(model, Skeleton) else model.skeleton
     x = None
     if positions is not None:
@@ -131,8 +132,11 @@ def judge_pose(
         raise ValueError("pose: expected rotations or coordinates, got None")
     else:
         placed = Pose(frozen(np.array(x)), np.full((tree.joint_count, 4), np.nan))
-    distances = [_distance(goal, placed.positions[goal.joint]) for goal in targets]
-    angles = [_angle(goal, placed.rotations[goal.joint]) for goal in targets]
+    distances, angles = [], []
+    for goal in targets:
+        distances.append(float(np.linalg.norm(placed.positions[goal.joint] - goal.position)))
+        Q = placed.rotations[goal.joint]
+        angles.append(0.0 if goal.rotation is None else float(rotation.angle(Q, goal.rotation)))
     errors = lengths = None
     if x is not None:
         lengths = frozen(_length_errors(model, tree, x))
@@ -160,22 +164,12 @@ def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatA
     return unit, deviation
 
 
-def _distance(target: CheckedTarget, position: FloatArray) -> float:
-    _check_single("target", target.position, 3)
-    return float(np.linalg.norm(position - target.position))
-
-
-def _angle(target: CheckedTarget, Q: FloatArray) -> float:
-    if target.rotation is None:
-        return 0.0
-    _check_single("rotation", target.rotation, 4)
-    return float(rotation.angle(Q, target.rotation))
-
-
-def _check_single(name: str, values: FloatArray, length: int) -> None:
-    if values.ndim != 1:
-        got = arguments.shape(values.shape)
-        raise ValueError(f"{name}: expected shape ({length},), got {got}")
+def _check_single(targets: Sequence[CheckedTarget]) -> None:
+    for goal in targets:
+        for name, values, length in (("target", goal.position, 3), ("rotation", goal.rotation, 4)):
+            if values is not None and values.ndim != 1:
+                got = arguments.shape(values.shape)
+                raise ValueError(f"{name}: expected shape ({length},), got {got}")
 
 
 def _length_errors(model: Skeleton | Articulation, tree: Skeleton, x: FloatArray) -> FloatArray:

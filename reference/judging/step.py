@@ -1,7 +1,7 @@
 """Evaluate positions from any solver as the result of a step of implicit Euler.
 
 The residual |grad g(x)| / |grad g(y)| says little about the distance to the minimiser where springs
-are stiff, and nothing about pins, which are not variables of g. Positions are therefore compared
+are stiff, and ignores pins, which are not variables of g. Positions are therefore compared
 with x*, the limit of Newton's method from y, by the error
 
     |x - x*| / |y - x*|,
@@ -108,7 +108,7 @@ def judge_step(
     """Return the errors of positions as the result of a step, with certificates.
 
     `positions` and `velocities` are the result to be judged, both of shape (particle, 3) [m, m/s];
-    without velocities only the positions are. The other arguments and the errors are those of
+    without velocities only the positions are. The other arguments and the errors are as for
     `ImplicitEuler.step`.
     """
     integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MAX_ITERATIONS)

@@ -23,7 +23,7 @@ from .problem import (
     new_problem,
     project,
 )
-from .riemannian_newton import cost, minimise, zero_multipliers
+from .riemannian_newton import cost, minimise
 
 __all__ = ["smooth"]
 
@@ -34,7 +34,7 @@ COARSEST_GRID = 64
 def smooth(
     mechanism: Mechanism, targets: RecordArray, q: FloatArray, reached: np.ndarray, closed: bool
 ) -> tuple[FloatArray, int]:
-    """Return a smooth trajectory near one that follows the targets, and the Newton steps taken.
+    """Return a smooth trajectory near q that follows the targets, and the Newton steps taken.
 
     The targets of each frame are records TARGET, (frame, effector); q holds the mechanism's
     coordinates to start from, (frame, coordinate). Frames that have `reached` their targets stay
@@ -46,8 +46,8 @@ def smooth(
     q = np.where(valid[:, None], projected, q)
     problem = problem._replace(constrained=reached & valid & ~near_singular(problem, q))
     result, steps = minimise_from_coarse(problem, q)
-    multipliers = zero_multipliers(problem, q)
-    if cost(problem, result, multipliers) > cost(problem, q, multipliers):
+    z = np.zeros((len(q), len(problem.limits)))  # multipliers
+    if cost(problem, result, z) > cost(problem, q, z):
         result, more = minimise(problem, q)
         steps += more
     return result, steps
@@ -73,7 +73,7 @@ def minimise_from_coarse(problem: TrajectoryProblem, q: FloatArray) -> tuple[Flo
 
 
 def every(stride: int, frames: int, closed: bool) -> IndexArray:
-    """Return the indices of every stride-th frame; of an open trajectory the last one too."""
+    """Return the indices of every stride-th frame; of an open trajectory the last too."""
     grid = np.arange(0, frames, stride)
     return grid if closed or grid[-1] == frames - 1 else np.append(grid, frames - 1)
 
@@ -81,7 +81,7 @@ def every(stride: int, frames: int, closed: bool) -> IndexArray:
 def interpolate(
     problem: TrajectoryProblem, q: FloatArray, coarse: IndexArray, dense: IndexArray, frames: int
 ) -> FloatArray:
-    """Return the poses at the frames `dense`, along the displacements between those at `coarse`."""
+    """Return the poses at the frames `dense`, along the displacements between `coarse` frames."""
     d, ends = displacements(problem, q), np.append(coarse, frames)
     before = np.searchsorted(coarse, dense, side="right") - 1
     fraction = (dense - coarse[before]) / (ends[before + 1] - coarse[before])

@@ -96,8 +96,8 @@ def limit_cost(problem, q, z):
 def add_active_limits(problem, q, z, step, gradient, diagonal, active):
     """Add the derivatives of the limits that are active where a step ends.
 
-    psi has a kink where a limit becomes active: to second order it is a parabola on one side and
-    zero on the other, and the step decides which. `active`, (frame, limit), is set to whether it
+    psi has a kink where a limit becomes active: to second order it is a parabola above it and
+    zero below, and the step decides which. `active`, (frame, limit), is set to whether it
     is the parabola.
 
     Returns:

@@ -10,20 +10,20 @@ the identity until it is positive definite and the step lowers the cost (Levenbe
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from .augmented_lagrangian import add_active_limits, limit_cost, update_multipliers
-from .cyclic_banded import CyclicBandedSystem
 from .problem import (
     TrajectoryProblem,
+    add_smoothness,
     displacements,
     errors_and_jacobians,
     integrate,
     project,
     transposed_pseudoinverse,
 )
-from .smoothness import add_smoothness
 from .task_derivatives import subtract_second_derivatives
 
 # The weight of half the squared errors, over the reach, of a frame that is not constrained.
@@ -64,10 +64,45 @@ class QuadraticModel(NamedTuple):
     P: FloatArray  # projections onto the null spaces, (frame, freedom, freedom)
 
 
+class CyclicBandedSystem:
+    """A positive definite system of n unknowns a frame, each frame coupled to the next.
+
+    A cycle has no narrow band in its own order. Numbered 0, 2, 4 .. along one half and .. 5, 3, 1
+    back along the other, neighbours are at most two apart, and a banded Cholesky factor solves it.
+    """
+
+    def __init__(self, frames: int, unknowns: int, closed: bool) -> None:
+        """Number the frames and allocate the band; `closed` couples the last to the first."""
+        number = np.arange(frames)
+        if closed:
+            number = np.where(2 * number < frames, 2 * number, 2 * (frames - number) - 1)
+        self._number = number
+        furthest = 2 if closed and frames > 2 else 1
+        self._band = np.empty((frames * unknowns, (furthest + 1) * unknowns))
+
+    def fill(self, diagonal: FloatArray, coupling: FloatArray) -> None:
+        """Set the blocks (frame, n, n) and the couplings of frames to the next, (.., n, n)."""
+        _fill(diagonal, coupling, self._number, self._band)
+
+    def solve(self, b: FloatArray, shift: float) -> FloatArray | None:
+        """Return x of (A + shift 1) x = b, (frame, n); None if it is not positive definite."""
+        band, permuted = self._band.copy(), np.empty_like(b)
+        band[:, 0] += shift
+        permuted[self._number] = b
+        try:
+            factor = scipy.linalg.cholesky_banded(
+                band.T, lower=True, overwrite_ab=True, check_finite=False
+            )
+        except np.linalg.LinAlgError:
+            return None
+        x = scipy.linalg.cho_solve_banded((factor, True), permuted.ravel(), check_finite=False)
+        return x.reshape(b.shape)[self._number]
+
+
 def minimise(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return the trajectory of least cost near one that meets its targets, and the steps taken."""
+    """Return the trajectory of least cost near q, which meets its targets, and the steps taken."""
     system = CyclicBandedSystem(len(q), problem.mechanism.freedoms, problem.closed)
-    z, shift = zero_multipliers(problem, q), FIRST_SHIFT
+    z, shift = np.zeros((len(q), len(problem.limits))), FIRST_SHIFT
     steps, converged = 0, False
     while steps < MAX_STEPS and not converged:
         steps += 1
@@ -81,11 +116,6 @@ def minimise(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, int
             change = _update_multipliers(problem, q, z)
         converged = is_negligible(predicted, model) and change <= MULTIPLIER_TOLERANCE
     return q, steps
-
-
-def zero_multipliers(problem: TrajectoryProblem, q: FloatArray) -> FloatArray:
-    """Return the first multipliers of the limits, (frame, limit)."""
-    return np.zeros((len(q), len(problem.limits)))
 
 
 def is_negligible(predicted: float, model: QuadraticModel) -> bool:
@@ -199,3 +229,25 @@ def project_derivatives(
 ) -> tuple[FloatArray, FloatArray]:
     """Return both within the null spaces; across them the Hessian is the identity."""
     return np.einsum("fkl,fl->fk", P, gradient), P @ diagonal @ P + np.eye(P.shape[-1]) - P
+
+
+def fill_band(diagonal, coupling, number, band):
+    """Fill the lower band: row c holds column c of the matrix from the diagonal on."""
+    frames, n = diagonal.shape[0], diagonal.shape[1]
+    band[:] = 0.0
+    for f in range(frames):
+        first = number[f] * n
+        for b in range(n):
+            for a in range(b, n):
+                band[first + b, a - b] = diagonal[f, a, b]
+    for f in range(len(coupling)):
+        row, successor = number[f], number[(f + 1) % frames]
+        for a in range(n):
+            for b in range(n):
+                if successor > row:
+                    band[row * n + b, (successor - row) * n + a - b] = coupling[f, a, b]
+                else:
+                    band[successor * n + a, (row - successor) * n + b - a] = coupling[f, a, b]
+
+
+_fill = Kernel(fill_band)

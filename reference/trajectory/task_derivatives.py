@@ -5,7 +5,7 @@ vector between them times a lever [m], times the square root of the effector's w
 above b on the path to an effector, of angular velocities w_a and w_b, change its position by the
 second derivative w_a x v_b, v_b its velocity by motion b; and its rotation vector by 1/2 w_a x w_b
 where the error is zero (the second term of the Baker-Campbell-Hausdorff series). For two rotations
-of one ball the mean of both orders counts.
+of a ball the mean of both orders counts.
 """
 
 from typing import NamedTuple

@@ -12,7 +12,7 @@ from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.cloth_peers import measurement as peers_cloth
 from plumbob.bench.experiments.cloth_peers import tables, truth
 from plumbob.bench.experiments.cloth_peers.job import Shape
-from plumbob.bench.experiments.cloth_peers.ladder import Rung, motion_rungs, step_rungs
+from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs, step_rungs
 from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_motion, truth_of
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
@@ -617,14 +617,14 @@ def test_the_published_times_stand_beside_ours(make):
 
 @pytest.mark.parametrize(
     ("name", "maker"),
-    [("one_step", "worked"), ("to_implicit_euler", "fell"), ("to_the_truth", "fell")],
+    [("step_chart", "worked"), ("implicit_chart", "fell"), ("truth_chart", "fell")],
 )
 def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_each_solver(
     make, name, maker
 ):
     solvers, maker = ("Plumbob Newton", "MuJoCo Euler"), getattr(make, maker)
     records = [maker(solver, stiffness) for solver in solvers for stiffness in (1e2, 1e4)]
-    svg = drawn(getattr(tables.figures, name)(Results(records))).svg
+    svg = drawn(getattr(tables, name)(Results(records))).svg
     for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", *solvers):
         assert text in svg
 

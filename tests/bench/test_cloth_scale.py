@@ -51,7 +51,7 @@ def test_what_is_measured_is_the_work_it_says(ours):
 
 def test_progress_is_announced_and_an_interrupt_ends_the_process(monkeypatch):
     messages, children = [], []
-    with listening(lambda progress: messages.append(progress.what)):
+    with listening(lambda progress: messages.append(progress.subject)):
         suite.in_its_own_process(SMALL, suite.SUPERNODAL)
     assert messages[0] == f"cloth/{SMALL}x{SMALL}, supernodal: cloth"
     assert messages[-1].endswith("second factor")

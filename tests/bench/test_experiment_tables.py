@@ -70,7 +70,8 @@ def phrases(path):
     """The strings of a file that have several words, docstrings and columns left out."""
     if path.suffix == ".toml":
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        for texts in (tables[name] for name in tables.keys() - {"columns", "folded"}):
+        parts = [tables[name] for name in tables.keys() - {"columns", "folded", "figures"}]
+        for texts in [*parts, *tables.get("figures", {}).values()]:
             yield from (" ".join(text.split()) for text in texts.values())
         return
     tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -8,7 +8,9 @@ long to read (`test_message`), processes that leave their session (`test_process
 import json
 import re
 import sys
+import tomllib
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -61,127 +63,35 @@ for line in sys.stdin:
 """
 
 
-class Row(NamedTuple):
-    """What a solver does, or answers, and what it gets by each way; None where it is not tried.
-
-    In the bench it gets the sentence of the Python file if there is no other.
-    """
+class Behaviour(NamedTuple):
+    """What a solver does or answers, and the sentence by each way; None where it is not tried."""
 
     does: str | dict
     python: str
     program: str | None = None
     files: str | None = None
-    bench: str | None = ""
+    bench: str | None = ""  # "" for the sentence of the Python file
     waits: bool = False
 
 
-def seconds(value, shown):
-    """A row of a solver that claims a time: a Python file is timed by us, files are not timed."""
-    refused = f'^answer; Not timed: expected "seconds" .*, got {shown}.$'
-    return Row({"local_rotations": POSE, "seconds": value}, "^answer$", refused, "^answer$")
-
-
-def alike(does, words, **other):
-    """A row that gets the same by every way that takes data."""
-    return Row(does, words, words, words if isinstance(does, dict) else None, **other)
-
-
-def count(value, words):
-    """A row of a solver that answers a number of iterations."""
-    answer = {"local_rotations": POSE, "iterations": value}
-    return alike(answer, f"^garbage: iterations: expected {words}")
-
-
-NOT_FINITE = "local_rotations: expected finite numbers, got"
 SILENT = "ended after 1 s of silence"
-ALLOWED = f"0 to {HOSTILE}, the max_iterations sent, got"
-BEHAVIOURS = {
-    "replaces the clock": Row("time.perf_counter = lambda: 0.0\nreturn right(request)", "^answer$"),
-    "claims 1e-12 s": seconds(1e-12, "1e-12"),
-    "claims 5e-324 s": seconds(5e-324, "5e-324"),
-    "claims no number of seconds": seconds(float("nan"), "nan"),
-    "claims negative seconds": seconds(-1.0, "-1.0"),
-    "claims infinite seconds": seconds(float("inf"), "inf"),
-    "claims -5 iterations": count(-5, f"{ALLOWED} -5$"),
-    "claims 1e9 iterations": count(10**9, f"{ALLOWED} 1000000000$"),
-    "claims one iteration too many": count(HOSTILE + 1, f"{ALLOWED} 10$"),
-    "claims 1.5 iterations": count(1.5, "one integer, got 1.5$"),
-    "claims many iterations": count("many", "one integer, got 'many'$"),
-    "answers NaN": alike(
-        {"local_rotations": [[float("nan")] * 4] * 3}, "^answer$", bench=NOT_FINITE
-    ),
-    "answers infinities": alike(
-        {"local_rotations": [[float("inf")] * 4] * 3}, "^answer$", bench=NOT_FINITE
-    ),
-    "answers the wrong shape": alike(
-        {"local_rotations": [[1.0]]},
-        r"^garbage: local_rotations: expected shape \(3, 4\), got \(1, 1\)$",
-    ),
-    "answers texts": alike(
-        {"local_rotations": [["1"] * 4] * 3},
-        r"^garbage: local_rotations: expected numbers of shape \(joint, 4\), got \[\['1', ",
-    ),
-    "answers lists in lists": alike(
-        {"local_rotations": json.loads("[" * 500 + "]" * 500)},
-        r"^garbage: local_rotations: expected ",
-    ),
-    "answers nothing known": alike(
-        {"colour": "red"}, "^garbage: inverse_kinematics: expected some"
-    ),
-    "raises": Row(
-        "raise ValueError('no arms')",
-        "^raised: It raised ValueError in line 6 of solver.py: no arms$",
-        "^crashed: It ended instead of answering: exit code 1. .* ValueError: no arms$",
-    ),
-    "exits": Row(
-        "sys.exit(3)", "^raised: It raised SystemExit", "^crashed: .* answering: exit code 3.$"
-    ),
-    "leaves at once": alike(
-        "os._exit(3)", "^crashed: It ended instead of answering: exit code 3.$"
-    ),
-    "aborts": alike("os.abort()", "^crashed: It ended instead of answering: it aborted"),
-    "hangs": alike("while True: pass", "^hung: It computed for", waits=True, bench=SILENT),
-    "ignores signals and hangs": alike(
-        "for one in (1, 2, 3, 13, 15): signal.signal(one, signal.SIG_IGN)\nwhile True: pass",
-        "^hung: It computed for",
-        waits=True,
-        bench=SILENT,
-    ),
-    "writes standard error without end": alike(
-        "while True: os.write(2, b'e' * 65536)", "^hung", waits=True, bench=SILENT
-    ),
-    "floods its output": Row(
-        "for _ in range(1000): print('garbage')\nreturn right(request)",
-        "^answer; It prints to its standard output, for example: garbage",
-        "^garbage: It printed more than 100 lines that are no answers, for example: garbage$",
-    ),
-    "eats memory": alike(
-        "while True: kept.append(bytearray(os.urandom(1) * (8 << 20))); time.sleep(0.01)",
-        "^memory: It took more than 0.262 GB of memory.$",
-        waits=True,
-        bench=None,
-    ),
-    "changes its inputs": Row(
-        "request['offsets'] += 1.0\nreturn right(request)",
-        "^answer; It changed its argument offsets.$",
-    ),
-    "changes its folder": alike("os.chdir('/')\nreturn right(request)", "^answer$"),
-    "closes its input": Row("sys.stdin.close()\nreturn right(request)", "^answer$"),
-    "leaves a child running": alike(
-        "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)', __file__])\n"
-        "return right(request)",
-        "^answer$",
-    ),
-    "replaces parts of NumPy and of json": Row(
-        "np.asarray = np.array = json.dumps = None\nreturn right(request)",
-        "^crashed: It ended instead of answering: exit code 1. .* TypeError: 'NoneType' object",
-    ),
-    "replaces the reference": Row(
-        "from plumbob import reference\nreference.forward_kinematics = reference.Skeleton = None\n"
-        "return right(request)",
-        "^answer$",
-    ),
-}
+DEEP = json.loads("[" * 500 + "]" * 500)
+
+
+def behaviour(words=None, answer=None, pose=True, does="", bench="", **others):
+    """Return an entry of the table."""
+    if answer is not None:
+        does = {"local_rotations": POSE} | answer if pose else answer
+        if does.get("local_rotations") == "lists in lists":
+            does["local_rotations"] = DEEP
+    if words is not None:
+        others |= {"python": words, "program": words}
+        others |= {"files": words} if answer is not None else {}
+    return Behaviour(does, bench=None if bench is False else bench, **others)
+
+
+TABLE = tomllib.loads(Path(__file__).with_name("hostile_entrants.toml").read_text("utf-8"))
+BEHAVIOURS = {name: behaviour(**entry) for name, entry in TABLE.items()}
 
 
 def source(does, loop):

@@ -43,9 +43,7 @@ def many_columns(count, rows=2):
 
 
 def hostile():
-    rows = [
-        (name, other, 1.0 / (i + 1)) for i, name in enumerate(NAMES) for other in NAMES[i : i + 1]
-    ]
+    rows = [(a, b, 1.0 / (i + 1)) for i, a in enumerate(NAMES) for b in NAMES[i : i + 1]]
     columns = (Column("name", words=True), Column("note", words=True), Column("value", "kg m²"))
     return Table('t"}\\x', HOSTILE, columns, tuple(rows), HOSTILE, HOSTILE, provenance="x" * 3_000)
 
@@ -62,17 +60,9 @@ def mixed():
 @pytest.fixture(scope="module")
 def every_table(records):
     """The tables of a report, and some that are harder."""
-    made = sections.tables(Results(records))
     long = [(f"solver {i}", 1.0 / (i + 1)) for i in range(120)]
-    return [
-        *made,
-        many_columns(30),
-        many_columns(12, 60),
-        hostile(),
-        mixed(),
-        table(*long),
-        table(),
-    ]
+    harder = [many_columns(30), many_columns(12, 60), hostile(), mixed(), table(*long), table()]
+    return sections.tables(Results(records)) + harder
 
 
 def document(tables, width):
@@ -86,24 +76,24 @@ def document(tables, width):
     )
 
 
-@pytest.fixture(scope="module", params=["page", "column"])
-def compiled(request, every_table, tmp_path_factory):
-    """The log and the uncompressed PDF of all tables."""
+def typeset(folder, text):
+    """Compile a document, if there is a pdflatex; return its log and PDF."""
     if not shutil.which("pdflatex"):
         pytest.skip("pdflatex is not installed")
-    folder = tmp_path_factory.mktemp("tex")
-    (folder / "all.tex").write_text(document(every_table, request.param), encoding="utf-8")
-    command = [
-        "pdflatex",
-        "-halt-on-error",
-        "-interaction=nonstopmode",
-        "-no-shell-escape",
-        "all.tex",
-    ]
-    run = subprocess.run(command, cwd=folder, capture_output=True, timeout=300)
+    (folder / "all.tex").write_text(text, encoding="utf-8")
+    options = ["-halt-on-error", "-interaction=nonstopmode", "-no-shell-escape"]
+    run = subprocess.run(
+        ["pdflatex", *options, "all.tex"], cwd=folder, capture_output=True, timeout=300
+    )
     log = (folder / "all.log").read_text(encoding="utf-8", errors="replace")
     assert run.returncode == 0, [line for line in log.splitlines() if line.startswith("!")]
     return log, folder / "all.pdf"
+
+
+@pytest.fixture(scope="module", params=["page", "column"])
+def compiled(request, every_table, tmp_path_factory):
+    """The log and the uncompressed PDF of all tables."""
+    return typeset(tmp_path_factory.mktemp("tex"), document(every_table, request.param))
 
 
 def test_all_tables_compile_and_none_sticks_out(compiled):
@@ -194,25 +184,18 @@ def test_a_row_is_no_option_of_the_row_before(name):
 
 def test_numbers_are_aligned_by_siunitx_and_the_best_are_bold_ties_too():
     text = latex.latex(table(("a", 1.2e-5), ("b", 0.5), ("c", 1.2001e-5), compared=0))
-    assert "S[table-format=1.3e-1]" in text
-    assert r"a & \bfseries 1.2e-5 \\" in text
-    assert r"c & \bfseries 1.2e-5 \\" in text
-    assert "b & 0.500" in text
-    assert "Best in bold" in text
-
-
-def test_a_column_in_which_nothing_stands_is_not_set():
-    columns = (Column("solver", words=True), Column("remark", words=True), Column("time", "s"))
-    made = latex.latex(Table("t", "T", columns, (("CCD", "", 1.0), ("LM", "", None))))
-    assert "remark" not in made
-    assert "CCD & 1.00" in made
-    said = latex.latex(Table("t", "T", columns, (("CCD", "cut", 1.0), ("LM", "", None))))
-    assert "remark" in said
-
-
-def test_captions_stand_apart_from_what_is_below():
-    text = latex.latex(Table("t", "T", (Column("a", "s"),), ((1.0,),)))
+    for part in ("S[table-format=1.3e-1]", r"a & \bfseries 1.2e-5 \\", r"c & \bfseries 1.2e-5 \\",
+                 "b & 0.500", "Best in bold"):  # fmt: skip
+        assert part in text
     assert text.index("belowcaptionskip") < text.index("caption[")
+
+
+@pytest.mark.parametrize("remark", ["", "cut"])
+def test_only_a_column_in_which_nothing_stands_is_not_set(remark):
+    columns = (Column("solver", words=True), Column("remark", words=True), Column("time", "s"))
+    text = latex.latex(Table("t", "T", columns, (("CCD", remark, 1.0), ("LM", "", None))))
+    assert ("remark" in text) == bool(remark)
+    assert f"CCD & {remark}{' & ' * bool(remark)}1.00" in text
 
 
 def test_a_share_says_its_total_once_where_all_have_the_same():
@@ -223,18 +206,11 @@ def test_a_share_says_its_total_once_where_all_have_the_same():
     assert r"of 3 \\" in several
 
 
-def test_groups_stand_under_a_heading_in_common():
-    columns = (
-        Column("name", words=True),
-        *(Column(f"time, {n}", group="time") for n in ("a", "b")),
-    )
-    text = latex.latex(table(("x", 1.0, 2.0), columns=columns))
-    assert r"\multicolumn{2}{c}{time}" in text
-    assert r"\cmidrule(lr){2-3}" in text
-    assert "{a} & {b}" in text
-
-
-def test_rows_of_one_name_are_set_apart_from_others():
+def test_groups_have_a_heading_in_common_and_rows_of_one_name_are_set_apart():
+    times = (Column(f"time, {n}", group="time") for n in ("a", "b"))
+    text = latex.latex(table(("x", 1.0, 2.0), columns=(Column("name", words=True), *times)))
+    for part in (r"\multicolumn{2}{c}{time}", r"\cmidrule(lr){2-3}", "{a} & {b}"):
+        assert part in text
     assert "addlinespace" not in latex.latex(table(("a", 1), ("b", 2)))
     assert latex.latex(table(("a", 1), ("a", 2), ("b", 3))).count("addlinespace") == 1
 
@@ -280,18 +256,13 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_checks_of_a_document_notice_what_they_are_for(fault, tmp_path):
-    if not shutil.which("pdflatex") or not shutil.which("pdftotext"):
-        pytest.skip("pdflatex or pdftotext is not installed")
-    filler = "words " * 1200
-    made = document([], "page").replace(
-        r"\end{document}", rf"{filler} {FAULTS[fault]}\end{{document}}"
-    )
-    made = made.replace("{lmodern,", "{graphicx,lmodern,")
-    (tmp_path / "all.tex").write_text(made, encoding="utf-8")
-    command = ["pdflatex", "-halt-on-error", "-interaction=nonstopmode", "all.tex"]
-    subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=100, check=True)
+    if not shutil.which("pdftotext"):
+        pytest.skip("pdftotext is not installed")
+    end, filler = r"\end{document}", "words " * 1200
+    text = document([], "page").replace(end, rf"{filler} {FAULTS[fault]}{end}")
+    compiled = typeset(tmp_path, text.replace("{lmodern,", "{graphicx,lmodern,"))
     laws = [test_no_text_is_smaller_than_eight_points, test_no_word_stands_upon_another]
     with pytest.raises(AssertionError):
-        laws[fault == "narrow"](("", tmp_path / "all.pdf"))
+        laws[fault == "narrow"](compiled)
     if fault != "narrow":
-        test_no_word_stands_upon_another(("", tmp_path / "all.pdf"))
+        test_no_word_stands_upon_another(compiled)

@@ -16,7 +16,7 @@ from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skeleton_claims
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS
-from plumbob.crosscheck.tolerances import TOLERANCES, Tolerance
+from plumbob.crosscheck.tolerances import TOLERANCES, ClaimTolerance
 from plumbob.crosscheck.verdict import Claim, Comparison, check_claim
 from plumbob.reference.backend.compiled import set_backend
 
@@ -122,7 +122,7 @@ def test_no_claim_hides_another_of_its_name():
 # ---- laws of `check_claim`: which comparisons pass and which do not
 
 
-TOLERANCE = Tolerance(1e-12, "made up")
+TOLERANCE = ClaimTolerance(1e-12, "made up")
 
 
 def comparison(actual=(1.0, 2.0), expected=(1.0, 2.0), baseline=(0.0, 0.0), scale=2.0):

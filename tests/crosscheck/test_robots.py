@@ -9,7 +9,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from plumbob.crosscheck.engines import ROBOT_ENGINES, pinocchio_robot
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
@@ -147,15 +146,10 @@ def rebuilt(articulation, **changes):
 def faulty(robot, q, links, *, fault):
     """Stand in for `reference_kinematics`, with a fault in the robot, in q or in the formulas."""
     a = robot.articulation
-    if fault == "axis not rotated by the frame":
-        frames = Rotation.from_quat(a.frames, scalar_first=True)
-        robot = robot._replace(articulation=rebuilt(a, axes=frames.inv().apply(a.axes.copy())))
     if fault == "joints by their order in another tree":
         single = [a.coordinates_of(j).start for j, k in enumerate(a.kinds) if k in ONE]
         q = q.copy()
         q[:, single] = q[:, single[::-1]]
-    if fault == "degrees for radians":
-        q = np.degrees(q)
     if fault == "mimic joints not in the Jacobian":
         kinds = ["fixed" if j in a.mimics else k for j, k in enumerate(a.kinds)]
         without_mimics = rebuilt(a, kinds=kinds, mimics={})
@@ -179,9 +173,7 @@ def faulty_jacobians(motion, fault):
 
 
 FORMULAS = {
-    "axis not rotated by the frame": QUANTITIES,
     "joints by their order in another tree": QUANTITIES,
-    "degrees for radians": QUANTITIES,
     "Jacobian along the link's own axes": ("jacobians",),
     "Jacobian at the origin of the world": ("jacobians",),
     "angular rows first": ("jacobians",),

@@ -118,7 +118,6 @@ def test_a_positive_number_is_within_75_orders_of_one(given):
         (partial(arguments.sequence, count=2, owner="a joint"), "ab", "2 x, one a joint, got 'ab'"),
         (partial(arguments.sequence, count=2, owner="a joint"), [1], "2 x, one a joint, got 1"),
         (partial(arguments.instance, kind=int), "a", "an int, got str"),
-        (arguments.generator, 3, "a Generator, got int"),
     ],
 )
 def test_a_wrong_value_of_any_kind_is_named(border, given, message):

@@ -234,15 +234,6 @@ class TestInputs:
         assert system.stiffnesses.tolist() == [4.0, 4.0]
         assert system.dampings.tolist() == [0.5, 0.5]
 
-    def test_lists_and_strided_float32_become_own_float64(self):
-        given = np.arange(12, dtype=np.float32).reshape(2, 6)[:, ::2]
-        state = State(given, [[0, 0, 0], [1, 2, 3]])
-        for array in (state.positions, state.velocities):
-            assert array.dtype == np.float64
-            assert array.flags.c_contiguous
-        given[:] = -1
-        assert state.positions.min() == 0
-
     def test_the_model_owns_its_arrays(self):
         given = {
             "masses": np.array([1.0, 2.0]),

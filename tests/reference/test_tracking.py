@@ -42,22 +42,22 @@ def test_a_warm_frame_starts_from_the_last_one_s_solution(arm, solver, backend):
         assert motion.iterations[i] == one.iterations
 
 
-@pytest.mark.parametrize("solver", IK_SOLVERS)
-def test_a_cold_frame_starts_from_the_given_pose(arm, solver, rng, backend):
-    curve, start = curves["circle"](5), rotation.random(rng, 5)
-    motion = track(arm, curve, solver, start, warm=False)
-    assert (motion.local_rotations == solve_ik(arm, start, curve, solver).local_rotations).all()
-
-
 @pytest.mark.parametrize(
     "options",
-    [{"effector": "palm"}, {"tolerance": 1e-9}, {"max_iterations": 1}, {"record": True}],
-    ids=lambda options: next(iter(options)),
+    [
+        {"effector": "palm"},
+        {"tolerance": 1e-9},
+        {"max_iterations": 1},
+        {"record": True},
+        *({"solver": name} for name in IK_SOLVERS),
+    ],
+    ids=lambda options: "-".join(map(str, *options.items())),
 )
 def test_a_cold_motion_is_a_batch_solved_with_the_same_options(arm, options, rng, backend):
     curve, start = curves["circle"](5), rotation.random(rng, 5)
-    motion = track(arm, curve, "fabrik", start, warm=False, **options)
-    batch = solve_ik(arm, start, curve, "fabrik", **options)
+    options = {"solver": "fabrik"} | options
+    motion = track(arm, curve, start=start, warm=False, **options)
+    batch = solve_ik(arm, start, curve, **options)
     for tracked, solved in zip(motion, batch, strict=True):
         np.testing.assert_array_equal(tracked, solved)
 
@@ -80,6 +80,7 @@ def test_warm_starts_keep_neighbouring_frames_alike(arm, solver):
         ({"curve": np.zeros((4, 2))}, "curve: expected shape"),
         ({"start": np.zeros((5, 4))}, "start: expected unit quaternions"),
         ({"solver": "pid"}, "solver: expected one of ccd, fabrik"),
+        ({"closed": True}, "closed: expected False where coherent is False"),
     ],
 )
 def test_bad_input_is_named(arm, change, message):

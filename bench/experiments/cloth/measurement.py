@@ -34,19 +34,12 @@ HALVED = tuple(H / 2**i for i in range(-1, 6))
 
 @dataclass(frozen=True)
 class ClothSwing:
-    """A cloth that falls and swings, in steps of fixed length.
+    """A cloth that falls and swings, in steps of fixed length."""
 
-    Attributes:
-        name: of the problem.
-        system: particles and springs.
-        start: the state before the first step.
-        h: the step [s].
-    """
-
-    name: str
+    name: str  # of the problem
     system: MassSpring
     start: State
-    h: float
+    h: float  # the step [s]
 
 
 @functools.cache
@@ -119,16 +112,16 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     path is the distance of the converged motion from its start.
     """
     integrator = integrator_of(problem, "local_global", 0.0, iterations)
-    start, *exact = states = converged_motion(problem)[FALLING:]
-    ends = [integrator.step(state).state for state in states[:-1]]
-    inertial = [integrator_of(problem).objective(state).y for state in states[:-1]]
+    start, *exact = converged = converged_motion(problem)[FALLING:]
+    ends = [integrator.step(state).state for state in converged[:-1]]
+    inertial = [integrator_of(problem).objective(state).y for state in converged[:-1]]
     errors = [
         metrics.relative_error(end.positions, x.positions, y)
         for end, x, y in zip(ends, exact, inertial, strict=True)
     ]
     distances = (
-        [metrics.rms_distance(a.positions, b.positions) for a, b in zip(others, exact, strict=True)]
-        for others in (ends, motion(start, STEPS, integrator)[1:], [start] * STEPS)
+        [metrics.rms_distance(a.positions, b.positions) for a, b in zip(states, exact, strict=True)]
+        for states in (ends, motion(start, STEPS, integrator)[1:], [start] * STEPS)
     )
     return Measured(TruncatedSteps(*map(np.array, (errors, *distances))))
 

@@ -31,8 +31,6 @@ Row = dict[str, Any]
 def convergence_chart(results: Results) -> Sketch | None:
     """Show residual and error over the iterations of one step, a column for each stiffness."""
     cloths = by_problem(results.all("cloth", task=ONE_STEP)).values()
-    if not cloths:
-        return None
     rows = {"residual": "residual", "error": "error |x − x*| / |y − x*|"}
     panels = (
         Panel(
@@ -49,13 +47,10 @@ def convergence_chart(results: Results) -> Sketch | None:
     )
     return chart_sketch(
         Chart(
-            "cloth_convergence",
-            "Convergence of one implicit Euler step",
-            "Top: residual. Bottom: error to the converged step. Both are 1 at the start; lines "
-            "end at rounding.",
-            tuple(panels),
-            Axis("iteration, log scale", log=True),
-            Axis(log=True, limits=(1e-14, 2)),
+            **CAPTIONS.figure("cloth_convergence"),
+            panels=tuple(panels),
+            x=Axis("iteration, log scale", log=True),
+            y=Axis(log=True, limits=(1e-14, 2)),
             columns=len(cloths),
             entrants=results.entrants,
         )
@@ -140,8 +135,8 @@ def _convergence_summary(rows: Sequence[Row]) -> Summary:
 
 def _count(row: Row) -> str:
     count = row[f"iterations to {SOLVED}"]
-    tried = f"more than {words(row['iterations tried'])}"
-    return f"{row['solver']} {tried if count is None else words(count)}"
+    limit = f"more than {words(row['iterations tried'])}"
+    return f"{row['solver']} {limit if count is None else words(count)}"
 
 
 def _single_iterations(rows: Sequence[Row]) -> Iterator[str]:

@@ -24,39 +24,23 @@ UNKNOWN = -1
 
 
 class Shape(NamedTuple):
-    """The length and repetitions of a motion.
-
-    Attributes:
-        frames: of one motion.
-        repeats: number of motions, each from the start.
-        budget: the time after which no further frame begins [s].
-        frame: the length of a frame [s].
-    """
+    """The length and repetitions of a motion."""
 
     frames: int
-    repeats: int
-    budget: float
-    frame: float = FRAME
+    repeats: int  # number of motions, each from the start
+    budget: float  # the time after which no further frame begins [s]
+    frame: float = FRAME  # its length [s]
 
 
 class ClothJob(NamedTuple):
-    """A cloth to be moved, and its solver.
+    """A cloth to be moved, and its solver."""
 
-    Attributes:
-        module: the adapter's module, by its full name.
-        system: particles and springs.
-        start: the state before the first frame.
-        settings: of the adapter.
-        shape: length and repetitions of the motion.
-        entrant: the name of a user's solver, whose first error is announced; "" of others.
-    """
-
-    module: str
+    module: str  # of the adapter, by its full name
     system: SystemArrays
     start: State
-    settings: Mapping[str, Any]
+    settings: Mapping[str, Any]  # of the adapter
     shape: Shape
-    entrant: str = ""
+    entrant: str = ""  # the name of a user's solver, whose first error is announced
 
     def perform(self) -> Iterator[Message]:
         """Yield the positions and the time of each frame as soon as it is computed."""

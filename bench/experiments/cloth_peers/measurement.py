@@ -21,12 +21,13 @@ from ...harness.isolation import Outcome, WorkerProcess
 from ...harness.measure import not_installed
 from ...harness.values import Values
 from ...peers import registry
-from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
+from ...peers.registry import EXPLICIT, LINEARISED, UNDECLARED, ClothPeer
 from ...problems.falling_cloth import (
     FRAME,
     SIDE,
     STIFFNESSES,
     FallingCloth,
+    explicit_substeps,
     falling_cloth,
     hanging_cloth,
     highest_mode,
@@ -35,10 +36,15 @@ from ...problems.falling_cloth import (
 from ..published import problem as published
 from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
-from .ladder import Rung, motion_rungs, step_rungs
 from .truth import ClothTruth, implicit_motion, inertial_positions, truth_of
 from .values import IterationCounts, LiuFrame, MotionWork, StabilityLimits, StepWork
 
+# Explicit steps a frame, relative to symplectic Euler's limit of stability.
+MARGINS = (1.1, 2.0, 4.0)
+# Implicit steps a frame.
+PARTS = (1, 4, 16)
+# Residual of solvers that converge, in motions.
+RESIDUAL, RESIDUAL_LABEL = 1e-6, "1e-6"
 # Repetitions of one step, within a twentieth of the budget of a ladder.
 REPEATS, _REPEATING = 5, 0.05
 # A ladder ends with the first rung of this error.
@@ -98,20 +104,22 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """
     peers = registry.cloth_peers(scale.entrants)
     for package in dict.fromkeys(peer.package for peer in peers if not peer.is_installed):
-        absent = partial(not_installed, package)
-        yield Block("cloth", "peers/all", package, absent, facts={"task": MISSING})
+        yield _block(MISSING, "all", package, partial(not_installed, package), {})
     for stiffness in STIFFNESSES:
         settings = {"size": NEEDED_SIZE, "stiffness": stiffness, "frame": FRAME}
-        name, facts = f"peers/iterations/k{stiffness:g}", {"task": NEEDED}
         for solver in registry.step_solvers():
             measure = partial(iterations_needed, solver, stiffness)
-            yield Block("cloth", name, solver, measure, settings, facts=facts)
+            yield _block(NEEDED, f"iterations/k{stiffness:g}", solver, measure, settings)
     for peer in (peer for peer in peers if peer.is_installed):
         yield from blocks_of(peer, scale)
     settings = {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME}
     for solver in published.LIU_2013 if levels(scale) == FULL else ():
-        measure, facts = partial(liu_2013, solver), {"task": LIU}
-        yield Block("cloth", "peers/liu2013", solver, measure, settings, facts=facts)
+        yield _block(LIU, "liu2013", solver, partial(liu_2013, solver), settings)
+
+
+def _block(task: str, name: str, solver: str, measure: Any, settings: Any, **more: Any) -> Block:
+    facts = {"task": task}
+    return Block("cloth", f"peers/{name}", solver, measure, settings, facts=facts, **more)
 
 
 def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
@@ -123,36 +131,70 @@ def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
     for own in scale.problems:
         if own.cloth is not None:
             system, _ = own.cloth
-            settings: dict[str, Any] = {"stiffness": float(system.stiffnesses.mean())}
-            settings |= {"frame": own.h}
+            settings = {"stiffness": float(system.stiffnesses.mean()), "frame": own.h}
             fall = Fall(sizes[0]._replace(size=system.particle_count), partial(own_cloth, own))
             for block in _falling(peer, own.name, settings, [fall]):
                 yield replace(block, facts={**block.facts, "cloth": own.name}).on(own)
     if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
         stiffnesses = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
-        settings = {"size": STABILITY_SIZE, "version": peer.version}
-        yield Block(
-            "cloth",
-            "peers/stability",
-            peer.title,
-            partial(stability, peer, stiffnesses),
-            settings,
-            len(stiffnesses),
-            {"task": STABILITY},
-        ).of(peer.entrant)
+        measure, size = partial(stability, peer, stiffnesses), len(stiffnesses)
+        version = {"size": STABILITY_SIZE, "version": peer.version}
+        block = _block(STABILITY, "stability", peer.title, measure, version, size=size)
+        yield block.of(peer.entrant)
 
 
 def _falling(
-    peer: ClothPeer, cloth: str, settings: dict[str, Any], falls: list[Fall]
+    peer: ClothPeer, cloth: str, settings: Mapping[str, Any], falls: Sequence[Fall]
 ) -> Iterator[Block]:
     """Yield one step and a motion of a cloth at some sizes."""
+    settings = {**settings, "version": peer.version}
     size, seconds = (sum(fall.level[i] for fall in falls) for i in (0, 2))
-    settings, budget = settings | {"version": peer.version}, _LADDER_PARTS * seconds
-    for words, task, measure in (("one step", ONE_STEP, one_step), ("motion", MOTION, motion)):
-        name, facts = f"peers/{words}/{cloth}", {"task": task}
-        work = partial(measure, peer, falls)
-        block = Block("cloth", name, peer.title, work, settings, size, facts, budget=budget)
+    for task, name, measure in ((ONE_STEP, "one step", one_step), (MOTION, "motion", motion)):
+        work, budget = partial(measure, peer, falls), _LADDER_PARTS * seconds
+        block = _block(
+            task, f"{name}/{cloth}", peer.title, work, settings, size=size, budget=budget
+        )
         yield block.of(peer.entrant)
+
+
+class Rung(NamedTuple):
+    """A solver with settings, a point in a work-precision diagram, and their label."""
+
+    label: str
+    settings: Mapping[str, Any]
+
+
+def step_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
+    """Return the rungs for one step of one frame, cheap ones first."""
+    return _rungs(peer, frequency, peer.ladder, (1,))
+
+
+def motion_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
+    """Return the rungs for a motion; steps of part of a frame are nearer to the truth."""
+    return _rungs(peer, frequency, peer.motion, PARTS)
+
+
+def _rungs(
+    peer: ClothPeer, frequency: float, iterations: tuple[int, ...], parts: tuple[int, ...]
+) -> list[Rung]:
+    stable = [explicit_substeps(frequency, margin) for margin in MARGINS]
+    substeps = {EXPLICIT: stable, LINEARISED: parts, UNDECLARED: sorted({*parts, *stable})}
+    if peer.kind in substeps:
+        return [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps[peer.kind]]
+    rungs = [_rung(peer, _counted(n, "iteration"), iterations=n) for n in iterations]
+    if peer.converges and len(parts) > 1:
+        for n in parts:
+            label = f"{_counted(n, 'step')} to {RESIDUAL_LABEL}"
+            rungs.append(_rung(peer, label, tolerance=RESIDUAL, substeps=n))
+    return rungs
+
+
+def _rung(peer: ClothPeer, label: str, **settings: float) -> Rung:
+    return Rung(label, {**peer.settings, **peer.spec, **settings})
+
+
+def _counted(count: int, name: str) -> str:
+    return f"{count:,} {name}{'' if count == 1 else 's'}"
 
 
 # The notes on set-ups that ran out of time, by adapter, entrant and number of particles.
@@ -160,22 +202,15 @@ _given_up: dict[tuple[str, str, int], str] = {}
 
 
 class RungResults:
-    """The rungs of one solver, and remarks on them.
-
-    Attributes:
-        rows: the numbers and the label of each rung, by the names of their fields.
-    """
+    """The results of one solver: the numbers and label of each rung, and remarks."""
 
     def __init__(self, peer: ClothPeer) -> None:
         self.rows: list[dict[str, Any]] = []
         self._peer = peer
-        self._facts: dict[str, list[Any]] = {"sizes": [], "remarks": [], "troubles": []}
+        self._remarks: list[tuple[int, str, bool]] = []  # particles, sentence, whether it failed
 
     def run(self, cloth: FallingCloth, rung: Rung, shape: Shape) -> Outcome:
-        """Return the outcome of a rung, with a remark if it has a note.
-
-        A set-up that ran out of time is not repeated.
-        """
+        """Return the outcome of a rung; a set-up that ran out of time is not repeated."""
         task = self._peer.module, self._peer.entrant_name, len(cloth.start.positions)
         if task in _given_up:
             outcome = Outcome(0.0, [], _given_up[task])
@@ -185,22 +220,19 @@ class RungResults:
             _given_up[task] = outcome.note
         if outcome.note:
             sentence = f"{cloth.size} × {cloth.size}, {rung.label}: {outcome.note}"
-            self._facts["sizes"].append(cloth.size)
-            self._facts["remarks"].append(sentence)
-            self._facts["troubles"] += [sentence] * bool(outcome.trouble)
+            self._remarks.append((cloth.size, sentence, bool(outcome.trouble)))
         return outcome
 
     def measured(self, kind: type[Values], **more: Any) -> Measured:
         """Return the rows as arrays, and their labels and remarks as facts."""
         names = {field.name for field in msgspec.structs.fields(kind)} - {"remark_particles", *more}
         arrays = {name: np.array([row[name] for row in self.rows]) for name in names}
-        arrays["remark_particles"] = np.array(self._facts["sizes"])
-        facts = {
-            "rungs": [row["rung"] for row in self.rows],
-            "remarks": self._facts["remarks"],
-            "trouble": next(iter(self._facts["troubles"]), ""),
-        }
-        return Measured(kind(**arrays, **more), facts=facts)
+        sizes, sentences = ([remark[i] for remark in self._remarks] for i in (0, 1))
+        troubles = [sentence for _, sentence, failed in self._remarks if failed]
+        trouble = next(iter(troubles), "")
+        rungs = [row["rung"] for row in self.rows]
+        facts = {"rungs": rungs, "remarks": sentences, "trouble": trouble}
+        return Measured(kind(**arrays, remark_particles=np.array(sizes), **more), facts=facts)
 
 
 def one_step(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
@@ -248,7 +280,7 @@ def _distances(outcome: Outcome, truth: ClothTruth, extent: float) -> dict[str, 
     frames = len(outcome.solved)
     seconds = np.array([frame.seconds for frame in outcome.solved])
     positions = np.array([frame.q for frame in outcome.solved])
-    positions = positions.reshape(frames, *truth.start.shape)
+    positions = positions.reshape(frames, *truth.inertial.shape)
     row = {
         "frames": frames,
         "seconds": metrics.spread(seconds).median,
@@ -326,10 +358,9 @@ def is_stable(
     """
     settings = {**peer.settings, **peer.spec, "substeps": STABILITY_STEPS}
     shape = Shape(1, 1, np.inf, h * STABILITY_STEPS)
-    cloth_job = ClothJob(
-        peer.module, system.arrays, start, settings, shape, entrant=peer.entrant_name
-    )
-    outcome = worker_process().perform(cloth_job)
+    arrays, entrant = system.arrays, peer.entrant_name
+    job = ClothJob(peer.module, arrays, start, settings, shape, entrant)
+    outcome = worker_process().perform(job)
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     offsets = np.abs(outcome.solved[-1].q - rest)

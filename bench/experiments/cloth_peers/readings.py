@@ -12,22 +12,13 @@ from ...tables.table import words
 
 
 class Point(NamedTuple):
-    """A solver with one setting on one cloth.
+    """A solver with one setting on one cloth."""
 
-    Attributes:
-        stiffness: of the springs [N/m].
-        particles: along each side.
-        solver: the method.
-        rung: the setting.
-        values: the measured numbers, by name.
-        record: its record.
-    """
-
-    stiffness: float
-    particles: int
+    stiffness: float  # of the springs [N/m]
+    particles: int  # along each side
     solver: str
-    rung: str
-    values: dict[str, float]
+    rung: str  # the setting
+    values: dict[str, float]  # the measured numbers, by name
     record: Record
 
     @property

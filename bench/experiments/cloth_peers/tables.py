@@ -1,10 +1,13 @@
 """One cloth for every solver: work against precision, motions, limits of stability."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from ...figures.chart import Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
@@ -14,7 +17,7 @@ from ...tables.layout import Layout
 from ...tables.results import Results, grouped, label, listed
 from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
-from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY, TARGETS, figures
+from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY, TARGETS
 from .measurement import AMPLITUDE, BISECTION, GROWTH, REPEATS, STABILITY_SIZE, STABILITY_STEPS
 from .readings import Point, points
 
@@ -39,6 +42,61 @@ CAPTIONS = Captions(
 )
 # A motion within this distance of the true one [m] is hard to tell from it by eye.
 NEAR = 1e-2
+# Larger errors are those of motions that diverged, and are not drawn.
+MAX_ERROR = 10.0
+ERRORS = {
+    "error": "error |x − x*| / |y − x*|",
+    "implicit": "rms distance [m]",
+    "true": "rms distance [m]",
+}
+
+
+def work_precision(name: str, task: str, error: str, results: Results) -> Sketch | None:
+    """Show an error against the time for a frame: a curve for each solver.
+
+    Each stiffness has a column, each size a row.
+    """
+    visible = [point for point in points(results, task) if _is_visible(point, error)]
+    cloths = [point for point in visible if not point.own]
+    stiffnesses = sorted({point.stiffness for point in cloths})
+    panels = [
+        Panel(
+            f"{size} × {size}, {stiffness:,.0f} N/m",
+            _curves([p for p in cloths if (p.particles, p.stiffness) == (size, stiffness)], error),
+        )
+        for size in sorted({point.particles for point in cloths})
+        for stiffness in stiffnesses
+    ]
+    own = grouped((point for point in visible if point.own), lambda point: point.own)
+    panels += [Panel(cloth, _curves(group, error)) for cloth, group in own.items()]
+    return chart_sketch(
+        Chart(
+            **CAPTIONS.figure(name),
+            panels=tuple(panels),
+            x=Axis("time for a frame [ms]", log=True),
+            y=Axis(ERRORS[error], log=True),
+            columns=len(stiffnesses) or len(panels),
+            entrants=results.entrants,
+        )
+    )
+
+
+def _curves(visible: Sequence[Point], error: str) -> tuple[Series, ...]:
+    return tuple(
+        series(solver, [1e3 * p.seconds for p in group], [p.values[error] for p in group])
+        for solver, group in grouped(visible, lambda point: point.solver).items()
+    )
+
+
+def _is_visible(point: Point, error: str) -> bool:
+    """Return whether a point reached its end, with an error that can be drawn."""
+    is_whole = "wanted" not in point.values or point.is_whole
+    return is_whole and point.seconds > 0 and 0 < point.values[error] < MAX_ERROR
+
+
+step_chart = partial(work_precision, "work_precision_step", ONE_STEP, "error")
+implicit_chart = partial(work_precision, "work_precision_implicit", MOTION, "implicit")
+truth_chart = partial(work_precision, "work_precision_truth", MOTION, "true")
 
 
 def _missing(results: Results) -> list[Row]:
@@ -96,7 +154,7 @@ one_step = Layout(
     **CAPTIONS.of("cloth_peers_step"),
     subjects=_step_rows,
     summary=_step_summary,
-    figures=(figures.one_step,),
+    figures=(step_chart,),
 )
 
 
@@ -197,7 +255,7 @@ motion = Layout(
     subjects=_motion_rows,
     ranked=lambda row: "point" not in row or row["point"].is_whole,
     summary=_motion_summary,
-    figures=(figures.to_implicit_euler, figures.to_the_truth),
+    figures=(implicit_chart, truth_chart),
 )
 
 

@@ -25,25 +25,14 @@ _COARSE = 2.0
 
 
 class ClothTruth(NamedTuple):
-    """The reference solutions, frame by frame.
+    """The reference solutions, frame by frame; positions [m] are (particle, 3)."""
 
-    Attributes:
-        start: positions before the first frame [m], (particle, 3).
-        inertial: y of the first step, the positions without forces, (particle, 3).
-        first: the end of the first step of implicit Euler, to 25 digits.
-        implicit: positions by converged implicit Euler, (frame, particle, 3).
-        true: positions of the true motion, (frame, particle, 3).
-        order: observed order of convergence of the true motion.
-        unsure: rms distance between the two finest motions at the end [m].
-    """
-
-    start: FloatArray
-    inertial: FloatArray
-    first: ExactStep
-    implicit: FloatArray
-    true: FloatArray
-    order: float
-    unsure: float
+    inertial: FloatArray  # y of the first step, the positions without forces
+    first: ExactStep  # the end of the first step of implicit Euler, to 25 digits
+    implicit: FloatArray  # by converged implicit Euler, (frame, particle, 3)
+    true: FloatArray  # of the true motion, (frame, particle, 3)
+    order: float  # observed order of convergence of the true motion
+    unsure: float  # rms distance between the two finest motions at the end [m]
 
 
 @functools.cache
@@ -53,10 +42,10 @@ def truth_of(cloth: FallingCloth, frames: int) -> ClothTruth:
     coarse, middle, fine = (true_motion(cloth, frames, n * substeps) for n in (1, 2, 4))
     unsure = metrics.rms_distance(middle[-1], fine[-1])
     order = math.log2(metrics.rms_distance(coarse[-1], middle[-1]) / unsure)
-    x, y = cloth.start.positions, inertial_positions(cloth, cloth.frame)
+    inertial = inertial_positions(cloth, cloth.frame)
     implicit = implicit_motion(cloth, frames, cloth.frame)
     first = exact_step(cloth.system, cloth.start, cloth.frame, implicit[0])
-    return ClothTruth(x, y, first, implicit, fine, order, unsure)
+    return ClothTruth(inertial, first, implicit, fine, order, unsure)
 
 
 def inertial_positions(cloth: FallingCloth, frame: float) -> FloatArray:

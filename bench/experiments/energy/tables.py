@@ -18,22 +18,16 @@ CAPTIONS = Captions(__file__, size=str(SIZE), damping=f"{DAMPINGS['damped']:g}")
 
 def energy_chart(results: Results) -> Sketch | None:
     """Show the energy that each integrator leaves over time, undamped and damped."""
-    records = results.all("energy")
-    if not records:
-        return None
     panels = (
         Panel(group[0].title, tuple(series(r.solver, r.values.time, r.values.left) for r in group))
-        for group in by_problem(records).values()
+        for group in by_problem(results.all("energy")).values()
     )
     return chart_sketch(
         Chart(
-            "energy",
-            "Energy of a swinging cloth by integrator",
-            "Without dampers the energy should stay constant. Lines that coincide belong to the "
-            "same method.",
-            tuple(panels),
-            Axis("time [s]", limits=(0, None)),
-            Axis("relative energy above rest", limits=(0, None)),
+            **CAPTIONS.figure("energy"),
+            panels=tuple(panels),
+            x=Axis("time [s]", limits=(0, None)),
+            y=Axis("relative energy above rest", limits=(0, None)),
             columns=2,
             better=GREATER,
             entrants=results.entrants,

@@ -9,6 +9,7 @@ from ...figures.sketch import Sketch
 from ...figures.view import ARM_VIEW, CLOTH_VIEW, seen
 from ...harness.record import Record
 from ...motion.motion import Moving, Scene
+from ...tables.captions import Captions
 from ...tables.results import Results, counted, label
 from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
 from .values import ClothDrawing, MovingCloth
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
+CAPTIONS = Captions(__file__)
 # Shades of the scale of spacings: few enough to be drawn as shapes rather than as an image.
 SHADES = 40
 # Frames beside each other in the filmstrip.
@@ -35,14 +37,13 @@ def arm_draws(results: Results) -> Sketch | None:
     records = results.all("pictures", task=ARM)
     if not records:
         return None
-    drawings = [(r.values.curve, r.values.spacing, r.values.ghosts) for r in records]
+    drawings = [
+        (r.details.evened, r.values.curve, r.values.spacing, r.values.ghosts) for r in records
+    ]
     return Sketch(
-        "arm_draws",
-        "The lab’s arm draws the custom curve",
-        "The arm hangs from its root above; the drawing lies in the plane y = 0. Fainter poses "
-        "are earlier frames.",
-        [(r.details.evened, *drawing) for r, drawing in zip(records, drawings, strict=True)],
-        _draw_arms,
+        **CAPTIONS.figure("arm_draws"),
+        data=drawings,
+        draw=_draw_arms,
     )
 
 
@@ -53,11 +54,9 @@ def falling_cloth(results: Results) -> Sketch | None:
         return None
     cloth: ClothDrawing = records[0].values
     return Sketch(
-        "falling_cloth",
-        "The lab’s cloth swings from two corners",
-        "Every step converged by Newton. The pinned corners are marked.",
-        (cloth.positions, cloth.time, cloth.pinned),
-        _draw_cloths,
+        **CAPTIONS.figure("falling_cloth"),
+        data=(cloth.positions, cloth.time, cloth.pinned),
+        draw=_draw_cloths,
     )
 
 
@@ -117,14 +116,10 @@ def arm_motion(results: Results) -> Scene | None:
     if not records:
         return None
     return Scene(
-        "arm",
-        "The lab’s arm draws the custom curve by two solvers",
-        "Each frame starts from the solution of the last; a coherent motion is as smooth as "
-        "possible. The drawn line has the colour of its error.",
-        [Moving(_arm_label(r), r.values.positions, r.values.error) for r in records],
-        DRAWING / len(records[0].values.positions),
-        "distance to the target",
-        ARM_VIEW,
+        **CAPTIONS.figure("arm"),
+        motions=[Moving(_arm_label(r), r.values.positions, r.values.error) for r in records],
+        seconds=DRAWING / len(records[0].values.positions),
+        view=ARM_VIEW,
         panes=2,
         curve=records[0].values.curve,
     ).checked()
@@ -136,14 +131,10 @@ def cloth_motion(results: Results) -> Scene | None:
     if not records:
         return None
     return Scene(
-        "cloth",
-        "The lab’s cloth falls by two solvers",
-        "Each particle has the colour of its distance to converged implicit Euler; the numbers "
-        "are root mean squares over the particles.",
-        [_cloth(record) for record in records],
-        records[0].details.h * records[0].details.every,
-        "distance to the exact implicit motion",
-        CLOTH_VIEW,
+        **CAPTIONS.figure("cloth"),
+        motions=[_cloth(record) for record in records],
+        seconds=records[0].details.h * records[0].details.every,
+        view=CLOTH_VIEW,
         panes=2,
         marked=records[0].values.pinned.tolist(),
     ).checked()

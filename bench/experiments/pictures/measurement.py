@@ -33,23 +33,24 @@ SWUNG, EVERY, THINNED, PLACES = 200, 4, 2, 6
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield the drawings with the first solver, the cloth, and the motions, at every scale."""
-    solver = next(iter(IK_SOLVERS))
+    first = next(iter(IK_SOLVERS))
+    spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
     for evened in (False, True):
-        settings = {"evened": evened, "min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
-        measure, facts = partial(drawing, solver, evened), {"task": ARM}
-        yield Block("pictures", f"arm/{CUSTOM}", solver, measure, settings, facts=facts)
-    settings, facts = {"h": H, "frames": FRAMES}, {"task": CLOTH}
-    yield Block("pictures", "cloth/x1", "newton", falling_cloth, settings, facts=facts)
+        measure = partial(drawing, first, evened)
+        yield _block(ARM, f"arm/{CUSTOM}", first, measure, {"evened": evened, **spacing})
+    yield _block(CLOTH, "cloth/x1", "newton", falling_cloth, {"h": H, "frames": FRAMES})
     for i, (solver, coherent) in enumerate(FOLLOWING):
-        limits: dict[str, Any] = {"coherent": coherent, "every": THINNED}
-        order = {"task": ARM_MOTION, "order": i}
         measure = partial(arm_motion, solver, coherent)
-        yield Block("pictures", f"motion/arm/{CUSTOM}", solver, measure, limits, facts=order)
+        settings = {"coherent": coherent, "every": THINNED}
+        yield _block(ARM_MOTION, f"motion/arm/{CUSTOM}", solver, measure, settings, order=i)
     for i, (solver, iterations) in enumerate(SWINGING):
+        measure = partial(cloth_motion, solver, iterations)
         limits = {"h": H, "every": EVERY, "iterations": iterations}
-        order = {"task": CLOTH_MOTION, "order": i}
-        swing = partial(cloth_motion, solver, iterations)
-        yield Block("pictures", "motion/cloth/x1", solver, swing, limits, facts=order)
+        yield _block(CLOTH_MOTION, "motion/cloth/x1", solver, measure, limits, order=i)
+
+
+def _block(task: str, name: str, solver: str, measure: Any, settings: Any, **facts: int) -> Block:
+    return Block("pictures", name, solver, measure, settings, facts={"task": task, **facts})
 
 
 def arm_motion(solver: str, coherent: bool) -> Measured:

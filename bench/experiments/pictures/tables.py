@@ -6,16 +6,13 @@ from typing import Any
 import numpy as np
 
 from ...harness.record import Record
-from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Layout
 from ...tables.results import label, listed, solvers
 from ...tables.table import Summary, words
 from . import ARM
-from .figures import arm_draws
+from .figures import CAPTIONS, arm_draws
 from .values import ArmDrawing
-
-CAPTIONS = Captions(__file__)
 
 
 def _row(record: Record) -> dict[str, Any]:

@@ -17,19 +17,12 @@ COMPILED, PLAIN, LIMIT = registry.COMPILED.name, registry.PLAIN.name, registry.L
 
 
 class TimedWork(NamedTuple):
-    """Work to be timed with every implementation.
+    """Work to be timed with every implementation."""
 
-    Attributes:
-        problem: the name in the records.
-        subject: kinematics, ik or cloth: each has a table and a figure.
-        group: the model that the work is done on, such as "10 balls".
-        title: the name of the work within its group.
-    """
-
-    problem: str
-    subject: str
-    group: str
-    title: str
+    problem: str  # the name in the records
+    subject: str  # kinematics, ik or cloth: each has a table and a figure
+    group: str  # the model that the work is done on, such as "10 balls"
+    title: str  # the name of the work within its group
 
     @property
     def facts(self) -> dict[str, str]:
@@ -40,25 +33,15 @@ class TimedWork(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """Work to be timed with one implementation.
-
-    Attributes:
-        work: what is done.
-        solver: the implementation.
-        prepare: sets everything up and returns the call to be timed.
-        operations: poses, solves or steps of one call; times are for one.
-        moved: bytes that one call reads and writes, for a yardstick of memory.
-        backend: the backend of the reference.
-        cores: number of cores; None for all.
-    """
+    """Work to be timed with one implementation."""
 
     work: TimedWork
-    solver: str
-    prepare: Callable[[], Callable[[], Any]]
-    operations: int = 1
-    moved: int = 0
-    backend: str = "numba"
-    cores: int | None = 1
+    solver: str  # the implementation
+    prepare: Callable[[], Callable[[], Any]]  # sets up and returns the call to be timed
+    operations: int = 1  # poses, solves or steps of one call; times are for one
+    moved: int = 0  # bytes that one call reads and writes, for a yardstick of memory
+    backend: str = "numba"  # of the reference
+    cores: int | None = 1  # None for all
 
     @property
     def name(self) -> str:

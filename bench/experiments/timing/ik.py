@@ -9,8 +9,7 @@ from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import IK_SOLVERS, solve_ik
 
 from ...peers import registry
-from ...peers.ik.levenberg_marquardt import levenberg_marquardt
-from ...peers.ik.reference_kinematics import ReferenceKinematics
+from ...peers.ik.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
 from ...problems.chains import chain_targets
 from ..chain.measurement import MAX_ITERATIONS, TOLERANCE
 from .case import COMPILED, PLAIN, Case, TimedWork

@@ -3,7 +3,7 @@
 import functools
 import math
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from timeit import Timer
 from typing import Any
@@ -84,54 +84,40 @@ def sweep(subject: str, group: str, seconds: float) -> dict[str, Any]:
     Return the rounds of each case [s], (sweep, round), its first exception, and the time of a fixed
     loop beside each measurement.
     """
-    rounds = [CaseRounds(case, seconds) for case in compared(subject, group)]
-    generator, paces = np.random.default_rng(len(rounds)), []
+    cases = compared(subject, group)
+    timers = [_rounds(case, seconds) for case in cases]
+    rounds: list[list[list[float]]] = [[] for _ in cases]
+    troubles, paces, generator = [""] * len(cases), [], np.random.default_rng(len(cases))
     for i in range(SWEEPS):
         announce(f"{group}, sweep {i + 1} of {SWEEPS}")
-        for number in generator.permutation(len(rounds)):
+        for number in generator.permutation(len(cases)):
             paces.append(pace())
-            rounds[number].take()
-    return {
-        "rounds": [case.seconds for case in rounds],
-        "troubles": [case.trouble for case in rounds],
-        "paces": paces,
-    }
+            if troubles[number]:
+                continue
+            case = cases[number]
+            try:
+                with set_backend(case.backend), set_num_threads(case.cores):
+                    rounds[number].append(next(timers[number]))
+            except Exception as error:
+                rounds[number], troubles[number] = [], describe(error)
+    return {"rounds": rounds, "troubles": troubles, "paces": paces}
 
 
-class CaseRounds:
-    """The rounds of one case, whose call is prepared, compiled and counted before the first.
+def _rounds(case: Case, seconds: float) -> Iterator[list[float]]:
+    """Yield the times of one call in the rounds of each sweep [s].
 
-    Attributes:
-        seconds: of one call [s], (sweep, round); as many rounds in each sweep.
-        trouble: the first exception of the case, else "".
+    The call is prepared, compiled and counted before the first.
     """
-
-    def __init__(self, case: Case, seconds: float) -> None:
-        """Take the total time of all rounds [s]."""
-        self.seconds: list[list[float]] = []
-        self.trouble = ""
-        self._case, self._budget = case, seconds
-        self._call: Callable[[], Any] | None = None
-
-    def take(self) -> None:
-        """Make the rounds of a sweep, unless the case raises or raised before."""
-        if self.trouble:
-            return
-        try:
-            with set_backend(self._case.backend), set_num_threads(self._case.cores):
-                self.seconds.append(self._rounds())
-        except Exception as error:
-            self.seconds, self.trouble = [], describe(error)
-
-    def _rounds(self) -> list[float]:
-        if self._call is None:
-            self._call = self._case.prepare()
-            self._call()  # may compile
-            self._timer = Timer(self._call)
-            self._loops, self._count = shape(self._timer, self._budget)
-        elif min(self.seconds[0]) < QUICK:
-            self._call()
-        return [t / self._loops for t in self._timer.repeat(self._count, self._loops)]
+    call = case.prepare()
+    call()  # may compile
+    timer = Timer(call)
+    loops, count = shape(timer, seconds)
+    first = [t / loops for t in timer.repeat(count, loops)]
+    yield first
+    while True:
+        if min(first) < QUICK:
+            call()
+        yield [t / loops for t in timer.repeat(count, loops)]
 
 
 def shape(timer: Timer, seconds: float) -> tuple[int, int]:

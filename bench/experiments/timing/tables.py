@@ -39,14 +39,14 @@ def median_time(record: Record) -> float:
 
 def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
     """Return the solvers by the medians of shared sweeps, None if they share none."""
-    sweeps = {_written(record.solver): _scores(record) for record in records}
+    sweeps = {_label(record.solver): _scores(record) for record in records}
     groups = {record.details.together for record in records}
     if len(groups) > 1 or len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
         return None
     return metrics.ranking(sweeps)
 
 
-def _written(solver: str) -> str:
+def _label(solver: str) -> str:
     return "Plumbob" if solver == COMPILED else solver
 
 
@@ -56,11 +56,9 @@ def _scores(record: Record) -> metrics.Floats:
     return -np.log(np.median(seconds, axis=-1) if seconds.ndim == 2 else seconds)
 
 
-def timing_chart(subject: str, unit: str, title: str, results: Results) -> Sketch | None:
+def timing_chart(subject: str, unit: str, results: Results) -> Sketch | None:
     """Show the medians of a subject: a row for each work, a mark for each implementation."""
     records = results.all("timing", subject=subject)
-    if not records:
-        return None
     works = by_problem(records)
     by_solver = (
         _marks(solver, [r for r in records if r.solver == solver], list(works), UNITS[unit])
@@ -68,12 +66,9 @@ def timing_chart(subject: str, unit: str, title: str, results: Results) -> Sketc
     )
     return chart_sketch(
         Chart(
-            f"timing_{subject}",
-            title,
-            "Further left is faster. A mark is the median of the rounds, its line goes from the "
-            "10th to the 90th percentile.",
-            (Panel("", tuple(by_solver)),),
-            Axis(f"median [{unit}], log scale", log=True),
+            **CAPTIONS.figure(f"timing_{subject}"),
+            panels=(Panel("", tuple(by_solver)),),
+            x=Axis(f"median [{unit}], log scale", log=True),
             columns=1,
             rows=tuple(group[0].title for group in works.values()),
             entrants=results.entrants,
@@ -173,20 +168,19 @@ def _times(unit: str, rows: Sequence[Row]) -> str:
 def _time(row: Row, unit: str) -> str:
     half = row["95 % interval of the median, ±"]
     width = "" if half is None else f" ± {round(100 * half, 1):g} %"
-    return f"{_written(row['implementation'])} {words_in(row['median'], unit)}{width}"
+    return f"{_label(row['implementation'])} {words_in(row['median'], unit)}{width}"
 
 
 def _layout(subject: str, unit: str) -> Layout:
     captions = CAPTIONS.of(
         f"timing_{subject}", lambda rows: {"steadiness": steadiness(_noise(rows))}
     )
-    title = captions["title"].removesuffix(" of the ten-ball chain")
     return Layout(
         **captions,
         subjects=partial(_rows, subject),
         columns=partial(_columns, unit),
         summary=partial(_summary, unit),
-        figures=(partial(timing_chart, subject, unit, title),),
+        figures=(partial(timing_chart, subject, unit),),
     )
 
 

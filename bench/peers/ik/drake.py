@@ -1,10 +1,10 @@
 """Drake: inverse kinematics as a nonlinear program, solved by a solver of its wheel.
 
-Nothing is minimised: effectors are constrained to a box and a cone about their targets, coordinates
-to their limits. The program is built once for a robot; frames in the world are moved to the
-targets. Solvers stop at the edge of the constraints, so half of the tolerance is set. Drake bounds
-an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's usual tolerance on constraints
-of 1e-6: a smaller one is given, or half of its claims are false.
+There is no objective: effectors are constrained to a box and a cone about their targets,
+coordinates to their limits. The program is built once for a robot; frames in the world are moved to
+the targets. Solvers stop at the edge of the constraints, so half of the tolerance is set. Drake
+bounds an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's usual tolerance on
+constraints of 1e-6: a smaller tolerance is given, or half of its claims are false.
 """
 
 import logging
@@ -91,7 +91,7 @@ def drake_plant(robot: Robot) -> tuple[Any, list[Any]]:
 
 
 def _program(robot: Robot, plant: Any, targets: list[Any], tolerance: Tolerance) -> Any:
-    """Return the program, whose positions are bounded in a cube within the ball of tolerance."""
+    """Return the program, with positions bounded in a cube within the ball of tolerance."""
     ik, identity = InverseKinematics(plant, True), RotationMatrix()
     side = np.full(3, INSIDE * tolerance.position / np.sqrt(3.0))
     for effector, target in zip(map(plant.GetFrameByName, robot.effectors), targets, strict=True):

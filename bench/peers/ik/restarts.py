@@ -1,4 +1,4 @@
-"""Restarts for solvers that make one attempt: again from random poses until one is claimed."""
+"""Restarts for solvers without restarts: from random poses until the solver claims success."""
 
 import zlib
 
@@ -13,8 +13,8 @@ _SEED = 1986
 def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
     """Return a solver that makes up to `restarts` further attempts from seeded random poses.
 
-    An attempt succeeds if it claims an answer within the limits, which not all solvers look at; one
-    that raises has failed. The poses depend on the target only, and all attempts are prepared
+    An attempt succeeds if it claims an answer within the limits, which not all solvers look at; an
+    exception is a failure. The poses depend on the target only, and all attempts are prepared
     before the clock runs.
     """
 

@@ -1,13 +1,11 @@
-"""Cases of mass-spring systems, the smallest first, fitted to what a solver takes.
+"""Cases of mass-spring systems, the smallest first, fitted to the systems that a solver takes.
 
-A probe is a small case in which one more aspect of a step matters than in those before it: flight,
-a spring, a damper, a pin, a changed h. Faults are sought along the probes.
+Each probe is a small case that adds an aspect of a step to the cases before it: flight, a spring,
+a damper, a pin, a changed h. Faults are sought along the probes.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,13 +17,14 @@ from ..case import Case
 from ..greeting import Greeting, System
 from ..sentence import Sentence, sentence
 from ..task import TASKS
+from .faults import read_table
 
 # In place of the mass 1, which hides what is divided by it.
 ONE_MASS = 0.8
 MOTION_STEPS = 6
 STEPS = ("mass_spring_step", "mass_spring_motion")
 GRAVITY = np.array([0.0, -9.81, 0.0])
-_TABLE = tomllib.loads((Path(__file__).parent / "scenes.toml").read_text(encoding="utf-8"))
+_TABLE = read_table("scenes.toml")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +67,18 @@ def task_cases(task: str, greeting: Greeting, seed: int, thorough: bool) -> list
     return [case for case in suitable if case.follows in names]
 
 
+def trace_of(family: str) -> Sentence:
+    """Return where to look if a scene of this family is the first that a solver gets wrong."""
+    traces = _TABLE["traces"]
+    return Sentence(traces.get(family, traces["cloth"])["sentence"], {})
+
+
 def _has(system: System, need: str) -> bool:
     return system.gravity == "vector" if need == "gravity" else bool(getattr(system, need))
 
 
 def _case(task: str, scene: SpringScene, system: System) -> Case:
-    """Return the scene as a request, with one number for all where the solver has but one."""
+    """Return the scene as a request, with equal numbers where the solver takes a single number."""
     springs = np.asarray(scene.springs, dtype=np.int64).reshape(-1, 2)
     x, v, g = scene.positions, scene.velocities, scene.gravity
     measured = system.rest_lengths == "measured" or isinstance(scene.rest_lengths, str)
@@ -165,7 +170,7 @@ def _pins_still(scene: SpringScene) -> SpringScene:
 
 
 def _changes(seed: int) -> list[SpringScene]:
-    """Return scenes that are asked one after another."""
+    """Return scenes whose requests follow each other."""
     before = replace(
         _random(seed + 1, 3, name="before h changes", family="h changes", sentence=""),
         about=sentence("Three particles, the step before h changes."),
@@ -175,13 +180,13 @@ def _changes(seed: int) -> list[SpringScene]:
         before, name="h changed", about=sentence("The same three particles with half the h."),
         h=before.h / 2, follows=before.name,
     )  # fmt: skip
-    again = replace(
+    other_masses = replace(
         before, name="masses changed", family="system changes",
         about=sentence("The same three particles with other masses and springs."),
         masses=before.masses[::-1] * 1.3, stiffnesses=before.stiffnesses * 2.0,
         h=before.h / 2, follows=after.name,
     )  # fmt: skip
-    return [before, after, again]
+    return [before, after, other_masses]
 
 
 def _cloth_scene(

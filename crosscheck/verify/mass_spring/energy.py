@@ -23,6 +23,7 @@ from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, combined
+from .laws import correct_digits
 from .model import StepModel
 from .problem import (
     SpringProblem,
@@ -32,7 +33,6 @@ from .problem import (
     state_of,
     system_of,
 )
-from .rounding import correct_digits
 
 TASK = "energy"
 Energies = Mapping[str, Any]
@@ -47,7 +47,7 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
-    """Return cases that suit the solver, most of them followed by a displaced one."""
+    """Return cases that suit the solver, most of them followed by the same case displaced."""
     pairs = ([case] if "of" in case.facts else [case, _displaced(case, seed)]
              for case in task_cases(TASK, greeting, seed, thorough))  # fmt: skip
     return [case for pair in pairs for case in pair]
@@ -134,7 +134,7 @@ def _formula(name: str, gap: float, allowed: float) -> Finding:
 
 
 def _sums(energies: Energies, allowed: float) -> list[Finding]:
-    """Return whether the parts add up, where all of them were answered."""
+    """Return whether the parts add up, where the answer holds all of them."""
     findings = []
     for whole, parts in SUMS.items():
         if all(name in energies for name in (whole, *parts)):
@@ -166,7 +166,7 @@ def _work(
 
 
 def works(p: SpringProblem, q: SpringProblem) -> dict[str, float]:
-    """Return the work of forces along the line from one state to the other, by energy [J]."""
+    """Return the work of forces along the line between two states, by energy [J]."""
     d, p = q.positions - p.positions, p.changed(velocities=np.zeros_like(p.velocities))
     elastic = 0.0
     for t, weight in zip(POINTS, WEIGHTS, strict=True):
@@ -183,19 +183,19 @@ def works(p: SpringProblem, q: SpringProblem) -> dict[str, float]:
 
 
 def _diagnose(judgements: Sequence[CaseJudgement], epsilon: float) -> Diagnosis:
-    answered = [
+    answers = [
         (problem_of(judgement.case.inputs), judgement.answer.values)
         for judgement in judgements
         if isinstance(judgement.answer, Answer)
     ]
-    if not answered or all(judgement.verdict < Verdict.WRONG for judgement in judgements):
+    if not answers or all(judgement.verdict < Verdict.WRONG for judgement in judgements):
         return Diagnosis()
     count = 0
     for _, same_size in groupby(combined(ENERGY_FAULTS), key=len):
         matches = []
         for faults in same_size:
             count += 1
-            if all(_matches(predict(faults, p), p, values, epsilon) for p, values in answered):
+            if all(_matches(predict(faults, p), p, values, epsilon) for p, values in answers):
                 matches.append(faults)
         if matches:
             keys = [" + ".join(fault.key for fault in faults) for faults in matches]
@@ -205,6 +205,6 @@ def _diagnose(judgements: Sequence[CaseJudgement], epsilon: float) -> Diagnosis:
     return Diagnosis(first_broken=first_broken(judgements), variant_count=count)
 
 
-def _matches(expected: Energies, p: SpringProblem, answered: Energies, epsilon: float) -> bool:
+def _matches(expected: Energies, p: SpringProblem, answers: Energies, epsilon: float) -> bool:
     limit = 8.0 * tolerance(p, epsilon)
-    return all(abs(answered[name] - expected[name]) <= limit for name in answered.keys() & PARTS)
+    return all(abs(answers[name] - expected[name]) <= limit for name in answers.keys() & PARTS)

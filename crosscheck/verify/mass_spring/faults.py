@@ -13,7 +13,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from ..sentence import Sentence
-from .model import Integrator, StepModel
+from .model import Integrator, StepModel, SystemMatrix
 from .problem import SpringProblem, frames
 
 # Aspects of a step in the order of the computation.
@@ -28,7 +28,7 @@ Change = Callable[[SpringProblem], Mapping[str, Any]]
 
 
 class Option(NamedTuple):
-    """One choice of how a solver does a thing, right or wrong."""
+    """A choice of a solver in an aspect of a step, right or wrong."""
 
     key: str  # its name in reports
     aspect: str  # what it is a choice of; a solver makes one choice for each aspect
@@ -88,23 +88,21 @@ CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
 }
 
 
-def read_options(name: str) -> dict[str, list[tuple[Option, Mapping[str, Any]]]]:
-    """Return the options of a TOML file beside this one by aspect, each with its entry."""
-    text = (Path(__file__).parent / name).read_text(encoding="utf-8")
-    return {
-        aspect: [(option, entry) for entry in entries for option in _expanded(aspect, entry)]
-        for aspect, entries in tomllib.loads(text).items()
-    }
+def read_table(name: str) -> dict[str, Any]:
+    """Return the content of a TOML file of this folder."""
+    return tomllib.loads((Path(__file__).parent / name).read_text(encoding="utf-8"))
 
 
-def _expanded(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
+def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
     """Yield an option for each combination of the numbers in an entry's `each`."""
-    each = entry.get("each", {})
-    for numbers in product(*each.values()):
-        values = dict(zip(each, numbers, strict=True))
+    ranges = entry.get("each", {})
+    for numbers in product(*ranges.values()):
+        values = dict(zip(ranges, numbers, strict=True))
         fields = dict(entry.get("model", {}))
         if "value" in entry:
             fields[aspect] = entry["value"].format(**values)
+        elif "matrix" in entry:
+            fields["matrix"] = SystemMatrix(**entry["matrix"])
         elif "integrator" in entry:
             fields["integrator"] = Integrator(**entry["integrator"], **values)
         elif aspect == "time" and values:
@@ -123,7 +121,7 @@ def _change(entry: Mapping[str, Any], values: Mapping[str, Any]) -> Change | Non
     return partial(function, **values) if function else None
 
 
-_FAULTS = read_options("faults.toml")
+_FAULTS = read_table("faults.toml")
 
 
 def faults_of(task: str, aspects: Sequence[str]) -> tuple[Option, ...]:
@@ -131,8 +129,9 @@ def faults_of(task: str, aspects: Sequence[str]) -> tuple[Option, ...]:
     return tuple(
         option
         for aspect in aspects
-        for option, entry in _FAULTS.get(aspect, ())
+        for entry in _FAULTS.get(aspect, ())
         if task in entry.get("tasks", (task,))
+        for option in options_of(aspect, entry)
     )
 
 

@@ -19,6 +19,7 @@ from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
+from .laws import correct_digits
 from .model import StepModel
 from .problem import (
     SpringProblem,
@@ -29,7 +30,6 @@ from .problem import (
     state_of,
     system_of,
 )
-from .rounding import correct_digits
 
 TASK = "mass_spring_forces"
 # Rounding of a length by the coordinates' epsilon, times the stiffness, and of some ten terms.
@@ -68,34 +68,32 @@ def _judge_case(
     forces, seconds = timed(lambda: reference_forces(system, state))
     if not isinstance(answer, Answer):
         return CaseJudgement(case, answer, (), {"forces": forces}, None, seconds)
-    answered, allowed, digits = answer.values["forces"], tolerance(p, greeting.epsilon), None
-    if np.isfinite(answered).all():
+    output, allowed, digits = answer.values["forces"], tolerance(p, greeting.epsilon), None
+    if np.isfinite(output).all():
         symmetry = laws.symmetry(exchange, exchanges, {"forces": 2.0 * allowed})
         findings = [
-            _formula(p, answered, forces, allowed),
-            _balance(p, answered, allowed),
+            _formula(p, output, forces, allowed),
+            _balance(p, output, allowed),
             *([symmetry] if symmetry else []),
             laws.equal_requests(exchange, {"forces": 2.0 * allowed}),
             *laws.remarks(answer),
         ]
         size = float(np.abs(forces).max())
         if size > allowed:
-            digits = correct_digits(float(np.abs(answered - forces).max()), size)
+            digits = correct_digits(float(np.abs(output - forces).max()), size)
     else:
         findings = [laws.not_finite(sentence("Forces hold NaN or infinity."))]
     return CaseJudgement(case, answer, tuple(findings), {"forces": forces}, digits, seconds)
 
 
-def _formula(
-    p: SpringProblem, answered: FloatArray, expected: FloatArray, allowed: float
-) -> Finding:
-    gap = np.abs(answered - expected).max(axis=1)
+def _formula(p: SpringProblem, output: FloatArray, expected: FloatArray, allowed: float) -> Finding:
+    gap = np.abs(output - expected).max(axis=1)
     index, worst = int(gap.argmax()), float(gap.max())
     message = sentence(
         "The force on particle {where} is {gap:.2g} N off {term}.",
         where=index,
         gap=worst,
-        term=_likeness(p, answered - expected),
+        term=_likeness(p, output - expected),
     )
     return laws.bounded("force formula", worst, allowed, "N", message, index)
 
@@ -117,9 +115,9 @@ def _likeness(p: SpringProblem, error: FloatArray) -> Sentence:
     return terms[best][1] if cosines[best] > ALIKE else sentence("(an error like no single term)")
 
 
-def _balance(p: SpringProblem, answered: FloatArray, allowed: float) -> Finding:
+def _balance(p: SpringProblem, output: FloatArray, allowed: float) -> Finding:
     """Springs and dampers pull both ends alike: the sum of forces is the weight."""
-    gap = float(np.abs(answered.sum(0) - p.constant.sum(0)).max())
+    gap = float(np.abs(output.sum(0) - p.constant.sum(0)).max())
     message = sentence("The sum of all forces is {gap:.2g} N off the weight.", gap=gap)
     limit = allowed * np.sqrt(p.count) * 2.0
     return laws.bounded("momentum balance", gap, limit, "N", message)

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..greeting import Step
 from ..sentence import Sentence, sentence
-from .faults import ASPECTS, STEP_FAULTS, Option, read_options
+from .faults import ASPECTS, STEP_FAULTS, Option, options_of, read_table
 from .model import EXPLICIT, Integrator
 
 EXPLICIT_SUBSTEPS = (1, 2, 3, 4, 5, 8, 10, 16, 20, 30, 50, 100, 1000)
@@ -18,32 +18,11 @@ SCALINGS = (0.9, 0.95, 0.98, 0.99, 0.995, 0.999)
 EXPLICIT_DAMPERS = ("none", "explicit", "diagonal", "blocks", "matrix")
 SYMPLECTIC_DAMPERS = ("diagonal", "blocks", "matrix")
 IMPLICIT_DAMPERS = ("length_rate", "end_velocity", "explicit", "none")
-# An integrator in words; a Newton step has its Hessian as well, and "s" where there are several.
-_SENTENCES: Mapping[str, Sentence] = {
-    "converged": sentence("converged implicit Euler"),
-    "symplectic": sentence("symplectic Euler"),
-    "explicit": sentence("explicit Euler"),
-    "taylor": sentence("x + h v + h²/2 a"),
-    "runge_kutta": sentence("the classical Runge-Kutta method"),
-    "local_global": sentence("{n} local/global iterations from {start}"),
-    "newton exact": sentence("one linearised implicit step from {start}"),
-    "newton exact s": sentence("{n} iterations of Newton's method from {start}"),
-    "newton gauss": sentence(
-        "one linearised implicit step from {start} without the geometric term of the Hessian"
-    ),
-    "newton gauss s": sentence("{n} Newton iterations from {start} without the geometric term"),
-    "newton projected": sentence(
-        "one linearised implicit step from {start} with the geometric term only where springs are "
-        "stretched"
-    ),
-    "newton projected s": sentence(
-        "{n} Newton iterations from {start} with the geometric term only where springs are "
-        "stretched"
-    ),
-}
+_TABLE = read_table("honest.toml")
+_WORDS = _TABLE.pop("words")
 HONEST = {
-    aspect: tuple(option for option, _ in pairs)
-    for aspect, pairs in read_options("honest.toml").items()
+    aspect: tuple(option for entry in entries for option in options_of(aspect, entry))
+    for aspect, entries in _TABLE.items()
 }
 
 
@@ -68,8 +47,8 @@ def _integrators(step: Step) -> tuple[Option, ...]:
 def _integrator_option(integrator: Integrator) -> Option:
     name, start, n = integrator.method, integrator.start, integrator.iterations
     if name == "newton":
-        name += f" {integrator.hessian}{' s' * (n > 1)}"
-    message = Sentence(_SENTENCES[name].template, {"n": n, "start": start})
+        name += f" {integrator.hessian}, {'one' if n == 1 else 'several'}"
+    message = Sentence(_WORDS[name]["sentence"], {"n": n, "start": start})
     key = " ".join(map(str, integrator))
     return Option(key, "integrator", message, fields={"integrator": integrator})
 
@@ -89,7 +68,7 @@ def _scaling(factor: float) -> Option:
 
 
 def honest(step: Step) -> dict[str, tuple[Option, ...]]:
-    """Return, for each aspect, the choices that are no faults, the usual one first."""
+    """Return, for each aspect, the honest choices, the usual choice first."""
     counts = sorted({*EXPLICIT_SUBSTEPS, step.substeps or 1})
     factors = dict.fromkeys((1.0, step.damping_factor or 1.0, *SCALINGS))
     return HONEST | {
@@ -100,7 +79,7 @@ def honest(step: Step) -> dict[str, tuple[Option, ...]]:
 
 
 def declared(option: Option, step: Step) -> bool:
-    """Return whether a choice is within what the greeting declares or leaves open."""
+    """Return whether a choice is declared or left open by the greeting."""
     choice = option.fields[option.aspect]
     match option.aspect:
         case "integrator":
@@ -138,7 +117,7 @@ def _declared_integrator(integrator: Integrator, step: Step) -> bool:
 
 
 def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
-    """Return, for each aspect, all choices with their costs: those of cost 0 first."""
+    """Return, for each aspect, all choices with their costs, cost 0 first."""
     right = honest(step)
     costs: dict[str, list[tuple[Option, int]]] = {}
     for aspect in ASPECTS:

@@ -1,9 +1,9 @@
-"""Laws that a step keeps whatever its solver is, and the laws of what it declares."""
+"""Laws of every step and of the step that a solver declares, and the rounding that they allow."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,13 @@ from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
 from .model import StepModel
 from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of
-from .rounding import SOLVED, Rounding, coordinate_gap, relative_gap
 
+# A sum of some ten terms, a few products and a square root, each rounded by half an epsilon, as
+# the inputs themselves are in single precision.
+ROUNDINGS = 4.0
+# What an iterative linear solver may leave of a displacement, and a velocity, without being taken
+# for another model.
+SOLVED = 1e-6
 # Up to this share of what a step changes, an answer is called imprecise; beyond it is another step.
 IMPRECISE = 1e-3
 # So many times what rounding allows is imprecise as well.
@@ -27,15 +32,73 @@ CONSISTENT = 0.1
 UNBALANCED = 1e-4
 
 
+class Rounding(NamedTuple):
+    """Bounds of a rounding error."""
+
+    positions: float  # [m]
+    velocities: float  # [m/s]
+
+
+def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
+    """Return bounds for an honest solver of that precision.
+
+    A coordinate is rounded by epsilon of its size in each substep, always to the same side where
+    the increments are alike. Lengths are rounded as coordinates are, and h² k / m of them enters
+    the right-hand side of a step; M + h² L is conditioned by 1 + h² k / m. An unstable explicit
+    step multiplies earlier errors by hs² k / m. The largest eigenvalue of M^-1 L is bounded by
+    the largest sum of |k| + |c| / h over the springs of a particle, times 2 / m.
+    """
+    stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
+    stiffest = float((2.0 * np.abs(p.incidence).T @ stiffness / p.masses).max(initial=0.0))
+    n, steps, growth = model.substeps, p.steps or 1, 1.0
+    if model.integrator.explicit:
+        growth = min(max(1.0, stiffest * (p.h / n) ** 2) ** (n - 1), 1e12)
+    size = np.abs(p.positions).max() + p.h * steps * np.abs(p.velocities).max()
+    size += (p.h * steps) ** 2 * float(np.linalg.norm(p.gravity))
+    x = ROUNDINGS * epsilon * size * (1.0 + n + p.h * p.h * stiffest) * growth * steps**2
+    v = 2.0 * x / p.h + ROUNDINGS * epsilon * float(np.abs(p.velocities).max())
+    return Rounding(float(x), float(v))
+
+
+def relative_gap(
+    p: SpringProblem, predicted: Mapping[str, Any], answers: Mapping[str, Any], allowed: Rounding
+) -> float:
+    """Return the largest difference of positions and velocities, over their changes.
+
+    Rounding counts as no difference; so a number above SOLVED means another step. Velocities of
+    pins are left out, for they affect no position.
+    """
+    gaps = [
+        coordinate_gap(p, name, predicted[name], answers[name])
+        / (np.abs(predicted[name] - before).max(initial=0.0) + getattr(allowed, name) / SOLVED)
+        for name, before in (("positions", p.positions), ("velocities", 0.0))
+        if name in answers
+    ]
+    return float(max(gaps)) if gaps and np.isfinite(gaps).all() else np.inf
+
+
+def coordinate_gap(p: SpringProblem, name: str, expected: Any, output: Any) -> float:
+    """Return the largest difference of a coordinate, the velocities of pins left out."""
+    gap = np.abs(np.asarray(expected) - np.asarray(output))
+    if name == "velocities":
+        gap[..., p.pinned, :] = 0.0
+    return float(gap.max(initial=0.0))
+
+
+def correct_digits(gap: float, size: float) -> float:
+    """Return how many digits of a number of this size are right, at most 16."""
+    return float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))
+
+
 @dataclass(frozen=True, eq=False)
 class StepContext:
-    """What the laws of one answer need."""
+    """An answer to a step, and the facts that its laws need."""
 
     problem: SpringProblem
-    answered: Mapping[str, Any]  # by the names of the outputs
+    answers: Mapping[str, Any]  # by the names of the outputs
     allowed: Rounding
     model: StepModel  # the step that is declared, completed by what was inferred
-    known: bool  # whether that model is declared or was recognised
+    recognised: bool  # whether that model is declared or was recognised
     description: Sentence  # the model in words
     expected: Mapping[str, Any]  # its prediction, or {} if it has none
     pins_declared: bool  # whether the greeting says how pins are held
@@ -51,7 +114,7 @@ class StepContext:
             external = external + damper_forces(p, p.positions, p.velocities)
         if damper != "length_rate":
             p = p.changed(dampings=np.zeros_like(p.dampings))
-        x = self.answered["positions"]
+        x = self.answers["positions"]
         return judge_step(system_of(p), state_of(p), p.h, x, external_forces=external)
 
     @property
@@ -61,7 +124,7 @@ class StepContext:
 
 
 def _graded(error: float, size: float, allowed: float) -> Verdict:
-    """Return what follows from an error relative to a size with its rounding."""
+    """Return the verdict on an error relative to a size with its rounding."""
     if error <= SOLVED:
         return Verdict.RIGHT
     gap = error * (size + allowed / SOLVED)
@@ -77,7 +140,7 @@ def bounded(
 
 
 def unsure(law: str, error: float, message: Sentence) -> Finding:
-    """Return the finding that nobody can tell whether a law holds."""
+    """Return the finding that a law can be neither confirmed nor refuted."""
     return Finding(law, Verdict.UNDECIDED, error, SOLVED, "", message)
 
 
@@ -87,13 +150,13 @@ def not_finite(message: Sentence) -> Finding:
 
 
 def remarks(answer: Answer) -> list[Finding]:
-    """Return what was odd about an answer."""
+    """Return the remarks on an answer as findings."""
     return [Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", remark) for remark in answer.remarks]
 
 
 def pins(context: StepContext) -> Finding | None:
     """Return how far pins are from where they were."""
-    p, x = context.problem, context.answered.get("positions")
+    p, x = context.problem, context.answers.get("positions")
     if len(p.pinned) == 0 or x is None:
         return None
     offsets = np.linalg.norm(x - p.positions, axis=-1)[..., p.pinned].reshape(-1, len(p.pinned))
@@ -112,19 +175,19 @@ def pins(context: StepContext) -> Finding | None:
 
 
 def declared_step(context: StepContext) -> Finding | None:
-    """Return how far positions are from those of the declared or recognised step."""
+    """Return how far positions are from the declared or recognised step."""
     law, p = "declared step", context.problem
-    if "positions" not in context.answered:
+    if "positions" not in context.answers:
         return None
-    if not context.known:
+    if not context.recognised:
         return unsure(
             law, np.inf, sentence("The step is none of those that are known; none was declared.")
         )
     if not context.expected or not np.isfinite(context.expected["positions"]).all():
         return unsure(law, np.inf, sentence("The declared step has no finite result here."))
-    answered = {"positions": context.answered["positions"]}
-    error = relative_gap(p, context.expected, answered, context.allowed)
-    gap = np.linalg.norm(context.expected["positions"] - answered["positions"], axis=-1)
+    answers = {"positions": context.answers["positions"]}
+    error = relative_gap(p, context.expected, answers, context.allowed)
+    gap = np.linalg.norm(context.expected["positions"] - answers["positions"], axis=-1)
     index = int(gap.reshape(-1, p.count).max(axis=0).argmax())
     message = sentence(
         "Positions are up to {gap:.2g} m from those of {model}, at particle {where}.",
@@ -156,14 +219,14 @@ def _excused(context: StepContext) -> Verdict:
 def _indefinite(p: SpringProblem) -> bool:
     """Return whether Newton's method may meet a Hessian that no two programs correct alike."""
     length, _ = frames(p, p.positions)
-    lost = p.stiffnesses * np.maximum(p.rest_lengths / length - 1.0, 0.0) * p.h**2
-    return bool((np.abs(p.incidence).T @ lost > 0.1 * p.masses).any())
+    softening = p.stiffnesses * np.maximum(p.rest_lengths / length - 1.0, 0.0) * p.h**2
+    return bool((np.abs(p.incidence).T @ softening > 0.1 * p.masses).any())
 
 
 def minimiser(context: StepContext) -> Finding | None:
     """Return how far positions are from converged implicit Euler, relative to how far y is."""
     law, p = "minimiser", context.problem
-    judgement = context.judgement if "positions" in context.answered else None
+    judgement = context.judgement if "positions" in context.answers else None
     if judgement is None or not judgement.outcome.solved:
         return None
     error = judgement.error
@@ -171,7 +234,7 @@ def minimiser(context: StepContext) -> Finding | None:
     if error <= SOLVED or rounded or judgement.same_minimiser is False:
         message = sentence("The step is the converged one of implicit Euler.")
         return Finding(law, Verdict.RIGHT, error, SOLVED, "", message)
-    if not context.known:
+    if not context.recognised:
         return unsure(law, error, sentence(
             "It is {distance:.2g} m from the minimiser of implicit Euler.",
             distance=judgement.distance))  # fmt: skip
@@ -184,15 +247,15 @@ def minimiser(context: StepContext) -> Finding | None:
 
 
 def velocities(context: StepContext) -> Finding | None:
-    """Return how far velocities are from those that the declared step gives."""
-    if "velocities" not in context.answered or not context.known or not context.expected:
+    """Return how far velocities are from the declared step's."""
+    if "velocities" not in context.answers or not context.recognised or not context.expected:
         return None
     expected, model = context.expected["velocities"], context.model
-    p, x = context.problem, context.answered.get("positions")
+    p, x = context.problem, context.answers.get("positions")
     by_displacement = model.velocity == "displacement" and not model.integrator.explicit
     if by_displacement and model.substeps == 1 and x is not None and not p.steps:
         expected = (x - p.positions) / p.h * model.scaling
-    gap = coordinate_gap(p, "velocities", expected, context.answered["velocities"])
+    gap = coordinate_gap(p, "velocities", expected, context.answers["velocities"])
     size = float(np.abs(expected).max(initial=0.0))
     error = gap / (size + context.allowed.velocities / SOLVED)
     message = sentence("Velocities are up to {gap:.2g} m/s from what the step makes them.", gap=gap)
@@ -204,7 +267,7 @@ def velocities(context: StepContext) -> Finding | None:
 
 def momentum(context: StepContext) -> Finding | None:
     """Return how far the centre of mass is from where gravity takes it, without pins."""
-    p, x, model = context.problem, context.answered.get("positions"), context.model
+    p, x, model = context.problem, context.answers.get("positions"), context.model
     method = model.integrator.method
     if x is None or len(p.pinned) or p.steps or method == "descent" or model.scaling != 1.0:
         return None
@@ -225,7 +288,7 @@ def momentum(context: StepContext) -> Finding | None:
 
 def consistency(context: StepContext) -> Finding | None:
     """Return how far the mean acceleration of a small step is from f / m."""
-    p, v = context.problem, context.answered.get("velocities")
+    p, v = context.problem, context.answers.get("velocities")
     if v is None or context.model.damper == "none" or context.model.scaling != 1.0:
         return None  # without velocities explicit and implicit steps part at the first order
     expected = accelerations(p, p.positions, p.velocities)
@@ -242,7 +305,7 @@ def consistency(context: StepContext) -> Finding | None:
 
 
 def equal_requests(exchange: Exchange, allowed: Mapping[str, float]) -> Finding:
-    """Return how far two answers to one request are apart, in the outputs that are named."""
+    """Return how far two answers to a request differ in the named outputs."""
     answer, repeat = exchange.answer, exchange.repeat
     if not isinstance(answer, Answer) or not isinstance(repeat, Answer):
         message = sentence("Asked a second time, it gave no answer.")

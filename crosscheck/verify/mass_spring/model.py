@@ -1,4 +1,4 @@
-"""One step of every model that a solver may declare, and of the faults that occur in them, dense.
+"""A step of every model that a solver may declare, and of the faults that occur in them, dense.
 
 An implicit step seeks x with M (x - y) = h² f(x), y = x_n + h v_n; with f = -grad E that is the
 minimum of g(x) = 1/2 (x - y)' M (x - y) + h² E(x) (Liu et al. 2013). Everything is a dense array of
@@ -45,6 +45,16 @@ class Integrator(NamedTuple):
         return self.method in EXPLICIT
 
 
+class SystemMatrix(NamedTuple):
+    """How the system matrix is put together from masses and springs."""
+
+    masses: float = 1.0  # how many times M is added
+    power: int = 2  # of h before the springs' part, with its sign
+    sign: float = 1.0
+    stiffness: bool = True  # whether the springs' part has its factor k
+    off_diagonal: float = 1.0  # factor of the entries off the diagonal
+
+
 class StepModel(NamedTuple):
     """A complete description of a step, honest or not."""
 
@@ -59,7 +69,7 @@ class StepModel(NamedTuple):
     # first: only one is held; origin: their columns dropped, so that springs end at the origin
     pins: str = "eliminated"
     velocity: str = "displacement"  # displacement, separate; or a key of VELOCITIES
-    matrix: str = "M+h²L"  # of an implicit step: a key of MATRICES
+    matrix: SystemMatrix = SystemMatrix()  # of an implicit step
     # what stands for y: y; x_n: no velocity; doubled: x_n + 2 h v; squared: x_n + h² v
     inertia: str = "y"
     # divided among substeps; undivided; before: of the last request, in the matrix only; or a
@@ -75,33 +85,6 @@ class StepModel(NamedTuple):
     def pin_strength(self) -> float:
         """The weight of a penalty, the stiffness of springs to the pins or their mass."""
         return float(self.pins.split()[-1])
-
-
-class SystemMatrix(NamedTuple):
-    """How the system matrix is put together from masses and springs."""
-
-    masses: float = 1.0  # how many times M is added
-    power: int = 2  # of h before the springs' part, with its sign
-    sign: float = 1.0
-    stiffness: bool = True  # whether the springs' part has its factor k
-    off_diagonal: float = 1.0  # factor of the entries off the diagonal
-
-
-MATRICES: Mapping[str, SystemMatrix] = {
-    "M+h²L": SystemMatrix(),
-    "L": SystemMatrix(masses=0.0),
-    "L without h²": SystemMatrix(masses=0.0, power=0),
-    "M+hL": SystemMatrix(power=1),
-    "M+L": SystemMatrix(power=0),
-    "M-h²L": SystemMatrix(sign=-1.0),
-    "without k": SystemMatrix(stiffness=False),
-    "without k, minus": SystemMatrix(stiffness=False, sign=-1.0),
-    "doubled beside": SystemMatrix(off_diagonal=2.0),
-    "positive beside": SystemMatrix(off_diagonal=-1.0),
-    "diagonal": SystemMatrix(off_diagonal=0.0),
-    "M": SystemMatrix(sign=0.0),
-    "2M+h²L": SystemMatrix(masses=2.0),
-}
 
 
 class Substep(NamedTuple):
@@ -238,7 +221,7 @@ def _runge_kutta(start: Substep) -> tuple[FloatArray, FloatArray]:
 
 
 def _in_place(start: Substep) -> tuple[FloatArray, FloatArray]:
-    """Move one particle after another, each by forces of the new positions of those before it."""
+    """Move particles in turn, each by forces of the new positions of its predecessors."""
     _, _, x, v, h = start
     x, v = x.copy(), v.copy()
     for i in range(len(x)):
@@ -280,7 +263,7 @@ VELOCITIES: Mapping[str, Callable[[Substep, FloatArray, FloatArray], FloatArray]
 
 
 class StepEquation:
-    """M (x - y) - h² f(x) = 0 of a substep, its derivative and, where it has one, g."""
+    """M (x - y) - h² f(x) = 0 of a substep, its derivative and, where it exists, g."""
 
     def __init__(self, start: Substep) -> None:
         """Set up y and the forces that stay through the step."""
@@ -307,9 +290,9 @@ class StepEquation:
 
     @property
     def uncoupled(self) -> bool:
-        """Whether no spring acts and the matrix is M: one Newton step arrives."""
+        """Whether no spring acts and the matrix is M: a Newton step arrives."""
         p, model = self.start.p, self.start.model
-        return not (p.stiff or self.damped or len(self.pins)) and model.matrix == "M+h²L"
+        return not (p.stiff or self.damped or len(self.pins)) and model.matrix == SystemMatrix()
 
     @cached_property
     def length_n(self) -> FloatArray:
@@ -331,7 +314,7 @@ class StepEquation:
         return gradient
 
     def free_gradient(self, x: FloatArray) -> FloatArray:
-        """Return the gradient, zero at what the step may not move."""
+        """Return the gradient, zero at particles that the step may not move."""
         return np.where(self.free[:, None], self.gradient(x), 0.0)
 
     def value(self, x: FloatArray) -> float:
@@ -341,16 +324,16 @@ class StepEquation:
         energy = 0.5 * (p.stiffnesses * stretches(p, length) ** 2).sum()
         if self.damped:
             energy += 0.5 / h * (p.dampings * (length - self.length_n) ** 2).sum()
-        held = 0.5 * self.hold * ((x - p.positions)[self.pins] ** 2).sum()
+        penalty = 0.5 * self.hold * ((x - p.positions)[self.pins] ** 2).sum()
         inertia = 0.5 * (p.masses[:, None] * (x - self.y) ** 2).sum()
-        return float(inertia + h * h * (energy - (self.constant * x).sum()) + held)
+        return float(inertia + h * h * (energy - (self.constant * x).sum()) + penalty)
 
     def blocks(self, x: FloatArray, kind: str) -> FloatArray:
         """Return each spring's 3 x 3 stiffness with its damper's, shape (spring, 3, 3)."""
         p = self.start.p
         length, u = frames(p, x)
         uu = u[:, :, None] * u[:, None, :]
-        k = p.stiffnesses if MATRICES[self.start.model.matrix].stiffness else np.ones(len(u))
+        k = p.stiffnesses if self.start.model.matrix.stiffness else np.ones(len(u))
         k = np.where(p.tension_only & (length <= p.rest_lengths), 0.0, k)
         safe = np.maximum(length, 1e-150)
         across = TRANSVERSE[kind](1.0 - p.rest_lengths / safe)
@@ -375,14 +358,14 @@ class StepEquation:
     def matrix(self, x: FloatArray, kind: str) -> FloatArray:
         """Return the matrix of a Newton step, (3 particle, 3 particle), as the model has it."""
         A = self.put_together(_assemble(self.start.p, self.blocks(x, kind)), 3)
-        held = np.repeat(self.pins, 3) * 3 + np.tile(np.arange(3), len(self.pins))
-        A[held, held] += self.hold
+        rows = np.repeat(self.pins, 3) * 3 + np.tile(np.arange(3), len(self.pins))
+        A[rows, rows] += self.hold
         return A
 
     def put_together(self, springs: FloatArray, size: int) -> FloatArray:
-        """Return M + h² times the springs' part, or what a faulty solver makes of it."""
+        """Return M + h² times the springs' part, or a faulty solver's version of it."""
         p, model = self.start.p, self.start.model
-        rule = MATRICES[model.matrix]
+        rule = model.matrix
         h = p.h_before / model.substeps if model.time == "before" else self.start.h
         if rule.off_diagonal != 1.0:
             cells = np.kron(np.eye(p.count), np.ones((size, size)))
@@ -444,10 +427,10 @@ def _local_global(equation: StepEquation, x: FloatArray, integrator: Integrator)
     start = equation.start
     p, h = start.p, start.h
     k, c = p.stiffnesses, (p.dampings / h if equation.damped else 0.0 * p.dampings)
-    weights = (k if MATRICES[start.model.matrix].stiffness else np.ones_like(k)) + c
+    weights = (k if start.model.matrix.stiffness else np.ones_like(k)) + c
     A = equation.put_together(p.pulled.T @ (weights[:, None] * p.incidence), 1)
     A[equation.pins, equation.pins] += equation.hold
-    held = np.where(equation.free[:, None] | (start.model.pins == "origin"), 0.0, x)
+    pinned_x = np.where(equation.free[:, None] | (start.model.pins == "origin"), 0.0, x)
     for _ in range(integrator.iterations):
         length, u = frames(p, x)
         rest = np.where(p.tension_only & (length < p.rest_lengths), length, p.rest_lengths)
@@ -455,7 +438,7 @@ def _local_global(equation: StepEquation, x: FloatArray, integrator: Integrator)
         pull = (k * rest + c * equation.length_n)[:, None] * u
         right = p.masses[:, None] * equation.y + h * h * (equation.constant + p.pulled.T @ pull)
         right[equation.pins] += equation.hold * p.positions[equation.pins]
-        x = np.where(equation.free[:, None], equation.solve(A, right - A @ held), x)
+        x = np.where(equation.free[:, None], equation.solve(A, right - A @ pinned_x), x)
     return x
 
 

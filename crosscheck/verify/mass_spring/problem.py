@@ -1,7 +1,7 @@
 """A small mass-spring system as dense arrays, with the changes that a wrong solver makes to it.
 
 Its forces are written from the formulas, apart from `reference`: a spring pulls its first end with
--(k (l - r) + c (v_i - v_j)·u) u. What a faulty solver does otherwise is a field.
+-(k (l - r) + c (v_i - v_j)·u) u. A field states each deviation of a faulty solver.
 """
 
 import dataclasses
@@ -21,7 +21,7 @@ COINCIDENT = 1e-150
 
 @dataclass(frozen=True, eq=False)
 class SpringProblem:
-    """What a request of a force, an energy or a step says, and how a faulty solver reads it."""
+    """The content of a request of a force, an energy or a step, as a solver reads it."""
 
     masses: FloatArray  # of inertia [kg]
     springs: IndexArray

@@ -1,6 +1,6 @@
-"""Find what a solver does by assuming one choice after another along the probes.
+"""Find the model of a solver by assuming choices in turn along the probes.
 
-In each probe one more aspect matters than in those before it. Choices are therefore refuted where
+Each probe adds an aspect to the probes before it. Choices are therefore refuted where
 they first matter, so that combinations of three among some hundred faults and as many honest models
 are found without trying the millions that there are.
 """
@@ -15,9 +15,9 @@ from ..contestant import Answer, Exchange
 from ..greeting import Step
 from .faults import ASPECTS, MAX_FAULTS, STEP_FAULTS, Option, apply
 from .honest import compatible, domains
+from .laws import SOLVED, Rounding, relative_gap, rounding
 from .model import Integrator, StepModel, predicted
 from .problem import SpringProblem
-from .rounding import SOLVED, Rounding, relative_gap, rounding
 
 # Seconds of the processor for honest choices, one fault, two, and three.
 PATIENCE = (6.0, 6.0, 3.0, 3.0)
@@ -59,10 +59,10 @@ class ModelMatch(NamedTuple):
 
 
 class Probe(NamedTuple):
-    """A problem, and what was answered."""
+    """A problem, and the answer to it."""
 
     problem: SpringProblem
-    answered: Mapping[str, Any]
+    answers: Mapping[str, Any]
     name: str
 
     @property
@@ -94,15 +94,15 @@ class ModelSearch:
             for flight, pairs in self.classes.items()
         ]
         self.costs = {id(option): cost for pairs in self.domains.values() for option, cost in pairs}
-        self.tried = 0  # number of predictions
+        self.prediction_count = 0  # number of predictions
         self._misplaced: set[tuple[Any, ...]] = set()  # choices whose positions are wrong
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
         self._explained: dict[tuple[Any, ...], bool | None] = {}
-        self._named: set[tuple[str, ...]] = set()  # faults that explain all probes
+        self._matched_keys: set[tuple[str, ...]] = set()  # faults that explain all probes
         self._deadline = 0.0
 
     def run(self) -> list[ModelMatch]:
-        """Return what explains all probes with the fewest faults; none if nothing does."""
+        """Return the matches of all probes with the fewest faults, none if there are none."""
         for budget in range(MAX_FAULTS + 1) if self.probes else ():
             self._deadline = time.process_time() + PATIENCE[budget]
             matches = [m for m in self._explanations({}, 0, budget) if len(m.faults) == budget]
@@ -111,11 +111,11 @@ class ModelSearch:
         return []
 
     def _explanations(self, choices: Choices, index: int, budget: int) -> Iterator[ModelMatch]:
-        """Yield what explains the probes from this one on, given the choices made before."""
+        """Yield the matches of the probes from an index on, given the choices made before."""
         if index == len(self.probes):
             if self._explains_enough(choices):
                 match = self._match(choices)
-                self._named.add(match.keys)
+                self._matched_keys.add(match.keys)
                 yield match
             return
         probe = self.probes[index]
@@ -133,9 +133,9 @@ class ModelSearch:
 
     def _is_named(self, choices: Choices) -> bool:
         """Return whether the same faults explain all probes with other honest choices."""
-        if not self._named or "flight" in choices:
+        if not self._matched_keys or "flight" in choices:
             return False
-        return self._match(choices).keys in self._named
+        return self._match(choices).keys in self._matched_keys
 
     def _extensions(
         self, choices: Choices, aspects: Sequence[str], budget: int
@@ -204,7 +204,7 @@ class ModelSearch:
             if by_centre:
                 self._explained[key] = self._has_right_centre(options, probe)
             else:
-                self.tried += 1
+                self.prediction_count += 1
                 self._explained[key], is_placed = self._compare(options, probe)
                 if not is_placed:
                     self._misplaced.add(position_key)
@@ -220,9 +220,9 @@ class ModelSearch:
         share = problem.masses / problem.masses.sum()
         x = predicted(problem, model)["positions"]
         centre = {"positions": share @ x, "velocities": np.zeros(0)}
-        answered = {"positions": share @ probe.answered["positions"]}
+        answers = {"positions": share @ probe.answers["positions"]}
         whole = probe.problem.changed(positions=share @ probe.problem.positions)
-        error = relative_gap(whole, centre, answered, self._rounding(probe, model))
+        error = relative_gap(whole, centre, answers, self._rounding(probe, model))
         return None if error <= SOLVED else False
 
     def _rounding(self, probe: Probe, model: StepModel) -> Rounding:
@@ -234,15 +234,15 @@ class ModelSearch:
     def _compare(self, options: tuple[Option, ...], probe: Probe) -> tuple[bool | None, bool]:
         """Return whether an answer is reproduced, and whether its positions may be."""
         problem, model = apply(options, probe.problem, StepModel(damper="none"))
-        prediction, answered = predicted(problem, model), probe.answered
+        prediction, answers = predicted(problem, model), probe.answers
         if _is_singular(prediction):
-            return (None if _is_singular(answered) else False), True
+            return (None if _is_singular(answers) else False), True
         allowed = self._rounding(probe, model)
-        if relative_gap(probe.problem, prediction, answered, allowed) <= SOLVED:
+        if relative_gap(probe.problem, prediction, answers, allowed) <= SOLVED:
             return True, True
-        if problem.steps or "positions" not in answered:
+        if problem.steps or "positions" not in answers:
             return False, True
-        positions = {"positions": answered["positions"]}
+        positions = {"positions": answers["positions"]}
         return False, relative_gap(probe.problem, prediction, positions, allowed) <= SOLVED
 
     def _match(self, choices: Choices) -> ModelMatch:
@@ -254,15 +254,15 @@ class ModelSearch:
 
 
 def _is_singular(values: Mapping[str, Any]) -> bool:
-    """Return whether positions are those that a singular matrix gives."""
+    """Return whether positions are missing or huge, as from a singular matrix."""
     return "positions" not in values or not np.abs(values["positions"]).max() < LARGEST
 
 
 def _takes_long(option: Option) -> bool:
     """Return whether a choice is not tried together with other faults.
 
-    These are integrators that take long, and those, as well as numbers of substeps, that are honest
-    but denied by the greeting.
+    These are integrators that take long, and honest integrators and numbers of substeps that the
+    greeting denies.
     """
     integrator = option.fields.get("integrator")
     if integrator is None:
@@ -272,7 +272,7 @@ def _takes_long(option: Option) -> bool:
 
 
 def _relevant_in_flight(choices: Choices) -> Choices:
-    """Return those choices that matter where no spring acts."""
+    """Return the choices that matter where no spring acts."""
     return {
         aspect: option
         for aspect, option in choices.items()
@@ -293,7 +293,7 @@ def in_flight(integrator: Integrator) -> Integrator:
 def probes_of(
     exchanges: Sequence[Exchange], problems: Mapping[str, SpringProblem], every: bool = False
 ) -> list[Probe]:
-    """Return the probes, or every case, that were answered, in their order."""
+    """Return the probes, or every case, that were answers, in their order."""
     return [
         Probe(problems[exchange.case.name], exchange.answer.values, exchange.case.name)
         for exchange in exchanges

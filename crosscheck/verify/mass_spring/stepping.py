@@ -1,6 +1,6 @@
-"""Judge steps and motions: against what is declared, or else inferred, and against laws."""
+"""Judge steps and motions by the declared or inferred model and by laws."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain, product
 from typing import NamedTuple
@@ -18,13 +18,12 @@ from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskRepo
 from ..sentence import Sentence, sentence
 from ..timing import timed
 from . import laws
-from .cases import task_cases
+from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
 from .honest import HONEST, compatible, domains, honest
-from .laws import StepContext
+from .laws import SOLVED, StepContext, correct_digits, relative_gap, rounding
 from .model import StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
-from .rounding import SOLVED, correct_digits, relative_gap, rounding
 from .search import ModelMatch, ModelSearch, Probe, probes_of
 
 MAX_EXPLANATIONS = 3
@@ -34,7 +33,7 @@ LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
 
 
 class Stepping(NamedTuple):
-    """The discipline of a task that makes one step, or several."""
+    """The discipline of a task of a single step or of several."""
 
     task: str
 
@@ -48,14 +47,16 @@ class Stepping(NamedTuple):
         search = ModelSearch(probes_of(exchanges, problems), greeting.step, greeting.epsilon)
         matches = search.run()
         options = honest_options(matches, greeting.step)
-        known = greeting.step.method is not None or bool(matches and not matches[0].faults)
+        recognised = greeting.step.method is not None or bool(matches and not matches[0].faults)
         judgements = [
-            _judge_case(exchange, exchanges, problems[exchange.case.name], greeting, options, known)
+            _judge_case(
+                exchange, exchanges, problems[exchange.case.name], greeting, options, recognised
+            )
             for exchange in exchanges
         ]
         probes = probes_of(exchanges, problems, every=True)
         diagnosis = _diagnose(judgements, search, matches, probes)
-        if diagnosis.explained and not known:
+        if diagnosis.explained and not recognised:
             judgements = list(map(_with_wrong_step, judgements))
         return TaskReport(self.task, "", judgements, diagnosis)
 
@@ -69,16 +70,16 @@ def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, 
         h_before = before.case.inputs["h"] if before is not None else None
         inputs = dict(exchange.case.inputs)
         if greeting.system.continues and before is not None and isinstance(before.answer, Answer):
-            answered = before.answer.values
-            for state in {"positions", "velocities"} & answered.keys():
-                frames = answered[state]
+            answers = before.answer.values
+            for state in {"positions", "velocities"} & answers.keys():
+                frames = answers[state]
                 inputs[state] = frames.reshape(-1, *frames.shape[-2:])[-1]
         problems[name] = problem_of(inputs, h_before)
     return problems
 
 
 def honest_options(matches: Sequence[ModelMatch], step: Step) -> tuple[Option, ...]:
-    """Return what was found of a solver, its faults replaced by what it declares."""
+    """Return the recognised choices of a solver, its faults replaced by declared choices."""
     options, faults = matches[0] if matches else ((), ())
     wrong = {fault.aspect for fault in faults}
     recognised = {option.aspect: option for option in options if option.aspect not in wrong}
@@ -108,7 +109,7 @@ def _judge_case(
     p: SpringProblem,
     greeting: Greeting,
     options: tuple[Option, ...],
-    known: bool,
+    recognised: bool,
 ) -> CaseJudgement:
     case, answer = exchange.case, exchange.answer
     if not isinstance(answer, Answer):
@@ -116,12 +117,12 @@ def _judge_case(
     _, model = apply(options, p, StepModel())
     expected = predicted(p, model)
     context = StepContext(
-        p, answer.values, rounding(p, model, greeting.epsilon), model, known,
+        p, answer.values, rounding(p, model, greeting.epsilon), model, recognised,
         describe_model(options), expected, greeting.step.pins is not None,
     )  # fmt: skip
     findings = tuple(_findings(exchange, exchanges, context)) + tuple(laws.remarks(answer))
     seconds = _reference_seconds(p, model)
-    if not known:
+    if not recognised:
         return CaseJudgement(case, answer, findings, {}, None, seconds)
     digits = None
     if expected and "positions" in answer.values:
@@ -135,7 +136,7 @@ def _findings(
     exchange: Exchange, exchanges: Sequence[Exchange], context: StepContext
 ) -> list[Finding]:
     """Return the findings of all laws that apply."""
-    values = context.answered
+    values = context.answers
     invalid = [name for name, numbers in values.items() if not np.isfinite(numbers).all()]
     if invalid:
         message = sentence("{name} hold NaN or infinity.", name=", ".join(invalid))
@@ -184,7 +185,7 @@ def _diagnose(
             model=describe_model(honest_options(matches, step)),
         )
     hints = hints_of(judgements)
-    diagnosis = Diagnosis(explanations, behaviour, None, hints, search.tried)
+    diagnosis = Diagnosis(explanations, behaviour, None, hints, search.prediction_count)
     if diagnosis.explained:
         return diagnosis
     if search.probes and behaviour is None and step.method is None:
@@ -197,7 +198,7 @@ _DECLARED = ("method", "substeps", "damper", "pins", "velocity")
 
 
 def _nearest(search: ModelSearch) -> Sentence:
-    """Return which of the steps that are known comes nearest to the answers to the probes."""
+    """Return which of the known steps comes nearest to the answers to the probes."""
     usual = {option.aspect: option for option in honest_options((), search.step)}
     steps = []
     for integrator, damper in product(honest(search.step)["integrator"], HONEST["damper"]):
@@ -235,25 +236,25 @@ def _explanation(
         hits = [gap for gap in gaps if gap <= SOLVED]
         scores.append((-len(hits) / max(len(gaps), 1), max(hits, default=0.0), match))
     scores.sort(key=lambda score: score[:2])
-    least, distance, _ = scores[0]
-    classes = {" + ".join(m.keys): m.faults for share, _, m in scores if share == least}
+    best, distance, _ = scores[0]
+    classes = {" + ".join(m.keys): m.faults for share, _, m in scores if share == best}
     keys = tuple(classes)[:MAX_EXPLANATIONS]
     message = either([list(map(_fault_sentence, classes[key])) for key in keys])
-    return Explanation(keys, message, -least, distance)
+    return Explanation(keys, message, -best, distance)
 
 
 def _gaps(options: tuple[Option, ...], probes: Sequence[Probe], epsilon: float) -> list[float]:
-    """Return how far each answer is from a step with these options, relative to what it moves."""
+    """Return how far answers are from a step with these options, relative to displacements."""
     gaps = []
-    for plain, answered, _ in probes:
+    for plain, answers, _ in probes:
         p, model = apply(options, plain, StepModel(damper="none"))
         expected, allowed = predicted(p, model), rounding(plain, model, epsilon)
-        gaps.append(relative_gap(plain, expected, answered, allowed) if expected else np.inf)
+        gaps.append(relative_gap(plain, expected, answers, allowed) if expected else np.inf)
     return gaps
 
 
 def _fault_sentence(option: Option) -> Sentence:
-    """Return the sentence of a fault; of an honest choice that was denied, that it is one."""
+    """Return the sentence of a fault, or of an honest choice that the greeting denies."""
     if any(option.key == choice.key for choice in honest(Step()).get(option.aspect, ())):
         return sentence("Other than declared, it behaves like this: {what}.", what=option.sentence)
     return option.sentence
@@ -262,28 +263,13 @@ def _fault_sentence(option: Option) -> Sentence:
 def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
     """Return the first law that broke, and where to look if all cases before are right.
 
-    The cases add one aspect after another.
+    Each case adds an aspect to the cases before it.
     """
     law = first_broken(judgements)
     case = next((j.case for j in judgements if j.verdict > Verdict.RIGHT_BUT), None)
     if law is None or case is None or case.name != law.values["case"]:
         return law
-    return sentence("{law} {trace}", law=law, trace=TRACES.get(case.family, TRACES["cloth"]))
-
-
-TRACES: Mapping[str, Sentence] = {
-    "flight": sentence("Look at gravity, h and the velocity: no spring acts there."),
-    "springs": sentence("Free flight is right: look at the spring's force and the system matrix."),
-    "rest": sentence("Nothing should move there: look at rest lengths."),
-    "dampers": sentence("Undamped springs are right: look at the damper."),
-    "pins": sentence("Without pins all is right: look at how particles are held."),
-    "gravity": sentence("Gravity along y is right: look at its other components."),
-    "external forces": sentence("Look at how external forces are added."),
-    "tension only": sentence("Look at springs shorter than at rest."),
-    "h changes": sentence("A single h is right: look at what is kept from one request to another."),
-    "system changes": sentence("Look at what is kept from one request to another."),
-    "cloth": sentence("Small systems are right: look at indices and at what larger ones add."),
-}
+    return sentence("{law} {trace}", law=law, trace=trace_of(case.family))
 
 
 def _with_wrong_step(judgement: CaseJudgement) -> CaseJudgement:

@@ -30,7 +30,7 @@ serve(spec, folder, float(patience))
 
 
 def open_contestant(spec: str | Path | Sequence[str], limits: ProcessLimits = LIMITS) -> Contestant:
-    """Return a solver, whatever it is; nothing of it is started before the first request.
+    """Return a solver of any kind; its process starts with the first request.
 
     Args:
         spec: a command as a list of words; a Python file, file.py:object or module:object; a
@@ -38,7 +38,7 @@ def open_contestant(spec: str | Path | Sequence[str], limits: ProcessLimits = LI
         limits: of its process.
 
     Raises:
-        ValueError: if there is nothing of the kind.
+        ValueError: if there is no solver of that name.
     """
     if not isinstance(spec, str | Path):
         return ProgramContestant(spec, limits=limits)
@@ -63,7 +63,7 @@ def open_contestant(spec: str | Path | Sequence[str], limits: ProcessLimits = LI
 def _python_contestant(spec: str, limits: ProcessLimits) -> ProgramContestant:
     """Return the solver in a file, file.py:object or module:object, run by this interpreter.
 
-    A file runs in its own folder, a module in the present one.
+    A file runs in its own folder, a module in the working directory.
     """
     source, colon, attribute = spec.partition(":")
     folder = Path.cwd()

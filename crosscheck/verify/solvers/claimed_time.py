@@ -1,4 +1,4 @@
-"""Whether the times that a program claims agree with what its processes are seen to compute.
+"""Whether the times that a program claims agree with the processor time of its processes.
 
 A request costs time beside the solver's: JSON, pipes, garbage collection. A larger message costs no
 less, so that the cheapest of all as large bounds this cost, its solution included; far more is
@@ -15,7 +15,7 @@ from ...process_tree import family, main_thread_seconds
 from ..sentence import Sentence, sentence
 
 # So many requests are compared, then again after as many more; the last ones are kept.
-COMPARED, KEPT = 10, 40
+COMPARED, WINDOW = 10, 40
 # A request contradicts its claim if it computes more than so many times as long, messages aside.
 FACTOR = 10.0
 # Messages cost at most so much, and so much a byte [s]; so many times what is seen is allowed.
@@ -28,30 +28,30 @@ Request = tuple[float, float, int]
 
 
 class ClaimedTimes:
-    """The last requests to a program, compared with what its processes are seen to compute."""
+    """The last requests to a program, compared with the processor time of its processes."""
 
     def __init__(self, leader: int) -> None:
         self._processes = [process.pid for process in family(leader)]
-        self._requests: deque[Request] = deque(maxlen=KEPT)
+        self._requests: deque[Request] = deque(maxlen=WINDOW)
         self._count = 0
 
     def begin(self) -> None:
         """Begin a request."""
         self._before = [main_thread_seconds(process) for process in self._processes]
 
-    def end(self, claimed: float, size: int) -> Sentence | None:
+    def end(self, claim: float, size: int) -> Sentence | None:
         """Return why the times that are claimed cannot be, as far as is seen after this request."""
         now = map(main_thread_seconds, self._processes)
         computed = (after - before for after, before in zip(now, self._before, strict=True))
-        self._requests.append((claimed, max(computed, default=0.0), size))
+        self._requests.append((claim, max(computed, default=0.0), size))
         self._count += 1
         if self._count % COMPARED or not contradicts(self._requests):
             return None
-        claimed, used, _ = np.sum(self._requests, axis=0).tolist()
+        claim, used, _ = np.sum(self._requests, axis=0).tolist()
         return sentence(
             "Timed by round trips: it claims {claimed:.2g} s for {count} requests over which its "
             "process computed for {computed:.2g} s.",
-            claimed=claimed,
+            claimed=claim,
             count=len(self._requests),
             computed=used,
         )
@@ -59,7 +59,7 @@ class ClaimedTimes:
 
 def contradicts(requests: Sequence[Request]) -> bool:
     """Return whether most requests compute far longer than is claimed for them."""
-    claimed, computed, size = np.array(sorted(requests, key=lambda request: -request[2])).T
+    claim, computed, size = np.array(sorted(requests, key=lambda request: -request[2])).T
     messages = np.minimum(np.minimum.accumulate(computed), MESSAGE + BYTE * size)
-    excess = computed - claimed - ALLOWED * messages - NOISE
-    return bool(np.mean(excess > (FACTOR - 1.0) * claimed) > 0.5)
+    excess = computed - claim - ALLOWED * messages - NOISE
+    return bool(np.mean(excess > (FACTOR - 1.0) * claim) > 0.5)

@@ -24,13 +24,12 @@ def export_cases(
     seed: int = 0,
     thorough: bool = False,
 ) -> int:
-    """Write all cases that suit a solver into a folder, with word of what to write where.
+    """Write all cases that suit a solver into a folder, with instructions for the answers.
 
     Args:
-        folder: a new one, an empty one, or one of an earlier export, whose answers stay.
-        greeting: what the solver is; if not given, what the folder's greeting.json says, else one
-            that offers all tasks.
-        tasks: only these of those that it offers.
+        folder: a new or empty folder, or that of an earlier export, whose answers stay.
+        greeting: of the solver; if None, that of the folder's greeting.json, or else all tasks.
+        tasks: a selection of its tasks.
         seed: of the random cases.
         thorough: whether to write the long list of cases.
 
@@ -98,7 +97,7 @@ def _check_is_export(folder: Path) -> None:
 
 
 def _description(task: Task) -> str:
-    """Return what a task is, and a line for each of its inputs and outputs."""
+    """Return a task in words, with a line for each input and output."""
     lines = [f"{task.name}: {task.about}"]
     for title, definitions in (("in", task.inputs), ("out", task.outputs)):
         for definition in definitions:

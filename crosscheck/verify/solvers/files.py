@@ -18,7 +18,7 @@ from .losses import LIMITS
 from .tables import read_table
 
 GREETING, SETTINGS, REQUEST, ANSWER = "greeting.json", "export.json", "request.json", "answer.json"
-# A table that answers has this before the name of the output: some are named as inputs are.
+# Some outputs have the names of inputs; so the tables of an answer have a prefix.
 PREFIX = "answer_"
 # A solver's own time is less: thirty years [s].
 LONGEST = 1e9
@@ -38,7 +38,7 @@ def _plain(name: str) -> str:
 
 
 def read_greeting(folder: Path) -> Greeting:
-    """Return what greeting.json of a folder says.
+    """Return the greeting in greeting.json of a folder.
 
     Raises:
         ValueError: if it is not there, or not understood.
@@ -51,12 +51,13 @@ def read_greeting(folder: Path) -> Greeting:
 
 def _object(path: Path) -> dict[str, Any]:
     """Return the JSON object of a file; raise ValueError if it holds something else."""
-    data = _content(path)
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        data = data.decode("utf-16", errors="replace").encode()
-    fields = message.decode_object(data)
+    content = _content(path)
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        content = content.decode("utf-16", errors="replace").encode()
+    fields = message.decode_object(content)
     if fields is None:
-        raise ValueError(f"{path.name}: expected a JSON object, got {message.shown(data, 60)!r}")
+        text = message.shown(content, 60)
+        raise ValueError(f"{path.name}: expected a JSON object, got {text!r}")
     return fields
 
 
@@ -69,11 +70,11 @@ def _content(path: Path) -> bytes:
 
 def _exported(task: Task) -> set[str]:
     """Return the names of the files that an export writes for a case."""
-    return {REQUEST, *(f"{field.name}.csv" for field in task.inputs)}
+    return {REQUEST, *(f"{definition.name}.csv" for definition in task.inputs)}
 
 
 class FileContestant:
-    """A solver that answers by files; they are read when they are asked for.
+    """A solver that answers by files; each is read for its request.
 
     Attributes:
         folder: of the export.
@@ -93,33 +94,36 @@ class FileContestant:
     @property
     def remarks(self) -> tuple[Sentence, ...]:
         """That an answer is never given twice, and which tasks have none."""
-        answered = self.greeting.tasks
-        without = ", ".join(task for task in self._offered().tasks if task not in answered)
-        once = sentence(
+        solved = self.greeting.tasks
+        missing = ", ".join(task for task in self._offered().tasks if task not in solved)
+        single = sentence(
             "Files answer once: whether equal requests have equal answers is not known."
         )
-        left_out = sentence("Left out, for they have no answers: {tasks}.", tasks=without)
-        return (once, left_out) if without else (once,)
+        left_out = sentence("Left out, for they have no answers: {tasks}.", tasks=missing)
+        return (single, left_out) if missing else (single,)
 
     @property
     def greeting(self) -> Greeting:
-        """What greeting.json says, of the tasks that have answers if there are any.
+        """The greeting in greeting.json, with the tasks that have answers if there are any.
 
         Raises:
             NoGreetingError: if it is not understood.
         """
         offered = self._offered()
-        every = ("", *offered.methods)
-        tasks = tuple(t for t in offered.tasks if any(self._answers(t, one) for one in every))
-        methods = tuple(
-            one for one in offered.methods if any(self._answers(task, one) for task in tasks)
-        )
+        solved = {
+            (task, method)
+            for task in offered.tasks
+            for method in ("", *offered.methods)
+            if self._has_answers(task, method)
+        }
+        tasks = tuple(task for task in offered.tasks if task in {task for task, _ in solved})
+        methods = tuple(m for m in offered.methods if m in {method for _, method in solved})
         if not tasks:
             return offered
         return msgspec.structs.replace(offered, tasks=tasks, methods=methods or offered.methods)
 
-    def _answers(self, task: str, method: str) -> bool:
-        """Return whether anything stands beside the cases of a task that was not exported."""
+    def _has_answers(self, task: str, method: str) -> bool:
+        """Return whether a file stands beside the cases of a task that was not exported."""
         files = (self.folder / _folder(task, method)).glob("*/[!.]*")
         return any(path.name not in _exported(TASKS[task]) for path in files)
 
@@ -131,10 +135,10 @@ class FileContestant:
             raise NoGreetingError(Failure(FailureKind.GARBAGE, words)) from None
 
     def answer(self, case: Case) -> Answer | Failure:
-        """Read what stands beside the case, the same each time it is asked."""
+        """Read the answer beside the case, the same for each request."""
         place = self.folder / place_of(case)
         try:
-            if not _is_asked(place, case):
+            if not _is_current(place / REQUEST, case):
                 return Failure(FailureKind.ABSENT, sentence(
                     "{place} holds another case: export again, and solve it.", place=place
                 ))  # fmt: skip
@@ -146,26 +150,26 @@ class FileContestant:
         """Do nothing: there is no process."""
 
 
-def _is_asked(place: Path, case: Case) -> bool:
-    """Return whether the request that was exported is the same as that of now."""
-    if not (place / REQUEST).is_file():
-        return False
-    return _object(place / REQUEST) | {"id": 0} == json.loads(message.encode_case(0, case))
+def _is_current(path: Path, case: Case) -> bool:
+    """Return whether the request that was exported is that of the case."""
+    encoded = json.loads(message.encode_case(0, case))
+    return path.is_file() and _object(path) | {"id": 0} == encoded
 
 
 def _read_answer(place: Path, case: Case) -> Answer | Failure:
-    """Return what answer.json of a folder says, or the tables.
+    """Return the answer in answer.json of a folder, or in the tables.
 
     Raises:
         ValueError: if they are not understood.
     """
     task = TASKS[case.task]
     counts = task.counts(case.inputs)
-    paths = {field: place / f"{PREFIX}{field.name}.csv" for field in task.outputs}
-    fields = _object(place / ANSWER) if (place / ANSWER).is_file() else {
-        field.name: read_table(field, counts, _content(path))
-        for field, path in paths.items() if path.is_file()
-    }  # fmt: skip
+    if (place / ANSWER).is_file():
+        fields = _object(place / ANSWER)
+    else:
+        paths = {place / f"{PREFIX}{output.name}.csv": output for output in task.outputs}
+        tables = {path: output for path, output in paths.items() if path.is_file()}
+        fields = {o.name: read_table(o, counts, _content(path)) for path, o in tables.items()}
     if not fields:
         return Failure(FailureKind.ABSENT, _absent(place, task))
     answer = message.decode_answer(fields, task, case.inputs, LONGEST)
@@ -176,8 +180,8 @@ def _read_answer(place: Path, case: Case) -> Answer | Failure:
 
 
 def _absent(place: Path, task: Task) -> Sentence:
-    """Return that there is no answer, and which file was perhaps meant as one."""
-    names = [ANSWER, *(f"{PREFIX}{field.name}.csv" for field in task.outputs)]
+    """Return that there is no answer, and which file was perhaps meant as an answer."""
+    names = [ANSWER, *(f"{PREFIX}{output.name}.csv" for output in task.outputs)]
     for file in sorted({path.name for path in place.iterdir()} - _exported(task)):
         if near := did_you_mean(file, names):
             return sentence(

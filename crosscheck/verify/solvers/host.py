@@ -1,8 +1,8 @@
 """The child process that a Python solver lives in; it speaks the protocol of any program.
 
-The protocol moves away from standard output before the solver is loaded: what the solver prints
-goes to standard error and is told as a remark. Nothing of ours but what answers needs is loaded
-here, so that the solver meets no module of another name.
+The protocol moves away from standard output before the solver is loaded: prints of the solver go
+to standard error and become a remark. Only the modules that answers need are loaded here, so that
+the solver meets no module of ours under a name of its own.
 """
 
 import contextlib
@@ -46,18 +46,18 @@ PRINT_SHOWN, PRINT_PASSED = 200, 4096
 
 
 class OfferError(ValueError):
-    """A solver was loaded, but offers nothing that is understood; the message says why."""
+    """A solver was loaded, but offers no known task; the message says why."""
 
 
 class PythonSolver:
-    """What a Python file or object offers.
+    """The tasks that a Python file or object offers.
 
     Attributes:
         functions: by the name of a task, or of a method of inverse kinematics.
         greeting: fields of the greeting.
 
     Raises:
-        OfferError: if it offers nothing, or what it declares is not understood.
+        OfferError: if it offers no task, or its declaration is not understood.
     """
 
     def __init__(self, source: object, name: str, declared: object) -> None:
@@ -115,13 +115,13 @@ def _functions(source: object, methods: Sequence[Any]) -> dict[str, Callable[...
 
 
 def _is_meant(function: Callable[..., Any], name: str) -> bool:
-    """Return whether a function is of its task; one of a common name has to take an input."""
+    """Return whether a function is of its task; under a common name it has to take an input."""
     inputs = TASKS[name].inputs if name in COMMON_NAMES else ()
     return not inputs or any(takes(function, definition.name) for definition in inputs)
 
 
 def _offers_nothing(source: object, name: str) -> str:
-    """Return why nothing is offered: no names of tasks, or functions that take other arguments."""
+    """Return why no task is offered: no names of tasks, or functions that take other arguments."""
     names = source if isinstance(source, Mapping) else dir(source)
     home = source.__name__ if inspect.ismodule(source) else None
     own = [
@@ -155,8 +155,8 @@ def load(spec: str) -> PythonSolver:
     """Return the solver in a Python file, file:object or module:object.
 
     Raises:
-        OfferError: if it offers nothing.
-        Exception: whatever it raises while it is loaded.
+        OfferError: if it offers no task.
+        Exception: any exception of the solver while it is loaded.
     """
     place, _, attribute = spec.partition(":")
     path = Path(place)
@@ -209,7 +209,7 @@ class _Prints(io.RawIOBase):
 
 @contextlib.contextmanager
 def _protocol_streams() -> Iterator[tuple[BinaryIO, BinaryIO, _Prints]]:
-    """Yield the streams of requests and answers, and what is printed instead of them."""
+    """Yield the streams of requests, answers and prints."""
     descriptors = take_streams()
     prints = _Prints()
     sys.stdout = io.TextIOWrapper(prints, encoding="utf-8", errors="replace", write_through=True)
@@ -256,7 +256,7 @@ def serve(spec: str, folder: str, patience: float) -> None:
 
     Args:
         spec: as of `load`.
-        folder: its own one, where it finds its other modules.
+        folder: that of the solver and its other modules.
         patience: after which its line is noted on standard error [s].
     """
     faulthandler.enable(all_threads=False)

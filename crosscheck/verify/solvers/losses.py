@@ -1,4 +1,4 @@
-"""The limits of a program, and the sentences for one that exceeds them or ends."""
+"""The limits of a program, and the sentences for a program that exceeds them or ends."""
 
 import os
 import signal
@@ -110,7 +110,7 @@ def not_started(program: str, error: Exception) -> FailureError:
 
 
 def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:
-    """End a program's input, then all that still runs; return what was odd in how it left."""
+    """End a program's input, then all that still runs; return remarks on how it left."""
     has_left, strays = process.leave(patience)
     if not has_left:
         return (sentence("It does not leave when its input ends."),)
@@ -123,6 +123,7 @@ def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:
             )
         )
     if process.code:
-        how = ending(process.code)
-        remarks.append(sentence("When its input ended it did not just leave: {how}.", how=how))
+        remarks.append(
+            sentence("When its input ended it did not just leave: {how}.", how=ending(process.code))
+        )
     return tuple(remarks)

@@ -21,7 +21,7 @@ class ProgramContestant:
     """A program, started for its first request, and anew after a loss.
 
     Attributes:
-        remarks: what was odd apart from the answers: how it left, what it left running.
+        remarks: on the program apart from its answers, as on processes that it left running.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class ProgramContestant:
 
     @property
     def greeting(self) -> Greeting:
-        """What it says of itself.
+        """Its description of itself.
 
         Raises:
             NoGreetingError: if it cannot be started, or its greeting is not understood.
@@ -51,9 +51,9 @@ class ProgramContestant:
         if self._greeting is None:
             try:
                 self._ready()
-            except FailureError as lost:
+            except FailureError as error:
                 self._lose()
-                raise NoGreetingError(lost.failure) from None
+                raise NoGreetingError(error.failure) from None
         assert self._greeting is not None
         return self._greeting
 
@@ -61,9 +61,9 @@ class ProgramContestant:
         """Send a request; a program that is lost is started again when the next case comes."""
         try:
             return self._answer(self._ready(), case)
-        except FailureError as lost:
+        except FailureError as error:
             self._lose()
-            return lost.failure
+            return error.failure
 
     def close(self) -> None:
         """End its input, then it and whatever it has started."""
@@ -134,8 +134,8 @@ class ProgramContestant:
         for _ in range(self._limits.prints + 1):
             try:
                 received = process.receive(start + patience - time.monotonic())
-            except LostError as lost:
-                failure = failure_of(lost.loss, process, self._limits, patience)
+            except LostError as error:
+                failure = failure_of(error.loss, process, self._limits, patience)
                 raise self._with_prints(failure) from None
             seconds = time.monotonic() - start
             size += len(received)
@@ -178,13 +178,13 @@ class ProgramContestant:
             )
         raise FailureError(FailureKind.GARBAGE, words)
 
-    def _with_prints(self, lost: FailureError) -> FailureError:
-        """Return a loss with the example of what the program has printed before, if anything."""
+    def _with_prints(self, error: FailureError) -> FailureError:
+        """Return a loss with an example of the program's earlier prints, if there are any."""
         if self._print is None:
-            return lost
+            return error
         words = sentence(
             "{what} Before it had printed lines that are no answers, for example: {line}",
-            what=lost.failure.sentence,
+            what=error.failure.sentence,
             line=message.shown(self._print, 80),
         )
-        return FailureError(lost.failure.kind, words)
+        return FailureError(error.failure.kind, words)

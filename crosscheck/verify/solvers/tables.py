@@ -1,4 +1,4 @@
-"""Arrays as CSV: one file an array, written plainly, and read as spreadsheets and C write it."""
+"""Arrays as CSV files, written plainly, and read as spreadsheets and C write them."""
 
 import math
 import re
@@ -22,7 +22,7 @@ _DIALECTS = ((";", ","), ("\t", ","), (",", "."), (None, ","))
 
 
 def write_table(value: Any) -> str:
-    """Return an array as CSV: the last axis along a row, the others down; 1-D ones in a column."""
+    """Return an array as CSV: the last axis along a row, the others down; vectors in a column."""
     if isinstance(value, str):
         return value + "\n"
     array = np.asarray(value)
@@ -40,11 +40,11 @@ def read_table(field: Field, counts: Mapping[str, int], data: bytes) -> Any:
     Cells stand between commas, semicolons, tabs or spaces; the decimal sign may be a comma where
     that is clear. Names in the first line, a comma at the end of each line, lines that begin with
     # and empty ones are left aside. The numbers run along rows, the last index fastest, and a row
-    holds the last axis, or the last ones, or one number.
+    holds the last axis, the last few axes, or a number.
 
     Args:
-        field: what it is to be.
-        counts: what the words of its shape stand for; one may be missing.
+        field: its definition.
+        counts: the numbers that the words of its shape stand for; a word may be missing.
         data: the file.
 
     Raises:

@@ -20,8 +20,8 @@ from pathlib import Path
 
 from .. import xml
 from ..robot import Robot
+from ..xml import Element
 from .bodies import robot
-from .include import include_files, refuse_includes
 
 __all__ = ["parse", "read"]
 
@@ -39,12 +39,68 @@ def read(path: str | Path, *, root: str | Path | None = None) -> Robot:
             includes one from outside the root, or has elements that generate bodies.
     """
     element = xml.read(path)
-    include_files(element, Path(path), root)
+    _include_files(element, Path(path), root)
     return robot(element, str(path))
 
 
 def parse(text: str) -> Robot:
     """Return the robot that a text describes, which can include no files; see `read`."""
     root = xml.parse(text, "MJCF")
-    refuse_includes(root)
+    for element in root.walk():
+        if element.tag == "include":
+            raise element.error("expected a text without includes; they need a file to be read")
     return robot(root, "MJCF")
+
+
+def _include_files(root: Element, path: Path, top: str | Path | None) -> None:
+    """Replace all includes by the content of the files, each of which may be included once.
+
+    `top` is the folder that must contain all files; that of the main file at `path` if None.
+    """
+    main = path.resolve()
+    folder = main.parent
+    if top is not None:
+        top_folder = _resolved(Path(top)) if isinstance(top, str | Path) else None
+        if top_folder is None or not (top_folder.is_dir() and main.is_relative_to(top_folder)):
+            expected = f"expected a folder that holds {main.name!r:.80}"
+            raise ValueError(f"root: {expected}, got {top!r:.80}")
+        folder = top_folder
+    files = {main}
+    waiting = [(root, main)]
+    while waiting:
+        element, file = waiting.pop()
+        children = [(child, file) for child in reversed(element.children)]
+        element.children.clear()
+        while children:
+            child, file = children.pop()
+            if child.tag == "include":
+                included = _included(child, file, main.parent, folder)
+                if included in files:
+                    raise child.error("expected every file to be included once, got it again")
+                files.add(included)
+                children += [(part, included) for part in reversed(xml.read(included).children)]
+            else:
+                element.children.append(child)
+                waiting.append((child, file))
+
+
+def _included(include: Element, file: Path, main_folder: Path, top: Path) -> Path:
+    """Return the included file, relative to the main file or else to the including file."""
+    name = include.word("file")
+    paths = [path for base in (main_folder, file.parent) if (path := _resolved(base / name))]
+    inside = [path for path in paths if path.is_relative_to(top)]
+    for path in inside:
+        if path.is_file():
+            return path
+    is_outside = paths and not inside
+    fault = "outside; root= names a wider folder" if is_outside else "not there"
+    raise include.error(f"expected a file in {top.name!r:.60}, got {name!r:.80}, which is {fault}")
+
+
+def _resolved(path: Path) -> Path | None:
+    """Return a path with symbolic links resolved; None if it is not a valid path."""
+    try:
+        path.exists()  # raises for names that are too long and for cycles of links
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return None

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...arguments import distinct_texts, frozen
 from ...quaternion import exponential, rotate, scale, subtract
-from ..robot import INFINITY, ORIGIN, Link, Robot, Vector, assemble
+from ..robot import INFINITY, ORIGIN, Robot, RobotLink, Vector, assemble
 from ..source import warn
 from ..xml import Element
 from .settings import CompilerSettings, Transform, direction, one_of, settings
@@ -55,7 +55,7 @@ class _Tree:
 
     def __init__(self, settings: CompilerSettings) -> None:
         self.settings = settings
-        self.links = [Link("world", -1)]
+        self.links = [RobotLink("world", -1)]
         self.bodies = {"world"}
         self.joints: dict[str, int] = {}
         self.homes: dict[int, tuple[float, ...]] = {}
@@ -166,15 +166,15 @@ class _Tree:
 
 def _chain(
     name: str, parent: int, number: int, pose: Transform, joints: list[_Joint]
-) -> list[Link]:
+) -> list[RobotLink]:
     """Return the links of a body; the last has the name and the pose of the body.
 
     The frames of the links are at the anchors of the joints. The file states the anchors in the
     body's frame for zero coordinates, and the joints act in the order of the file.
     """
     if joints and joints[0].kind == "free":
-        return [Link(name, 0, kind="free")]
-    links: list[Link] = []
+        return [RobotLink(name, 0, kind="free")]
+    links: list[RobotLink] = []
     anchor = ORIGIN
     for label, kind, next_anchor, axis, *limits, ref in joints:
         if kind != "slide":
@@ -184,8 +184,8 @@ def _chain(
         x, R = pose.compose(
             Transform(R=exponential(shift)) if kind == "hinge" else Transform(shift)
         )
-        links.append(Link(f"{name}/{label}", parent, x, R, kind, axis, *limits))
+        links.append(RobotLink(f"{name}/{label}", parent, x, R, kind, axis, *limits))
         parent, pose = number + len(links) - 1, Transform()
     if links and anchor == ORIGIN:
         return [*links[:-1], links[-1]._replace(name=name)]
-    return [*links, Link(name, parent, pose.apply(scale(-1.0, anchor)), pose.R)]
+    return [*links, RobotLink(name, parent, pose.apply(scale(-1.0, anchor)), pose.R)]

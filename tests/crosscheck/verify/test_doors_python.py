@@ -3,6 +3,8 @@
 import math
 import re
 import sys
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,6 +29,7 @@ from plumbob.crosscheck.verify.solvers.files import FileContestant
 from plumbob.crosscheck.verify.solvers.program import ProgramContestant
 from plumbob.crosscheck.verify.task import TASKS
 
+TABLE = tomllib.loads(Path(__file__).with_name("python_files.toml").read_text("utf-8"))
 FORWARD = "def forward_kinematics(parents, offsets, local_rotations):\n    "
 
 
@@ -83,6 +86,12 @@ def inside(tmp_path, monkeypatch):
     yield make
     for name in set(sys.modules) - known:
         del sys.modules[name]
+
+
+def rows(name):
+    """Parametrise over the rows of a table in python_files.toml."""
+    columns = tuple(TABLE[name][0])
+    return pytest.mark.parametrize(columns, [tuple(row.values()) for row in TABLE[name]])
 
 
 def inverse(method=None):
@@ -212,60 +221,7 @@ def test_what_a_file_says_of_itself_is_its_greeting(inside):
     assert (greeting.tasks, greeting.language) == (("forward_kinematics",), "Python")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            "import numpy as np\nclass A:\n    def forwardKinematics(self): pass\n"
-            "def forwardKinematics(): pass",
-            r"my_ik.py: expected functions named as some of forward_kinematics, .*"
-            r"got A, forwardKinematics \(did you mean forward_kinematics\?\)$",
-        ),
-        (
-            "from math import cos\ndef part1_forward_kinematics(): pass\ndef spring_forces(): pass",
-            r"got part1_forward_kinematics \(did you mean forward_kinematics\?\), "
-            r"spring_forces \(did you mean mass_spring_forces\?\)$",
-        ),
-        ("x = 3", "expected functions named as some of .*, got none"),
-        ("def energy(chain): pass", "expected energy to take some of masses, .*, got others"),
-        ("PLUMBOB = 3\ndef energy(masses): pass", "PLUMBOB: expected a dict .*, got 3"),
-        (
-            "PLUMBOB = {'precision': 'float'}\ndef energy(masses): pass",
-            "PLUMBOB: precision: expected 'single' or 'double', got 'float'",
-        ),
-        (
-            "PLUMBOB = {'tasks': ['enegry']}\ndef energy(masses): pass",
-            r"PLUMBOB: tasks: .* did you mean energy\?",
-        ),
-        (
-            "PLUMBOB = {'max_joints': object()}\ndef energy(masses): pass",
-            "PLUMBOB: max_joints: expected an integer of 1 or more, got",
-        ),
-        (
-            "PLUMBOB = {'name': 'x' * 10**6}\ndef energy(masses): pass",
-            "PLUMBOB: name: expected a text of at most 100 characters, got 1000000 characters: ",
-        ),
-        (
-            "PLUMBOB = {'step': {'substeps': 100000}}\ndef energy(masses): pass",
-            "PLUMBOB: step: substeps: expected an integer from 1 to 1000, got 100000",
-        ),
-        (
-            "PLUMBOB = {'methods': ['ccd'] * 5000}\ndef ccd(target): pass",
-            "PLUMBOB: methods: expected a list of .*, at most 20 of them, got 5000 entries",
-        ),
-        (
-            "PLUMBOB = ['x' * 10**6] * 3\ndef energy(masses): pass",
-            "PLUMBOB: expected a dict with texts as keys, got 3 entries: ",
-        ),
-        ("PLUMBOB = {3: 4}\ndef energy(masses): pass", "PLUMBOB: expected a dict with texts"),
-        ("def f(:\n  pass", "raised: It raised SyntaxError in line 1 of my_ik.py: invalid syntax"),
-        ("\n\nx = y", "raised: It raised NameError in line 3 of my_ik.py: name 'y' is not defined"),
-        ("\nimport numpyy", "raised: It raised ModuleNotFoundError in line 2 of my_ik.py"),
-        ("import broken", "raised: It raised ZeroDivisionError in line 2 of broken.py: division"),
-        ("x = 0\nexit(3)", "raised: It raised SystemExit in line 2 of my_ik.py: 3"),
-        ("raise KeyError", "raised: It raised KeyError in line 1 of my_ik.py: no message"),
-    ],
-)
+@rows("offers_nothing")
 def test_a_file_that_offers_nothing_says_what_to_mend(inside, text, message):
     contestant = inside(text, broken="x = 1\nx / 0")
     with pytest.raises(NoGreetingError) as caught:
@@ -287,22 +243,7 @@ def test_a_helper_of_a_common_name_is_not_taken_for_a_task(inside):
     assert contestant.greeting.tasks == ("forward_kinematics",)
 
 
-@pytest.mark.parametrize(
-    ("body", "message"),
-    [
-        ("return 1 / 0", "raised: It raised ZeroDivisionError in line 4 of my_ik.py: division by"),
-        ("return helper.deep(0)", "raised: .*ZeroDivisionError in line 2 of helper.py: "),
-        ("import numpy; return numpy.linalg.inv(offsets)", "LinAlgError in line 4 of my_ik.py"),
-        ("raise SystemExit('bye')", "raised: It raised SystemExit in line 4 of my_ik.py: bye"),
-        ("return forward_kinematics(parents, offsets, 0)", "raised: It raised RecursionError in l"),
-        ("return offsets[:1]", r"garbage: .*positions \(joint, 3\).*got \(1, 3\)"),
-        ("return None", "garbage: .*got None"),
-        ("return 'text', {}", "garbage: .*got 'text'"),
-        ("return {'positions': [[1]]}", r"garbage: positions: expected shape \(3, 3\)"),
-        ("return {'positions': 10**5000}", "garbage: positions: expected numbers"),
-        ("raise ValueError('{x.y} %s <b>' * 99)", "raised: .*: {x.y} %s <b>"),
-    ],
-)
+@rows("does_wrong")
 def test_what_a_function_does_wrong_is_told_with_its_line(inside, body, message):
     contestant = inside(three_joints(body), helper="def deep(x):\n    return 1 / x\n")
     assert isinstance(contestant.answer(case(2)), Answer)
@@ -316,22 +257,7 @@ def three_joints(body):
     return f"import helper\n{FORWARD}if len(parents) == 3:\n        {body}\n    return offsets\n"
 
 
-@pytest.mark.parametrize(
-    ("body", "message"),
-    [
-        ("return helper.deep(0)", "raised: .*ZeroDivisionError in line 2 of helper.py: division"),
-        ("import os; os._exit(4)", "crashed: It ended instead of answering: exit code 4"),
-        (
-            "import os; os.kill(os.getpid(), 11)",
-            "crashed: .*not its own.* line 4 in forward_kinematics$",
-        ),
-        ("import os; os.close(0); os.close(1); os.close(2); return 3 / 0", "raised: .*Zero"),
-        (
-            "for _ in iter(int, 1): pass",
-            "hung: It computed for 0.5 s .*: It was in line 4 of my_ik.py",
-        ),
-    ],
-)
+@rows("survives")
 def test_a_process_survives_or_is_started_anew(solver, body, message):
     contestant = solver(three_joints(body), helper="def deep(x):\n    return 1 / x\n")
     assert isinstance(contestant.answer(case(2)), Answer)
@@ -340,34 +266,14 @@ def test_a_process_survives_or_is_started_anew(solver, body, message):
     assert isinstance(contestant.answer(case(2)), Answer)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("x = input()", "raised: It raised EOFError in line 1 of my_ik.py"),
-        ("import os; os._exit(3)", "crashed: .*exit code 3"),
-        ("def energies(masses): pass", r"garbage: .*energies \(did you mean energy\?\)"),
-    ],
-)
+@rows("cannot_load")
 def test_a_process_that_cannot_load_its_file_says_so(solver, text, message):
     with pytest.raises(NoGreetingError) as caught:
         _ = solver(text).greeting
     assert re.search(message, words(caught.value.failure))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (
-            "offsets, chain",
-            "no input is called chain: There are parents, offsets, local_ro",
-        ),
-        ("parents, offset", r"called offset; did you mean offsets\? There are parents"),
-        (
-            "offsets, *, rotations",
-            r"called rotations; did you mean local_rotations\? There are parents",
-        ),
-    ],
-)
+@rows("unknown_arguments")
 def test_an_argument_that_no_input_has_is_told_with_those_there_are(inside, arguments, message):
     contestant = inside(f"def forward_kinematics({arguments}): return offsets")
     said = words(contestant.answer(case(2)))

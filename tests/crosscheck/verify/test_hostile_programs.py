@@ -5,7 +5,9 @@ import re
 import signal
 import sys
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from hostile_programs import LIMITS, LOOP, case, program, running
@@ -17,106 +19,15 @@ from plumbob.crosscheck.verify.judgement import Diagnosis, TaskReport
 from plumbob.crosscheck.verify.solvers.program import ProgramContestant
 from plumbob.crosscheck.verify.verify import DISCIPLINES, verify
 
-FORK = "if os.fork() == 0:\n    {before}\n    os.close(1)\n    while True: tick()\n"
-ALLOCATE = "kept = []\nwhile True: kept.append(b'x' * (8 << 20)); tick()"
-# What a program does instead of answering, and words of the sentence, by the kind of failure.
-HUNG = {
-    "waits": ("while True: tick()", "was not computing: does it .* flush"),
-    "computes": ("while True: pass", "It computed for 0.5 s without an answer"),
-    "answers without an end of line": (
-        "os.write(1, b'{\"id\": 2')\nwhile True: tick()",
-        'printed 8 bytes, but no end of line within 0.5 s: {"id": 2',
-    ),
-    "prints bytes": (
-        "os.write(1, b'\\xff\\x00\\xfe\\n')\nwhile True: tick()",
-        "Before it had printed lines that are no answers",
-    ),
-    "closes its input": (
-        "os.close(0)\nright(request)\nwhile True: tick()",
-        "closed its standard input",
-    ),
-    "forks twice into another session": (
-        FORK.format(before="os.setsid(); os.fork() and os._exit(0)") + "while True: tick()",
-        "no answer",
-    ),
-    "forks and forks": ("for _ in range(4): os.fork()\nwhile True: tick()", " 0.5 s"),
-    "ignores all signals": (
-        "for one in (1, 2, 3, 13, 15): signal.signal(one, signal.SIG_IGN)\nwhile True: tick()",
-        "no answer",
-    ),
-    "stops itself": ("os.kill(os.getpid(), signal.SIGSTOP)", "no answer"),
-    "floods standard error": ("while True: os.write(2, b'e' * 65536)", " 0.5 s"),
-}
-CRASHED = {
-    "crashes": ("os.kill(os.getpid(), 11)", "instead of answering: it used memory that is not its"),
-    "aborts with words": (
-        "sys.stderr.write('one\\ntwo\\nthree\\n\\x1b[31massert x > 0\\n'); os.abort()",
-        r"aborted, .*Its last words on standard error: two / three / \[31massert x > 0$",
-    ),
-    "ends": ("os._exit(3)", "It ended instead of answering: exit code 3."),
-    "raises": ("{}['offsets']", "exit code 1. Its last words .* KeyError: 'offsets'"),
-    "a signal without a story": (
-        "signal.signal(signal.SIGUSR1, signal.SIG_DFL); os.kill(os.getpid(), signal.SIGUSR1)",
-        "ended by signal SIGUSR1",
-    ),
-    "half a line": (
-        'sys.stdout.write(\'{"id": 2, "posi\'); sys.stdout.flush(); os._exit(0)',
-        r'ended in the middle of a line \({"id": 2, "posi\): exit code 0',
-    ),
-    "closes its output": ("os.close(1)\nwhile True: tick()", "its standard output, but runs on"),
-    "closes all": ("os.closerange(0, 99)\nwhile True: tick()", "its standard output, but runs on"),
-    "leaves its output to a child": (
-        "if os.fork() == 0:\n    while True: tick()\nos._exit(4)",
-        "ended instead of answering: exit code 4",
-    ),
-    "forks into another session": (FORK.format(before="os.setsid()") + "os._exit(4)", "code 4"),
-    "forks and ends, on and on": (
-        "end = time.time() + 5\nwhile time.time() < end:\n    if os.fork(): os._exit(0)",
-        "exit code 0",
-    ),
-    "fills standard error": (
-        "for _ in range(20): os.write(2, b'e' * 65536)\nsys.exit(5)",
-        r"exit code 5. Its last words on standard error: e{197}\.\.\.$",
-    ),
-}
-GARBAGE = {
-    "prints garbage without end": (
-        "while True: print('garbage')",
-        "more than 100 lines that are no answers, for example: gar",
-    ),
-    "a gigabyte without an end of line": (
-        "while True: os.write(1, b'x' * 65536)",
-        "than 1048576 bytes without an end of line, beginning with: xxx",
-    ),
-    "the wrong id": ("request['id'] += 7; right(request)", "answered request 2 with the id 9"),
-    "no id": ("say(positions=[])", "answered request 2 without an id"),
-    "true as id": ("say(id=True)", "with the id True"),
-    "a list as id": ("say(id=[1])", r"with the id \[1\]"),
-    "broken JSON": ("print('{\"id\": 2, positions}', flush=True)", "a broken line: exp"),
-    "the wrong shape": (
-        "say(id=request['id'], positions=[[1, 2, 3]])",
-        r"positions: expected shape \(3, 3\), got \(1, 3\)",
-    ),
-}
-HOSTILE = {
-    **{name: (*case, "hung") for name, case in HUNG.items()},
-    **{name: (*case, "crashed") for name, case in CRASHED.items()},
-    **{name: (*case, "garbage") for name, case in GARBAGE.items()},
-    "a format instead of an error": (
-        "say(id=2, error='{0.__class__} {why} %s <b>')",
-        r"cannot: {0.__class__} {why} %s <b>$",
-        "refused",
-    ),
-    "allocates without end": (ALLOCATE, "took more than 0.262 GB of memory", "memory"),
-    "lets a child allocate": (f"os.fork()\n{ALLOCATE}", "took more than 0.262 GB", "memory"),
-}
+TABLE = tomllib.loads((Path(__file__).parents[2] / "hostile_programs.toml").read_text("utf-8"))
+AT_THE_START = TABLE.pop("start")
+HOSTILE = {name: row | {"kind": kind} for kind, rows in TABLE.items() for name, row in rows.items()}
 
 
 def ask(folder, name):
     """What a program answers before, when and after it misbehaves, and what still runs then."""
-    misbehave, _, kind = HOSTILE[name]
-    patience = LIMITS.request if kind == "hung" else LIMITS.first
-    contestant = program(folder, misbehave, LIMITS._replace(request=patience))
+    patience = LIMITS.request if HOSTILE[name]["kind"] == "hung" else LIMITS.first
+    contestant = program(folder, HOSTILE[name]["does"], LIMITS._replace(request=patience))
     try:
         before, failure = contestant.answer(case(2)), contestant.answer(case(3))
         if name == "closes its input":  # it has answered first, and cannot read the next
@@ -129,9 +40,9 @@ def ask(folder, name):
 
 def greet(folder, name):
     """Why a program does not greet, twice."""
-    start, kind, _ = AT_THE_START[name]
-    limits = LIMITS._replace(first=0.5 if kind == "hung" else LIMITS.first)
-    contestant = program(folder, "pass", limits, loop=f"{start}\nwhile True: tick()")
+    row = AT_THE_START[name]
+    limits = LIMITS._replace(first=0.5 if row["kind"] == "hung" else LIMITS.first)
+    contestant = program(folder, "pass", limits, loop=f"{row['does']}\nwhile True: tick()")
     failures = []
     for _ in range(2):
         with pytest.raises(NoGreetingError) as caught:
@@ -160,52 +71,29 @@ def outcomes(request, tmp_path_factory):
         }
 
 
+def check(folder, failures, row):
+    for failure in failures:
+        assert isinstance(failure, Failure)
+        assert re.search(row["words"], str(failure.sentence)), str(failure.sentence)
+        assert failure.kind == row["kind"]
+    assert not running(folder)
+
+
 @pytest.mark.parametrize("name", HOSTILE)
 def test_each_has_its_sentence_and_the_next_case_works(outcomes, name):
     folder, future = outcomes[ask, name]
     before, failure, after, contestant = future.result()
-    _, words, kind = HOSTILE[name]
     assert isinstance(before, Answer)
-    assert isinstance(failure, Failure)
-    assert re.search(words, str(failure.sentence)), str(failure.sentence)
-    assert failure.kind == kind
     assert isinstance(after, Answer)
     assert contestant.remarks == ()
-    assert not running(folder)
-
-
-AT_THE_START = {
-    "hangs": ("while True: tick()", "hung", "no answer within 0.5 s"),
-    "ends before it reads": ("sys.exit(9)", "crashed", "exit code 9"),
-    "closes its input before it reads": ("os.close(0)\nwhile True: tick()", "hung", "."),
-    "prints what it can do": ("print('usage: solver FILE')\nsys.exit(2)", "crashed", "usage"),
-    "cannot greet": (
-        "say(id=read()['id'], error='unknown task greeting')",
-        "refused",
-        "It says that it cannot: unknown task greeting",
-    ),
-    "greets with another protocol": ("greet(protocol=2)", "garbage", "protocol: expected 1, got 2"),
-    "greets with an unknown task": (
-        "greet(tasks=['forwardKinematics'])",
-        "garbage",
-        "did you mean forward_kinematics?",
-    ),
-    "greets with an unknown field": ("greet(nmae='x')", "garbage", "did you mean name?"),
-    "greets with garbage": ("print('{]', flush=True)", "garbage", "broken line"),
-    "greets without end": ("while True: os.write(1, b'x' * 65536)", "garbage", "1048576 bytes"),
-}
+    check(folder, [failure], HOSTILE[name])
 
 
 @pytest.mark.parametrize("name", AT_THE_START)
 def test_what_does_not_greet_is_a_misuse_with_its_sentence(outcomes, name):
     folder, future = outcomes[greet, name]
     *failures, _ = future.result()
-    _, kind, words = AT_THE_START[name]
-    assert len(failures) == 3
-    for failure in failures:
-        assert re.search(words, str(failure.sentence)), str(failure.sentence)
-        assert failure.kind == kind
-    assert not running(folder)
+    check(folder, failures, AT_THE_START[name])
 
 
 @pytest.fixture

@@ -11,10 +11,15 @@ from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.mass_spring import laws
-from plumbob.crosscheck.verify.mass_spring.laws import IMPRECISE, StepContext
+from plumbob.crosscheck.verify.mass_spring.laws import (
+    IMPRECISE,
+    ROUNDINGS,
+    SOLVED,
+    StepContext,
+    rounding,
+)
 from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel, predicted
 from plumbob.crosscheck.verify.mass_spring.problem import problem_of
-from plumbob.crosscheck.verify.mass_spring.rounding import ROUNDINGS, SOLVED, rounding
 from plumbob.crosscheck.verify.sentence import sentence
 
 EPSILON = 2.0**-52

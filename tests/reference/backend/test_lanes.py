@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from plumbob.reference import quaternion
 from plumbob.reference.backend import compiled
 from plumbob.reference.backend.simd import vectors
 from plumbob.reference.backend.simd.vectors import (
@@ -15,7 +14,6 @@ from plumbob.reference.backend.simd.vectors import (
     store_vectors,
 )
 from plumbob.reference.quaternion import (
-    IDENTITY,
     add,
     conjugate,
     load_quaternion,
@@ -50,13 +48,6 @@ def gather(scratch, tile):
 def put_the_same(tile, scratch):
     store_quaternions(tile, 1, (1.0, 2.0, 3.0, 4.0))
     store_lanes(scratch, 1, (1.0, 2.0, 3.0, 4.0))
-
-
-def put_one_or_other(scratch, tile, other):
-    q = IDENTITY
-    if other:
-        q = load_lanes(scratch, 2)
-    store_quaternions(tile, 1, q)
 
 
 def bounded(scratch, bound):
@@ -103,14 +94,6 @@ def test_a_row_of_a_tile_is_read_and_written_whole_and_no_other(copy, count, num
     assert (tile == before).all()
 
 
-def test_a_tile_in_the_middle_of_a_batch_leaves_its_neighbours_as_they_are(numbers, backend):
-    batch, given = numbers(3 * LANES, JOINTS, 3), numbers(LANES, JOINTS, 3)
-    expected = batch.copy()
-    expected[LANES : 2 * LANES, 1] = given[:, 2]
-    run(copy_vectors, given, batch[LANES : 2 * LANES])
-    assert (batch == expected).all()
-
-
 def test_scratch_holds_a_component_of_all_poses_side_by_side(numbers, backend):
     tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
     expected = scratch.copy()
@@ -128,13 +111,6 @@ def test_a_float_stands_for_itself_in_every_lane(numbers, backend):
     run(put_the_same, tile, scratch)
     assert (tile[:, 1] == [1.0, 2.0, 3.0, 4.0]).all()
     assert (scratch[1].T == [1.0, 2.0, 3.0, 4.0]).all()
-
-
-@pytest.mark.parametrize("other", [False, True])
-def test_a_variable_may_be_floats_here_and_lanes_there(other, numbers, backend):
-    tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
-    run(put_one_or_other, scratch, tile, other)
-    assert (tile[:, 1] == (scratch[2].T if other else quaternion.IDENTITY)).all()
 
 
 def test_lanes_compute_the_bits_of_floats(numbers, backend):

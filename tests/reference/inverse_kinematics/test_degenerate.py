@@ -13,7 +13,6 @@ from plumbob.reference import (
     Target,
     forward_kinematics,
     rotation,
-    scenes,
     solve_ik,
 )
 from plumbob.reference.articulation import KINDS
@@ -188,20 +187,12 @@ def test_what_only_rounding_keeps_from_its_target_is_stalled(rng):
     assert (solution.outcome[off] == Outcome.STALLED).all()
 
 
-def test_the_lab_s_arm_of_hinges_draws_in_its_plane(solver, backend):
-    arm, _ = scenes.lab_arm()
-    model = Articulation(arm, "hinge", [0.0, 0.0, 1.0], lower=-2.8, upper=2.8)
-    angles = np.linspace(0.0, 2.0 * np.pi, 5)
-    curve = np.stack([0.5 + 0.4 * np.cos(angles), 0.3 * np.sin(angles), 0.0 * angles], axis=-1)
-    solution = solve_ik(model, model.zero(), curve, solver, max_iterations=1000)
-    if solver in ("levenberg_marquardt", "ccd", "damped_least_squares"):
-        assert (solution.outcome == Outcome.CONVERGED).all()
-    np.testing.assert_allclose(solution.positions[..., 2], 0.0, rtol=0, atol=1e-15)
-
-
 # ---- anything at all
 
-coordinate = st.sampled_from([0.0, 0.5, 1.0, -1.0, 2.0]) | st.floats(-3.0, 3.0)
+# Lengths below 1e-75 but 0 are refused.
+coordinate = st.sampled_from([0.0, 0.5, 1.0, -1.0, 2.0]) | st.floats(-3.0, 3.0).map(
+    lambda x: x if abs(x) > 1e-70 else 0.0
+)
 point = st.lists(coordinate, min_size=3, max_size=3)
 quaternion = point.map(rotation.exponential)
 wanted = st.tuples(

@@ -21,9 +21,8 @@ from plumbob.reference import (
 )
 from plumbob.reference.arguments import frozen
 from plumbob.reference.backend.threads import set_num_threads
-from plumbob.reference.inverse_kinematics.problem import checked_targets
+from plumbob.reference.inverse_kinematics.problem import checked_settings, checked_targets
 from plumbob.reference.inverse_kinematics.reduce import prepare
-from plumbob.reference.inverse_kinematics.settings import checked_settings
 from plumbob.reference.inverse_kinematics.solve import solve_checked
 
 # Distances of a few metres over six joints, positions recomputed.

@@ -103,16 +103,6 @@ def test_restarts_follow_from_the_seed(arm, poses, rng):
     assert (first.coordinates != other.coordinates).any()
 
 
-def test_restarts_are_the_same_one_by_one_and_in_a_batch(arm, poses, rng, solver):
-    q = arm.random(rng)
-    batch = solve_ik(arm, q, poses, solver, restarts=3, max_iterations=20)
-    for i in (0, 7, 29):
-        target = Target(poses.position[i], poses.rotation[i])
-        one = solve_ik(arm, q, target, solver, restarts=3, max_iterations=20)
-        assert (batch.coordinates[i] == one.coordinates).all()
-        assert batch.iterations[i] == one.iterations
-
-
 def test_restarts_keep_limits_and_leave_other_joints(
     articulated, reachable, moving_joints, rng, solver, backend
 ):
