@@ -159,21 +159,6 @@ def test_a_closed_motion_does_not_depend_on_where_it_begins():
     np.testing.assert_allclose(later.positions, np.roll(whole, -17, axis=0), rtol=0, atol=1e-6)
 
 
-def test_a_rotated_world_gives_the_rotated_trajectory(rng):
-    R = rotation.random(rng)
-    offsets = ARM.offsets.copy()
-    offsets[0] = rotation.rotate(R, offsets[0])
-    start = rotation.identity(5)
-    start[0] = R
-    curve = rotation.rotate(R, curves["heart"](FRAMES))
-    motion = track(
-        Skeleton(ARM.parents, offsets), curve, LM, start, coherent=True,
-        tolerance=TOLERANCE,
-    )  # fmt: skip
-    upright = drawn("heart").positions
-    np.testing.assert_allclose(motion.positions, rotation.rotate(R, upright), rtol=0, atol=1e-6)
-
-
 def test_a_finer_drawing_gives_the_same_motion():
     """The sums are those of an integral: halving the steps leaves a quarter of the difference."""
     found = []

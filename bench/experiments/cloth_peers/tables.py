@@ -1,4 +1,4 @@
-"""One cloth for every solver: work against precision, motions, limits of stability."""
+"""The same cloth for every solver: work against precision, motions, limits of stability."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
