@@ -1,7 +1,6 @@
 """Success and residuals within reach, on the arm's curves and the chain's targets."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import quantile_cells, spread_of
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, by_problem, grouped, leaders
 from ...tables.table import Summary, words
 from ..chain import BEYOND, CHAIN
@@ -20,8 +19,6 @@ from . import CURVE
 
 STARTS = {None: "random", False: "rest", True: "last solution"}
 _CAPTIONS = Captions(__file__)
-# The cells of a row by the titles of their columns, and its record.
-Row = dict[str, Any]
 
 
 def _rows(results: Results) -> list[Row]:

@@ -1,7 +1,6 @@
 """Targets beyond reach, and the iterations of CCD and FABRIK: two of the lab's questions."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from ...tables.columns import (
     spread_of_iterations,
     words_in,
 )
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, by_problem, grouped, label
 from ...tables.table import Summary, words
 from .. import arm
@@ -29,8 +28,6 @@ STRAIGHT = 0.01
 # Iterations at which targets are counted.
 COUNTED = np.unique(np.logspace(0, 3, 61).round())
 _CAPTIONS = Captions(__file__)
-# The cells of a row by the titles of their columns, and its records.
-Row = dict[str, Any]
 
 
 def solves_row(record: Record) -> Row:

@@ -1,7 +1,6 @@
 """How far joints rotate from frame to frame along closed curves: the lab's third question."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import spread_of, words_in
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, by_problem, grouped, label
 from ...tables.table import Summary, in_unit, words
 from .. import arm
@@ -25,8 +24,6 @@ ALIKE = 0.01
 # Repetitions of the curve that is drawn several times.
 REPETITIONS = (1, 2, 3)
 _CAPTIONS = Captions(__file__)
-# The cells of a row by the titles of their columns, and its records by mode.
-Row = dict[str, Any]
 
 
 def _rows(results: Results) -> list[Row]:

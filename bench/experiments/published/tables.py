@@ -1,7 +1,6 @@
 """Published tables of solvers, and the same set-up measured here."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -9,16 +8,13 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, grouped, label
 from ...tables.table import Summary, listing, words
 from ..robots.readings import Score
 from ..robots.tables import RULE
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
-
-# A published number and the one measured here, by the titles of the columns.
-Row = dict[str, Any]
 
 
 def _rows(results: Results) -> list[Row]:

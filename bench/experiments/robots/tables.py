@@ -13,7 +13,7 @@ from ...peers import registry
 from ...peers.registry import Peer, PeerEntry
 from ...tables.columns import words_in
 from ...tables.entered import entered
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, counted, grouped, leaders, listed, steadiness
 from ...tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from . import REACHABLE, readings
@@ -24,8 +24,6 @@ from .values import RobotDetails
 # The rule for solvers that a budget of time cut short.
 RULE = CAPTIONS.shared["rule"]
 MEAN = "time, geometric mean"
-# The cells of a row by the titles of their columns, and the score or the records behind them.
-Row = dict[str, Any]
 
 
 # Participants.
