@@ -47,14 +47,9 @@ CLAIMS: dict[str, Claim] = {
 def run_claims(
     names: Sequence[str] | None = None, progress: Callable[[Claim], None] | None = None
 ) -> list[ClaimVerdict]:
-    """Check the named claims in their order, by default all.
+    """Check the named claims in their order, by default all; call `progress` before each.
 
-    Args:
-        names: of claims, or None for all.
-        progress: called with each claim before it is checked.
-
-    Raises:
-        ValueError: if a name is unknown or the list is empty.
+    Raise a ValueError if a name is unknown or the list is empty.
     """
     claims = [
         CLAIMS[arguments.choice("names", name, CLAIMS)]
