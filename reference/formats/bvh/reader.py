@@ -128,7 +128,10 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
     tree = _Tree()
     for line in lines:
         if line.upper() == "MOTION":
-            tree.check_complete()
+            if tree.path or not tree.joints:
+                path = [tree.joints[j].name for j in tree.path]
+                got = f"{path[-1]!r:.40} still open" if path else "none"
+                raise ValueError(f"expected complete joints before MOTION, got {got}")
             return tree.joints
         if len(line) > MAX_CHARACTERS:
             raise ValueError(f"expected lines of at most {MAX_CHARACTERS:,} characters")
@@ -195,12 +198,6 @@ class _Tree:
         self.path.pop()
         if joint.is_end and joint.offset == ORIGIN:
             self.names.remove(self.joints.pop().name)
-
-    def check_complete(self) -> None:
-        """Raise a ValueError if there is no joint or a joint is still open."""
-        if self.path or not self.joints:
-            got = f"{self.joints[self.path[-1]].name!r:.40} still open" if self.path else "none"
-            raise ValueError(f"expected complete joints before MOTION, got {got}")
 
 
 def _set_channels(joint: _Joint, text: str = "") -> None:
