@@ -587,8 +587,8 @@ class TestMotion:
             assert np.abs(one - other).max() > 1e-4
 
 
-class TestSymmetries:
-    """Unchanged after two iterations: what holds at every iterate holds at the solution."""
+class TestBackends:
+    """Both backends give the same results."""
 
     ROUNDING = 1e-13  # a solve and a gradient away from positions of about 1 m
 
