@@ -164,8 +164,8 @@ def _jit(kernel: PythonKernel, relaxed: bool, **options: Any) -> PythonKernel:
     calls = _calls(kernel)
     compiled_globals = {
         name: _compiled_global(value, relaxed, calls[name] == 1)
-        for name, value in named_globals(kernel)
-        if kernels_in(value) and value is not kernel
+        for name, value in _named_globals(kernel)
+        if _kernels_in(value) and value is not kernel
     }
     rebuilt = _rebuild(kernel, kernel.__globals__ | compiled_globals)
     rebuilt.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
@@ -182,16 +182,16 @@ def _compiled_global(value: Any, relaxed: bool, inline: bool) -> Any:
 
 def _calls(kernel: PythonKernel) -> Counter[str]:
     """Return how many times a kernel mentions each of its globals."""
-    codes = map(dis.get_instructions, code_objects(kernel.__code__))
+    codes = map(dis.get_instructions, _code_objects(kernel.__code__))
     return Counter(i.argval for code in codes for i in code if i.opname in GLOBAL_LOADS)
 
 
 @functools.cache
 def _inlined_size(kernel: PythonKernel) -> int:
     """Return the number of instructions of the interpreter, all callees inlined."""
-    own = sum(len(list(dis.get_instructions(code))) for code in code_objects(kernel.__code__))
+    own = sum(len(list(dis.get_instructions(code))) for code in _code_objects(kernel.__code__))
     calls = _calls(kernel)
-    return own + sum(calls[name] * _inlined_size(callee) for name, callee in callees(kernel))
+    return own + sum(calls[name] * _inlined_size(callee) for name, callee in _callees(kernel))
 
 
 @functools.cache
@@ -201,9 +201,9 @@ def allocates(kernel: PythonKernel) -> bool:
     Otherwise it is compiled without counting references to its arguments, which takes half of the
     time where a tuple holds many arrays; numba would report a wrong answer as an error.
     """
-    names = {name for code in code_objects(kernel.__code__) for name in code.co_names}
+    names = {name for code in _code_objects(kernel.__code__) for name in code.co_names}
     return bool(ALLOCATING & names) or any(
-        allocates(callee) for _, callee in callees(kernel) if not hasattr(callee, "compiled_in")
+        allocates(callee) for _, callee in _callees(kernel) if not hasattr(callee, "compiled_in")
     )
 
 
@@ -224,34 +224,34 @@ def digest(kernel: PythonKernel) -> str:
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
 
 
-def named_globals(kernel: PythonKernel) -> list[tuple[str, Any]]:
+def _named_globals(kernel: PythonKernel) -> list[tuple[str, Any]]:
     """Return the globals that a kernel mentions, with their values, in the order of their names."""
-    names = sorted({name for code in code_objects(kernel.__code__) for name in code.co_names})
+    names = sorted({name for code in _code_objects(kernel.__code__) for name in code.co_names})
     return [(name, kernel.__globals__[name]) for name in names if name in kernel.__globals__]
 
 
-def kernels_in(value: Any) -> tuple[PythonKernel, ...]:
+def _kernels_in(value: Any) -> tuple[PythonKernel, ...]:
     """Return a kernel, or the kernels in a NamedTuple; none for any other value."""
     kernels = value if isinstance(value, tuple) else (value,)
     return tuple(kernel for kernel in kernels if isinstance(kernel, types.FunctionType))
 
 
-def callees(kernel: PythonKernel) -> list[tuple[str, PythonKernel]]:
+def _callees(kernel: PythonKernel) -> list[tuple[str, PythonKernel]]:
     """Return the other kernels that a kernel calls, by the names under which it does."""
     return [
         (name, callee)
-        for name, value in named_globals(kernel)
-        for callee in kernels_in(value)
+        for name, value in _named_globals(kernel)
+        for callee in _kernels_in(value)
         if callee is not kernel
     ]
 
 
-def code_objects(code: types.CodeType) -> Iterator[types.CodeType]:
+def _code_objects(code: types.CodeType) -> Iterator[types.CodeType]:
     """Yield a code object and the code objects nested in it, like comprehensions."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from code_objects(constant)
+            yield from _code_objects(constant)
 
 
 def _collect(kernel: PythonKernel, parts: list[bytes], visited: set[Any]) -> None:
@@ -262,16 +262,16 @@ def _collect(kernel: PythonKernel, parts: list[bytes], visited: set[Any]) -> Non
     parts.append(repr(kernel.__defaults__).encode())
     if hasattr(kernel, "compiled_in"):
         parts.append(_module_fingerprint(kernel.compiled_in))
-    for name, value in named_globals(kernel):
+    for name, value in _named_globals(kernel):
         parts.append(name.encode())
-        for callee in kernels_in(value):
+        for callee in _kernels_in(value):
             _collect(callee, parts, visited)
-        if not kernels_in(value):
+        if not _kernels_in(value):
             parts.append(_fingerprint(value))
 
 
 def _collect_code(whole: types.CodeType, parts: list[bytes]) -> None:
-    for code in code_objects(whole):
+    for code in _code_objects(whole):
         constants = [c for c in code.co_consts if not isinstance(c, types.CodeType)]
         parts += [code.co_code, repr((constants, code.co_names, code.co_varnames)).encode()]
 
