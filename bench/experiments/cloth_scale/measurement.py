@@ -8,6 +8,7 @@ import resource
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -166,6 +167,12 @@ _total = Kernel(total, relaxed=True)
 
 
 def memory() -> int:
-    """Return the peak memory of this process [bytes]."""
+    """Return the peak memory of this process [bytes].
+
+    On Linux `ru_maxrss` includes the memory that the parent had when it started the process.
+    """
+    status = Path("/proc/self/status")
+    if status.exists():
+        return 1024 * int(status.read_text().split("VmHWM:")[1].split()[0])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak
