@@ -29,7 +29,9 @@ PRESENTATION = (
     *("bench/tables", "crosscheck/verify/output"),
 )
 # Likewise in every experiment.
-PRESENTATION_FILES = ("tables.py", "participants.py", "figures.py", "readings.py", "files.py")
+PRESENTATION_FILES = (
+    *("tables.py", "tables.toml", "participants.py", "figures.py", "readings.py", "files.py"),
+)
 
 
 @functools.cache

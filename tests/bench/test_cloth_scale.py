@@ -3,6 +3,7 @@
 import json
 import signal
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -47,6 +48,13 @@ def test_what_is_measured_is_the_work_it_says(ours):
     for name in ("solve", "local", "step", "limit"):
         assert len(ours[name]) == suite.ROUNDS[1]
         assert min(ours[name]) > 0
+
+
+def test_the_memory_of_a_process_is_not_that_of_its_parent():
+    held = np.ones(25_000_000)
+    code = f"from {suite.__name__} import memory; print(memory())"
+    child = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert int(child.stdout) < held.nbytes < suite.memory()
 
 
 def test_progress_is_announced_and_an_interrupt_ends_the_process(monkeypatch):

@@ -27,7 +27,7 @@ KINEMATICS: dict[str, type[SkeletonEngine] | type[ReferenceKinematics]] = {
 
 
 def cases() -> Iterator[Case]:
-    """Yield our solvers compiled, plain and as one batch, and one loop on all three kinematics."""
+    """Yield our solvers compiled, plain and in batches, and a Python loop on three kinematics."""
     for stratum in STRATA:
         for solver in IK_SOLVERS:
             work = _work(stratum, solver)
@@ -58,7 +58,7 @@ def single_solves(stratum: str, solver: str, count: int) -> Callable[[], Any]:
 
 
 def batch_solve(stratum: str, solver: str) -> Callable[[], Any]:
-    """Return a call that solves all targets as one batch."""
+    """Return a call that solves all targets as a batch."""
     problem = chain_targets(stratum, TARGETS)
     batch = (problem.skeleton, problem.starts, problem.targets, solver)
     return partial(solve_ik, *batch, **LIMITS)
