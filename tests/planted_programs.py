@@ -1,7 +1,7 @@
 """Right programs in C++, JavaScript and Python, what is planted in them, and how to ask them.
 
-They were written from the lab's mathematics, apart from `reference/`; what each fault is stands
-here in words, apart from the diagnosis that is to name it.
+They were written from the lab's mathematics, independently of `reference/`; `programs/faults.toml`
+lists their faults.
 """
 
 import json
@@ -10,7 +10,6 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,20 +22,11 @@ FORCES, ENERGY, STEP = "mass_spring_forces", "energy", "mass_spring_step"
 MOTION = "mass_spring_motion"
 
 
-class Planted(NamedTuple):
-    """A fault of a program: the task that it breaks, and what it is."""
-
-    task: str
-    words: str
-
-
-TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-FAULTS = {
-    name: Planted(task, words)
-    for task, faults in TABLE["faults"].items()
-    for name, words in faults.items()
+FAULTS = tomllib.loads((ROOM / "faults.toml").read_text(encoding="utf-8"))
+IN = {
+    language: [key for key, fault in FAULTS.items() if language in fault["languages"]]
+    for language in ("cpp", "javascript", "python")
 }
-IN = TABLE["programs"]
 # What makes a program of each source, if anything, and what has to be installed.
 COMPILERS = {
     "cpp": ("g++", ["-std=c++17", "-O1", f"-I{TEMPLATES}"]),

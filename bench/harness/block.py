@@ -1,4 +1,4 @@
-"""A block: one problem for one solver, measured in one go; and the choice of blocks of a run."""
+"""A block: one problem for one solver, and the choice of blocks of a run."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -16,7 +16,7 @@ class Measured(NamedTuple):
     Attributes:
         values: numbers, of the type that the experiment declares; None where there are none.
         notes: sentences on them, by name.
-        facts: what tables select and sort by, beside the facts of the block; see `Block`.
+        facts: for tables to select and sort by, beside the facts of the block; see `Block`.
     """
 
     values: Any  # `Values` of the type that the experiment declares, or None
@@ -38,8 +38,8 @@ class Scale:
     Attributes:
         targets: random targets a problem.
         seconds: of a benchmark.
-        entrants: solvers of the user's, beside those that the bench knows.
-        problems: problems of the user's, likewise.
+        entrants: the user's solvers, beside the registered ones.
+        problems: the user's problems, likewise.
     """
 
     targets: int
@@ -71,7 +71,7 @@ class Block:
         facts: the names as values: numbers, words, truth values and lists of words. "title" is how
             the problem is written, "task" the kind of its numbers, see `harness.values`.
         times: whether times are among the numbers, or end the work: see `Experiment`.
-        conditions: of its solver, beside those of every record.
+        conditions: of its solver, beside the conditions of every record.
         budget: the time that bounds the work [s]; 0 if none does.
     """
 
@@ -104,11 +104,11 @@ class Block:
 
 @dataclass(frozen=True)
 class Choice:
-    """The blocks of a run: all of them, or those that the user selected.
+    """The blocks of a run: all of them, or the user's selection.
 
     Attributes:
         name: of the scale, "quick" or "full".
-        scale: how much is measured, and whose solvers and problems take part.
+        scale: how much is measured, and the user's solvers and problems.
         solvers: only these, by the names in records; all if none.
         problems: only these.
         is_partial: whether it leaves out something that the scale has.

@@ -1,4 +1,4 @@
-"""Experiments and suites: an experiment is a folder, a suite is one experiment or several.
+"""Experiments and suites: an experiment is a folder, a suite is a group of experiments.
 
 A folder of `bench/experiments` holds a measurement, its tables and its figures.
 """
@@ -28,13 +28,13 @@ SUITES = {
 
 
 class Experiment(NamedTuple):
-    """One folder of `bench/experiments`, without importing it.
+    """A folder of `bench/experiments`, without importing it.
 
     Attributes:
         package: the folder, by its full name as a package.
         suite: its name on the command line; experiments may share a suite.
         chapter: the section of the report that shows it.
-        times: whether times are among its numbers, or a budget of time ends its work; such blocks
+        times: whether times are among its numbers, or a budget of time ends its work; timed blocks
             share no machine with others while they are measured.
     """
 
@@ -50,28 +50,28 @@ class Experiment(NamedTuple):
 
 
 # Whether times are among the numbers of an experiment.
-TIMED, UNTIMED = True, False
+WITH_TIMES, WITHOUT_TIMES = True, False
 
 _BENCH = __package__.rpartition(".")[0]
 # Folder, suite, and chapter of the report, in whose order they are measured and shown.
 EXPERIMENTS = [
     Experiment(f"{_BENCH}.experiments.{folder}", suite, chapter, times)
     for folder, suite, chapter, times in (
-        ("check", "check", "right", UNTIMED),
-        ("self_test", "self_test", "right", UNTIMED),
-        ("robot_models", "robot_models", "right", UNTIMED),
-        ("chain", "ik", "kinematics", TIMED),
-        ("closed_curves", "tracking", "kinematics", UNTIMED),
-        ("arm", "arm", "kinematics", UNTIMED),
-        ("pictures", "pictures", "kinematics", UNTIMED),
-        ("robots", "ik", "kinematics", TIMED),
-        ("published", "ik", "kinematics", TIMED),
-        ("cloth", "cloth", "cloth", UNTIMED),
-        ("newton", "newton", "cloth", UNTIMED),
-        ("cloth_peers", "cloth", "cloth", TIMED),
-        ("energy", "energy", "cloth", UNTIMED),
-        ("timing", "timing", "speed", TIMED),
-        ("cloth_scale", "cloth_scale", "speed", TIMED),
+        ("check", "check", "right", WITHOUT_TIMES),
+        ("self_test", "self_test", "right", WITHOUT_TIMES),
+        ("robot_models", "robot_models", "right", WITHOUT_TIMES),
+        ("chain", "ik", "kinematics", WITH_TIMES),
+        ("closed_curves", "tracking", "kinematics", WITHOUT_TIMES),
+        ("arm", "arm", "kinematics", WITHOUT_TIMES),
+        ("pictures", "pictures", "kinematics", WITHOUT_TIMES),
+        ("robots", "ik", "kinematics", WITH_TIMES),
+        ("published", "ik", "kinematics", WITH_TIMES),
+        ("cloth", "cloth", "cloth", WITHOUT_TIMES),
+        ("newton", "newton", "cloth", WITHOUT_TIMES),
+        ("cloth_peers", "cloth", "cloth", WITH_TIMES),
+        ("energy", "energy", "cloth", WITHOUT_TIMES),
+        ("timing", "timing", "speed", WITH_TIMES),
+        ("cloth_scale", "cloth_scale", "speed", WITH_TIMES),
     )
 ]
 
@@ -80,7 +80,7 @@ def blocks(suite: str, scale: Scale) -> Iterator[Block]:
     """Yield the blocks of a suite; engines are imported only now.
 
     Raises:
-        KeyError: if there is no such suite.
+        KeyError: if there is no suite of this name.
     """
     if suite not in SUITES:
         raise KeyError(suite)

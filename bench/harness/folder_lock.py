@@ -1,4 +1,4 @@
-"""Let one process at a time write the records of a folder."""
+"""Let a single process write the records of a folder."""
 
 import contextlib
 import fcntl
@@ -13,10 +13,10 @@ LOCK_NAME = "records.lock"
 
 @contextlib.contextmanager
 def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
-    """Hold the lock of a folder inside the block; a process that was killed holds nothing.
+    """Hold the lock of a folder inside the block; the lock of a killed process is free.
 
-    A file system without locks allows everyone. The lock's file stays: to remove it would let two
-    processes lock two files of one name.
+    A file system without locks allows everyone. The lock's file stays: without it two
+    processes could lock two files of the same name.
 
     Raises:
         ValueError: naming folder and process, if another holds it.

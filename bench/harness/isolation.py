@@ -79,13 +79,16 @@ class WorkerProcess:
                     case Numbers(by_name):
                         outcome = outcome._replace(numbers=by_name)
                     case Finished(trouble, is_lost, is_silent):
-                        trouble = trouble or raised(outcome.solved)
-                        ending = (trouble, is_lost and is_ready)
-                        outcome = Outcome(
-                            *outcome[:2], *ending, outcome.numbers, is_silent, outcome.remark
+                        outcome = outcome._replace(
+                            trouble=trouble or raised(outcome.solved),
+                            is_lost=is_lost and is_ready,
+                            is_silent=is_silent,
                         )
         if any(target.doubt for target in outcome.solved):  # then all times are round trips
-            solved = [t._replace(seconds=max(t.seconds, t.round_trip)) for t in outcome.solved]
+            solved = [
+                target._replace(seconds=max(target.seconds, target.round_trip))
+                for target in outcome.solved
+            ]
             outcome = outcome._replace(solved=solved)
         return outcome
 
@@ -135,7 +138,7 @@ class WorkerProcess:
             raise
 
     def close(self) -> None:
-        """End the worker, if there is one, and whatever it has started."""
+        """End the worker, if any, and whatever it has started."""
         child, self._child = self._child, None
         if child is not None:
             child.end()
@@ -157,7 +160,7 @@ def _receive(child: ChildProcess, patience: float) -> Message:
 
 
 def in_a_fresh_process(patience: float, function: Calculate, *arguments: Any) -> Mapping[str, Any]:
-    """Return the numbers of a call in a process that does nothing else, within so long [s].
+    """Return the numbers of a call in a fresh process, within so long [s].
 
     Raises:
         RuntimeError: if the call raises or the process is lost; the message says which.
@@ -169,6 +172,9 @@ def in_a_fresh_process(patience: float, function: Calculate, *arguments: Any) ->
 def raised(solved: list[Solved]) -> str:
     """Return the most frequent exception with its count, and why times are doubted; else ""."""
     counts = Counter(target.trouble for target in solved if target.trouble)
-    sentences = [f"{what}, on {n} of {len(solved)} targets" for what, n in counts.most_common(1)]
+    sentences = [
+        f"{trouble}, on {count} of {len(solved)} targets"
+        for trouble, count in counts.most_common(1)
+    ]
     sentences += [target.doubt for target in solved if target.doubt][:1]
     return "; ".join(sentences)

@@ -1,4 +1,4 @@
-"""Targets that one solver with its settings solves one by one in a worker's process."""
+"""Targets that a solver with its settings solves in order in a worker's process."""
 
 import contextlib
 import ctypes
@@ -29,13 +29,13 @@ class Job(NamedTuple):
     Attributes:
         module: the adapter's module, by its full name.
         model: the robot or skeleton that the adapter is prepared for.
-        targets: solved in order: `request(i)` is what the solver is asked, and `shape` the number
+        targets: solved in order: `request(i)` is the request of a target, `shape` the number
             of targets and of the numbers of an answer.
         tolerance: when a target counts as reached.
         settings: of the adapter.
-        restarts: further attempts from random poses, made here for solvers that make one.
+        restarts: further attempts from random poses, made here for solvers without restarts.
         budget: no further target is begun after so long [s].
-        entrant: the name of a user's solver, whose first trouble is announced; else "".
+        entrant: the name of a user's solver, to announce its first trouble; else "".
         warms_up: whether the first target is solved, and quick solves are repeated, uncounted.
     """
 
@@ -69,7 +69,7 @@ class Job(NamedTuple):
         return restarted(ask, self.model, self.restarts) if self.restarts else ask
 
     def _answers(self, ask: Any) -> Iterator[Solved]:
-        """Solve the targets one by one within the budget."""
+        """Solve the targets in order within the budget."""
         budget, previous = Budget(self.budget), None
         for i in range(self.targets.shape[0]):
             if budget.is_spent:
@@ -135,5 +135,5 @@ def _seed_shared_generators(seed: int) -> None:
 
 @functools.cache
 def worker_process() -> WorkerProcess:
-    """Return the one process in which solvers of targets work, one after the other."""
+    """Return the process in which all solvers of targets work in turn."""
     return WorkerProcess()

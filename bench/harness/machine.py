@@ -29,7 +29,9 @@ PRESENTATION = (
     *("bench/tables", "crosscheck/verify/output"),
 )
 # Likewise in every experiment.
-PRESENTATION_FILES = ("tables.py", "participants.py", "figures.py", "readings.py", "files.py")
+PRESENTATION_FILES = (
+    *("tables.py", "tables.toml", "participants.py", "figures.py", "readings.py", "files.py"),
+)
 
 
 @functools.cache
@@ -39,7 +41,7 @@ def stamp() -> dict[str, Any]:
 
 
 def machine() -> dict[str, Any]:
-    """Return the facts that determine the speed; nothing that names the machine or its owner."""
+    """Return the facts that determine the speed, without names of the machine or its owner."""
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
@@ -49,7 +51,7 @@ def machine() -> dict[str, Any]:
 
 
 def conditions() -> dict[str, Any]:
-    """Return what may influence a measurement now, but does not make it a different one.
+    """Return conditions that may influence a measurement now, but do not invalidate it.
 
     "commit" is that of our sources, "pace" how long a fixed piece of work takes [s], which shows
     the drift of a machine, "affinity" on how many cores this process may run, and "load" the
@@ -78,19 +80,22 @@ def commit_of(root: Path) -> str:
 
 
 def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Return how one stamp differs from another, "" if it does not."""
+    """Return how a stamp differs from another, "" if it does not."""
     for part, title in (("machine", "another machine"), ("versions", "other versions")):
         old, new = before.get(part, {}), now.get(part, {})
-        names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-        if names:
-            changes = (f"{n} {old.get(n) or 'none'}, now {new.get(n) or 'none'}" for n in names)
+        changes = [
+            f"{name} {old.get(name) or 'none'}, now {new.get(name) or 'none'}"
+            for name in {**old, **new}
+            if old.get(name) != new.get(name)
+        ]
+        if changes:
             return f"{title} ({'; '.join(changes)})"
     old, new = before.get("source", "none"), now.get("source", "none")
     return f"other sources ({old}, now {new})" if old != new else ""
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that take part, "" where one is missing."""
+    """Return the versions of Python and of the packages that take part, "" of a missing package."""
     return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
@@ -103,15 +108,15 @@ def source_digest() -> str:
 
 
 def source_files() -> list[Path]:
-    """Return all files of the three packages but those that only show numbers."""
-    every = (path for name in _PACKAGES for path in (ROOT / name).rglob("*") if path.is_file())
-    return sorted(path for path in every if not _is_left_out(path.relative_to(ROOT).parts))
-
-
-def _is_left_out(parts: tuple[str, ...]) -> bool:
-    shows = any("/".join(parts[:n]) in PRESENTATION for n in range(2, 4))
-    shows |= parts[:2] == ("bench", "experiments") and parts[-1] in PRESENTATION_FILES
-    return shows or "__pycache__" in parts
+    """Return all files of the three packages but files that only show numbers."""
+    files = []
+    for path in (path for name in _PACKAGES for path in (ROOT / name).rglob("*") if path.is_file()):
+        parts = path.relative_to(ROOT).parts
+        shows = any("/".join(parts[:n]) in PRESENTATION for n in range(2, 4))
+        shows |= parts[:2] == ("bench", "experiments") and parts[-1] in PRESENTATION_FILES
+        if not shows and "__pycache__" not in parts:
+            files.append(path)
+    return sorted(files)
 
 
 def _processor() -> str:

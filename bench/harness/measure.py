@@ -41,7 +41,7 @@ def failure(why: str) -> Measured:
 
 
 def not_installed(package: str) -> Measured:
-    """Return the result of a block whose package is missing."""
+    """Return the result of a block with a missing package."""
     return Measured(None, {"remark": f"{package} is not installed"})
 
 

@@ -1,4 +1,4 @@
-"""Every number that tables and figures show, from arrays; nothing here formats or draws."""
+"""Every number that tables and figures show, from arrays, without formatting or drawing."""
 
 import functools
 import itertools
@@ -49,14 +49,14 @@ class Interval(NamedTuple):
 
 
 class Ranking(NamedTuple):
-    """Names, the best first, and those that tie with the first, itself included."""
+    """Names, the best first, and the names that tie with the first, itself included."""
 
     order: tuple[str, ...]
     first: tuple[str, ...]
 
 
 class Timing(NamedTuple):
-    """Seconds per operation over the rounds of one benchmark: median, tenths, 95 % interval."""
+    """Seconds per operation over the rounds of a benchmark: median, tenths, 95 % interval."""
 
     median: float
     low: float
@@ -75,7 +75,7 @@ _FEW = 12
 
 
 class PairedRatio(NamedTuple):
-    """The factor by which one of two paired samples exceeds the other, with its 95 % interval."""
+    """The ratio of two paired samples, with its 95 % interval."""
 
     mean: float
     low: float
@@ -120,7 +120,7 @@ def spread(values: Floats) -> Spread:
 
 
 def effort(seconds: Floats) -> Effort:
-    """Return median, 95th percentile and mean of all solves, those that failed among them."""
+    """Return median, 95th percentile and mean of all solves, failures included."""
     median, p95, _ = spread(seconds)
     return Effort(median, p95, mean(seconds))
 
@@ -158,23 +158,23 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
     """Return the order by mean score, and the names that tie with the greatest.
 
     The scores are of the same targets, (target,) each, so they are compared in pairs: a target may
-    be easy or hard for all. Two differ if their mean difference is larger than 95 % of those under
-    random signs (Fisher 1935, section 21). For truth values that is McNemar's exact test (1947).
-    With several rivals the probabilities are adjusted by Holm (1979).
+    be easy or hard for all. Two differ if their mean difference exceeds 95 % of the mean
+    differences under random signs (Fisher 1935, section 21). For truth values that is McNemar's
+    exact test (1947). With several rivals the probabilities are adjusted by Holm (1979).
     """
     order = sorted(scores, key=lambda name: -mean(scores[name]))
     if not order:
         return Ranking((), ())
     first, *rivals = order
     chances = adjusted([chance_of_pairs(scores[first], scores[rival]) for rival in rivals])
-    tied = [r for r, chance in zip(rivals, chances, strict=True) if chance > 1 - CONFIDENCE]
+    tied = [name for name, chance in zip(rivals, chances, strict=True) if chance > 1 - CONFIDENCE]
     return Ranking(tuple(order), (first, *tied))
 
 
 def chance_of_pairs(a: Floats, b: Floats) -> float:
-    """Return the probability of such a mean difference under random signs, (target,) each.
+    """Return the probability of a mean difference as large under random signs, (target,) each.
 
-    Exact for differences of one size, and for few; else the sum is taken to be normal.
+    Exact for differences of equal size, and for few; else the sum is taken to be normal.
     """
     differences = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
     differences = differences[differences != 0]
@@ -193,7 +193,7 @@ def chance_of_pairs(a: Floats, b: Floats) -> float:
 def adjusted(chances: Sequence[float]) -> Floats:
     """Return probabilities that hold over all comparisons at once (Holm 1979).
 
-    A false discovery rate (Benjamini & Hochberg 1995) would not do: one false alarm stops a merge.
+    A false discovery rate (Benjamini & Hochberg 1995) would not do: a false alarm stops a merge.
     """
     raw = np.asarray(chances, dtype=float)
     order = np.argsort(raw, kind="stable")
@@ -209,8 +209,8 @@ def penalised(seconds: Floats, solved: NDArray[np.bool_], penalty: float) -> Flo
 def shifted_geometric_mean(seconds: Floats, shift: float, groups: Sequence[int] = ()) -> Interval:
     """Return exp(mean(log(seconds + shift))) - shift and its interval by the bootstrap.
 
-    Targets are resampled within each group, such as those of one robot; `groups` are the sizes of
-    the groups, in order, one group by default. The draws are seeded.
+    Targets are resampled within each group, for example a robot; `groups` are the sizes of the
+    groups, in order, by default of a single group. The draws are seeded.
     """
     logs = np.log(np.asarray(seconds, dtype=float) + shift)
     sizes = tuple(groups) or (len(logs),)
@@ -221,14 +221,14 @@ def shifted_geometric_mean(seconds: Floats, shift: float, groups: Sequence[int] 
     else:
         means = _resamples(sizes) @ logs / len(logs)
         low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return Interval(*(float(np.exp(x) - shift) for x in (np.mean(logs), low, high)))
+    return Interval(*(float(np.exp(log) - shift) for log in (np.mean(logs), low, high)))
 
 
 @functools.lru_cache(maxsize=8)
 def _resamples(groups: tuple[int, ...]) -> Floats:
     """Return how often each target is drawn, (resample, target)."""
     rng = np.random.default_rng(_SEED)
-    drawn = [rng.multinomial(n, np.full(n, 1.0 / n), size=RESAMPLES) for n in groups]
+    drawn = [rng.multinomial(size, np.full(size, 1.0 / size), size=RESAMPLES) for size in groups]
     return np.concatenate(drawn, axis=1).astype(float)
 
 
@@ -278,15 +278,15 @@ def paired_ratio(a: Floats, b: Floats) -> PairedRatio:
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
     """Return the spread of counts, as integers where they are."""
-    median, p95, largest = (int(x) if x.is_integer() else x for x in spread(values))
+    median, p95, largest = (int(part) if part.is_integer() else part for part in spread(values))
     return median, p95, largest
 
 
 def timing(seconds: Floats) -> Timing:
     """Return the median, the 10th and 90th percentiles of the rounds, and the median's interval.
 
-    `seconds` are those of rounds, (round,), or of the rounds of each sweep, (sweep, round). The
-    median is that of all rounds. Successive rounds of one sweep are correlated, so the interval is
+    `seconds` are times of rounds, (round,), or of the rounds of each sweep, (sweep, round). The
+    median is that of all rounds. Successive rounds of a sweep are correlated, so the interval is
     that of the sweeps' medians.
     """
     rounds = np.asarray(seconds, dtype=float)
@@ -310,7 +310,7 @@ def bend(positions: Floats, target: Floats) -> Floats:
 
 
 def excess(residual: Floats, distance: Floats, reach: float) -> Floats:
-    """Return by how much a residual exceeds the least possible one, distance - reach [m]."""
+    """Return by how much a residual exceeds its lower bound, distance - reach [m]."""
     return residual - np.maximum(distance - reach, 0.0)
 
 

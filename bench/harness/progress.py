@@ -12,7 +12,7 @@ TROUBLE = "trouble"
 class Progress(NamedTuple):
     """A step of a measurement; `state` and `message` where it changes the state of a case."""
 
-    what: str
+    subject: str
     state: str = ""
     message: str = ""
 
@@ -30,8 +30,8 @@ def listening(listener: Callable[[Progress], None]) -> Iterator[None]:
         _listener.reset(token)
 
 
-def announce(what: str, state: str = "", message: str = "") -> None:
-    """Report a step to the listener, if there is one."""
+def announce(subject: str, state: str = "", message: str = "") -> None:
+    """Report a step to the listener, if any."""
     listener = _listener.get()
     if listener is not None:
-        listener(Progress(what, state, message))
+        listener(Progress(subject, state, message))

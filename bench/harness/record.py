@@ -1,6 +1,6 @@
-"""Result files: one record a line of JSON, appended as it is produced; the last of a key counts.
+"""Result files: a record is a line of JSON, appended as it is produced; the last of a key counts.
 
-No other file of the bench opens a result file. A record is one block: suite, problem, solver and
+No other file of the bench opens a result file. A record is a block: suite, problem, solver and
 settings, the arrays that came out, and where it was measured.
 """
 
@@ -77,21 +77,21 @@ _DECODER = msgspec.json.Decoder(_Line)
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One block of results.
+    """The results of a block.
 
     Attributes:
-        suite: the family of problems, such as "arm".
+        suite: the family of problems, for example "arm".
         problem: the name of the problem.
         solver: the name of the solver.
         settings: numbers, words and truth values that change the answer.
-        size: how much was measured, such as the number of random targets.
-        arrays: the results, arrays of numbers with one entry a target, frame or step.
+        size: how much was measured, for example the number of random targets.
+        arrays: the results, arrays of numbers with an entry for each target, frame or step.
         notes: words that belong to it; "failed" says why there are no arrays.
         stamp: machine, versions and digest of the sources, see `plumbob.bench.harness.machine`.
         when: the moment it was produced, ISO 8601 with time zone.
         seconds: how long it took to produce.
-        facts: what tables select and sort by: numbers, words, truth values and lists of words.
-        conditions: of the measurement, which do not make it a different one: the commit of the
+        facts: for tables to select and sort by: numbers, words, truth values and lists of words.
+        conditions: of the measurement, which do not invalidate it: the commit of the
             sources, affinity, load, pace.
     """
 
@@ -120,7 +120,7 @@ class Record:
 
     @functools.cached_property
     def details(self) -> Any:
-        """Settings, notes and facts as the type that the experiment declares; None without one."""
+        """Settings, notes and facts as the type that the experiment declares, None without it."""
         kind = self._kind
         return kind and values.read(kind.details, {**self.settings, **self.notes, **self.facts})
 
@@ -145,7 +145,7 @@ class Record:
 
     @property
     def key(self) -> Key:
-        """The same for two records of one measurement."""
+        """Equal for two records of the same measurement."""
         return key(self.suite, self.problem, self.solver, self.settings)
 
     @property
@@ -178,7 +178,7 @@ class Reading(NamedTuple):
 
 
 class _DecodedLine(NamedTuple):
-    """A line of a result file: its record, and why it has none or one of the wrong type."""
+    """A line of a result file: its record or None, and why it is invalid."""
 
     number: int
     text: bytes
@@ -187,7 +187,7 @@ class _DecodedLine(NamedTuple):
 
 
 class RecordFile:
-    """The result file of one report folder."""
+    """The result file of a report folder."""
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.path = Path(folder) / FILE_NAME
@@ -195,8 +195,8 @@ class RecordFile:
     def read(self, typed: bool = True) -> Reading:
         """Return the records, the later of two with the same key; none if there is no file.
 
-        Lines without a record are left out and listed in the warning; so are records whose fields
-        are not of the type that their experiment declares, unless `typed` is false.
+        Lines without a record are left out and listed in the warning; so are records with fields
+        of another type than their experiment declares, unless `typed` is false.
 
         Raises:
             ValueError: naming the file, if it is no regular file, or no line of it is a record.
@@ -249,7 +249,7 @@ class RecordFile:
                 raise
 
     def drop(self, is_unwanted: Callable[[Record], bool]) -> None:
-        """Remove records; the old file stays whole until the new one is, and all else stays in it.
+        """Remove records; the old file stays until the new file is complete, with all other lines.
 
         Raises:
             ValueError: as `read` does.
@@ -264,11 +264,11 @@ class RecordFile:
             )
 
     def arrange(self, order: Iterable[Key]) -> None:
-        """Sort the records of these keys, each into the line of one of them.
+        """Sort the records of these keys among their lines.
 
         Tables show rows in the order of the file, and blocks that are measured at the same time
-        end in any order. All other lines keep their place, and the old file stays whole until the
-        new one is.
+        end in any order. All other lines keep their place, and the old file stays until the
+        new file is complete.
 
         Raises:
             ValueError: as `read` does.
@@ -288,7 +288,7 @@ class RecordFile:
             self._replace(texts)
 
     def _lines(self) -> tuple[list[_DecodedLine], bytes]:
-        """Return all lines with text, and the last one if it is a record that was cut off."""
+        """Return all lines with text, and the last if it is a record that was cut off."""
         check_regular(self.path)
         content = self.path.read_bytes() if self.path.exists() else b""
         *texts, last_line = content.split(b"\n")
@@ -348,7 +348,7 @@ def _write(file: io.FileIO, content: bytes) -> None:
 
 @contextlib.contextmanager
 def _write_errors_named(path: Path) -> Iterator[None]:
-    """Let a failure to write name the file, and say that nothing is lost."""
+    """Let a failure to write name the file, and say that earlier records are safe."""
     try:
         yield
     except OSError as error:
@@ -389,7 +389,7 @@ def _kind_of_file(mode: int) -> str:
 
 
 def _is_unfinished(line: bytes) -> bool:
-    """Return whether a line is the beginning of a record, and not a whole one."""
+    """Return whether a line is the beginning of a record, but not complete."""
     begin = f'{{"format": {FORMAT}, "suite": '.encode()
     is_ours = bool(line) and (line.startswith(begin) or begin.startswith(line))
     return is_ours and _decoded(line)[1] is None
@@ -409,7 +409,7 @@ def _decoded(text: bytes) -> tuple[bytes, Record | None, str]:
 
 
 def encode(record: Record) -> str:
-    """Return the record as one line of standard JSON; NaN and infinities become words."""
+    """Return the record as a line of standard JSON; NaN and infinities become words."""
     content = {"format": FORMAT} | {name: getattr(record, name) for name in _FIELDS}
     content["arrays"] = {name: _nested_list(np.asarray(a)) for name, a in record.arrays.items()}
     # Names of files may bring halves of surrogate pairs along.
@@ -423,8 +423,8 @@ def decode(line: bytes | str) -> Record:
     """Return the record of a line that `encode` wrote.
 
     Raises:
-        ValueError: if the line is not JSON, of another format, lacks a field, or has one of
-            another type.
+        ValueError: if the line is not JSON, of another format, lacks a field, or has a
+            field of another type.
     """
     record = untyped(line)
     record.check()

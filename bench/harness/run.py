@@ -12,7 +12,7 @@ import numpy as np
 from plumbob.reference.arguments import distinct_texts
 
 from .block import SCALES, Block, Choice
-from .executor import THIS_PROCESS, Executor, NotMeasured
+from .executors import THIS_PROCESS, Executor, NotMeasured
 from .experiment import blocks
 from .folder_lock import locked
 from .machine import conditions
@@ -31,13 +31,13 @@ class Event(NamedTuple):
         state: "kept" if a record of it was there, "measuring", "measured", "failed", or "not run"
             for records of a solver that are not part of this run.
         suite: the suite.
-        what: problem and solver.
+        subject: problem and solver.
         message: why it is measured again, why it failed, or how many were not run; else "".
     """
 
     state: str
     suite: str
-    what: str
+    subject: str
     message: str = ""
 
 
@@ -57,7 +57,7 @@ def run(
     file, choice = RecordFile(folder), chosen(scale)
     with locked(folder):
         present = {record.key: record for record in file.read().records}
-        for group in [suites] if executor.takes_suites_together else [[s] for s in suites]:
+        for group in [suites] if executor.takes_suites_together else [[suite] for suite in suites]:
             begin = time.perf_counter()
             every = [block for suite in group for block in blocks(suite, choice.scale)]
             executor.note_records(present.get(block_key(block)) for block in every if block.times)
@@ -67,11 +67,9 @@ def run(
             seconds = time.perf_counter() - begin
             for suite in group:
                 suite_keys = {block_key(block) for block in selected if block.suite == suite}
-                if choice.is_partial:
-                    yield from _unselected(suite, suite_keys, file)
-                else:
+                if not choice.is_partial:
                     _record_finish(suite, suite_keys, choice.name, seconds, executor, file)
-                    yield from _unrequested(suite, suite_keys, file)
+                yield from _extra_records(suite, suite_keys, file, choice.is_partial)
 
 
 def _run_blocks(
@@ -126,30 +124,30 @@ def _record_finish(
         file.append([finished])
 
 
-def _unselected(suite: str, suite_keys: Set[Key], file: RecordFile) -> Iterator[Event]:
-    """Report how many records of a suite the choice left out."""
-    count = sum(r.suite == suite and r.key not in suite_keys for r in file.read().records)
-    if count:
-        yield Event(NOT_RUN, suite, "", f"{_records(count)} of what was not chosen kept")
-
-
-def _unrequested(suite: str, suite_keys: Set[Key], file: RecordFile) -> Iterator[Event]:
-    """Report the records of a suite that are not part of it now; mark those with old settings."""
-    extra = [r for r in file.read().records if r.suite == suite and r.key not in suite_keys]
+def _extra_records(
+    suite: str, suite_keys: Set[Key], file: RecordFile, is_partial: bool
+) -> Iterator[Event]:
+    """Report the records of a suite that were not requested; mark records with old settings."""
+    records = [record for record in file.read().records if record.suite == suite]
+    extra = [record for record in records if record.key not in suite_keys]
+    if is_partial:
+        if extra:
+            yield Event(NOT_RUN, suite, "", f"{_records(len(extra))} of what was not chosen kept")
+        return
     current = {key[:3] for key in suite_keys}
-    old = [record for record in extra if _is_missing(record) or record.key[:3] in current]
+    old = []
+    for record in extra:
+        is_remark = not (record.arrays or record.failed or record.facts.get("entrant"))
+        if is_remark or record.key[:3] in current:
+            old.append(record)
     if newly := [record for record in old if not record.superseded]:
-        file.append([replace(r, notes={**r.notes, "superseded": now()}) for r in newly])
+        notes = {"superseded": now()}
+        file.append([replace(record, notes={**record.notes, **notes}) for record in newly])
     for solver, count in Counter(record.solver for record in old).items():
         why = f"{_records(count)} of {solver} under other settings kept, left out of tables"
         yield Event(NOT_RUN, suite, solver, why)
     for solver, count in Counter(record.solver for record in extra if record not in old).items():
         yield Event(NOT_RUN, suite, solver, f"{_records(count)} of {solver} kept, not run")
-
-
-def _is_missing(record: Record) -> bool:
-    """Return whether a record says only that something was missing."""
-    return not (record.arrays or record.failed or record.facts.get("entrant"))
 
 
 def _records(count: int) -> str:
@@ -160,9 +158,11 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
     """Return a sentence for each recorded claim of the suites that does not hold."""
     if "check" not in suites:
         return []
-    checks = [r for r in RecordFile(folder).read().records if r.suite == "check"]
+    checks = [record for record in RecordFile(folder).read().records if record.suite == "check"]
     missed = [record for record in checks if not np.all(record.arrays.get("held", True))]
-    return [f"claim {r.problem!r} missed: {r.notes.get('missed', '')}" for r in missed]
+    return [
+        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}" for record in missed
+    ]
 
 
 def forget(suites: Sequence[str], scale: str | Choice, folder: Path) -> None:

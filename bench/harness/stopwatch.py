@@ -10,7 +10,7 @@ MAXIMUM_EXTENSION = 10.0
 
 
 def time_call(call: Callable[[], T]) -> tuple[T, float]:
-    """Return what a call returns, and how long it took [s]."""
+    """Return the result of a call, and how long it took [s]."""
     begin = time.perf_counter()
     result = call()
     return result, time.perf_counter() - begin

@@ -1,7 +1,7 @@
 """Typed fields of records: the numbers of an experiment, and its settings, notes and facts.
 
 An experiment declares its types in `values.py`, in `KINDS`. Records are read into them, so that a
-record that lacks a field, or has one of another type, is refused.
+record that lacks a field, or has a field of another type, is refused.
 """
 
 import functools
@@ -23,7 +23,7 @@ _TAKES = {"f": "fiu", "i": "iu", "b": "b"}
 
 
 class Values(msgspec.Struct, frozen=True, eq=False):
-    """The numbers of a block: arrays of one axis or more, and scalars.
+    """The numbers of a block: arrays with axes, and scalars.
 
     A field that is None is not on record. A name that is no identifier is given as
     `msgspec.field(name="cold wall")`.
@@ -38,7 +38,7 @@ class Details(msgspec.Struct, frozen=True):
 
 
 class Kind(NamedTuple):
-    """The types of the records of one task of a suite."""
+    """The types of the records of a task."""
 
     values: type[Values]
     details: type[Details] = Details
@@ -51,7 +51,7 @@ def kind_of(suite: str, task: str) -> Kind | None:
     No engine is imported.
 
     Raises:
-        ValueError: if the suite has no such task.
+        ValueError: if the suite has no task of this name.
     """
     from .experiment import EXPERIMENTS
 
@@ -67,10 +67,10 @@ Typed = TypeVar("Typed", bound=msgspec.Struct)
 
 
 def read(kind: type[Typed], fields: Mapping[str, Any]) -> Typed:
-    """Return fields, by their names on record, as a type; unknown ones are left out.
+    """Return fields, by their names on record, as a type; unknown fields are left out.
 
     Raises:
-        ValueError: if there is no such field, or it is of another type or number of axes.
+        ValueError: if a field is missing, or of another type or number of axes.
     """
     scalars = {
         name: field.item() if isinstance(field, np.ndarray) and not field.ndim else field
@@ -83,7 +83,7 @@ def read(kind: type[Typed], fields: Mapping[str, Any]) -> Typed:
 
 
 def stored(values: Values) -> dict[str, Any]:
-    """Return values by their names on record, without those that are None."""
+    """Return values by their names on record, without None."""
     fields = msgspec.structs.fields(values)
     return {
         field.encode_name: number
@@ -93,7 +93,7 @@ def stored(values: Values) -> dict[str, Any]:
 
 
 def _array(kind: Any, nested: Any) -> np.ndarray:
-    """Return an array of the kind; an empty one is of every type."""
+    """Return an array of the kind; an empty array is of every type."""
     shape, dtype = get_args(kind)
     axes, expected = len(get_args(shape)), np.dtype(get_args(dtype)[0])
     array = np.asarray(nested)

@@ -19,7 +19,7 @@ class Begun(NamedTuple):
 
 
 class Ready(NamedTuple):
-    """The solver is set up and has solved one target that does not count.
+    """The solver is set up and has solved a target that does not count.
 
     Attributes:
         setup: how long the set-up took, without imports [s].
@@ -31,14 +31,14 @@ class Ready(NamedTuple):
 
 
 class Solved(NamedTuple):
-    """The answer for one target.
+    """The answer for a target.
 
     Attributes:
         q: the coordinates, NaN if there are none.
         claim: 1 if the solver says that it solved the target, 0 if not, -1 if it does not say.
         seconds: how long it took.
         trouble: the exception that the solver raised, else "".
-        round_trip: duration of the request, 0 without one [s].
+        round_trip: duration of the request, 0 without a request [s].
         doubt: why the seconds that the solver counted cannot be right, else "".
     """
 
@@ -79,7 +79,7 @@ Message = Begun | Ready | Progress | Solved | Numbers | Finished
 
 
 class Calculation(NamedTuple):
-    """A job that is one call, which returns numbers by name."""
+    """A job that is a call, which returns numbers by name."""
 
     function: Callable[..., Mapping[str, Any]]
     arguments: tuple[Any, ...]
@@ -94,7 +94,7 @@ class Calculation(NamedTuple):
 
 
 def main() -> None:
-    """Perform the jobs of the process that started this one until there are no more."""
+    """Perform the jobs of the process that started this one until the connection is closed."""
     requests, answers = connect()
     with listening(answers.send):
         while True:

@@ -1,1 +1,1 @@
-"""Solvers of ours and of others as the bench calls them, one adapter a file."""
+"""Solvers of ours and of others as the bench calls them, an adapter each."""

@@ -1,4 +1,4 @@
-"""The user's solver that works in this worker's child: one at a time, opened at its first use."""
+"""The user's solver that works in this worker's child, opened at its first use."""
 
 from collections.abc import Mapping
 from time import perf_counter
@@ -40,11 +40,7 @@ class Contestant:
         self._door.close()
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], OwnTime]:
-        """Return its answer and its time.
-
-        Raises:
-            NoAnswerError: if it gives no answer.
-        """
+        """Return its answer and its time, or raise NoAnswerError if it gives no answer."""
         begin = perf_counter()
         answer = self._door.answer(Case("of the bench", task, inputs, "bench", _ABOUT))
         round_trip = perf_counter() - begin

@@ -19,7 +19,7 @@ class Entrant:
     Attributes:
         name: its own, or the user's name for it.
         door: its address as the user gave it.
-        spec: what opens it.
+        spec: the argument that opens it.
         version: its own; "" if it states none.
         commit: of its sources, and whether they were changed since; "" outside of git.
         digest: twelve hex digits over its sources.
@@ -42,7 +42,10 @@ class Entrant:
     def titles(self) -> dict[str, str]:
         """The names of its rows, by its methods of inverse kinematics."""
         several = len(self.methods) > 1
-        return {m: f"{self.name}, {m}" if m and several else self.name for m in self.methods}
+        return {
+            method: f"{self.name}, {method}" if method and several else self.name
+            for method in self.methods
+        }
 
     @property
     def facts(self) -> dict[str, Any]:

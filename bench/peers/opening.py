@@ -31,11 +31,11 @@ def addresses(words: Sequence[str], program: Sequence[str] = ()) -> list[SolverA
     """Return the addresses in --with and in a program behind --.
 
     Args:
-        words: each a Python file, module:object, a program's file, or NAME= before one of these.
+        words: each a Python file, module:object, a program's file, or NAME= before any of these.
         program: a command and its arguments.
     """
-    entered = [_address(word) for word in words]
-    return [*entered, SolverAddress(" ".join(program), tuple(program))] if program else entered
+    solvers = [_address(word) for word in words]
+    return [*solvers, SolverAddress(" ".join(program), tuple(program))] if program else solvers
 
 
 def _address(word: str) -> SolverAddress:
@@ -67,7 +67,7 @@ def opened(entered: Sequence[SolverAddress], suites: Sequence[str]) -> list[Entr
     """Return the solvers, each started once to describe itself.
 
     Raises:
-        ValueError: if one cannot be opened, offers no task of the suites, or has the name of
+        ValueError: if a solver cannot be opened, offers no task of the suites, or has the name of
             another.
     """
     entrants = [_opened(address) for address in entered]

@@ -1,4 +1,4 @@
-"""What adapters of all kinds share: the time that a solver measures itself, and its failures."""
+"""The parts that all adapters share: the time that a solver measures itself, and its failures."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple

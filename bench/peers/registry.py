@@ -1,12 +1,13 @@
 """Every solver that the bench knows: its name, its style, how many iterations it is given.
 
-A solver of the reference takes part as soon as the reference lists it; a line here gives it a
-label, a style and limits of its own. A peer is an adapter and an entry in `solvers.toml`. A user's
-solver is a peer of the run that it was entered for. Nothing here imports an engine.
+A solver of the reference takes part as soon as the reference lists it; an entry in `solvers.toml`
+gives it a label, a style and limits of its own. A peer is an adapter and an entry there. A user's
+solver is a peer of the run that it was entered for. No engine is imported.
 """
 
 import functools
 import importlib.metadata
+import sys
 import tomllib
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
@@ -18,26 +19,29 @@ import msgspec
 
 from plumbob.reference import IK_SOLVERS, STEP_SOLVERS
 
-from . import environments
 from .entrant import CHAIN_TASK, ROBOT_TASK, Entrant
 
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
 
 
 class Style(NamedTuple):
-    """A colour by its name in `presentation.figures.style`, a line and a marker of matplotlib's."""
+    """A colour by its name in `bench.figures.style`, a line and a marker of matplotlib's."""
 
     colour: str
     line: Any
     marker: str
 
 
-FIRST = Style("orange", "-", "o")
-SECOND = Style("blue", "--", "s")
-THIRD = Style("green", "-.", "^")
-FOURTH = Style("purple", (0, (1, 1)), "v")
-FIFTH = Style("brass", (0, (4, 1, 1, 1, 1, 1)), "D")
-OTHER = Style("faint", ":", "P")
+_DATA: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("solvers.toml").read_text(encoding="utf-8")
+)
+
+
+STYLES = {
+    name: Style(colour, (line[0], tuple(line[1])) if isinstance(line, list) else line, marker)
+    for name, (colour, line, marker) in _DATA["styles"].items()
+}
+OTHER = STYLES["other"]
 # Styles of unknown solvers are made of these: lines that no solver above has.
 _COLOURS = ("ink", "blue", "orange", "green", "purple", "brass")
 _LINES: tuple[Any, ...] = ((0, (8, 2)), (0, (3, 1, 1, 1)), (0, (8, 2, 2, 2)))
@@ -60,22 +64,17 @@ class Solver:
     style: Style = OTHER
 
 
-# Iterations of one step, or of a frame of a motion, in work-precision diagrams.
-_MANY = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-_FEW = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 40)
-
-
 @dataclass(frozen=True)
 class StepSolver(Solver):
     """A solver of implicit Euler's steps, and its iterations in each experiment.
 
     Attributes:
-        is_linear: whether it solves one linear system, and so makes one iteration only.
+        is_linear: whether it solves a linear system, and so makes a single iteration.
         converges: whether it solves a step to the end, in few iterations.
-        followed: iterations of one step whose residual and error are kept; 0 for none.
-        counted: the maximum of one step in which powers of ten of the error are counted.
+        followed: iterations of a step with recorded residual and error; 0 for none.
+        counted: the maximum of a step in which powers of ten of the error are counted.
         certified: the maximum before an answer is certified.
-        ladder: iterations of one step in a work-precision diagram.
+        ladder: iterations of a step in a work-precision diagram.
         motion: iterations of a frame there.
     """
 
@@ -84,55 +83,48 @@ class StepSolver(Solver):
     followed: int = 200
     counted: int = 2000
     certified: int = 3000
-    ladder: tuple[int, ...] = _MANY
+    ladder: tuple[int, ...] = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
     motion: tuple[int, ...] = (1, 10, 100)
 
 
-_IK = (
-    Solver("ccd", "CCD", style=FIRST),
-    Solver("fabrik", "FABRIK", style=SECOND),
-    Solver("levenberg_marquardt", "Levenberg-Marquardt", style=THIRD),
-    Solver("damped_least_squares", "damped least squares", style=FOURTH),
-    Solver("jacobian_transpose", "Jacobian transpose", style=FIFTH),
-)
-_QUADRATIC: dict[str, Any] = {"converges": True, "followed": 12, "counted": 60}
-_QUADRATIC |= {"ladder": _FEW, "motion": (1, 3)}
-_LINEAR: dict[str, Any] = {"is_linear": True, "followed": 0, "counted": 20, "certified": 1}
-_STEP = (
-    StepSolver("local_global", "local/global", style=FIRST, followed=1000),
-    StepSolver("chebyshev", "Chebyshev", style=THIRD, followed=1000),
-    StepSolver("lbfgs", "L-BFGS", style=FOURTH),
-    StepSolver("newton_cg", "Newton-CG", style=FIFTH, **_QUADRATIC),
-    StepSolver("newton", "Newton", style=SECOND, certified=100, **_QUADRATIC),
-    StepSolver("gauss_newton", "Gauss-Newton", **_LINEAR),
-)
+_Row = TypeVar("_Row")
 
-# One Levenberg-Marquardt loop on the kinematics of two engines.
-LOOPS = tuple(Solver(f"lm/{engine}", f"LM, {engine}", engine) for engine in (PINOCCHIO, MUJOCO))
-# Solvers of the timing suite.
-COMPILED = Solver("Plumbob, compiled", "Plumbob, compiled", style=Style("blue", "", "o"))
-PLAIN = Solver("Plumbob, plain Python", "Plumbob, plain Python", style=Style("orange", "", "D"))
-OUR_KINEMATICS = Solver(
-    "Plumbob's kinematics", "Plumbob's kinematics", style=Style("brass", "", "v")
-)
-LIMIT_NAME = "limit: copying as many bytes"
-LIMIT = Solver(LIMIT_NAME, "plain copy of as many bytes", "", Style("ink", "", "|"))
-_BENCHMARKED = (
-    *(COMPILED, PLAIN, OUR_KINEMATICS),
-    Solver(PINOCCHIO, PINOCCHIO, PINOCCHIO, Style("green", "", "s")),
-    Solver(MUJOCO, MUJOCO, MUJOCO, Style("purple", "", "^")),
-    LIMIT,
-)
-# Libraries that factorise.
-SUPERNODAL = Solver("supernodal", "ours")
-CHOLMOD = Solver("cholespy", "CHOLMOD (cholespy)", "CHOLMOD")
-FACTORS = (SUPERNODAL, CHOLMOD)
+
+def _rows(table: str, kind: type[_Row]) -> dict[str, _Row]:
+    """Return the solvers of a table by name."""
+    rows = [{**row, "style": STYLES[row.get("style", "other")]} for row in _DATA[table]]
+    return {row["name"]: msgspec.convert(row, kind) for row in rows}
+
+
+_IK, _STEP = _rows("ik", Solver), _rows("steps", StepSolver)
+LOOPS, FACTORS = (tuple(_rows(name, Solver).values()) for name in ("loops", "factors"))
+_BENCHMARKED = _rows("benchmarked", Solver)
+COMPILED, PLAIN, OUR_KINEMATICS, *_, LIMIT = _BENCHMARKED.values()
+LIMIT_NAME = LIMIT.name
+SUPERNODAL, CHOLMOD = FACTORS
+
+
+def environment_python(name: str) -> Path:
+    """Return the path of the Python of a peer's environment, which need not exist.
+
+    Peers with requirements that contradict ours have environments of their own. `make peers` makes
+    them as `peers/NAME` below the environment that runs the bench.
+    """
+    place = "Scripts/python.exe" if sys.platform == "win32" else "bin/python"
+    return Path(sys.prefix, "peers", name, place)
+
+
+def _distribution(environment: str, package: str) -> importlib.metadata.Distribution | None:
+    """Return a package in a peer's environment, or in ours if that is "", None if it lacks."""
+    places = map(str, Path(sys.prefix, "peers", environment).glob("lib/python*/site-packages"))
+    path = list(places) if environment else sys.path
+    return next(iter(importlib.metadata.distributions(name=package, path=path)), None)
 
 
 @functools.cache
 def version(package: str) -> str:
     """Return the version of a package, "" if it is not installed."""
-    distribution = environments.distribution("", package)
+    distribution = _distribution("", package)
     return distribution.version if distribution else ""
 
 
@@ -143,9 +135,9 @@ class Adapter:
     Attributes:
         title: how it is written.
         module: its adapter.
-        package: what must be installed.
-        environment: of its own, whose Python runs it; "" if it works in ours.
-        entrant: the user's solver, if it is one: it is always there.
+        package: the package that must be installed.
+        environment: of its own, with the Python that runs it; "" if it works in ours.
+        entrant: the user's solver, if any, which is always there.
     """
 
     title: str
@@ -157,7 +149,7 @@ class Adapter:
     @property
     def distribution(self) -> importlib.metadata.Distribution | None:
         """The package where it is installed, None if it is not."""
-        return environments.distribution(self.environment, self.package)
+        return _distribution(self.environment, self.package)
 
     @property
     def version(self) -> str:
@@ -194,9 +186,9 @@ class PeerEntry:
     """A peer with settings, as it enters the tables.
 
     Attributes:
-        kind: one start, or restarts.
+        kind: `ONE_START` or `RESTARTS`.
         settings: of its adapter.
-        restarts: further attempts from random poses, for solvers that make only one.
+        restarts: further attempts from random poses, for solvers without restarts.
         note: tells it from another entry of the same solver and kind.
     """
 
@@ -212,7 +204,7 @@ class Peer(Adapter):
 
     Attributes:
         license: of the package.
-        can: what it takes.
+        can: the robots that it takes.
         entries: its settings.
         kinematics: whether its forward kinematics is compared with ours.
         precision: how exact that is, where it is not in double precision.
@@ -254,8 +246,8 @@ class ClothPeer(Adapter):
     Attributes:
         engine: its engine.
         kind: how its settings differ from try to try.
-        settings: those of its adapter that are always the same.
-        ladder: iterations in one step, where it iterates.
+        settings: the constant settings of its adapter.
+        ladder: iterations in a step, where it iterates.
         motion: iterations a frame of a motion.
         converges: whether it solves a step to the end.
     """
@@ -269,18 +261,16 @@ class ClothPeer(Adapter):
 
 
 _IK_ADAPTERS, _CLOTH_ADAPTERS = f"{__package__}.ik", f"{__package__}.cloth"
-_Entered = TypeVar("_Entered", Peer, ClothPeer)
 
 
-def _listed(table: str, adapters: str, kind: type[_Entered]) -> tuple[_Entered, ...]:
-    """Return the peers of a table of `solvers.toml`."""
-    text = Path(__file__).with_name("solvers.toml").read_text(encoding="utf-8")
-    rows = [{**row, "module": f"{adapters}.{row['adapter']}"} for row in tomllib.loads(text)[table]]
+def _peers(table: str, adapters: str, kind: type[_Row]) -> tuple[_Row, ...]:
+    """Return the peers of a table."""
+    rows = [{**row, "module": f"{adapters}.{row['adapter']}"} for row in _DATA[table]]
     return tuple(msgspec.convert(row, kind) for row in rows)
 
 
-PEERS = _listed("robots", _IK_ADAPTERS, Peer)
-CLOTH_ENGINES = _listed("cloths", _CLOTH_ADAPTERS, ClothPeer)
+PEERS = _peers("robots", _IK_ADAPTERS, Peer)
+CLOTH_ENGINES = _peers("cloths", _CLOTH_ADAPTERS, ClothPeer)
 _PEERS = {peer.title: peer for peer in PEERS}
 PLUMBOB_LM, TOOLBOX = _PEERS["Plumbob LM"], _PEERS["Robotics Toolbox ik_LM"]
 TRAC_IK, DRAKE, PLACO = _PEERS["TRAC-IK"], _PEERS["Drake"], _PEERS["PlaCo"]
@@ -289,7 +279,7 @@ SINGLE_PRECISION = {peer.title: peer.precision for peer in PEERS if peer.precisi
 
 
 def robot_peers(entrants: Iterable[Entrant] = ()) -> list[Peer]:
-    """Return the solvers for robots: those known, then those of a user that take robots."""
+    """Return the solvers for robots: `PEERS`, then the user's that take robots."""
     restarts = PeerEntry(RESTARTS, {}, _RESTART_COUNT, f"{_RESTART_COUNT} restarts")
     adapter = (f"{_IK_ADAPTERS}.entrant", "", "", "", (PeerEntry(ONE_START), restarts))
     takers = [entrant for entrant in entrants if ROBOT_TASK in entrant.tasks]
@@ -307,10 +297,10 @@ def chain_peers(entrants: Iterable[Entrant]) -> list[ChainPeer]:
 
 
 def cloth_peers(entrants: Iterable[Entrant] = ()) -> tuple[ClothPeer, ...]:
-    """Return the solvers for cloths: the reference's, those of engines, those of a user."""
+    """Return the solvers for cloths: the reference's, the engines', the user's."""
     reference = map(_reference_cloth_peer, step_solvers().values())
-    entered = (_entered_cloth_peer(e) for e in entrants if e.offers("cloth"))
-    return (*reference, *CLOTH_ENGINES, *entered)
+    users = (_entered_cloth_peer(e) for e in entrants if e.offers("cloth"))
+    return (*reference, *CLOTH_ENGINES, *users)
 
 
 def _reference_cloth_peer(solver: StepSolver) -> ClothPeer:
@@ -330,30 +320,28 @@ def _entered_cloth_peer(entrant: Entrant) -> ClothPeer:
 
 def ik_solvers() -> dict[str, Solver]:
     """Return the solvers of inverse kinematics that the reference has, by name, in its order."""
-    listed = {solver.name: solver for solver in _IK}
-    return {name: listed.get(name) or Solver(name, name.replace("_", " ")) for name in IK_SOLVERS}
+    return {name: _IK.get(name) or Solver(name, name.replace("_", " ")) for name in IK_SOLVERS}
 
 
 def step_solvers() -> dict[str, StepSolver]:
     """Return the solvers of steps that the reference has, by name, in its order."""
-    listed = {solver.name: solver for solver in _STEP}
     return {
-        name: listed.get(name) or StepSolver(name, name.replace("_", " ")) for name in STEP_SOLVERS
+        name: _STEP.get(name) or StepSolver(name, name.replace("_", " ")) for name in STEP_SOLVERS
     }
 
 
 def followed_step_solvers() -> list[StepSolver]:
-    """Return those whose convergence is followed: the listed ones in order, then others."""
+    """Return the solvers with recorded convergence: the listed in order, then others."""
     solvers = step_solvers()
-    order = dict.fromkeys([*(solver.name for solver in _STEP), *solvers])
+    order = dict.fromkeys([*_STEP, *solvers])
     return [solvers[name] for name in order if name in solvers and solvers[name].followed]
 
 
 def find(name: str) -> Solver:
-    """Return the solver of a name in records; an unknown one is written by that name."""
-    known = _by_name(tuple(IK_SOLVERS), tuple(STEP_SOLVERS)).get(name)
-    if known:
-        return known
+    """Return the solver of a name in records; the label of an unknown solver is its name."""
+    solver = _by_name(tuple(IK_SOLVERS), tuple(STEP_SOLVERS)).get(name)
+    if solver:
+        return solver
     number = zlib.crc32(name.encode(errors="replace"))  # the same style whenever it is drawn
     colour = _COLOURS[number % len(_COLOURS)]
     line = _LINES[number // len(_COLOURS) % len(_LINES)]
@@ -372,7 +360,8 @@ def names() -> set[str]:
 
 
 def _solvers() -> Iterator[Solver]:
-    yield from (*ik_solvers().values(), *step_solvers().values(), *LOOPS, *_BENCHMARKED, *FACTORS)
+    yield from (*ik_solvers().values(), *step_solvers().values())
+    yield from (*LOOPS, *_BENCHMARKED.values(), *FACTORS)
     yield from (Solver(peer.title, peer.title, peer.engine) for peer in cloth_peers())
     for peer in PEERS:
         labels = [peer.label_of(entry) for entry in peer.entries]

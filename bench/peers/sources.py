@@ -41,9 +41,9 @@ def git_commit(folder: Path, paths: Sequence[str]) -> str:
 
 
 def source_files(spec: Spec) -> list[Path]:
-    """Return the files of a Python file, of a module, or of a command, the main one first.
+    """Return the files of a Python file, of a module, or of a command, the main file first.
 
-    A Python file brings along those of its own folder that it imports, a module its package.
+    A Python file brings along its imports from its own folder, a module its package.
     """
     if not isinstance(spec, str):
         paths = [Path(word).resolve() for word in spec if "/" in word or "." in word]
@@ -61,7 +61,7 @@ def _is_source(path: Path) -> bool:
 
 
 def _with_imports(path: Path, files: dict[Path, None]) -> dict[Path, None]:
-    """Add a file and those of its folder that it imports, however deep."""
+    """Add a file and its imports from its own folder, however deep."""
     if path not in files and _is_source(path):
         files[path] = None
         for name in _imported(path):

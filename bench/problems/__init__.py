@@ -1,1 +1,1 @@
-"""What solvers are asked: robots, chains, cloths, curves, their targets and evaluation."""
+"""The problems of the bench: robots, chains, cloths, curves, their targets and evaluation."""

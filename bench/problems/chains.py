@@ -42,7 +42,7 @@ class TargetsForSkeleton:
 
 
 class ChainRequest(NamedTuple):
-    """One target [m], (3,), local rotations to start from, (joint, 4), and allowed iterations."""
+    """A target [m], (3,), local rotations to start from, (joint, 4), and allowed iterations."""
 
     target: FloatArray
     start: FloatArray
@@ -50,7 +50,7 @@ class ChainRequest(NamedTuple):
 
 
 class ChainRequests(NamedTuple):
-    """Targets as a user's solver is asked for them, one by one.
+    """Targets as requests to a user's solver.
 
     Attributes:
         problem: the targets.
@@ -66,16 +66,16 @@ class ChainRequests(NamedTuple):
         return len(self.iterations), 1 + 3 * self.problem.skeleton.joint_count
 
     def request(self, i: int) -> ChainRequest:
-        """Return one target."""
+        """Return a target."""
         targets, starts = self.problem.targets, self.problem.every_start
         return ChainRequest(targets[i], starts[i], int(self.iterations[i]))
 
 
 def chain_targets(stratum: str, count: int) -> TargetsForSkeleton:
-    """Return targets in one stratum of distance; directions and starts are uniform at random.
+    """Return targets in a stratum of distance; directions and starts are uniform at random.
 
     Raises:
-        ValueError: if there is no such stratum.
+        ValueError: if there is no stratum of this name.
     """
     low, high = STRATA[choice("stratum", stratum, STRATA)]
     rng = np.random.default_rng([_SEED, list(STRATA).index(stratum)])

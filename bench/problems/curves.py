@@ -52,7 +52,7 @@ class FollowedCurve:
 
 
 def arm_curves() -> list[FollowedCurve]:
-    """Return the arm with every named curve; the custom one resampled evenly."""
+    """Return the arm with every named curve, the custom curve resampled evenly."""
     skeleton, rest = scenes.lab_arm()
     drawn = {name: curves[name](frames) for name, frames in FRAMES.items()}
     drawn[CUSTOM] = evened_custom_curve()
@@ -88,7 +88,7 @@ def arm_beyond(count: int) -> TargetsForSkeleton:
 
 @functools.cache
 def arm_closed_curves() -> Sequence[FollowedCurve]:
-    """Return the lab's arm on the lab's curves; the custom one resampled and closed."""
+    """Return the lab's arm on the lab's curves, the custom curve resampled and closed."""
     skeleton, rest = scenes.lab_arm()
     drawn = {name: curves[name](FRAMES[name]) for name in ARM_CURVES}
     spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}

@@ -26,7 +26,7 @@ class Tolerance(NamedTuple):
 
 
 class PoseRequest(NamedTuple):
-    """One target.
+    """A target.
 
     Attributes:
         positions: of the effectors [m], (effector, 3).
@@ -77,16 +77,16 @@ class Targets(NamedTuple):
         return len(self.starts), self.starts.shape[-1]
 
     def request(self, i: int) -> PoseRequest:
-        """Return one target."""
+        """Return a target."""
         return PoseRequest(self.positions[i], self.rotations[i], self.starts[i].copy())
 
     def after(self, count: int) -> "Targets":
-        """Return the targets after the first ones."""
+        """Return the targets after the first `count`."""
         return Targets(*(part[count:] for part in self))
 
 
 class Evaluation(NamedTuple):
-    """The errors of the answers, one entry a target.
+    """The errors of the answers, an entry for each target.
 
     Attributes:
         position: the largest distance of an effector from its target [m]; NaN without an answer.
@@ -112,7 +112,7 @@ def mujoco_model(robot: Robot) -> Any:
 
 
 class Evaluator:
-    """The kinematics of one robot."""
+    """The kinematics of a robot."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot

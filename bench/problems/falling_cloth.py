@@ -1,9 +1,9 @@
 """A square cloth in mid-fall, finer and stiffer: the same piece of fabric for every solver.
 
-It has the lab's springs without dampers, two metres a side and one kilogram however many particles
-it is made of, and hangs from two corners. It has fallen for a while by symplectic Euler, damped, so
-that its motion is smooth. It began a little uneven: an even cloth stays mirror-symmetric until
-rounding decides to which side it folds.
+It has the lab's springs without dampers, two metres a side and a mass of 1 kg however many
+particles it is made of, and hangs from two corners. It has fallen for a while by symplectic Euler,
+damped, so that its motion is smooth. It began a little uneven: an even cloth stays mirror-symmetric
+until rounding decides to which side it folds.
 """
 
 import functools
@@ -127,5 +127,5 @@ def highest_mode(
 
 
 def explicit_substeps(frequency: float, margin: float) -> int:
-    """Return steps for a frame, `margin` times those at symplectic Euler's limit h = 2/omega."""
+    """Return `margin` times the steps a frame at symplectic Euler's limit h = 2/omega."""
     return math.ceil(margin * FRAME * frequency / 2.0)

@@ -30,7 +30,7 @@ def read(
     """Return the problems in files, and the names of all selected problems.
 
     Raises:
-        ValueError: if a file cannot be read, or holds nothing for the suites.
+        ValueError: if a file cannot be read, or has no problem for the suites.
     """
     own: list[OwnProblem] = []
     names: list[str] = []

@@ -1,6 +1,7 @@
 """Problems from model files: a robot of URDF or MJCF, a skeleton of BVH, a cloth of OBJ."""
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from plumbob.reference.arguments import FloatArray, IndexArray, name_list
 from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
 
 from .chains import TargetsForSkeleton, random_rotations
-from .robots import TWO_REVOLUTIONS, Robot, chain_from
+from .robots import TWO_REVOLUTIONS, Robot, chain_of
 
 # Springs [N/m] and mass [kg] of cloths from meshes.
 STIFFNESS, MASS = 1000.0, 1.0
@@ -33,7 +34,8 @@ def robot(path: Path, name: str, effector: str | None) -> Robot:
     """Return the chain of hinges of a URDF or MJCF file, from its root to the effector.
 
     Raises:
-        ValueError: if it cannot be read, has no such link, or other joints than hinges on the path.
+        ValueError: if it cannot be read, has no link of this name, or other joints than hinges on
+        the path.
     """
     read = urdf.read if path.suffix.lower() == ".urdf" else mjcf.read
     model = read(path).articulation
@@ -44,8 +46,7 @@ def robot(path: Path, name: str, effector: str | None) -> Robot:
     if wrong or "hinge" not in kinds:
         got = [*wrong, "none"][0]
         raise ValueError(f"{path}: expected hinges to {model.names[tip]!r}, got {got}")
-    text, root, last = _urdf(model, steps)
-    return chain_from(name, name, text, root, last)
+    return chain_of(name, name, "base", list(_joints(model, steps)))
 
 
 def _effector(skeleton: Skeleton, names: tuple[str, ...], effector: str | None) -> int:
@@ -58,35 +59,29 @@ def _effector(skeleton: Skeleton, names: tuple[str, ...], effector: str | None) 
     return max(sorted(leaves), key=lambda leaf: len(skeleton.path(leaf)))
 
 
-def _urdf(model: Articulation, steps: list[int]) -> tuple[str, str, str]:
-    """Return the path as URDF, with the names of its root and its effector."""
-    tree, half = ElementTree.Element("robot", name="robot"), TWO_REVOLUTIONS / 2
-    names = ["base", *(f"{i}_{model.names[j]}" for i, j in enumerate(steps))]
-    for link in names:
-        ElementTree.SubElement(tree, "link", name=link)
-    for parent, child, j in zip(names, names[1:], steps, strict=False):
-        kind = "revolute" if model.kinds[j] == "hinge" else "fixed"
-        joint = ElementTree.SubElement(tree, "joint", name=f"joint_{child}", type=kind)
-        xyz, rpy = model.skeleton.offsets[j], _rpy(model.frames[j])
-        ElementTree.SubElement(joint, "origin", xyz=_numbers(xyz), rpy=_numbers(rpy))
+def _joints(model: Articulation, steps: list[int]) -> Iterator[ElementTree.Element]:
+    """Yield the joints of a path as URDF, which begins at the link `base`."""
+    parent, half = "base", TWO_REVOLUTIONS / 2
+    for i, j in enumerate(steps):
+        child, kind = f"{i}_{model.names[j]}", "revolute" if model.kinds[j] == "hinge" else "fixed"
+        R = rotation.to_matrix(model.frames[j])
+        pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
+        rpy = np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
+        joint = ElementTree.Element("joint", name=f"joint_{child}", type=kind)
+        origin = {"xyz": _numbers(model.skeleton.offsets[j]), "rpy": _numbers(rpy)}
+        ElementTree.SubElement(joint, "origin", origin)
         ElementTree.SubElement(joint, "parent", link=parent)
         ElementTree.SubElement(joint, "child", link=child)
         if kind == "revolute":
             ElementTree.SubElement(joint, "axis", xyz=_numbers(model.axes[j]))
             lower, upper = (float(np.clip(x[j], -half, half)) for x in (model.lower, model.upper))
             ElementTree.SubElement(joint, "limit", lower=repr(lower), upper=repr(upper))
-    return ElementTree.tostring(tree, encoding="unicode"), names[0], names[-1]
+        yield joint
+        parent = child
 
 
-def _rpy(quaternion: FloatArray) -> FloatArray:
-    """Return roll, pitch and yaw: about x, then y, then z, all fixed axes."""
-    R = rotation.to_matrix(quaternion)
-    pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-    return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
-
-
-def _numbers(values: FloatArray) -> str:
-    return " ".join(repr(float(x)) for x in values)
+def _numbers(vector: FloatArray) -> str:
+    return " ".join(repr(float(x)) for x in vector)
 
 
 def skeletons(
@@ -95,7 +90,7 @@ def skeletons(
     """Return targets for the balls of a BVH file, from random poses: anywhere, far out, near.
 
     Raises:
-        ValueError: if it cannot be read, or has no such joint.
+        ValueError: if it cannot be read, or has no joint of this name.
     """
     skeleton = bvh.read(path).skeleton
     tip = _effector(skeleton, skeleton.names, effector)

@@ -14,7 +14,7 @@ _LONGEST = 60
 
 
 def clean(name: str) -> str:
-    """Return a name on one line with printable letters only."""
+    """Return a name on a line with printable letters only."""
     return shown(visible(name.encode(errors="replace").decode()), _LONGEST)
 
 

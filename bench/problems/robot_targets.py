@@ -1,7 +1,7 @@
 """Targets for the effectors of robots: strata, all from seeded poses, so that they can be reached.
 
-Targets come from a pool of random poses within the limits. Those of a stratum are drawn from the
-poses of the pool that belong to it. Unreachable targets lie farther from the first joint than the
+Targets come from a pool of random poses within the limits. A stratum is drawn from the poses of
+the pool that belong to it. Unreachable targets lie farther from the first joint than the
 sum of all link lengths.
 """
 
@@ -45,7 +45,7 @@ def robot_targets(name: str, count: int) -> Targets:
 def stratum_poses(
     evaluator: Evaluator, rng: np.random.Generator, count: int
 ) -> dict[str, FloatArray]:
-    """Return the poses whose effectors are the targets, (count, coordinate) for each stratum."""
+    """Return the poses that define the targets, (count, coordinate) for each stratum."""
     pool = evaluator.robot.draw(rng, _POOL * count)
     effectors, _ = evaluator.forward(pool)
     distance = np.linalg.norm(effectors - root(evaluator), axis=-1).max(axis=-1)
@@ -116,9 +116,9 @@ def _extreme(rng: np.random.Generator, measure: FloatArray, count: int) -> Float
 
 
 def spread(rng: np.random.Generator, effectors: FloatArray, count: int) -> FloatArray:
-    """Return the numbers of poses whose first effector is spread over all occupied cells.
+    """Return the numbers of poses that spread the first effector over all occupied cells.
 
-    A cell is drawn first, then one of the poses within.
+    A cell is drawn first, then a pose within it.
     """
     points = effectors[:, 0]
     edge = np.ptp(points, axis=0).max() / _CELLS
@@ -138,7 +138,7 @@ def _at_a_limit(rng: np.random.Generator, evaluator: Evaluator, count: int) -> F
 
 
 def root(evaluator: Evaluator) -> FloatArray:
-    """Return the position of the first joint: nothing before it moves [m], (3,)."""
+    """Return the position of the first joint, which is fixed [m], (3,)."""
     if evaluator.robot.is_chain:
         return links(evaluator.robot)[0].transform[:3, 3]
     return np.array(evaluator.model.body(evaluator.model.jnt_bodyid[0]).pos)

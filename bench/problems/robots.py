@@ -2,8 +2,8 @@
 
 An arm is the chain of links from a root to an effector. Everything that is not kinematics is
 dropped from the file, and so are soft limits, which some readers take for the limits. Continuous
-joints are limited to two revolutions in either direction, so that every solver has one number a
-joint. All solvers and the evaluation read this same text.
+joints are limited to two revolutions in either direction, so that every solver has a number for
+each joint. All solvers and the evaluation read this same text.
 """
 
 import contextlib
@@ -49,7 +49,7 @@ class Robot:
         root: the link or body that stands still.
         effectors: the links or bodies that have targets.
         joints: the joints that move, in the order of the coordinates.
-        lower: the lower limits of the coordinates [rad], (coordinate,); -inf for those of balls.
+        lower: the lower limits of the coordinates [rad], (coordinate,); -inf for balls.
         upper: the upper limits.
         balls: where the quaternions of balls, w first, begin among the coordinates.
         oriented: whether the effectors have target rotations as well as target positions.
@@ -68,11 +68,11 @@ class Robot:
 
     @property
     def is_chain(self) -> bool:
-        """Whether it is a chain of hinges, as URDF describes it, with one effector."""
+        """Whether it is a chain of hinges, as URDF describes it, with a single effector."""
         return not self.balls and len(self.effectors) == 1
 
     def require_chain(self) -> None:
-        """Refuse a robot that is not a chain of hinges with one effector.
+        """Refuse a robot that is not a chain of hinges with a single effector.
 
         Raises:
             UnableError: if it is not.
@@ -131,7 +131,7 @@ OWN: dict[str, Robot] = {}
 
 
 def enter(own: Robot) -> None:
-    """Register a user's robot by its name, in place of one entered before."""
+    """Register a user's robot by its name, in place of an earlier robot."""
     if OWN.get(own.name) is not own:
         OWN[own.name] = own
         robot.cache_clear()
@@ -207,11 +207,16 @@ def chain_from(name: str, title: str, text: str, root: str, effector: str) -> Ro
     while link != root:
         joints.insert(0, above[link])
         link = _link(above[link], "parent")
+    return chain_of(name, title, root, joints)
+
+
+def chain_of(name: str, title: str, root: str, joints: Sequence[ElementTree.Element]) -> Robot:
+    """Return the chain of these joints of a URDF, in order from a root to the effector."""
     moving = [joint for joint in joints if joint.get("type") != "fixed"]
-    limits = np.array([_limits(joint) for joint in moving])
+    lower, upper = np.array([_limits(joint) for joint in moving]).T
     names = tuple(joint.get("name", "") for joint in moving)
-    text = _urdf(name, root, joints)
-    return Robot(name, title, text, root, (effector,), names, *limits.T)
+    effectors = (_link(joints[-1], "child"),)
+    return Robot(name, title, _urdf(name, root, joints), root, effectors, names, lower, upper)
 
 
 def _link(joint: ElementTree.Element, end: str) -> str:

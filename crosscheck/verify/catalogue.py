@@ -1,8 +1,4 @@
-"""Renew the gettext catalogues from the sources: `make messages`.
-
-A catalogue is a .po file, which people edit, and the .mo file that gettext reads. Renewing keeps
-the translations that are still used and adds new templates without translation.
-"""
+"""Renew the gettext catalogues (.po, .mo) from the sources, with `make messages`."""
 
 import ast
 import io
@@ -39,11 +35,7 @@ def templates() -> dict[str, str]:
 
 
 def literal_templates(source: str, place: str) -> Iterator[str]:
-    """Yield the first argument of every call of `sentence` in a source, both if it chooses one.
-
-    Raises:
-        ValueError: if a template is no literal, so that nobody could translate it.
-    """
+    """Yield the templates of all `sentence` calls in a source; raise ValueError for others."""
     calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
     for node in sorted(calls, key=lambda node: (node.lineno, node.col_offset)):
         if getattr(node.func, "id", None) != "sentence":

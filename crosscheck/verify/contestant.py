@@ -12,11 +12,7 @@ from .sentence import Sentence
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """An answer of a solver.
-
-    The values are float64 arrays, numbers and booleans of the task's shapes, by the names of its
-    outputs; NaN where a number is missing.
-    """
+    """An answer: float64 arrays, numbers and booleans by output, NaN where a number is missing."""
 
     values: Mapping[str, Any]
     seconds: float  # the solver's own time; if `untimed`, of the round trip, or 0 of a file [s]
@@ -66,11 +62,7 @@ class Contestant(Protocol):
 
     @property
     def greeting(self) -> Greeting:
-        """Its declaration.
-
-        Raises:
-            NoGreetingError: if it sends none.
-        """
+        """Its declaration; raise NoGreetingError if it sends none."""
 
     @property
     def remarks(self) -> tuple[Sentence, ...]:

@@ -1,7 +1,7 @@
 """Find the variants of the reference that reproduce a solver's answers.
 
-A variant is the reference with faults, each an independent small change. The variants with the
-fewest faults come first, so that a combination is named only where no part of it suffices.
+The variants with the fewest faults come first, so that a combination is named only where no part
+of it suffices.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -164,11 +164,7 @@ def together(mistakes: Sequence[Sentence]) -> Sentence:
 
 
 def either(explanations: Sequence[Sequence[Sentence]]) -> Sentence:
-    """Return explanations that no answer tells apart as a single sentence.
-
-    An explanation is a list of simultaneous mistakes. Mistakes in all explanations are listed once,
-    then up to three alternatives.
-    """
+    """Return explanations (lists of mistakes) that no answer tells apart as a single sentence."""
     shared = [m for m in explanations[0] if all(m in mistakes for mistakes in explanations)]
     alternatives = [[m for m in mistakes if m not in shared] for mistakes in explanations]
     if not all(alternatives):

@@ -42,10 +42,7 @@ class FunctionContestant:
 
 
 def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) -> Answer | Failure:
-    """Call a function with copies of the inputs that it takes, and check its outputs.
-
-    An exception becomes a failure, a changed argument a remark.
-    """
+    """Call a function with copies of its inputs; exceptions are failures, changes are remarks."""
     if reason := _missing_input(function, task, inputs):
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=reason))
     arguments = {
@@ -183,11 +180,7 @@ def _by_shape(task: Task, counts: Mapping[str, int], parts: list[object]) -> dic
 
 
 def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
-    """Return a value of a request or an answer as an array, a number or a text; null is NaN.
-
-    Raises:
-        ValueError: if its shape or its kind is another.
-    """
+    """Return a value as an array, number or text, null as NaN; raise ValueError if it misfits."""
     if field.kind == "text":
         if isinstance(value, str):
             return value

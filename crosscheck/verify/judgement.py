@@ -96,10 +96,7 @@ class Diagnosis:
 
 
 def smallest_failure(judgements: Sequence[CaseJudgement], explained: bool) -> CaseJudgement | None:
-    """Return the failing case with the fewest numbers, or None.
-
-    Where no fault explains wrong answers, only cases with the worst verdict count.
-    """
+    """Return the failing case with the fewest numbers, of the worst verdict if unexplained."""
     failing = [judgement for judgement in judgements if judgement.verdict >= Verdict.WRONG]
     if failing and not explained:
         worst = max(judgement.verdict for judgement in failing)

@@ -21,11 +21,7 @@ def language_of(environment: Mapping[str, str] = os.environ) -> str:
 
 
 def translator(language: str) -> Callable[[str], str]:
-    """Return what translates a template; one without a translation stays as it is.
-
-    Raises:
-        ValueError: if the language is not one of LANGUAGES.
-    """
+    """Return a function that translates templates, those without a translation unchanged."""
     if language not in LANGUAGES:
         raise ValueError(f"lang: expected one of {', '.join(LANGUAGES)}, got {language!r}")
     catalogue = gettext.translation(

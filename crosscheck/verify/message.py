@@ -58,11 +58,7 @@ def encode_greeting(number: int = 0) -> bytes:
 
 
 def encode_case(number: int, case: Case) -> bytes:
-    """Return the line that asks a case, arrays as nested lists, NaN as null.
-
-    Raises:
-        ValueError: if a number is infinite, which JSON cannot express.
-    """
+    """Return the line that asks a case, NaN as null; raise ValueError if a number is infinite."""
     inputs = {name: plain(value) for name, value in case.inputs.items() if value is not None}
     for name, value in case.inputs.items():
         if isinstance(value, float | np.ndarray) and np.isinf(value).any():
@@ -86,13 +82,7 @@ def _line(fields: Mapping[str, Any]) -> bytes:
 
 
 def decode_object(line: bytes) -> dict[str, Any] | None:
-    """Return the JSON object of a line, or None of a stray print.
-
-    Printed text before an object on the same line is ignored.
-
-    Raises:
-        ValueError: if the line begins as an object but is invalid.
-    """
+    """Return the JSON object of a line, after any print; None of a print, ValueError if invalid."""
     text = line.removeprefix(_BOM).strip()
     if not text.startswith(b"{"):
         match = re.search(rb'\{\s*"id"', text)
@@ -140,11 +130,7 @@ def shown(text: str | bytes, length: int = 200) -> str:
 
 
 def decode_request(line: bytes) -> Request:
-    """Return a request with its inputs as arrays, as a solver written in Python reads it.
-
-    Raises:
-        ValueError: if the line is no request.
-    """
+    """Return a request with its inputs as arrays; raise ValueError if the line is no request."""
     fields = decode_object(line)
     if fields is None or not isinstance(fields.get("id"), int):
         raise ValueError(f"request: expected an object with an id, got {shown(line)}")
@@ -162,14 +148,7 @@ def decode_request(line: bytes) -> Request:
 def decode_answer(
     fields: Mapping[str, Any], task: Task, inputs: Mapping[str, Any], seconds: float
 ) -> Answer | Failure:
-    """Return the answer in a JSON object.
-
-    Args:
-        fields: the object.
-        task: of the request.
-        inputs: of the request, for the shapes of the answer.
-        seconds: from the request to the answer, used if the solver sends no time of its own.
-    """
+    """Return the answer in a JSON object; `seconds` is the time of the round trip."""
     if fields.get("error") is not None:
         return decode_error(fields)
     try:
@@ -227,15 +206,7 @@ def prints(line: str | bytes) -> Sentence:
 
 
 def decode_greeting(fields: Mapping[str, Any], source: str = "greeting") -> Greeting:
-    """Return the greeting of a solver.
-
-    Args:
-        fields: an object of JSON.
-        source: its name in error messages.
-
-    Raises:
-        ValueError: if a field is invalid.
-    """
+    """Return the greeting in a JSON object; errors (ValueError) begin with `source`."""
     fields = {name: value for name, value in fields.items() if name not in _OF_ANY_ANSWER}
     if fields.get("protocol") != PROTOCOL:
         raise ValueError(
@@ -309,11 +280,7 @@ def _type_name(kind: Any) -> str:
 
 
 def one_of(name: str, value: object, options: Iterable[str]) -> str:
-    """Return a value if it is one of the options.
-
-    Raises:
-        ValueError: if it is not, with the nearest option.
-    """
+    """Return a value that is an option; raise ValueError with the nearest option if it is none."""
     options = list(options)
     if isinstance(value, str) and value in options:
         return value

@@ -1,8 +1,4 @@
-"""Infer a solver's precision from the numbers of its answers, whatever its greeting declares.
-
-Programs compute in single precision, or print few digits, without declaring it: judged as double
-precision all their answers would be wrong, and no fault would explain it.
-"""
+"""Infer a solver's precision from its answers: many compute in floats without declaring it."""
 
 from collections.abc import Iterable, Sequence
 from decimal import Decimal, DecimalTuple
@@ -88,10 +84,7 @@ def _decimals(numbers: np.ndarray) -> list[DecimalTuple]:
 
 
 def _outputs(exchanges: Sequence[Exchange]) -> dict[str, np.ndarray]:
-    """Return the numbers of each output that do not come from the request.
-
-    Requests in short decimals are left out: a double may answer in such. A residual is a claim.
-    """
+    """Return the numbers of each output that do not come from the request, residuals aside."""
     outputs: dict[str, np.ndarray] = {}
     for exchange in exchanges:
         inputs = _long_numbers(exchange.case.inputs.values())

@@ -1,7 +1,4 @@
-"""The JSON Schema of the protocol's messages, made from the tasks and the greeting.
-
-`python -m plumbob.crosscheck.verify.schema` writes it beside this file.
-"""
+"""The JSON Schema of the protocol; `python -m plumbob.crosscheck.verify.schema` writes it."""
 
 import json
 from collections.abc import Iterable
@@ -28,12 +25,11 @@ _TYPES: dict[str, Any] = {
 def schema() -> dict[str, Any]:
     """Return the schema of any message; `$defs` has each kind of message by its name."""
     hello = {"id": {"const": 0}, "task": {"const": "greeting"}, "protocol": {"const": PROTOCOL}}
+    error = {"id": _ID, "error": {"type": "string"}}
     messages = {
         GREETING_REQUEST: _message("What is asked first.", hello, list(hello)),
         **_greeting(),
-        ERROR: _message(
-            "Why there is no answer.", {"id": _ID, "error": {"type": "string"}}, ["id", "error"]
-        ),
+        ERROR: _message("Why there is no answer.", error, list(error)),
     }
     for task in TASKS.values():
         inputs = {"id": _ID, "task": {"const": task.name}} | _fields(task.inputs)
@@ -82,18 +78,17 @@ def _message(about: str, properties: dict[str, Any], required: list[str]) -> dic
 
 
 def _fields(fields: Iterable[Field]) -> dict[str, Any]:
-    return {field.name: _field(field) for field in fields}
-
-
-def _field(field: Field) -> dict[str, Any]:
-    """Return nested arrays; a count that is a word may be any."""
-    values = _TYPES[field.kind]
-    for count in reversed(field.shape):
-        values = {"type": "array", "items": values}
-        if isinstance(count, int):
-            values |= {"minItems": count, "maxItems": count}
-    shape = f" ({', '.join(map(str, field.shape))})" if field.shape else ""
-    return {**values, "description": field.about + shape}
+    """Return the schemas of fields: nested arrays, in which a count that is a word may be any."""
+    schemas = {}
+    for field in fields:
+        kind = _TYPES[field.kind]
+        for count in reversed(field.shape):
+            kind = {"type": "array", "items": kind}
+            if isinstance(count, int):
+                kind |= {"minItems": count, "maxItems": count}
+        shape = f" ({', '.join(map(str, field.shape))})" if field.shape else ""
+        schemas[field.name] = {**kind, "description": field.about + shape}
+    return schemas
 
 
 def text() -> str:

@@ -1,9 +1,4 @@
-"""Try the judge itself: every known fault is caught and named, and nobody right is accused.
-
-A fault is *caught* by laws, which know nothing of faults, and *named* by the search that knows
-them all. Honest solvers are the reference, its answers in single precision, engines, and models of
-the step that are right as declared.
-"""
+"""Test the judge: laws catch every known fault, the search names it, honest solvers are right."""
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -34,9 +29,8 @@ from .mass_spring.problem import all_forces, problem_of, state_of, system_of
 from .sentence import sentence
 from .verify import verify
 
-_NOTHING = sentence("")
 HONEST = "honest solvers"
-# How models hold their pins, and how they declare it.
+# The pins of models, and how they declare them.
 PINS: dict[str, Literal["overwritten", "penalty", "heavy"]] = {
     "overwritten": "overwritten",
     "penalty 1e10": "penalty",
@@ -45,28 +39,27 @@ PINS: dict[str, Literal["overwritten", "penalty", "heavy"]] = {
 PRECISIONS: dict[Precision, type] = {"double": np.float64, "single": np.float32}
 FK, IK, STEP = "forward_kinematics", "inverse_kinematics", "mass_spring_step"
 FAMILIES = {"forward": "forward kinematics", "ccd": "CCD", "fabrik": "FABRIK"}
-EVERYTHING = System(external_forces=True, tension_only=True)
+ALL_SYSTEMS = System(external_forces=True, tension_only=True)
 
 
 class Subject(NamedTuple):
-    """A solver of which is known what is wrong with it."""
+    """A solver with a known fault, or an honest one."""
 
-    name: str  # what it is
-    family: str  # what it is one of: "CCD", "steps", "honest solvers"
-    task: str  # what it solves
-    function: Callable[..., Any]  # the solver
-    greeting: Greeting  # what it says of itself
-    fault: str = ""  # the key of what is wrong; "" if nothing is
+    name: str
+    family: str  # "CCD", "steps", "honest solvers"
+    task: str
+    function: Callable[..., Any]
+    greeting: Greeting
+    fault: str = ""  # its key; "" of an honest solver
 
 
 class Trial(NamedTuple):
-    """What the judge said of a subject."""
+    """The judgement of a subject."""
 
     subject: Subject
     verdict: Verdict
-    laws: frozenset[str]  # those that were broken
-    # whether the first explanation names the fault, or a class of faults that it is in and that no
-    # answer tells apart; for an honest one, whether nothing is named
+    laws: frozenset[str]  # that were broken
+    # whether the first explanation includes the fault; of an honest solver, whether there is none
     named: bool
 
     @property
@@ -76,27 +69,27 @@ class Trial(NamedTuple):
 
     @property
     def passed(self) -> bool:
-        """Whether the fault is caught and named, or the honest one is left in peace."""
+        """Whether the fault is caught and named, or the honest solver is not accused."""
         if self.subject.fault:
             return self.caught and self.named
         return self.verdict <= Verdict.RIGHT_BUT and self.named
 
 
 def attempt(subject: Subject) -> Trial:
-    """Judge a subject as `verify` judges anyone."""
+    """Judge a subject as `verify` judges any solver."""
     contestant = FunctionContestant({subject.task: subject.function}, subject.greeting)
     report = verify(contestant).tasks[0]
-    least = Verdict.RIGHT_BUT if subject.fault else Verdict.WRONG
+    threshold = Verdict.RIGHT_BUT if subject.fault else Verdict.WRONG
     laws = frozenset(
         finding.law
-        for one in report.judgements
-        for finding in one.findings
-        if finding.verdict >= least and finding.law != "remarks"
+        for judgement in report.judgements
+        for finding in judgement.findings
+        if finding.verdict >= threshold and finding.law != "remarks"
     )
     explanations = report.diagnosis.explanations
-    told = explanations[0].faults if explanations else ()
-    named = subject.fault in told if subject.fault else not told
-    return Trial(subject, report.verdict, laws, named)
+    keys = explanations[0].faults if explanations else ()
+    is_named = subject.fault in keys if subject.fault else not keys
+    return Trial(subject, report.verdict, laws, is_named)
 
 
 def subjects() -> Iterator[Subject]:
@@ -106,19 +99,19 @@ def subjects() -> Iterator[Subject]:
 
 
 def _subjects(
-    family: str, task: str, functions: Mapping[str, Callable[..., Any]], **said: Any
+    family: str, task: str, functions: Mapping[str, Callable[..., Any]], **declared: Any
 ) -> Iterator[Subject]:
-    """Yield a subject for each function by its name, which is its fault if it is not honest."""
-    greeting = Greeting(PROTOCOL, (task,), **said)
+    """Yield a subject for each function; the name of a faulty function is its fault."""
+    greeting = Greeting(PROTOCOL, (task,), **declared)
     for name, function in functions.items():
         yield Subject(name, family, task, function, greeting, "" if family == HONEST else name)
 
 
 def _kinematic_faults() -> Iterator[Subject]:
-    for kind, family in FAMILIES.items():
-        task, method = (FK, "") if kind == "forward" else (IK, kind)
-        faults = {fault.key: switches([fault]) for fault in FAULTS[kind] if not fault.honest}
-        functions = {key: partial(_textbook, method, one) for key, one in faults.items()}
+    for part, family in FAMILIES.items():
+        task, method = (FK, "") if part == "forward" else (IK, part)
+        faults = {fault.key: switches([fault]) for fault in FAULTS[part] if not fault.honest}
+        functions = {key: partial(_textbook, method, setting) for key, setting in faults.items()}
         yield from _subjects(family, task, functions, methods=(method,))
 
 
@@ -133,16 +126,16 @@ def _robots() -> Iterator[Subject]:
 
 def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str, Any]:
     if not method:
-        return predict_forward(switched, Case("", "", inputs, "", _NOTHING))
+        return predict_forward(switched, Case("", "", inputs, "", sentence("")))
     local, positions, _ = solve(method, inputs, switched)
     return {"local_rotations": local, "positions": positions}
 
 
-def _followed(method: str, /, **inputs: Any) -> Mapping[str, Any]:
-    return predict_track(method, switches([]), Case("", "", inputs, "", _NOTHING))
+def _track(method: str, /, **inputs: Any) -> Mapping[str, Any]:
+    return predict_track(method, switches([]), Case("", "", inputs, "", sentence("")))
 
 
-# Models of the step, and how they declare themselves.
+# Models of the step, and their declarations.
 LINEARISED = StepModel(Integrator("newton", "x_n", 1), damper="explicit")
 CONVERGED = StepModel(Integrator("converged", "y"))
 LOCAL_GLOBAL = StepModel(Integrator("local_global", "y", 10))
@@ -151,9 +144,9 @@ SYMPLECTIC = StepModel(Integrator("symplectic"), 10, "explicit", velocity="separ
 
 def _declared(model: StepModel, method: Method, iterations: int | None = None) -> Step:
     velocity: Any = "separate" if model.velocity == "separate" else "displacement"
-    said: Any = {"start": model.integrator.start} if method != "symplectic" else {}
-    said |= {"damper": model.damper, "substeps": model.substeps, "iterations": iterations}
-    return Step(method, pins="eliminated", velocity=velocity, **said)
+    fields: Any = {"start": model.integrator.start} if method != "symplectic" else {}
+    fields |= {"damper": model.damper, "substeps": model.substeps, "iterations": iterations}
+    return Step(method, pins="eliminated", velocity=velocity, **fields)
 
 
 DECLARED: dict[str, tuple[StepModel, Step]] = {
@@ -162,9 +155,9 @@ DECLARED: dict[str, tuple[StepModel, Step]] = {
     "local/global": (LOCAL_GLOBAL, _declared(LOCAL_GLOBAL, "local_global", 10)),
     "symplectic": (SYMPLECTIC, _declared(SYMPLECTIC, "symplectic")),
 }
-# A fault that a request for forces does not let one have: it marks no tension-only springs.
+# Faults that requests for forces cannot show: these mark no tension-only springs.
 NO_FORCES = ("tension only ignored",)
-# Faults that only some models can have; the others are tried on a linearised step.
+# The models that have a fault; the other faults are tried on a linearised step.
 _BASES = {
     "h not divided": "symplectic",
     "pins free until the end": "symplectic",
@@ -175,7 +168,7 @@ _BASES = {
 
 
 class Stepper:
-    """A step with faults; it remembers the first h of each system, for factors that are kept."""
+    """A step with faults, which keeps the first h of each system for cached factors."""
 
     def __init__(
         self, model: StepModel, faults: Sequence[Option] = (), precision: type = np.float64
@@ -203,13 +196,13 @@ class Stepper:
 
 
 def _mass_spring_faults() -> Iterator[Subject]:
-    options = _by_key([one for one in FORCE_FAULTS if one.key not in NO_FORCES])
+    options = _by_key([fault for fault in FORCE_FAULTS if fault.key not in NO_FORCES])
     functions = {key: partial(_evaluated, option) for key, option in options.items()}
-    yield from _subjects("forces", "mass_spring_forces", functions, system=EVERYTHING)
+    yield from _subjects("forces", "mass_spring_forces", functions, system=ALL_SYSTEMS)
     for key, option in _by_key(STEP_FAULTS).items():
         model, step = DECLARED[_BASES.get(key, "linearised")]
         stepper = {key: Stepper(model, [option])}
-        yield from _subjects("steps", STEP, stepper, system=EVERYTHING, step=step)
+        yield from _subjects("steps", STEP, stepper, system=ALL_SYSTEMS, step=step)
 
 
 def _by_key(options: Sequence[Option]) -> dict[str, Option]:
@@ -235,7 +228,7 @@ def _right_kinematics() -> Iterator[Subject]:
         function = {f"reference, {solver}": partial(_solved, solver)}
         yield from _subjects(HONEST, IK, function, methods=(solver,))
     for method in ("ccd", "fabrik"):
-        function = {f"textbook, {method}": partial(_followed, method)}
+        function = {f"textbook, {method}": partial(_track, method)}
         yield from _subjects(HONEST, "track", function, methods=(method,))
 
 
@@ -254,8 +247,8 @@ def _solved(solver: str, /, parents: Any, offsets: Any, method: str, **inputs: A
     return {"local_rotations": solution.local_rotations, "positions": solution.positions}
 
 
-# Steps of the reference and of MuJoCo, and what they declare to be. The reference's damper is
-# part of the energy, MuJoCo's discrete step likewise; see docs/verify.md.
+# Steps of the reference and of MuJoCo, and their declarations. The reference's damper and MuJoCo's
+# discrete step are part of the energy; see docs/verify.md.
 _REFERENCE: dict[str, tuple[Callable[..., Any], Step]] = {
     "implicit Euler by Newton": (
         lambda s, state, h: ImplicitEuler(s, h=h, solver="newton", tolerance=0.0).step(state).state,
@@ -281,9 +274,9 @@ def _right_steps() -> Iterator[Subject]:
             stepper = {f"{name}, {precision}": Stepper(model, (), kind)}
             yield from _subjects(HONEST, STEP, stepper, step=step, precision=precision)
         yield from _subjects(HONEST, STEP, {f"{name}, undeclared": Stepper(model)})
-    for pins, said in PINS.items():
+    for pins, declared in PINS.items():
         stepper = {f"linearised, pins {pins}": Stepper(LINEARISED._replace(pins=pins))}
-        yield from _subjects(HONEST, STEP, stepper, step=Step(pins=said))
+        yield from _subjects(HONEST, STEP, stepper, step=Step(pins=declared))
     for name, (function, step) in _REFERENCE.items():
         yield from _subjects(HONEST, STEP, {name: partial(_stepped, function)}, step=step)
 

@@ -1,8 +1,4 @@
-"""Sentences that are printed in English or translated.
-
-A sentence is a template and its fields, which are joined where it is printed. Every template is a
-literal in a call of `sentence`, or in a catalogue of faults or tasks: `catalogue.py` collects them.
-"""
+"""Sentences to print in English or translated: a literal template and its fields."""
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping

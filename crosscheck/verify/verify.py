@@ -53,7 +53,7 @@ DISCIPLINES: Mapping[str, Discipline] = {
 }
 
 
-def _silent(task: str, done: int, total: int) -> None:
+def _silent(task: str, count: int, total: int) -> None:
     pass
 
 

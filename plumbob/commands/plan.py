@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from plumbob.bench.experiments import SUITES, blocks
 from plumbob.bench.harness import run
 from plumbob.bench.harness.block import Block, Choice
-from plumbob.bench.harness.executor import THIS_PROCESS
+from plumbob.bench.harness.executors import THIS_PROCESS
 from plumbob.bench.harness.measure import block_key, not_asked, not_installed
 from plumbob.bench.harness.record import Key, Record, RecordFile
 from plumbob.bench.peers import registry

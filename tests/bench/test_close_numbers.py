@@ -105,8 +105,8 @@ def test_any_two_numbers_have_texts_that_differ(digits):
         for bound in (np.nextafter(number, np.inf), number * CLOSE, 2.0 * number):
             texts = arguments.distinct_texts(number, bound, digits)
             assert texts[0] != texts[1]
-            row = comparison.Row("x", [1.0, number], [1.0, bound])
-            theirs, ours = comparison.written(row)
+            row = comparison.NumberRow("x", [1.0, number], [1.0, bound])
+            theirs, ours = comparison.texts(row)
             assert theirs != ours
 
 

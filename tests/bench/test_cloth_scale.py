@@ -3,6 +3,7 @@
 import json
 import signal
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -49,9 +50,16 @@ def test_what_is_measured_is_the_work_it_says(ours):
         assert min(ours[name]) > 0
 
 
+def test_the_memory_of_a_process_is_not_that_of_its_parent():
+    held = np.ones(25_000_000)
+    code = f"from {suite.__name__} import memory; print(memory())"
+    child = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert int(child.stdout) < held.nbytes < suite.memory()
+
+
 def test_progress_is_announced_and_an_interrupt_ends_the_process(monkeypatch):
     messages, children = [], []
-    with listening(lambda progress: messages.append(progress.what)):
+    with listening(lambda progress: messages.append(progress.subject)):
         suite.in_its_own_process(SMALL, suite.SUPERNODAL)
     assert messages[0] == f"cloth/{SMALL}x{SMALL}, supernodal: cloth"
     assert messages[-1].endswith("second factor")

@@ -1,7 +1,6 @@
 """Workers of a Dask cluster: the same answers as one process, each row once, whoever is lost."""
 
 import contextlib
-import json
 import os
 import pickle
 import signal
@@ -26,7 +25,7 @@ from plumbob.bench.harness.executors import dask, executor_at, work
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import block_key, measure
 from plumbob.bench.harness.progress import Progress, listening
-from plumbob.bench.harness.record import RecordFile, encode
+from plumbob.bench.harness.record import RecordFile, decode, encode
 from plumbob.bench.harness.values import Values
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.sources import digest_of
@@ -45,18 +44,18 @@ class Numbers(Values, frozen=True):
 
 def rows(folder):
     """How often each row was written."""
-    lines = RecordFile(folder).path.read_text().splitlines()
-    written = [json.loads(line) for line in lines]
-    return Counter(run.block_key(replace_block(one)) for one in written if one["solver"])
-
-
-def replace_block(line):
-    settings = line["settings"]
-    return Block(line["suite"], line["problem"], line["solver"], Measured, settings)
+    lines = map(decode, RecordFile(folder).path.read_text().splitlines())
+    return Counter(record.key for record in lines if record.solver)
 
 
 def records(folder):
     return [record for record in RecordFile(folder).read().records if record.solver]
+
+
+def processors(folder):
+    """The machines of the timed records."""
+    timed = [record for record in records(folder) if record.suite != "arm"]
+    return {record.stamp["machine"]["processor"] for record in timed}
 
 
 def states(events):
@@ -87,7 +86,7 @@ def few(monkeypatch):
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda e: e.package.rsplit(".")[-1])
-def test_every_experiment_says_whether_it_takes_times(experiment):
+def test_every_experiment_states_whether_it_takes_times(experiment):
     """One that reads the stopwatch or keeps seconds shares no machine while it is measured."""
     folder = ROOT / Path(*experiment.package.split(".")[1:])
     files = [path for path in folder.glob("*.py") if path.name != "tables.py"]
@@ -124,7 +123,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_another_server_at_the_address_is_misuse_soon(name):
+def test_another_server_at_the_address_is_misuse(name):
     """A Client waits for its answer for ever, so that this one has a process of its own."""
     pytest.importorskip("distributed", reason=INSTALLED)
     answer, why = OTHERS[name]
@@ -189,23 +188,23 @@ class MadeUpCluster:
     def subscribe_topic(self, topic, handler):
         pass
 
-    def submit(self, function, task, key, workers=None):
+    def submit(self, function, suite, scale, name, *arguments, key, workers=None):
         future = MadeUpFuture(key)
         if not self.workers:
             return future
         (at,) = workers or [next(iter(self.workers))]
-        self.given.append((task, at if workers else None))
+        self.given.append((suite, at if workers else None))
         if len(self.given) in self.lose:
             del self.workers[at]
             return future
-        (block,) = (b for b in PLANTED if block_key(b) == task.key)
+        (block,) = (b for b in PLANTED if block_key(b) == name)
         made = replace(measure(block), stamp=self.place(at)["stamp"])
-        future.set_result(work.Reply(line=encode(made)))
+        future.set_result({"line": encode(made)})
         return future
 
     def hosts(self, suite):
         """The hosts of what was given out of a suite, in order; None where any would do."""
-        return [at and HOSTS[at] for task, at in self.given if task.suite == suite]
+        return [at and HOSTS[at] for name, at in self.given if name == suite]
 
 
 HOSTS = {"w1": "h1", "w2": "h1", "w3": "h2", "w4": "h3"}
@@ -234,27 +233,25 @@ def made_up(monkeypatch, tmp_path):
     return go
 
 
-def test_what_takes_times_stays_on_one_machine_and_a_suite_on_one_host(made_up, tmp_path):
+def test_times_stay_on_one_machine_and_a_suite_on_one_host(made_up, tmp_path):
     cluster = MadeUpCluster(**TWO_KINDS)
     assert states(made_up(cluster)) == {run.MEASURING: 9, run.MEASURED: 9}
     assert cluster.hosts("arm") == [None] * 3
     assert [set(cluster.hosts(suite)) for suite in ("ik", "timing")] == [{"h1"}, {"h2"}]
-    timed = [r for r in records(tmp_path) if r.suite != "arm"]
-    assert {r.stamp["machine"]["processor"] for r in timed} == {"slide rule"}
+    assert processors(tmp_path) == {"slide rule"}
 
 
-def test_machines_are_mixed_if_asked(made_up, tmp_path):
+def test_machines_are_mixed_on_request(made_up):
     cluster = MadeUpCluster(**TWO_KINDS)
     made_up(cluster, mix=True)
     assert set(cluster.hosts("ik")) == {"h1", "h2", "h3"}
     assert states(made_up(MadeUpCluster(w4="h3/abacus"), mix=True)) == {run.KEPT: 9}
 
 
-def test_one_host_measures_one_block_that_takes_times_after_the_other(made_up):
-    steps = [
-        event for event in made_up(MadeUpCluster(w1="h1/x", w2="h1/x")) if event.suite != "arm"
-    ]
-    assert [event.state for event in steps] == [run.MEASURING, run.MEASURED] * 6
+def test_a_host_measures_timed_blocks_in_order(made_up):
+    events = made_up(MadeUpCluster(w1="h1/x", w2="h1/x"))
+    steps = [event.state for event in events if event.suite != "arm"]
+    assert steps == [run.MEASURING, run.MEASURED] * 6
 
 
 def test_another_host_of_the_machine_takes_over_from_a_lost_one(made_up, tmp_path):
@@ -264,20 +261,17 @@ def test_another_host_of_the_machine_takes_over_from_a_lost_one(made_up, tmp_pat
     assert len(rows(tmp_path)) == 9
 
 
-def test_without_that_machine_times_are_not_taken_and_the_next_run_takes_all_of_them(
-    made_up, tmp_path
-):
-    cluster = MadeUpCluster(lose={6}, w1="h1/slide rule", w2="h1/slide rule", w4="h3/abacus")
-    cluster.lose |= {7}
-    events = made_up(cluster)
-    assert states(events)[run.FAILED] > 0
-    assert all("slide rule" in e.message for e in events if e.state == run.FAILED)
+def test_times_are_taken_on_the_chosen_machine_only_until_the_next_run(made_up, tmp_path):
+    workers = {"w1": "h1/slide rule", "w2": "h1/slide rule", "w4": "h3/abacus"}
+    events = made_up(MadeUpCluster(lose={6, 7}, **workers))
+    failures = [event.message for event in events if event.state == run.FAILED]
+    assert failures
+    assert all("slide rule" in message for message in failures)
     made_up(MadeUpCluster(w4="h3/abacus"))
-    timed = [r for r in records(tmp_path) if r.suite != "arm"]
-    assert {r.stamp["machine"]["processor"] for r in timed} == {"abacus"}
+    assert processors(tmp_path) == {"abacus"}
 
 
-def test_the_machine_of_most_records_goes_on_and_answers_of_any_machine_are_kept(made_up):
+def test_the_machine_with_most_records_continues_and_other_answers_are_kept(made_up):
     made_up(MadeUpCluster(w4="h3/abacus"))
     assert states(made_up(MadeUpCluster(**TWO_KINDS))) == {run.KEPT: 9}
     again = made_up(MadeUpCluster(**ONE_KIND))
@@ -285,7 +279,7 @@ def test_the_machine_of_most_records_goes_on_and_answers_of_any_machine_are_kept
     assert any("times are taken on another machine (slide rule)" in e.message for e in again)
 
 
-def test_some_rows_of_a_table_are_not_timed_elsewhere_than_the_others(made_up, monkeypatch):
+def test_rows_of_a_table_are_timed_on_the_same_machine(made_up, monkeypatch):
     made_up(MadeUpCluster(**ONE_KIND))
     some = Choice("quick", TINY, problems=("a", "b"), is_partial=True)
     monkeypatch.setattr(run, "chosen", lambda scale: some)
@@ -297,17 +291,13 @@ def test_some_rows_of_a_table_are_not_timed_elsewhere_than_the_others(made_up, m
     assert states(mixed)[run.KEPT] == 6
 
 
-def test_no_worker_is_misuse(made_up):
+def test_a_run_without_workers_ends_and_can_be_continued(made_up, tmp_path):
     with pytest.raises(ValueError, match=r"expected a worker, got none within 0\.1 s"):
         made_up(MadeUpCluster())
-
-
-def test_a_run_without_any_worker_left_ends_and_can_be_taken_up(made_up, tmp_path):
     with pytest.raises(ValueError, match="no worker is left"):
         made_up(MadeUpCluster(lose={2}, w1="h1/x"))
-    assert states(made_up(MadeUpCluster(w1="h1/x"))) == {
-        run.KEPT: 1, run.MEASURING: 8, run.MEASURED: 8,
-    }  # fmt: skip
+    counts = states(made_up(MadeUpCluster(w1="h1/x")))
+    assert counts == {run.KEPT: 1, run.MEASURING: 8, run.MEASURED: 8}
     assert set(rows(tmp_path).values()) == {1}
 
 
@@ -317,8 +307,8 @@ def test_a_run_without_any_worker_left_ends_and_can_be_taken_up(made_up, tmp_pat
 @pytest.mark.parametrize("part", [{"versions": {"numpy": "0"}}, {"source": "0"}])
 def test_a_worker_with_other_versions_or_sources_refuses(made_up, part):
     other = {**stamp(), **part}
-    task = work.Task("arm", pickle.dumps(TINY), ("arm", "no such", "s", "{}"), False, other)
-    assert "other" in work.perform(task).refused
+    block = ("arm", pickle.dumps(TINY), ("arm", "no such", "s", "{}"), False)
+    assert "other" in work.perform(*block, other, "")["refused"]
     for reply, words in (
         ({"host": "h1", "stamp": other}, "what is installed here, got other"),
         (ModuleNotFoundError("No module named 'bench'"), "Plumbob, got No module named"),
@@ -329,7 +319,7 @@ def test_a_worker_with_other_versions_or_sources_refuses(made_up, part):
             made_up(cluster)
 
 
-def test_a_solver_of_the_users_has_to_be_on_the_worker_as_it_is_there(tmp_path):
+def test_a_users_solver_must_have_the_same_files_on_the_worker(tmp_path):
     path = tmp_path / "my_ik.py"
     path.write_text("def inverse_kinematics(request):\n    return request\n")
     entrant = Entrant("Mine", str(path), str(path), digest=digest_of(str(path)))
@@ -361,7 +351,7 @@ def test_a_machine_is_shared_by_answers_and_not_by_times(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("words", ["got a link", "another user's"])
-def test_a_lock_that_is_not_ours_is_not_taken(tmp_path, monkeypatch, words):
+def test_a_lock_of_another_user_is_not_taken(tmp_path, monkeypatch, words):
     """Everyone may write to the folder of temporary files: a link would lead to any file."""
     monkeypatch.setattr(work.tempfile, "gettempdir", lambda: str(tmp_path))
     user = os.getuid()
@@ -374,7 +364,7 @@ def test_a_lock_that_is_not_ours_is_not_taken(tmp_path, monkeypatch, words):
     assert not (tmp_path / "file").exists()
 
 
-def test_what_a_worker_does_is_heard(made_up, monkeypatch):
+def test_the_progress_of_a_worker_is_reported(made_up, monkeypatch):
     """Long steps are said while they last, as in one process."""
     cluster = MadeUpCluster(w1="h1/x")
     cluster.subscribe_topic = lambda topic, handler: setattr(cluster, "tell", handler)
@@ -386,7 +376,7 @@ def test_what_a_worker_does_is_heard(made_up, monkeypatch):
 
     cluster.submit = tell_and_submit
     heard = []
-    with listening(lambda progress: heard.append(progress.what)):
+    with listening(lambda progress: heard.append(progress.subject)):
         made_up(cluster)
     assert heard == [f"step {i}" for i in range(9)]
 
@@ -412,23 +402,19 @@ def address(cluster):
     return cluster.scheduler_address.replace("tcp://", "dask://")
 
 
-def shown(folder, suites):
-    """All tables as text."""
-    made = tables(Results(RecordFile(folder).read().records), suites)
-    return {table.name: markdown(table) for table in made if table.rows}
+def results(folder, suites, *executor):
+    """All tables as text, and all arrays."""
+    list(run.run(suites, "quick", folder, *executor))
+    all_tables = tables(Results(RecordFile(folder).read().records), suites)
+    texts = {table.name: markdown(table) for table in all_tables if table.rows}
+    arrays = {r.key: {n: a.tobytes() for n, a in r.arrays.items()} for r in records(folder)}
+    return texts, arrays
 
 
 def assert_same_tables(suites, executor, folder):
-    list(run.run(suites, "quick", folder / "one"))
-    list(run.run(suites, "quick", folder / "two", executor))
-    one, two = (shown(folder / name, suites) for name in ("one", "two"))
-    assert one
-    assert one == two
-    arrays = [
-        {r.key: {name: a.tobytes() for name, a in r.arrays.items()} for r in records(folder / name)}
-        for name in ("one", "two")
-    ]
-    assert arrays[0] == arrays[1]
+    local = results(folder / "one", suites)
+    assert local[0]
+    assert results(folder / "two", suites, executor) == local
 
 
 def test_two_workers_give_the_same_tables_to_the_bit_as_one_process(executor, few, tmp_path):
@@ -439,10 +425,7 @@ def test_two_workers_give_the_same_tables_to_the_bit_as_one_process(executor, fe
 @pytest.mark.slow
 @pytest.mark.parametrize("suite", sorted({e.suite for e in EXPERIMENTS if not e.times}))
 def test_every_suite_gives_the_same_tables_on_two_workers(executor, monkeypatch, suite, tmp_path):
-    def untimed(suite, scale):
-        return (block for block in blocks(suite, scale) if not block.times)
-
-    monkeypatch.setattr(run, "blocks", untimed)
+    monkeypatch.setattr(run, "blocks", lambda *suite: (b for b in blocks(*suite) if not b.times))
     assert_same_tables([suite], executor, tmp_path)
 
 
@@ -451,7 +434,6 @@ import os, sys, signal
 from plumbob.bench.experiments import SCALES, Scale
 from plumbob.bench.harness.executors import executor_at
 from plumbob.bench.harness import run
-from plumbob.bench.harness.block import Choice
 from pathlib import Path
 SCALES["quick"] = Scale(targets=3, seconds=0.001)
 done = 0
@@ -462,7 +444,7 @@ for event in run.run(["arm"], "quick", Path(sys.argv[1]), executor_at(sys.argv[2
 """
 
 
-def test_a_client_that_was_killed_takes_up_where_it_was(cluster, executor, tmp_path):
+def test_a_killed_client_continues_where_it_was(cluster, executor, tmp_path):
     command = [sys.executable, "-c", CLIENT, str(tmp_path), address(cluster)]
     done = subprocess.run(command, cwd=ROOT, check=False, stderr=subprocess.DEVNULL)
     assert done.returncode == -signal.SIGKILL

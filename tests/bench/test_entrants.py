@@ -73,7 +73,7 @@ def cells(table):
 
 
 @pytest.mark.parametrize("code", [IK, CLOTH, ROBOT], ids=["ik", "cloth", "robot"])
-def test_fifteen_lines_suffice(code):
+def test_the_examples_of_the_page_are_short(code):
     assert sum(bool(line.strip()) for line in code.splitlines()) <= 15
 
 
@@ -133,7 +133,7 @@ def test_a_cloth_solver_moves_on_and_has_the_limit_of_its_method(folder):
     assert "My symplectic Euler" in cells(made("cloth")["cloth_peers_motion"])
 
 
-def test_a_later_plain_run_keeps_what_was_entered(folder, capsys, monkeypatch):
+def test_a_later_plain_run_keeps_records_of_entrants(folder, capsys, monkeypatch):
     bench("ik", *SMALL, "--with", "my_ik.py", "--solver", "My FABRIK")
     (before,) = records()
     assert not any(one.suite == "finished" for one in RecordFile("out").read().records)
@@ -160,11 +160,11 @@ def test_a_changed_file_is_measured_again_and_a_part_forgets_nothing(folder, cap
     assert bench(*asked) == 0
     said = capsys.readouterr().out
     assert re.search(
-        r"measured again: 1, for other sources of My FABRIK \(\w{12}, now \w{12}\)", said
+        r"easured again: 1, for other sources of My FABRIK \(\w{12}, now \w{12}\)", said
     )
 
 
-def test_the_sources_of_a_solver_and_their_commit_are_known(folder):
+def test_the_digest_and_the_commit_cover_imported_files(folder):
     """A file of its folder that it imports belongs to it."""
     path, part = folder / "my_ik.py", folder / "mine" / "one.py"
     path.write_text("import mine.one\n" + IK, encoding="utf-8")
@@ -193,7 +193,7 @@ for line in sys.stdin:
 
 
 @pytest.mark.parametrize(("extra", "remark"), [('"seconds": 1e-7', ""), ("", "round trip")])
-def test_a_program_enters_by_lines_and_is_timed_by_itself_or_says_so(folder, extra, remark):
+def test_a_program_is_timed_by_its_own_clock_or_by_round_trips(folder, extra, remark):
     (folder / "program.py").write_text(PROGRAM.replace("EXTRA", extra), encoding="utf-8")
     words = ["bench", "ik", *SMALL, "--solver", "My program", "-o", "out"]
     assert run_command([*words, "--", sys.executable, str(folder / "program.py")]) == 0
@@ -205,7 +205,7 @@ def test_a_program_enters_by_lines_and_is_timed_by_itself_or_says_so(folder, ext
 @pytest.mark.parametrize(
     ("extra", "done"), [('"seconds": 1e-7', 6), pytest.param("", 2, marks=pytest.mark.slow)]
 )
-def test_a_budget_goes_by_the_seconds_that_a_solver_behind_a_slow_door_counts(folder, extra, done):
+def test_a_budget_counts_the_seconds_of_the_solver_not_of_its_requests(folder, extra, done):
     slow = PROGRAM.replace("EXTRA", extra).replace("print(json", "time.sleep(0.15); print(json")
     (folder / "slow.py").write_text(slow.replace("import json", "import json, time"))
     entrant = Entrant("slow", "", (sys.executable, str(folder / "slow.py")), tasks=(CHAIN_TASK,))
@@ -230,9 +230,7 @@ def pass_by(monkeypatch):
 
 
 @pytest.mark.parametrize(("claimed", "counted"), [(0.0, 1.5), (1e-12, 1e-12)])
-def test_a_request_that_a_solver_counts_no_time_of_takes_its_round_trip(
-    pass_by, monkeypatch, claimed, counted
-):
+def test_a_request_without_a_time_takes_its_round_trip(pass_by, monkeypatch, claimed, counted):
     door = SimpleNamespace(answer=lambda case: pass_by(1.5) or Answer({}, claimed))
     monkeypatch.setattr(contestant, "open_contestant", lambda *_: door)
     solver = contestant.Contestant("mine")
@@ -240,7 +238,7 @@ def test_a_request_that_a_solver_counts_no_time_of_takes_its_round_trip(
     assert bool(solver.remark) == (not claimed)
 
 
-def test_a_budget_ends_though_a_solver_counts_almost_nothing(pass_by):
+def test_a_budget_ends_even_if_a_solver_claims_almost_no_time(pass_by):
     budget = stopwatch.Budget(1.0)
     for _ in range(int(stopwatch.MAXIMUM_EXTENSION)):
         assert not budget.is_spent
@@ -296,13 +294,10 @@ def entrants(*words):
     return opening.opened(opening.addresses(words), ["ik"])
 
 
-@pytest.mark.parametrize("name", ["CCD", "mink", "TRAC-IK, 5 ms"])
-def test_a_name_of_ours_or_of_a_peer_gets_the_address_behind_it(folder, name):
-    (one,) = entrants(f"{name}=my_ik.py")
-    assert one.name == f"{name} (my_ik.py)"
-
-
-def test_two_of_one_name_are_refused_and_may_be_called_otherwise(folder):
+def test_names_are_made_distinct_or_refused(folder):
+    """A name of ours or of a peer gets the address behind it."""
+    for name in ("CCD", "mink", "TRAC-IK, 5 ms"):
+        assert [e.name for e in entrants(f"{name}=my_ik.py")] == [f"{name} (my_ik.py)"]
     (folder / "other.py").write_text(IK)
     with pytest.raises(ValueError, match=r"'My FABRIK' twice, my_ik\.py and other\.py"):
         entrants("my_ik.py", "other.py")
@@ -365,7 +360,7 @@ def test_an_entry_point_takes_part_by_itself_and_a_broken_one_harms_nobody(
     assert "takes no part" in told.err
 
 
-def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solver_itself(folder):
+def test_a_robot_solver_is_run_with_one_start_and_with_restarts(folder):
     (folder / "robot.py").write_text(ROBOT)
     bench("ik", "--quick", "--targets", "10", "--problem", "robots/ur5", "--with", "robot.py",
           "--solver", "Mine")  # fmt: skip
@@ -377,7 +372,7 @@ def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solv
 
 
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
-def test_a_request_calls_the_tool_as_the_protocol_says(name):
+def test_the_link_of_the_tool_is_where_poses_are_evaluated(name):
     """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
     from plumbob.bench.peers.ik.entrant import robot_inputs
     from plumbob.bench.problems.evaluate import evaluator_of
@@ -397,11 +392,11 @@ def test_a_request_calls_the_tool_as_the_protocol_says(name):
         np.testing.assert_allclose(tool_pose(inputs, q).positions, positions[0], atol=1e-12)
 
 
-def test_the_door_is_closed_after_the_greeting(folder, monkeypatch):
-    closed, door = [], open_contestant(str(folder / "my_ik.py"))
-    close = door.close
-    monkeypatch.setattr(door, "close", lambda: closed.append(close()))
-    monkeypatch.setattr(opening, "open_contestant", lambda *_: door)
+def test_a_solver_is_closed_after_its_greeting(folder, monkeypatch):
+    closed, solver = [], open_contestant(str(folder / "my_ik.py"))
+    close = solver.close
+    monkeypatch.setattr(solver, "close", lambda: closed.append(close()))
+    monkeypatch.setattr(opening, "open_contestant", lambda *_: solver)
     entrants("my_ik.py")
     assert closed == [None]
 
@@ -422,7 +417,7 @@ def test_the_door_is_closed_after_the_greeting(folder, monkeypatch):
         ),
     ],
 )
-def test_a_near_miss_is_met_with_a_question(folder, capsys, words, said):
+def test_a_misspelt_name_gets_a_suggestion(folder, capsys, words, said):
     assert bench("ik", "--quick", *words) == 2
     assert said in capsys.readouterr().err
 
@@ -443,7 +438,7 @@ def test_a_dry_run_measures_nothing_and_knows_how_long_it_takes(folder, capsys):
     assert len(records()) == 1
 
 
-def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
+def test_problems_of_a_python_file_stand_in_the_same_tables(folder, capsys):
     (folder / "my_problems.py").write_text(PROBLEMS, encoding="utf-8")
     words = ("--problem", "my_problems.py", "--with", "my_ik.py", "--solver", "My FABRIK")
     assert bench("ik", "--quick", *words, "--solver", "ccd") == 0
@@ -453,17 +448,9 @@ def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
     assert [row[0] for row in made("ik")["accuracy"].rows] == ["tentacle", "tentacle"]
     assert all((r.arrays["residual"] <= 1e-4).mean() > 0.5 for r in records())
     (folder / "my_problems.py").write_text(PROBLEMS.replace("0.3, 0.3", "0.2, 0.2"))
-    assert "tentacle is another problem now" in dry(folder, *words)
-
-
-def dry(folder, *words):
-    from plumbob.commands import plan
-    from plumbob.commands.selection import Request, choose
-
-    given = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--problem"]
-    entered = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--with"]
-    choice = choose(["ik"], "quick", Request(entered, problems=given))
-    return "\n".join(plan.dry_run(["ik"], choice, folder / "out"))
+    capsys.readouterr()
+    assert bench("ik", "--quick", *words, "--dry-run") == 0
+    assert "tentacle is another problem now" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.slow
@@ -615,7 +602,9 @@ def test_a_folder_of_models_is_measured_by_ours_and_by_entrants(folder):
         ("--problem", "bad.obj", "f 1 2 3", "bad.obj"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_opened_is_refused_in_one_sentence(folder, capsys, option, name, text, said):
+def test_an_invalid_solver_or_problem_is_refused_in_one_sentence(
+    folder, capsys, option, name, text, said
+):
     if text:
         (folder / name).write_text(text)
     assert bench("cloth" if name.endswith("obj") else "ik", "--quick", option, name) == 2

@@ -38,17 +38,14 @@ def only_shows(path):
 def test_an_edit_of_any_file_changes_the_digest_unless_it_only_shows_numbers(copy):
     files = machine.source_files()
     assert files == sorted(p for p in every_file(copy) if not only_shows(p.relative_to(copy)))
+    once_left_out = ("peers/cloth/plumbob.py", "experiments/cloth_peers/job.py")
+    assert {copy / "bench" / name for name in once_left_out} <= set(files)
+    assert all((copy / name).exists() for name in machine.PRESENTATION)
     digests = {machine.source_digest()}
     for path in files[::40]:
         path.write_bytes(path.read_bytes() + b"\n")
         digests.add(machine.source_digest())
     assert len(digests) == 1 + len(files[::40])
-
-
-def test_the_files_that_were_once_left_out_count():
-    names = ("peers/cloth/plumbob.py", "experiments/cloth_peers/job.py")
-    files = machine.source_files()
-    assert all(ROOT / "bench" / name in files for name in names)
 
 
 def test_a_new_file_and_a_new_name_change_the_digest_and_a_compiled_cache_does_not(copy):
@@ -63,10 +60,6 @@ def test_a_new_file_and_a_new_name_change_the_digest_and_a_compiled_cache_does_n
     cache.mkdir()
     (cache / "kernel.nbi").write_text("")
     assert machine.source_digest() in digests
-
-
-def test_what_only_shows_numbers_is_there():
-    assert all((ROOT / name).exists() for name in machine.PRESENTATION)
 
 
 def imported(path, root):
@@ -99,7 +92,7 @@ def measuring_files_that_import_what_shows(root):
     ]  # fmt: skip
 
 
-def test_what_measures_never_imports_what_only_shows():
+def test_measurements_never_import_presentation():
     assert measuring_files_that_import_what_shows(ROOT) == []
 
 
@@ -113,19 +106,16 @@ def test_what_measures_never_imports_what_only_shows():
         'importlib.import_module("plumbob.bench.tables.results")',
     ],
 )
-def test_an_import_of_what_only_shows_is_found(copy, line):
+def test_an_import_of_presentation_is_found(copy, line):
     path = copy / "bench" / "harness" / "metrics.py"
     path.write_text(f"{path.read_text()}\n{line}\n")
     assert measuring_files_that_import_what_shows(copy)
 
 
-def test_the_stamp_names_machine_and_versions_but_no_host():
+def test_the_stamp_names_machine_and_versions_but_no_host(monkeypatch):
     stamp = machine.stamp()
     assert stamp["machine"]["cores"] >= 1
     assert all(stamp["versions"][name] for name in ("python", "numpy", "mujoco", "pin"))
     assert socket.gethostname() not in str(stamp)
-
-
-def test_a_package_that_is_missing_has_an_empty_version(monkeypatch):
     monkeypatch.setattr(machine, "PACKAGES", ("no-such-package-anywhere",))
     assert machine.versions()["no-such-package-anywhere"] == ""

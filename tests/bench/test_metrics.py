@@ -27,19 +27,26 @@ def test_wilsons_interval_of_the_textbook():
     assert (round(share.low, 4), round(share.high, 4)) == (0.2553, 0.3662)
 
 
-def test_no_solves_say_nothing():
+def test_closed_forms():
     assert metrics.share(np.array([], bool)) == (0, 0, 0.0, 1.0)
-    assert all(math.isnan(x) for x in metrics.spread(np.array([])))
-
-
-def test_spread_does_not_hide_a_nan():
-    assert all(math.isnan(x) for x in metrics.spread(np.array([1.0, np.nan])))
-
-
-def test_spread_and_whole_of_counts():
+    assert np.isnan([metrics.spread(np.array([])), metrics.spread(np.array([1.0, np.nan]))]).all()
     assert metrics.spread(np.arange(101)) == (50.0, 95.0, 100.0)
     assert metrics.whole(np.array([1, 2])) == (1.5, pytest.approx(1.95), 2)
     assert isinstance(metrics.whole(np.array([1, 2]))[2], int)
+    excess = metrics.excess(np.array([1.0, 0.25]), np.array([2.5, 1.0]), 2.0)
+    np.testing.assert_array_equal(excess, [0.5, 0.25])
+    x, exact, start = np.array([[1.0, 0]]), np.array([[0.0, 0]]), np.array([[0.0, 4]])
+    assert metrics.relative_error(x, exact, start) == 0.25
+    points = np.array([[3.0, 4, 0], [0, 0, 0]])
+    assert metrics.rms_distance(points, np.zeros((2, 3))) == pytest.approx(math.sqrt(12.5))
+    assert metrics.first_below(np.array([1.0, 0.1, 0.2, 0.01]), 0.1) == 1
+    assert metrics.first_below(np.array([1.0, np.nan]), 0.1) is None
+    assert metrics.timing(np.arange(11.0))[:4] == (5.0, 1.0, 9.0, 11)
+    assert metrics.effort(np.array([1.0, 1.0, 1.0, 9.0])) == (1.0, pytest.approx(7.8), 3.0)
+    seconds, solved = np.array([1.0, 2.0, 50.0, np.inf]), np.array([True, False, False, False])
+    assert metrics.penalised(seconds, solved, 10.0).tolist() == [1.0, 10.0, 50.0, 10.0]
+    assert metrics.relative_spread(np.array([0.9, 1.0, 1.1] * 10)) == pytest.approx(0.1)
+    assert math.isnan(metrics.relative_spread(np.array([])))
 
 
 def test_bend_of_a_right_angle_and_of_a_straight_line():
@@ -52,37 +59,11 @@ def test_bend_of_a_right_angle_and_of_a_straight_line():
     assert metrics.bend(straight, np.array([2.0, 4, 6])) < 1e-15
 
 
-def test_excess_is_measured_from_the_best_residual():
-    excess = metrics.excess(np.array([1.0, 0.25]), np.array([2.5, 1.0]), 2.0)
-    np.testing.assert_array_equal(excess, [0.5, 0.25])
-
-
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.1, 3.0])
-def test_turns_are_the_angle_between_frames_whatever_the_quaternions_sign(angle):
+def test_rotation_angles_do_not_depend_on_the_sign_of_quaternions(angle):
     baseline, rotated = rotation.identity(2), rotation.exponential([[0, angle, 0], [0, 0, 0]])
     angles = metrics.rotation_angles(np.array([baseline, rotated, -rotated]))
     np.testing.assert_allclose(angles, [[angle, 0], [0, 0]], rtol=1e-9, atol=1e-15)
-
-
-def test_errors_and_distances():
-    x, exact, start = np.array([[1.0, 0]]), np.array([[0.0, 0]]), np.array([[0.0, 4]])
-    assert metrics.relative_error(x, exact, start) == 0.25
-    points = np.array([[3.0, 4, 0], [0, 0, 0]])
-    assert metrics.rms_distance(points, np.zeros((2, 3))) == pytest.approx(math.sqrt(12.5))
-
-
-def test_first_below():
-    assert metrics.first_below(np.array([1.0, 0.1, 0.2, 0.01]), 0.1) == 1
-    assert metrics.first_below(np.array([1.0, np.nan]), 0.1) is None
-
-
-def test_timing_is_the_median_between_tenths():
-    took = metrics.timing(np.arange(11.0))
-    assert took[:4] == (5.0, 1.0, 9.0, 11)
-
-
-def test_effort_counts_all():
-    assert metrics.effort(np.array([1.0, 1.0, 1.0, 9.0])) == (1.0, pytest.approx(7.8), 3.0)
 
 
 solves = st.lists(st.tuples(st.floats(1e-6, 10.0), st.booleans()), min_size=1, max_size=30)
@@ -97,7 +78,7 @@ def test_a_budget_curve_rises_to_the_success(made):
     assert curve[-1] == metrics.share(solved).hits / len(solved)
 
 
-def test_a_budget_counts_what_is_solved_in_just_that_time():
+def test_a_budget_counts_targets_solved_in_exactly_that_time():
     seconds, solved = np.array([1.0, 2.0, 3.0, 0.5]), np.array([True, True, False, False])
     curve = metrics.within_budget(seconds, solved, np.array([0.9, 1.0, 2.0, 5.0]))
     assert curve.tolist() == [0.0, 0.25, 0.5, 0.5]
@@ -151,7 +132,7 @@ def flags(hits, total):
     return np.arange(total) < hits
 
 
-def test_a_leader_within_chance_of_a_rival_ties_with_it_and_leads_no_further():
+def test_a_leader_within_chance_of_a_rival_ties_with_it():
     scores = {"a": flags(98, 100), "b": flags(97, 100), "c": flags(60, 100)}
     assert metrics.ranking(scores) == (("a", "b", "c"), ("a", "b"))
     assert metrics.ranking({"c": flags(60, 100), "a": flags(98, 100)}).first == ("a",)
@@ -160,14 +141,14 @@ def test_a_leader_within_chance_of_a_rival_ties_with_it_and_leads_no_further():
 
 
 @pytest.mark.parametrize(("gained", "lost"), [(6, 0), (5, 1), (0, 0), (8_900, 9_100)])
-def test_truth_values_are_told_apart_by_mcnemars_exact_test(gained, lost):
+def test_truth_values_are_compared_by_mcnemars_exact_test(gained, lost):
     a = np.concatenate([np.ones(gained), np.zeros(lost), np.ones(30)])
     b = np.concatenate([np.zeros(gained), np.ones(lost), np.ones(30)])
     chance = 2.0 * stats.binom.cdf(min(gained, lost), gained + lost, 0.5)
     assert metrics.chance_of_pairs(a, b) == pytest.approx(min(1.0, chance), rel=1e-9)
 
 
-def test_pairs_tell_apart_what_two_intervals_would_not(rng):
+def test_pairs_differ_where_two_intervals_overlap(rng):
     """Targets differ by thousands, the solvers by a tenth on each."""
     hard = rng.lognormal(0.0, 3.0, 200)
     scores = {"fast": -np.log(hard), "slow": -np.log(1.1 * hard * rng.lognormal(0.0, 0.1, 200))}
@@ -175,21 +156,14 @@ def test_pairs_tell_apart_what_two_intervals_would_not(rng):
 
 
 @pytest.mark.parametrize("count", [8, 40])
-def test_equals_are_told_apart_in_at_most_five_of_a_hundred(rng, count):
-    """Four equals, ranked 400 times: rarely is one told apart (the error is 0.011)."""
-    told_apart = sum(
+def test_equals_differ_in_at_most_five_of_a_hundred(rng, count):
+    """Four equals, ranked 400 times: rarely does one differ (the error is 0.011)."""
+    differing = sum(
         len(metrics.ranking(dict(zip("abcd", rng.lognormal(size=(4, count)), strict=True))).first)
         < 4
         for _ in range(400)
     )
-    assert told_apart <= 0.075 * 400
-
-
-def test_what_was_not_solved_costs_the_penalty_or_what_it_took():
-    taken = metrics.penalised(
-        np.array([1.0, 2.0, 50.0, np.inf]), np.array([True, False, False, False]), 10.0
-    )
-    assert taken.tolist() == [1.0, 10.0, 50.0, 10.0]
+    assert differing <= 0.075 * 400
 
 
 def test_the_shifted_geometric_mean_is_that_of_its_definition(rng):
@@ -211,15 +185,15 @@ def test_the_bootstrap_draws_within_each_group():
     assert high > 2.0 * low
 
 
-def test_the_intervals_of_the_bootstrap_hold_the_truth(rng):
-    held = 0
+def test_the_intervals_of_the_bootstrap_contain_the_truth(rng):
+    count = 0
     for _ in range(200):
         _, low, high = metrics.shifted_geometric_mean(rng.lognormal(0.0, 1.0, 60), 0.0)
-        held += low <= 1.0 <= high
-    assert held >= 0.89 * 200  # 0.94 of these; 200 draws err by 0.017
+        count += low <= 1.0 <= high
+    assert count >= 0.89 * 200  # 0.94 of these; 200 draws err by 0.017
 
 
-def test_of_very_many_targets_the_interval_is_the_same_without_draws(rng, monkeypatch):
+def test_very_many_targets_have_the_same_interval_without_draws(rng, monkeypatch):
     values = np.concatenate([rng.lognormal(0.0, 1.0, 3000), rng.lognormal(3.0, 0.1, 3000)])
     drawn = metrics.shifted_geometric_mean(values, 1e-5, (3000, 3000))
     monkeypatch.setattr(metrics, "LARGE", 5000)
@@ -234,8 +208,3 @@ def test_the_interval_of_a_timing_is_that_of_its_sweeps():
     assert metrics.timing(sweeps).interval == (5.5, 2.0, 9.0)
     assert metrics.timing(sweeps).rounds == 500
     assert metrics.timing(sweeps.ravel()).interval.high < 9.0
-
-
-def test_the_spread_of_a_loop_is_half_its_middle_eight_tenths():
-    assert metrics.relative_spread(np.array([0.9, 1.0, 1.1] * 10)) == pytest.approx(0.1)
-    assert math.isnan(metrics.relative_spread(np.array([])))

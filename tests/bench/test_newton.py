@@ -24,55 +24,54 @@ def stiff():
     return {which: suite.certified_step(SIZE, 1e5, *which) for which in wanted}
 
 
+def is_certified(arrays):
+    return arrays["covered"] and arrays["same"]
+
+
 def test_newton_reaches_the_tolerance_and_is_covered(stiff):
-    found = stiff["newton", suite.FROM_Y, 100].arrays
-    assert found["residual"] <= suite.TOLERANCE or found["at_floor"]
-    assert found["covered"]
-    assert found["same"]
-    assert found["balance"] < 1e-10
-    assert 0 < found["distance"] < 1e-9
+    arrays = stiff["newton", suite.FROM_Y, 100].arrays
+    assert arrays["residual"] <= suite.TOLERANCE or arrays["at_floor"]
+    assert is_certified(arrays)
+    assert arrays["balance"] < 1e-10
+    assert 0 < arrays["distance"] < 1e-9
 
 
 @pytest.mark.parametrize(
-    "which", [("lbfgs", suite.FROM_Y, 2000), ("local_global", suite.NEAR_NEWTON, 500)]
+    "key", [("lbfgs", suite.FROM_Y, 2000), ("local_global", suite.NEAR_NEWTON, 500)]
 )
-def test_the_others_limits_are_newtons_wherever_both_are_covered(stiff, which):
-    found = stiff[which].arrays
-    assert found["covered"]
-    assert found["same"]
-    newton = stiff["newton", suite.FROM_Y, 100].arrays
-    assert 0 < found["apart"] <= found["distance"] + newton["distance"]
+def test_the_limits_of_other_solvers_are_newtons_where_both_are_covered(stiff, key):
+    arrays, newton = stiff[key].arrays, stiff["newton", suite.FROM_Y, 100].arrays
+    assert is_certified(arrays)
+    assert 0 < arrays["apart"] <= arrays["distance"] + newton["distance"]
 
 
 def test_an_answer_far_from_the_limit_has_no_bound_but_an_error(stiff):
     measured = stiff["local_global", suite.FROM_Y, 3]
-    found = measured.arrays
-    assert not any(found[name] for name in ("covered", "same", "different"))
-    assert found["distance"] == np.inf
-    assert found["error"] > 0.1
-    assert found["above"] > 0
-    assert measured.notes["why"].startswith("No bound")
+    arrays, notes = measured.arrays, measured.notes
+    assert not any(arrays[name] for name in ("covered", "same", "different"))
+    assert arrays["distance"] == np.inf
+    assert arrays["error"] > 0.1
+    assert arrays["above"] > 0
+    assert notes["why"].startswith("No bound")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stiffness", STIFFNESSES)
 def test_on_thirty_by_thirty_newton_converges_and_the_others_limits_agree(stiffness):
-    here = [
-        block
+    answers = {
+        (block.solver, block.settings["start"]): block.measure().arrays
         for block in blocks("newton", SCALES["full"])
         if block.problem == f"swing/k{stiffness:g}" and block.settings["iterations"] > suite.USUAL
-    ]
-    found = {(b.solver, b.settings["start"]): b.measure().arrays for b in here}
-    newton = found["newton", suite.FROM_Y]
+    }
+    newton = answers["newton", suite.FROM_Y]
     assert newton["residual"] <= suite.TOLERANCE or newton["at_floor"]
     assert newton["covered"]
-    for arrays in found.values():
-        if arrays["covered"]:
-            assert arrays["same"]
-            assert arrays["apart"] <= arrays["distance"] + newton["distance"]
+    for arrays in (arrays for arrays in answers.values() if arrays["covered"]):
+        assert arrays["same"]
+        assert arrays["apart"] <= arrays["distance"] + newton["distance"]
     others = set(STEP_SOLVERS) - {"newton", "gauss_newton"}
     start = suite.NEAR_NEWTON if stiffness >= suite.STIFF else suite.FROM_Y
-    assert all(found[solver, start]["covered"] for solver in others)
+    assert all(answers[solver, start]["covered"] for solver in others)
 
 
 def test_every_solver_has_a_block_at_every_stiffness():

@@ -1,7 +1,10 @@
-"""Result files: nothing is lost, nothing is read that is not there."""
+"""Result files: nothing is lost, nothing is read that is not there or not of its type."""
 
+import errno
 import json
 import os
+import resource
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from plumbob.bench.experiments.energy.values import Swing
+from plumbob.bench.harness.block import Block, Measured
+from plumbob.bench.harness.measure import measure, record_of
 from plumbob.bench.harness.record import FILE_NAME, Record, RecordFile, decode, encode, key
 
 ANY_FLOATS = arrays.arrays(
@@ -20,49 +26,40 @@ def block(solver="ccd", value=1.0, **settings):
     return Record("made up", "arm/circle", solver, settings, arrays={"residual": np.array([value])})
 
 
-def same(a, b):
-    return encode(a) == encode(b)
+def returned(**fields):
+    """A record that was written and read."""
+    return decode(encode(Record("s", "p", "v", **fields)))
+
+
+@pytest.fixture
+def file(tmp_path):
+    return RecordFile(tmp_path)
+
+
+def solvers(file):
+    return [record.solver for record in file.read().records]
 
 
 @given(ANY_FLOATS)
-def test_numbers_come_back_bit_for_bit_nan_and_infinities_too(values):
-    back = decode(encode(Record("s", "p", "v", arrays={"x": values}))).arrays["x"]
-    assert back.shape == values.shape
-    np.testing.assert_array_equal(back, values)
-    np.testing.assert_array_equal(np.signbit(back), np.signbit(values) & ~np.isnan(values))
-
-
-def test_integers_and_truth_values_keep_their_kind():
-    made = Record("s", "p", "v", arrays={"i": np.array([1, 2]), "b": np.array([True, False])})
-    back = decode(encode(made)).arrays
-    assert back["i"].dtype.kind == "i"
-    assert back["b"].dtype.kind == "b"
-
-
-def test_a_line_is_standard_json_whatever_the_numbers():
-    line = encode(Record("s", "p", "v", arrays={"x": np.array([np.nan, np.inf, -np.inf])}))
-
+def test_numbers_come_back_bit_for_bit_as_standard_json(array):
     def refuse(word):
         raise AssertionError(f"{word} is no JSON")
 
-    json.loads(line, parse_constant=refuse)
+    json.loads(encode(Record("s", "p", "v", arrays={"x": array})), parse_constant=refuse)
+    back = returned(arrays={"x": array}).arrays["x"]
+    assert back.shape == array.shape
+    np.testing.assert_array_equal(back, array)
+    np.testing.assert_array_equal(np.signbit(back), np.signbit(array) & ~np.isnan(array))
 
 
-def test_facts_come_back_as_they_are():
+def test_integers_truth_values_facts_and_notes_come_back_as_they_are():
+    back = returned(arrays={"i": np.array([1, 2]), "b": np.array([True, False])}).arrays
+    assert [back[name].dtype.kind for name in "ib"] == ["i", "b"]
     facts = {"title": "arm, circle", "joints": 7, "damping": 0.0, "closed": True, "strata": ["a"]}
-    assert decode(encode(Record("s", "p", "v", facts={**facts, "none": None}))).facts == {
-        **facts, "none": None,
-    }  # fmt: skip
-
-
-def test_what_is_no_number_is_refused():
+    assert returned(facts={**facts, "none": None}).facts == {**facts, "none": None}
+    assert returned(notes={"failed": "no file \udcff"}).failed == "no file ?"
     with pytest.raises(ValueError, match="expected numbers"):
         encode(Record("s", "p", "v", arrays={"x": np.array(["one"])}))
-
-
-def test_a_note_with_half_a_surrogate_pair_is_written_so_that_it_can_be_read():
-    made = Record("s", "p", "v", notes={"failed": "no file \udcff"})
-    assert decode(encode(made)).failed == "no file ?"
 
 
 def test_the_key_ignores_the_order_of_settings_but_not_their_values():
@@ -70,39 +67,29 @@ def test_the_key_ignores_the_order_of_settings_but_not_their_values():
     assert key("s", "p", "v", {"a": 1}) != key("s", "p", "v", {"a": 2})
 
 
-def test_of_two_records_with_one_key_the_later_counts(tmp_path):
-    file = RecordFile(tmp_path)
+def test_of_two_records_with_one_key_the_later_counts(file):
+    assert file.read() == ([], "")
     file.append([block(value=1.0), block("fabrik")])
     file.append([block(value=2.0)])
-    read = file.read().records
-    assert [r.solver for r in read] == ["ccd", "fabrik"]
-    assert read[0].arrays["residual"] == 2.0
-
-
-def test_no_file_holds_no_records(tmp_path):
-    assert RecordFile(tmp_path).read() == ([], "")
+    assert solvers(file) == ["ccd", "fabrik"]
+    assert file.read().records[0].arrays["residual"] == 2.0
 
 
 @pytest.mark.parametrize("cut", [1, 2, 20, 100])
-def test_a_last_line_cut_off_is_left_out_and_said_and_mended(tmp_path, cut):
-    file = RecordFile(tmp_path)
+def test_a_truncated_last_line_is_left_out_and_replaced(file, cut):
     file.append([block("ccd"), block("fabrik")])
     whole = file.path.read_bytes()
     file.path.write_bytes(whole[:-cut])
-    records, warning = file.read()
-    if cut == 1:  # only the line's end is missing, not a letter of the record
-        assert len(records) == 2
-        assert warning == ""
-    else:
-        assert [r.solver for r in records] == ["ccd"]
-        assert "cut off" in warning
+    # With a cut of one only the line's end is missing, not a letter of the record.
+    assert solvers(file) == ["ccd", "fabrik"][: 1 + (cut == 1)]
+    assert ("cut off" in file.read().warning) == (cut > 1)
     file.append([block("fabrik")])
     assert file.path.read_bytes() == whole if cut > 1 else file.read().warning == ""
-    assert [r.solver for r in file.read().records] == ["ccd", "fabrik"]
+    assert solvers(file) == ["ccd", "fabrik"]
 
 
 def changed(path, value):
-    """A good line in which what stands at a path is another value, or is not there."""
+    """A valid line with another value at a path, or without it."""
     content = json.loads(encode(block(tolerance=1e-4)))
     content["notes"], content["when"] = {"remark": "fine"}, "2000-01-02T03:04:05+00:00"
     content["stamp"] = {
@@ -110,13 +97,14 @@ def changed(path, value):
         "versions": {"python": "3"},
         "source": "0",
     }
-    at = content
-    for name in path[:-1]:
-        at = at[name]
+    *parents, last = path
+    place = content
+    for name in parents:
+        place = place[name]
     if value is MISSING:
-        del at[path[-1]]
+        del place[last]
     else:
-        at[path[-1]] = value
+        place[last] = value
     return json.dumps(content).encode()
 
 
@@ -137,37 +125,35 @@ WRONG = {
     ("arrays", "residual"): NO_NUMBERS,
     ("format",): (None, 0, 1, 2, 4, 99, "3", True, [], 1.5),
 }
-FIELDS = [path for path in WRONG if len(path) == 1]
+
+
+def with_text(path, text):
+    """A valid line with a JSON text at a path, which need not be valid."""
+    return changed(path, "HERE").replace(b'"HERE"', text)
+
+
 DAMAGED = {
     **{f"{'.'.join(path)}={value!r}": changed(path, value)
        for path, values in WRONG.items() for value in values},
-    **{f"no {path[0]}": changed(path, MISSING) for path in FIELDS},
+    **{f"no {path[0]}": changed(path, MISSING) for path in WRONG if len(path) == 1},
     "broken": b"{", "a list": b"[]", "null": b"null", "a word": b'"NaN"', "nothing": b"{}",
-    "binary": b"\x00\xff\xfe", "NUL": changed(("solver",), "a").replace(b'"a"', b'"\x00"'),
+    "binary": b"\x00\xff\xfe", "NUL": with_text(("solver",), b'"\x00"'),
     "deep": b"[" * 100_000, "deep and whole": b"[" * 100_000 + b"]" * 100_000,
-    "deep array": changed(("arrays", "residual"), 0).replace(
-        b'"residual": 0', b'"residual": ' + b"[" * 300 + b"]" * 300),
-    "very deep array": changed(("arrays", "residual"), 0).replace(
-        b'"residual": 0', b'"residual": ' + b"[" * 10**5 + b"]" * 10**5),
+    "deep array": with_text(("arrays", "residual"), b"[" * 300 + b"]" * 300),
+    "very deep array": with_text(("arrays", "residual"), b"[" * 10**5 + b"]" * 10**5),
     "a lone surrogate": changed(("solver",), "\ud800"), "no UTF-8": b'{"format": 3, "\xff": 1}',
     "NaN": changed(("size",), float("nan")), "infinity": changed(("size",), float("inf")),
-    "beyond floats": changed(("size",), 0).replace(b'"size": 0', b'"size": 1e999'),
-    "a huge integer": changed(("size",), 0).replace(b'"size": 0', b'"size": ' + b"9" * 5000),
-    "a huge setting": changed(("settings", "tolerance"), 0).replace(
-        b'"tolerance": 0', b'"tolerance": ' + b"9" * 5000),
+    "beyond floats": with_text(("size",), b"1e999"),
+    "a huge integer": with_text(("size",), b"9" * 5000),
+    "a huge setting": with_text(("settings", "tolerance"), b"9" * 5000),
     "cut off": encode(block()).encode()[:-20], "cut off early": b'{"format": 3',
     "two in one": encode(block()).encode() * 2, "a mark of order": b"\xef\xbb\xbf{}",
 }  # fmt: skip
 
 
-def test_the_line_that_is_damaged_is_whole_before():
-    assert decode(changed(("solver",), "x")).solver == "x"
-    assert len(DAMAGED) >= 62
-
-
 @pytest.mark.parametrize("line", DAMAGED.values(), ids=[name[:60] for name in DAMAGED])
-def test_a_damaged_line_costs_itself_and_a_sentence_and_no_other(tmp_path, line):
-    file = RecordFile(tmp_path)
+def test_a_damaged_line_costs_itself_and_a_sentence_and_no_other(file, line):
+    assert decode(changed(("solver",), "x")).solver == "x"
     file.append([block("ccd")])
     good = file.path.read_bytes()
     file.path.write_bytes(good + line + b"\n")
@@ -178,97 +164,170 @@ def test_a_damaged_line_costs_itself_and_a_sentence_and_no_other(tmp_path, line)
     assert sentence.isprintable()
     assert len(sentence) < 300
     file.drop(lambda record: record.solver == "fabrik")
-    assert [r.solver for r in file.read().records] == ["ccd", "lm"]
+    assert solvers(file) == ["ccd", "lm"]
     assert file.path.read_bytes().startswith(good + line + b"\n")
 
 
-def test_of_many_damaged_lines_a_few_are_named_and_all_are_counted(tmp_path):
-    file = RecordFile(tmp_path)
+def test_of_many_damaged_lines_a_few_are_listed_and_all_are_counted(file):
     file.append([block()])
     file.path.write_bytes(b"rubbish\n\n" * 50 + file.path.read_bytes())
     records, sentence = file.read()
     assert len(records) == 1
     assert all(f"line {number} (" in sentence for number in (1, 3, 5, 7, 9))
-    assert sentence.endswith("; 45 more.")
+    assert "; 45 more" in sentence
     assert len(sentence) < 500
 
 
 @pytest.mark.parametrize("line", [b"rubbish", b"{}", b"\x00\xff", b'{"format": 99}', b"[" * 10**5])
-def test_a_file_without_a_record_is_not_ours(tmp_path, line):
-    file = RecordFile(tmp_path)
+def test_a_file_without_a_record_is_neither_read_nor_changed(file, line):
     file.path.write_bytes(line + b"\n" + line)
-    with pytest.raises(ValueError, match=rf"{FILE_NAME}, line 1: not a record"):
-        file.read()
+    for use in (file.read, lambda: file.drop(lambda record: True)):
+        with pytest.raises(ValueError, match=rf"{FILE_NAME}, line 1: not a record"):
+            use()
+    assert file.path.read_bytes() == line + b"\n" + line
 
 
-def test_an_end_that_is_no_record_cut_off_is_kept(tmp_path):
-    file = RecordFile(tmp_path)
+def test_an_end_that_is_no_truncated_record_is_kept(file):
     file.append([block("ccd")])
     whole = file.path.read_bytes()
     file.path.write_bytes(whole + b"a note of mine")
     file.append([block("fabrik")])
     assert file.path.read_bytes().startswith(whole + b"a note of mine\n")
-    assert [r.solver for r in file.read().records] == ["ccd", "fabrik"]
-
-
-def in_the_way(path, kind):
-    """Put something at a path that cannot be read to its end."""
-    if kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "device":
-        path.symlink_to("/dev/zero")
-    else:
-        path.mkdir()
+    assert solvers(file) == ["ccd", "fabrik"]
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
-def test_what_is_no_file_is_neither_read_nor_written(tmp_path, kind):
-    file = RecordFile(tmp_path)
-    in_the_way(file.path, kind)
-    message = f"{FILE_NAME}: expected a file, got a {kind}"
-    with pytest.raises(ValueError, match=message):
-        file.read()
-    with pytest.raises(ValueError, match=message):
-        file.append([block()])
+def test_a_path_that_is_no_file_is_neither_read_nor_written(file, kind):
+    if kind == "pipe":
+        os.mkfifo(file.path)
+    elif kind == "device":
+        file.path.symlink_to("/dev/zero")
+    else:
+        file.path.mkdir()
+    for use in (file.read, lambda: file.append([block()])):
+        with pytest.raises(ValueError, match=f"{FILE_NAME}: expected a file, got a {kind}"):
+            use()
 
 
-def test_a_corrupt_file_is_not_written_to(tmp_path):
-    file = RecordFile(tmp_path)
-    file.append([block()])
-    file.path.write_text("rubbish\n")
-    with pytest.raises(ValueError, match="line 1"):
-        file.drop(lambda record: True)
-    assert file.path.read_text() == "rubbish\n"
-
-
-def test_drop_removes_just_what_is_unwanted(tmp_path):
-    file = RecordFile(tmp_path)
+def test_drop_removes_only_unwanted_records(file):
     kept = block("fabrik", size=3)
     file.append([block("ccd"), kept])
     file.drop(lambda record: record.solver == "ccd")
-    assert len(file.read().records) == 1
-    assert same(file.read().records[0], kept)
-    assert list(tmp_path.iterdir()) == [file.path]
+    assert [encode(record) for record in file.read().records] == [encode(kept)]
+    assert list(file.path.parent.iterdir()) == [file.path]
 
 
-def test_records_are_brought_into_order_and_all_else_keeps_its_place(tmp_path):
-    file = RecordFile(tmp_path)
+def test_records_are_brought_into_order_and_all_else_keeps_its_place(file, monkeypatch):
     old, new = (block("b", value=value) for value in (1.0, 2.0))
-    given = [block("other"), block("c"), old, block("rest"), block("a"), new]
-    file.append(given)
+    file.append([block("other"), block("c"), old, block("rest"), block("a"), new])
     file.path.write_bytes(b"rubbish\n" + file.path.read_bytes())
-    before = file.path.read_bytes().splitlines()
-    file.arrange([block(name).key for name in "abc"])
+    before, order = file.path.read_bytes().splitlines(), [block(name).key for name in "abc"]
+    file.arrange(order)
     after = file.path.read_bytes().splitlines()
-    assert [r.solver for r in file.read().records] == ["other", "a", "b", "rest", "c"]
+    assert solvers(file) == ["other", "a", "b", "rest", "c"]
     assert sorted(after) == sorted(before)
     assert after[0] == b"rubbish"
     assert file.read().records[2].arrays["residual"] == 2.0
-
-
-def test_a_file_in_order_is_not_written_again(tmp_path, monkeypatch):
-    """A record that was measured again stands where it first stood."""
-    file = RecordFile(tmp_path)
-    file.append([block("a"), block("b"), block("a", value=2.0)])
+    file.append([block("a", value=2.0)])  # which stands where it first stood
     monkeypatch.setattr(RecordFile, "_replace", None)
-    file.arrange([block(name).key for name in "ab"])
+    file.arrange(order)
+
+
+def test_a_full_disk_costs_one_sentence_and_nothing_on_record(file, monkeypatch):
+    file.append([block("a")])
+    whole = file.path.read_bytes()
+
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full)
+        with pytest.raises(OSError, match="No space left on device; what was finished") as caught:
+            file.append([block("b")])
+        assert caught.value.filename == str(file.path)
+        with pytest.raises(OSError, match="No space left"):
+            file.drop(lambda record: True)
+    assert file.path.read_bytes() == whole
+    assert list(file.path.parent.iterdir()) == [file.path]
+
+
+@pytest.mark.parametrize("truncated", [0, 20])
+def test_a_write_that_ends_in_its_middle_leaves_no_part_of_it(file, truncated):
+    """The limit on the size of files lets a part be written, as a disk does that fills up."""
+    file.append([block("a")])
+    whole = file.path.read_bytes()
+    if truncated:
+        file.path.write_bytes(whole + whole[:-truncated])
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(whole) + 100, hard))
+    try:
+        with pytest.raises(OSError, match="File too large; what was finished"):
+            file.append([block("b")])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert file.path.read_bytes() == whole
+    file.append([block("b")])
+    assert solvers(file) == ["a", "b"]
+
+
+# Records of their type.
+
+SETTINGS = {"h": 0.1, "steps": 2, "every": 1, "tolerance": 1e-10}
+FACTS = {"title": "undamped", "damping": 0.0}
+BLOCK = Block("energy", "swing/undamped", "RK4", lambda: None, SETTINGS, facts=FACTS)
+TIMES, LEFT = np.array([0.0, 0.1]), np.array([1.0, np.nan])
+
+
+@pytest.fixture
+def swing():
+    return record_of(BLOCK, Measured(Swing(TIMES, LEFT)), 1.0)
+
+
+def test_typed_values_come_back_by_their_fields(swing):
+    back = decode(encode(swing))
+    assert list(back.arrays) == ["time", "left"]
+    np.testing.assert_array_equal(back.values.left, LEFT)
+    assert (back.details.every, back.details.damping) == (1, 0.0)
+
+
+@pytest.mark.parametrize(("part", "name", "value", "why"), [
+    ("arrays", "left", None, "missing required field `left`"),
+    ("arrays", "left", [[1.0]], "expected 1 dimensions, got 2 - at `left`"),
+    ("arrays", "left", 1.0, "expected 1 dimensions, got 0 - at `left`"),
+    ("arrays", "left", [True], "expected float64, got bool - at `left`"),
+    ("facts", "damping", None, "missing required field `damping`"),
+    ("facts", "damping", "much", "Expected `float`, got `str` - at `damping`"),
+    ("settings", "every", 0.5, "Expected `int`, got `float` - at `every`"),
+])  # fmt: skip
+def test_a_line_of_the_wrong_type_is_refused_by_its_number(swing, file, part, name, value, why):
+    content = json.loads(encode(swing))
+    content[part].pop(name)
+    content[part] |= {} if value is None else {name: value}
+    file.append([block("other")])
+    with file.path.open("a") as lines:
+        lines.write(json.dumps(content) + "\n")
+    records, sentence = file.read()
+    assert [r.solver for r in records] == ["other"]
+    assert "line 2 (" in sentence
+    assert why in sentence
+
+
+def test_a_measurement_of_another_type_is_a_failure():
+    wrong = replace(BLOCK, measure=lambda: Measured(Swing(TIMES, 1.0)))
+    assert measure(wrong).failed == "ValueError: expected 1 dimensions, got 0 - at `left`"
+    assert not measure(replace(BLOCK, measure=lambda: Measured(Swing(TIMES, LEFT)))).failed
+
+
+@pytest.mark.parametrize("notes", [{"failed": "no memory"}, {"remark": "not installed"}])
+def test_a_record_without_numbers_has_no_values(notes):
+    back = decode(encode(record_of(BLOCK, Measured(None, notes), 1.0)))
+    assert back.values is None
+    assert back.details.every == 1
+
+
+def test_a_record_of_its_type_takes_the_place_of_one_that_is_not(swing, file):
+    file.append([swing])
+    line = file.path.read_text()
+    file.path.write_text(line.replace('"left"', '"lift"') + line)
+    assert file.read().warning == ""
+    assert len(file.read().records) == 1

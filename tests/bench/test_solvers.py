@@ -13,8 +13,11 @@ from plumbob.bench.experiments.chain.measurement import (
 )
 from plumbob.bench.experiments.chain.tables import beyond_reach
 from plumbob.bench.harness.record import Record
-from plumbob.bench.peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
-from plumbob.bench.peers.ik.reference_kinematics import ReferenceKinematics
+from plumbob.bench.peers.ik.levenberg_marquardt import (
+    ReferenceKinematics,
+    levenberg_marquardt,
+    within_reach,
+)
 from plumbob.bench.problems.chains import BEYOND, chain_targets
 from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import SKELETON_ENGINES

@@ -117,33 +117,31 @@ def test_rounds_are_as_long_and_as_many_as_the_time_allows(single, expected):
     assert measurement.shape(timer, 0.2) == expected
 
 
-def test_the_limit_moves_as_many_bytes_as_it_says(monkeypatch):
+def test_a_copy_moves_as_many_bytes_as_it_says(monkeypatch):
     sizes = []
     monkeypatch.setattr(np, "copyto", lambda to, source: sizes.append(to.nbytes + source.nbytes))
     case = copying(WORK, 1600, passes=3, operations=10)
     case.prepare()()
-    assert sizes == [1600] * 3
-    assert (case.moved, case.solver) == (4800, LIMIT)
+    assert (sizes, case.moved, case.solver) == ([1600] * 3, 4800, LIMIT)
 
 
-@pytest.mark.parametrize("many", [1, 3])
-def test_the_limit_of_batches_reads_and_writes_all_that_it_says(many, monkeypatch):
-    moved = []
+@pytest.mark.parametrize(("cores", "minimum", "slices"), [(1, 0, 1), (3, 8, 3 * 4)])
+def test_a_stream_reads_and_writes_all_that_it_says(cores, minimum, slices, monkeypatch):
+    sizes = []
 
     def watched(source, sink):
         stream(source, sink)
-        moved.append((source.nbytes, sink.nbytes))
+        sizes.append((source.nbytes, sink.nbytes))
         assert (sink[: len(source)] == 2.0).all()
         assert (sink[len(source) :] == 1.0).all()
 
     monkeypatch.setattr(timing_case, "_stream", watched)
-    case = streaming(WORK, 320, 560, cores=many, minimum=0 if many == 1 else 8)
-    with set_num_threads(many):
+    case = streaming(WORK, 320, 560, cores=cores, minimum=minimum)
+    with set_num_threads(cores):
         case.prepare()()
-    assert len(moved) == (1 if many == 1 else 3 * 4)
-    assert [sum(column) for column in zip(*moved, strict=True)] == [320, 560]
-    assert case.moved == 320 + 2 * 560
-    assert (case.solver, case.cores) == (LIMIT, many)
+    assert len(sizes) == slices
+    assert [sum(column) for column in zip(*sizes, strict=True)] == [320, 560]
+    assert (case.moved, case.solver, case.cores) == (320 + 2 * 560, LIMIT, cores)
 
 
 def test_every_batch_moves_what_its_limit_moves_on_as_many_cores():

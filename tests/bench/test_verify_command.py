@@ -131,28 +131,13 @@ def test_a_program_stands_behind_two_hyphens_with_its_own_options(capsys):
     assert json.loads(Path("a.json").read_text())["solver"]["name"] == "--lang zh --fast"
 
 
-# A time in seconds of each request by its number, of eight: four cases, each asked twice; the
-# reference's is 1e-5 in every case.
+# The time in seconds of each request by its number, of eight: four cases, each asked twice; the
+# reference's is 1e-5 in every case. Then the speed, or why there is none.
 TIMES = {
     "1e-6": "10 x faster",
     "2e-6 if number < 5 else 1e-6": "10 x faster",
     "1e-6 if number < 5 else 2e-6": "10 x faster",
     "4e-6 if number % 4 == 0 else 0": "10 x faster",
-}
-
-
-@pytest.mark.parametrize("seconds", TIMES)
-def test_a_time_beside_the_reference_is_the_programs_own(capsys, folder, seconds):
-    code, out, _ = verified_program(capsys, folder, seconds)
-    assert f"  {TIMES[seconds]}\n" in out
-    assert "Not timed" not in out
-    (task,) = json.loads(Path("out/verdict.json").read_text())["tasks"]
-    own, reference = (sum(c[k] for c in task["cases"]) for k in ("seconds", "reference_seconds"))
-    assert task["slowdown"] == pytest.approx(own / reference) == pytest.approx(0.1)
-    assert f"<td>{TIMES[seconds]}</td>" in Path("out/index.html").read_text()
-
-
-UNTIMED = {
     "None": "Not timed: only the round trips of requests are known",
     "None if number == 3 else 1e-6": "Not timed: only the round trips of requests are known",
     "100": "as 0, or a number from 1e-9 to the time that the answer took, got 100.",
@@ -161,30 +146,30 @@ UNTIMED = {
 }
 
 
-@pytest.mark.parametrize("seconds", UNTIMED)
-def test_a_program_without_a_time_of_its_own_stands_not_beside_the_reference(
-    capsys, folder, seconds
-):
-    code, out, _ = verified_program(capsys, folder, seconds)
-    assert "  not timed\n" in out
-    assert UNTIMED[seconds] in " ".join(out.split())
-    (task,) = (result := json.loads(Path("out/verdict.json").read_text()))["tasks"]
-    assert task["slowdown"] is None
-    assert any(UNTIMED[seconds] in remark for remark in result["remarks"])
-    assert all(one["seconds"] in (None, 0, 1e-6) for one in task["cases"])
-    page = Path("out/index.html").read_text()
-    assert "<td>not timed</td>" in page
-    for text in (out, page):
-        assert " x slower" not in text
-        assert " x faster" not in text
-
-
-def verified_program(capsys, folder, seconds):
-    """The exit code, stdout and stderr of `plumbob verify` of a program that says this time."""
-    answered = 'number = asked["id"]; answer["seconds"] = ' + seconds
-    text = PROGRAM.replace('answer["positions"]', f'{answered}; answer["positions"]')
+@pytest.mark.parametrize(("seconds", "words"), TIMES.items())
+def test_only_the_programs_own_time_is_compared_with_the_reference(capsys, folder, seconds, words):
+    setting = 'number = asked["id"]; answer["seconds"] = ' + seconds
+    text = PROGRAM.replace('answer["positions"]', f'{setting}; answer["positions"]')
     (folder / "timed.py").write_text(text)
-    return plumbob(capsys, "-o", "out", "--", sys.executable, "timed.py")
+    _, out, _ = plumbob(capsys, "-o", "out", "--", sys.executable, "timed.py")
+    result = json.loads(Path("out/verdict.json").read_text())
+    (task,) = result["tasks"]
+    page = Path("out/index.html").read_text()
+    if "faster" in words:
+        times = ([c[key] for c in task["cases"]] for key in ("seconds", "reference_seconds"))
+        own, reference = map(sum, times)
+        assert task["slowdown"] == pytest.approx(own / reference) == pytest.approx(0.1)
+        assert f"  {words}\n" in out
+        assert "Not timed" not in out
+        assert f"<td>{words}</td>" in page
+        return
+    assert task["slowdown"] is None
+    assert all(case["seconds"] in (None, 0, 1e-6) for case in task["cases"])
+    assert "  not timed\n" in out
+    assert words in " ".join(out.split())
+    assert any(words in remark for remark in result["remarks"])
+    assert "<td>not timed</td>" in page
+    assert not any(f" x {rate}" in text for rate in ("slower", "faster") for text in (out, page))
 
 
 def test_answers_are_judged_in_files(capsys, folder):
@@ -275,27 +260,24 @@ def templates(monkeypatch):
         ),
         "python": SimpleNamespace(files=("solver.py",), build="", run="python3 solver.py"),
     }
-    made = ModuleType("templates")
-    made.LANGUAGES = languages
-    made.template = lambda language: {one: f"// {one}\n" for one in languages[language].files}
-    monkeypatch.setitem(sys.modules, "plumbob.crosscheck.verify.templates", made)
+    module = ModuleType("templates")
+    module.LANGUAGES = languages
+    module.template = lambda language: {name: f"// {name}\n" for name in languages[language].files}
+    monkeypatch.setitem(sys.modules, "plumbob.crosscheck.verify.templates", module)
 
 
-def test_a_template_is_written_and_says_what_comes_next(capsys, folder, templates):
+def test_template_is_written_once_with_its_next_commands(capsys, folder, templates):
     code, out, _ = plumbob(capsys, "--template", "cpp")
     assert code == 0
-    assert (folder / "solver.cpp").read_text() == "// solver.cpp\n"
-    assert (folder / "plumbob.hpp").exists()
     for words in ("Build: g++ -o solver solver.cpp", "Then: plumbob verify -- ./solver"):
         assert words in out
     assert "Then: plumbob verify solver.py" in plumbob(capsys, "--template", "python")[1]
-
-
-def test_a_template_overwrites_nothing(capsys, folder, templates):
+    assert (folder / "solver.cpp").read_text() == "// solver.cpp\n"
+    (folder / "solver.cpp").unlink()
     (folder / "plumbob.hpp").write_text("mine")
     code, out, err = plumbob(capsys, "--template", "cpp")
     assert (code, out) == (2, "")
-    assert "plumbob.hpp is here already and stays as it is" in err
+    assert "plumbob.hpp is here already" in err
     assert (folder / "plumbob.hpp").read_text() == "mine"
     assert not (folder / "solver.cpp").exists()
 
@@ -354,48 +336,45 @@ test_wrong = laws(forward_kinematics=wrong.forward_kinematics, seed=1)
 """
 
 
+ROOT = str(Path(cli.__file__).parents[1])
+CODE = "from plumbob.cli import main; main()"
+
+
+def run_python(*arguments, **options):
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT}/tests:."}
+    environment |= options.pop("environment", {})
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, text=True, env=environment, timeout=120, **options)
+
+
 def test_laws_run_under_plain_pytest(folder):
     (folder / "test_mine.py").write_text(LAWS)
-    root = str(cli.__file__).removesuffix("plumbob/cli.py")
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([root, f"{root}tests", "."])}
-    run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-rA", "test_mine.py"],
-        capture_output=True, text=True, env=environment, timeout=120,
-    )  # fmt: skip
+    run = run_python("-m", "pytest", "-p", "no:cacheprovider", "-rA", "test_mine.py")
     assert run.returncode == 1, run.stdout
-    assert "4 failed, 4 passed" in run.stdout
-    assert "PASSED test_mine.py::test_right[forward_kinematics forward_kinematics, pose 0]" in (
-        run.stdout
-    )
-    assert "positions differ by" in run.stdout
-    assert "Its own rotation is applied to a joint's own offset." in run.stdout
+    for words in [
+        "4 failed, 4 passed",
+        "PASSED test_mine.py::test_right[forward_kinematics forward_kinematics, pose 0]",
+        "positions differ by",
+        "Its own rotation is applied to a joint's own offset.",
+    ]:
+        assert words in run.stdout
     assert "raceback" not in run.stdout
 
 
 def test_letters_that_a_terminal_lacks_cost_no_output():
-    code = "from plumbob.cli import main; main(['verify', '--list', '--lang', 'zh'])"
-    root = str(Path(cli.__file__).parents[1])
-    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONPATH": root}
-    run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=120
-    )
+    ascii_terminal = {"PYTHONIOENCODING": "ascii"}
+    run = run_python("-c", CODE, "verify", "--list", "--lang", "zh", environment=ascii_terminal)
     assert (run.returncode, run.stderr) == (0, "")
     assert "forward_kinematics(parents, offsets, local_rotations)" in run.stdout
 
 
 @pytest.mark.parametrize("solver", ["right.py", "wrong.py"])
-def test_a_full_disk_behind_the_screen_costs_no_file(folder, solver):
-    code = "from plumbob.cli import main; main()"
-    root = str(Path(cli.__file__).parents[1])
+def test_full_disk_behind_the_screen_costs_no_file(folder, solver):
     with Path("/dev/full").open("w") as full:
-        run = subprocess.run(
-            [sys.executable, "-c", code, "verify", solver, "-o", "out"], stdout=full, text=True,
-            stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": root}, timeout=120,
-        )  # fmt: skip
-    assert (run.returncode, run.stderr) == (
-        2,
-        "plumbob: /dev/stdout could not be written: No space left on device\n",
-    )
+        run = run_python("-c", CODE, "verify", solver, "-o", "out", stdout=full)
+    message = "plumbob: /dev/stdout could not be written: No space left on device\n"
+    assert (run.returncode, run.stderr) == (2, message)
     verdict = json.loads((folder / "out" / "verdict.json").read_text())["verdict"]
     assert f"{verdict}.py" == solver
     assert (folder / "out" / "verdict.xml").exists()

@@ -142,32 +142,31 @@ FILES = {("forward_kinematics", ""): Path("plumbob_failures/forward_kinematics.j
 
 @pytest.mark.parametrize("language", ["en", "zh"])
 @pytest.mark.parametrize("which", ["wrong", "right"])
-def test_a_result_fits_one_screen(request, which, language):
+def test_screen_has_24_lines_of_80_columns(request, which, language):
     lines = terminal.lines(request.getfixturevalue(which), shown(language, FILES))
     assert len(lines) <= terminal.HEIGHT
     assert [line for line in lines if cell_len(line) > terminal.WIDTH] == []
 
 
-def test_the_screen_says_what_is_wrong_where_and_what_next(wrong):
-    text = normal(" ".join(terminal.lines(wrong, shown(files=FILES))))
-    task = wrong.tasks[0]
-    for told in explanations(task):
-        assert normal(str(told)) in text
-    assert "(explains 100% of the answers compared)" in text
-    assert normal(str(task.smallest_failure.complaints[0])) in text
-    assert "plumbob verify --rerun plumbob_failures/forward_kinematics.json my_ik.py" in text
-    assert "forward_kinematics WRONG" in text
-    assert "inverse_kinematics ccd BROKEN" in text
-    assert "Next: correct forward_kinematics first" in text
-
-
-def test_the_screen_shows_their_numbers_beside_ours(wrong):
-    text = "\n".join(terminal.lines(wrong, shown(files=FILES)))
-    row = comparison.rows(wrong.tasks[0].smallest_failure)[0]
-    for side in comparison.texts(row):
-        assert side in text
-    assert "yours" in text
-    assert "expected" in text
+def test_screen_has_explanations_complaints_numbers_and_advice(wrong, right):
+    screen = "\n".join(terminal.lines(wrong, shown(files=FILES)))
+    failure = wrong.tasks[0].smallest_failure
+    sentences = [*explanations(wrong.tasks[0]), failure.complaints[0]]
+    for words in [
+        *map(str, sentences),
+        "(explains 100% of the answers compared)",
+        "plumbob verify --rerun plumbob_failures/forward_kinematics.json my_ik.py",
+        "forward_kinematics WRONG",
+        "inverse_kinematics ccd BROKEN",
+        "Next: correct forward_kinematics first",
+    ]:
+        assert normal(words) in normal(screen)
+    for words in (*comparison.texts(comparison.rows(failure)[0]), "yours", "expected"):
+        assert words in screen
+    screen = "\n".join(terminal.lines(right, shown()))
+    assert re.search(r"forward_kinematics  RIGHT +1\d\.\d +4/4", screen)
+    assert "Next: --junit FILE for your CI" in screen
+    assert "saved" not in screen
 
 
 def test_nothing_is_cut_in_a_pipe(wrong, capsys):
@@ -182,27 +181,23 @@ def test_nothing_is_cut_in_a_pipe(wrong, capsys):
 
 
 @pytest.mark.parametrize("language", ["en", "zh"])
-def test_what_a_screen_cuts_is_marked_and_where_all_of_it_is_said(wrong, language):
+def test_cut_is_marked_and_a_larger_screen_shows_more(wrong, language):
     context = shown(language)
-    said = speaker(language)(sentence("Cut at …: --html FILE or | cat shows all."))
+    hint = context.say(sentence("Cut at …: --html FILE or | cat shows all."))
     task = a_wrong_task(1.0, sentence("Mend this and that. " * 30))
     for tasks in ([task], [wrong.tasks[0], task]):
         report = Report(wrong.greeting, tasks, 0)
         lines = terminal.lines(report, context)
         assert any(line.endswith("…") for line in lines)
-        assert said in lines
+        assert hint in lines
         assert len(lines) <= terminal.HEIGHT
         whole = "\n".join(terminal.lines(report, context, terminal.ENDLESS))
         assert "…" not in whole
         assert normal(whole).count("Mend this and that.") == 30
-    assert said not in terminal.lines(Report(wrong.greeting, wrong.tasks[:1], 0), context)
-
-
-def test_a_larger_screen_shows_more(wrong):
-    tasks = [a_wrong_task(1.0, sentence("Mend this and that. " * 30)), wrong.tasks[0]]
-    lines = terminal.lines(Report(wrong.greeting, tasks, 0), shown())
-    more = terminal.lines(Report(wrong.greeting, tasks, 0), shown(), 60)
-    assert len(lines) < len(more) <= 60
+    report = Report(wrong.greeting, [task, wrong.tasks[0]], 0)
+    small, large = (terminal.lines(report, context, height) for height in (terminal.HEIGHT, 60))
+    assert len(small) < len(large) <= 60
+    assert hint not in terminal.lines(Report(wrong.greeting, wrong.tasks[:1], 0), context)
 
 
 def test_numbers_side_by_side_are_whole():
@@ -239,13 +234,6 @@ def test_a_fault_that_explains_few_answers_is_not_told_as_what_is_wrong(share, l
         near = {"en": "nearest known mistake explains only", "zh": "最接近的已知错误只能解释"}
         assert (near[language] in text) is (share < 0.5)
     assert json.loads(json_file.text(report, say))["tasks"][0]["explanations"][0]["share"] == share
-
-
-def test_a_right_solver_is_told_so(right):
-    text = "\n".join(terminal.lines(right, shown()))
-    assert re.search(r"forward_kinematics  RIGHT +1\d\.\d +4/4", text)
-    assert "Next: --junit FILE for your CI" in text
-    assert "saved" not in text
 
 
 def test_no_control_character_is_printed(wrong, right):
@@ -316,30 +304,17 @@ def test_json_holds_every_sentence_verdict_and_number(wrong):
     assert found["tasks"][0]["explanations"][0]["share"] == 1.0
 
 
-def texts_of(value):
-    """Every text in a value that JSON holds."""
-    if isinstance(value, str):
-        yield value
-    for one in (
-        value if isinstance(value, list) else value.values() if isinstance(value, dict) else ()
-    ):
-        yield from texts_of(one)
-
-
-def test_no_text_of_json_holds_a_control_character():
+def test_json_has_no_control_character_and_null_for_numbers_that_are_not_finite():
     greeting = Greeting(1, TASKS, HOSTILE, HOSTILE, HOSTILE, methods=(HOSTILE,))
-    one = undecided(Verdict.RIGHT).tasks[0]
-    report = Report(greeting, [TaskReport("energy", HOSTILE, one.judgements, Diagnosis())], 0)
-    found = json.loads(json_file.text(report, speaker("en")))
-    assert [text for text in texts_of(found) if not text.isprintable()] == []
-    assert found["solver"]["methods"] == [found["tasks"][0]["method"]]
-
-
-def test_numbers_that_json_does_not_have_are_null():
-    record = json.loads(json_file.text(undecided(Verdict.RIGHT), speaker("en")))
+    task = undecided(Verdict.RIGHT).tasks[0]
+    report = Report(greeting, [TaskReport("energy", HOSTILE, task.judgements, Diagnosis())], 0)
+    text = json_file.text(report, speaker("en"))
+    assert text.replace("\n", "").isprintable()
+    assert not re.search(r"(?<!\\)\\u00[01]", text)
+    record = json.loads(text)
+    assert record["solver"]["methods"] == [record["tasks"][0]["method"]]
     finding = record["tasks"][0]["cases"][0]["findings"][0]
-    assert finding["error"] is None
-    assert finding["tolerance"] is None
+    assert (finding["error"], finding["tolerance"]) == (None, None)
 
 
 def test_junit_counts_what_it_holds(wrong):
@@ -366,25 +341,20 @@ def test_junit_skips_what_nobody_can_tell_and_passes_reservations():
         assert "2 dampers" in "".join(case.itertext())
 
 
-def test_the_page_is_whole_and_needs_nothing_else(wrong):
+def test_page_is_self_contained_and_escapes_the_texts_of_a_solver(wrong):
     text = page.render(wrong, shown(files=FILES))
-    found = Page(text)
-    assert found.open == []
-    assert all(link.startswith("#") for link in found.links)
+    parsed = Page(text)
+    assert parsed.open == []
+    assert all(link.startswith("#") for link in parsed.links)
     assert not re.search(r"url\((?!#)", text)
-    told = normal(" ".join(found.texts))
-    for one in every_sentence(wrong):
-        assert normal(speaker("en")(one)) in told
+    words = normal(" ".join(parsed.texts))
+    for part in every_sentence(wrong):
+        assert normal(speaker("en")(part)) in words
     for task in wrong.tasks:
-        for one in task.judgements:
-            assert one.case.name in told
-
-
-def test_nothing_that_a_solver_says_stands_unescaped_in_the_page(wrong):
-    text = page.render(wrong, shown())
+        assert all(judgement.case.name in words for judgement in task.judgements)
     assert "<script" not in text.lower()
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in text
-    assert "script" not in Page(text).tags
+    assert "script" not in parsed.tags
 
 
 def test_the_page_draws_theirs_and_ours(wrong):
@@ -461,28 +431,25 @@ def test_numbers_are_shown_from_where_answers_part():
     assert [row.label for row in comparison.rows(one)] == ["positions[2]", "positions[3]"]
 
 
-def test_an_output_that_is_only_rounded_is_not_shown_beside_a_wrong_one():
+def test_rounded_output_is_not_shown_beside_a_wrong_one():
     ours = {"positions": np.eye(3)[:2], "rotations": np.eye(4)[:2]}
     theirs = {name: value + 1e-8 for name, value in ours.items()}
     one = answered("forward_kinematics", {}, theirs, ours)
     assert {row.label[:9] for row in comparison.rows(one, 9)} == {"positions", "rotations"}
     theirs["positions"] = theirs["positions"] + 1e-3
     assert {row.label[:9] for row in comparison.rows(one, 9)} == {"positions"}
+    negated = {"rotations": -ours["rotations"]}
+    del ours["positions"]
+    assert comparison.rows(answered("forward_kinematics", {}, negated, ours)) == []
 
 
-def test_quaternions_of_opposite_sign_do_not_part():
-    ours = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]])
-    one = answered("forward_kinematics", {}, {"rotations": -ours}, {"rotations": ours})
-    assert comparison.rows(one) == []
+@pytest.mark.parametrize("gap", [1.0, 1e-6, 1e-14])
+def test_numbers_have_digits_enough_to_differ(gap):
+    answer, expected = comparison.texts(comparison.NumberRow("x", [1.0, 2.0], [1.0, 2.0 + gap]))
+    assert answer != expected
 
 
-@pytest.mark.parametrize("apart", [1.0, 1e-6, 1e-14])
-def test_numbers_have_digits_enough_to_differ(apart):
-    theirs, ours = comparison.texts(comparison.NumberRow("x", [1.0, 2.0], [1.0, 2.0 + apart]))
-    assert theirs != ours
-
-
-def test_answers_of_other_shapes_are_counted():
+def test_lengths_of_answers_of_other_shapes_are_compared():
     one = answered("resample", {}, {"points": np.zeros((4, 3))}, {"points": np.zeros((5, 3))})
     assert comparison.rows(one) == [comparison.NumberRow("len(points)", [4.0], [5.0])]
 

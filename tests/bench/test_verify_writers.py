@@ -105,26 +105,19 @@ def test_a_case_that_cannot_be_saved_costs_no_verdict(report, capsys):
     assert err == "plumbob: plumbob_failures could not be written: File exists\n"
 
 
-def test_the_verdict_is_on_the_screen_before_any_file_is_written(report, monkeypatch):
+def test_files_are_written_after_the_screen_though_nobody_reads_it(report, monkeypatch):
     order = []
-    monkeypatch.setattr(terminal, "show", lambda *_: order.append("screen"))
+
+    def closed(*_):
+        order.append("screen")
+        raise SystemExit(1) from BrokenPipeError()
+
+    monkeypatch.setattr(terminal, "show", closed)
     monkeypatch.setattr(Path, "write_text", lambda path, *_, **__: order.append(path.name))
     Files(None, None, None, Path("out")).write(
         report, Question(), Presentation(speaker("en"), "en", ["my.py"])
     )
     assert order == ["screen", "verdict.json", "verdict.xml", "index.html"]
-
-
-def test_files_are_written_though_nobody_reads_the_screen(report, monkeypatch):
-    def closed(*_):
-        raise SystemExit(1) from BrokenPipeError()
-
-    monkeypatch.setattr(terminal, "show", closed)
-    context = Presentation(speaker("en"), "en", ["my.py"])
-    Files(None, None, None, Path("out")).write(report, Question(), context)
-    assert {"verdict.json", "verdict.xml", "index.html"} <= {
-        one.name for one in Path("out").glob("*")
-    }
 
 
 def test_numbers_of_numpy_are_written_like_any_other(report):

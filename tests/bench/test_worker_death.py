@@ -1,4 +1,4 @@
-"""A worker may die, hang or talk nonsense at any moment: it costs its job a sentence, no more."""
+"""A worker may die, hang or send garbage at any moment: it costs its job a sentence, no more."""
 
 import os
 import re
@@ -19,7 +19,7 @@ ROOT = Path(isolation.__file__).resolve().parents[2]
 PATIENCE = 3.0
 LARGE = 2**22
 
-# A job that lets its worker end in some manner at some moment, and one that does what it should.
+# A job that lets its worker end in some manner at some moment, and one that starts a child.
 JOBS = """
 import ctypes, gc, os, pickle, signal, struct, subprocess, sys, time
 from multiprocessing.connection import Connection
@@ -70,10 +70,9 @@ class WithChild:
         time.sleep(600)
 """
 MOMENTS = {"reading": 0, "preparing": 0, "solving": 1, "in a message": 1}
-WITHIN = {("rubbish", "in a message"), ("stranger", "in a message")}  # then it is a part of that
 BREAKS_OFF = "its process broke off the connection, or sent what is no message"
 SILENT = "ended after .* s of silence"
-# What a worker does, and the sentence for it.
+# How a worker ends, and its sentence.
 MANNERS = {
     "leave": ("os._exit(3)", "its process ended with code 3"),
     "go": ("sys.exit(4)", "its process ended with code 4"),
@@ -86,6 +85,13 @@ MANNERS = {
     "rubbish": ("write(b'hello', 5)", BREAKS_OFF),
     "stranger": ("write(pickle.dumps(42), len(pickle.dumps(42)))", BREAKS_OFF),
 }
+# Garbage in the middle of a message is a part of it, and an exception at reading is an answer.
+IMPOSSIBLE = {("rubbish", "in a message"), ("stranger", "in a message"), ("raises", "reading")}
+DEATHS = [(manner, moment) for manner in MANNERS for moment in MOMENTS]
+QUICK = {("hang", "preparing"), ("hang", "in a message"), ("stop", "solving"), ("crash", "solving")}
+QUICK |= {(manner, moment) for manner in ("leave", "kill") for moment in MOMENTS}
+QUICK |= {("close", "solving"), ("raises", "solving"), ("go", "reading"), ("rubbish", "solving")}
+QUICK |= {("stranger", "preparing"), ("close", "preparing")}
 
 
 @pytest.fixture(scope="module")
@@ -104,13 +110,8 @@ def jobs(tmp_path_factory):
 
 @pytest.fixture
 def worker(jobs):
-    worker = WorkerProcess(start_patience=PATIENCE, target_patience=0.3)
-    yield worker
-    worker.close()
-
-
-def pid(worker):
-    return worker._child.pid
+    with closing(WorkerProcess(start_patience=PATIENCE, target_patience=0.3)) as worker:
+        yield worker
 
 
 def is_gone(process):
@@ -126,40 +127,31 @@ def assert_works(worker, jobs):
     assert (outcome.trouble, len(outcome.solved), outcome.setup) == ("", 2, 0.5)
 
 
-FEW = {("hang", "preparing"), ("hang", "in a message"), ("stop", "solving"), ("crash", "solving")}
-FEW |= {(manner, moment) for manner in ("leave", "kill") for moment in MOMENTS}
-FEW |= {("close", "solving"), ("raises", "solving"), ("go", "reading"), ("rubbish", "solving")}
-FEW |= {("stranger", "preparing"), ("close", "preparing")}
-
-
 @pytest.mark.parametrize(
     ("manner", "moment"),
     [
-        pytest.param(*both, marks=[] if both in FEW else [pytest.mark.slow])
-        for both in ((manner, moment) for manner in MANNERS for moment in MOMENTS)
-        if both not in WITHIN
+        pytest.param(*death, marks=[] if death in QUICK else [pytest.mark.slow])
+        for death in DEATHS
+        if death not in IMPOSSIBLE
     ],
 )
 def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(worker, jobs, manner, moment):
-    if (manner, moment) == ("raises", "reading"):  # that is an answer
-        assert (
-            worker.perform(jobs.Dying(MANNERS[manner][0], moment)).trouble
-            == "SystemError: from within"
-        )
-        return
     with pytest.MonkeyPatch.context() as patch:
         assert_works(worker, jobs)
-        before = pid(worker)
-        seen = []
-        end = ChildProcess.end
-        patch.setattr(ChildProcess, "end", lambda w: (seen.append(w.pid), end(w)))
+        ended, first, end = [], worker._child.pid, ChildProcess.end
+        patch.setattr(ChildProcess, "end", lambda child: (ended.append(child.pid), end(child)))
         outcome = worker.perform(jobs.Dying(MANNERS[manner][0], moment))
     assert re.fullmatch(MANNERS[manner][1], outcome.trouble)
     assert len(outcome.solved) == MOMENTS[moment]
     assert outcome.is_lost == (MOMENTS[moment] > 0)
-    assert before in seen
-    assert all(is_gone(process) for process in seen)
+    assert first in ended
+    assert all(is_gone(process) for process in ended)
     assert_works(worker, jobs)
+
+
+def test_an_exception_at_reading_a_job_is_an_answer(worker, jobs):
+    outcome = worker.perform(jobs.Dying(MANNERS["raises"][0], "reading"))
+    assert outcome.trouble == "SystemError: from within"
 
 
 @pytest.mark.parametrize("manner", ["leave", "kill", "close", "stop", "rubbish"])
@@ -181,7 +173,7 @@ STARTS = {
 @pytest.mark.parametrize("load", [0, LARGE])
 @pytest.mark.parametrize("start", STARTS)
 def test_a_death_before_the_job_is_read_is_a_sentence(worker, jobs, monkeypatch, start, load):
-    """A large job does not fit into what the system keeps for a reader."""
+    """A large job does not fit into the buffer of a pipe."""
     monkeypatch.setattr(isolation, "_START", start)
     outcome = worker.perform(jobs.Dying("", "never", load))
     assert re.fullmatch(STARTS[start], outcome.trouble)
@@ -191,7 +183,7 @@ def test_a_death_before_the_job_is_read_is_a_sentence(worker, jobs, monkeypatch,
 
 
 def assert_gone(path):
-    """The worker and what it has started, whose numbers stand in a file, end soon."""
+    """The worker and its child, whose numbers stand in a file, end soon."""
     deadline = time.monotonic() + 5.0
     processes = [int(word) for word in path.read_text().split()]
     while not all(map(is_gone, processes)) and time.monotonic() < deadline:
@@ -200,15 +192,16 @@ def assert_gone(path):
     assert all(map(is_gone, processes))
 
 
-@pytest.mark.parametrize("how", ["close", "interrupt", "silence"])
-def test_nothing_is_left_running_not_even_what_a_solver_started(jobs, tmp_path, how):
-    worker, path = WorkerProcess(5.0, 0.3 if how == "silence" else 60.0), tmp_path / "processes"
-    if how == "silence":
+@pytest.mark.parametrize("manner", ["close", "interrupt", "silence"])
+def test_nothing_is_left_running_not_even_a_child_of_the_solver(jobs, tmp_path, manner):
+    path = tmp_path / "processes"
+    worker = WorkerProcess(5.0, 0.3 if manner == "silence" else 60.0)
+    if manner == "silence":
         assert "silence" in worker.perform(jobs.WithChild(path)).trouble
     else:
         messages = worker.stream(jobs.WithChild(path))
         assert isinstance(next(messages), Ready)
-        if how == "interrupt":
+        if manner == "interrupt":
             with pytest.raises(KeyboardInterrupt):
                 messages.throw(KeyboardInterrupt)
         else:
@@ -219,8 +212,7 @@ def test_nothing_is_left_running_not_even_what_a_solver_started(jobs, tmp_path, 
 @pytest.mark.parametrize(
     "end", ["sys.exit(3)", "os.kill(os.getpid(), 15)", "os.kill(os.getpid(), 9)"]
 )
-def test_a_worker_ends_with_the_program_that_started_it(jobs, tmp_path, end):
-    """And with it what it has started, even if the program is killed while a solver sleeps."""
+def test_a_worker_and_its_child_end_with_the_program_that_started_it(jobs, tmp_path, end):
     script = (
         "import sys; import os; from pathlib import Path\n"
         "from plumbob.bench.harness.isolation import WorkerProcess\n"
@@ -237,14 +229,14 @@ SHADOW = 'open({path!r}, "a").write(__name__); raise SystemExit("the wrong one")
 
 
 @pytest.mark.parametrize("name", ["plumbob", "numpy", "multiprocessing", "pickle"])
-def test_what_lies_where_one_works_is_not_imported(jobs, tmp_path, monkeypatch, name):
+def test_the_working_directory_is_not_imported_from(jobs, tmp_path, monkeypatch, name):
     """Nor is another Plumbob on the path."""
-    trace, here = tmp_path / "imported", tmp_path / "here"
-    (here / name).mkdir(parents=True)
-    (here / name / "__init__.py").write_text(SHADOW.format(path=str(trace)))
-    monkeypatch.chdir(here)
+    trace, folder = tmp_path / "imported", tmp_path / "folder"
+    (folder / name).mkdir(parents=True)
+    (folder / name / "__init__.py").write_text(SHADOW.format(path=str(trace)))
+    monkeypatch.chdir(folder)
     if name == "plumbob":
-        monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(here), os.environ["PYTHONPATH"]]))
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ["PYTHONPATH"]]))
     with closing(WorkerProcess(start_patience=60.0)) as worker:
         assert_works(worker, jobs)
     assert not trace.exists()

@@ -315,19 +315,6 @@ def test_slightly_long_quaternions_are_normalised_once(arm, q, backend):
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda q: np.where(q == q[4], 2.0, q), "expected unit quaternions"),
-        (lambda q: 0.0 * q, "expected unit quaternions .* length 0"),
-    ],
-)
-@pytest.mark.parametrize("use", ["clamp", "within_limits", "local_transforms", "forward"])
-def test_bad_coordinates_are_named(use, change, message, arm, q, backend):
-    with pytest.raises(ValueError, match=f"q: {message}"):
-        getattr(arm, use)(change(q))
-
-
-@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         ({"kinds": ["hinge"]}, "kinds: expected 3 kinds, one a joint, got 1"),

@@ -153,13 +153,6 @@ def test_resampled_points_lie_on_the_curve(backend):
     assert len(even) == 12
 
 
-def test_resampling_is_indifferent_to_scale(backend):
-    points = curves["plumb_bob"]()
-    even = resample(points, min_spacing=0.01, max_spacing=0.03)
-    large = resample(1024 * points, min_spacing=10.24, max_spacing=30.72)
-    np.testing.assert_allclose(large, 1024 * even, rtol=1e-12, atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("points", "spacings", "message"),
     [

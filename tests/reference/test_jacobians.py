@@ -159,20 +159,3 @@ def test_leading_axes_broadcast(arm, q, rng, backend):
     assert (jacobian(arm, moved, -1) == J[..., -1, :, :]).all()
     none = np.empty((0, arm.coordinate_count))
     assert jacobian(arm, none, -1).shape == (0, 6, arm.freedom_count)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda m, q: jacobians(m, 2.0 * q), "q: expected unit quaternions"),
-        (lambda m, q: jacobian(m, q, "hand"), "effector: expected one of"),
-        (
-            lambda m, q: integrate(m, np.stack([q, q]), np.ones((3, 11))),
-            r"v: expected leading axes that broadcast with \(2,\), got \(3,\)",
-        ),
-        (lambda m, q: difference(m, [q, q], [q, q, q]), "q1: expected leading axes"),
-    ],
-)
-def test_bad_arguments_are_named(call, message, arm, q):
-    with pytest.raises(ValueError, match=message):
-        call(arm, q)

@@ -51,7 +51,7 @@ def cloth_swing(factor: float, size: int = 11, damping: float = 0.0) -> ClothSwi
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield, for each stiffness: consecutive Newton steps, one step's iterations, few iterations.
+    """Yield, for each stiffness: Newton steps, the iterations of a step, few iterations, dampers.
 
     The cloth is the same at every scale.
     """
@@ -91,7 +91,7 @@ def newton_steps(problem: ClothSwing) -> Measured:
 
 
 def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
-    """Iterate one step from mid-swing; keep residual and error after each iteration."""
+    """Iterate a step from mid-swing; keep residual and error after each iteration."""
     state = converged_motion(problem)[MIDDLE]
     newton = integrator_of(problem, tolerance=0.0, max_iterations=50).step(state).state.positions
     exact = exact_step(problem.system, state, problem.h, newton)
@@ -107,8 +107,8 @@ def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
 def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     """Compare steps of a few local/global iterations with converged steps.
 
-    The error and distance are those of a single such step from each state of the converged motion.
-    The drift is the distance between the converged motion and the motion of such steps alone; the
+    The error and distance are measured after a single step from each state of the converged motion.
+    The drift is the distance between the converged motion and a motion of only truncated steps; the
     path is the distance of the converged motion from its start.
     """
     integrator = integrator_of(problem, "local_global", 0.0, iterations)
@@ -127,7 +127,7 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
 
 
 def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
-    """Take one step of each length after the first ones; compare the two laws at its end."""
+    """Take a step of each length from mid-swing; compare the two laws at its end."""
     state = motion(problem.start, first, integrator_of(problem))[-1]
     differences = []
     for h in HALVED:

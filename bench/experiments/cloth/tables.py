@@ -29,7 +29,7 @@ Row = dict[str, Any]
 
 
 def convergence_chart(results: Results) -> Sketch | None:
-    """Show residual and error over the iterations of one step, a column for each stiffness."""
+    """Show residual and error over the iterations of a step, a column for each stiffness."""
     cloths = by_problem(results.all("cloth", task=ONE_STEP)).values()
     rows = {"residual": "residual", "error": "error |x − x*| / |y − x*|"}
     panels = (

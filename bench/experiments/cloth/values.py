@@ -16,7 +16,7 @@ class ConsecutiveSteps(Values, frozen=True):
 
 
 class IterationErrors(Values, frozen=True):
-    """Residual and error of one step at the start and after each iteration, (iteration + 1,)."""
+    """Residual and error of a step at the start and after each iteration, (iteration + 1,)."""
 
     residual: Floats1
     error: Floats1

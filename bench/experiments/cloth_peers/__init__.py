@@ -1,4 +1,4 @@
-"""One cloth for every engine: work against precision, stability."""
+"""The same cloth for every engine: work against precision, stability."""
 
 # The tasks of its records.
 ONE_STEP, MOTION, NEEDED = "work of a step", "work of a motion", "iterations of a step"

@@ -1,4 +1,4 @@
-"""A worker's job: move a cloth frame by frame, by one solver with its settings."""
+"""A worker's job: move a cloth frame by frame, by a solver with its settings."""
 
 import importlib
 from collections.abc import Iterator, Mapping
@@ -74,7 +74,7 @@ class ClothJob(NamedTuple):
 
 
 def advanced(mover: Mover, nowhere: FloatArray) -> Solved:
-    """Advance by one frame; the positions are `nowhere` if the solver reports an overflow."""
+    """Advance by a frame; the positions are `nowhere` if the solver reports an overflow."""
     (is_finite, own_time), seconds = time_call(lambda: _advance(mover))
     q = mover.positions() if is_finite else nowhere
     return solved_in(own_time or OwnTime(seconds), q, UNKNOWN)

@@ -1,4 +1,4 @@
-"""One cloth for every installed solver: work and precision, limits of stability.
+"""The same cloth for every installed solver: work and precision, limits of stability.
 
 Each solver runs in a worker process. Its positions are compared with converged implicit Euler and
 with the true motion.
@@ -98,9 +98,9 @@ class Fall(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield one step, a motion and the limit of every solver; a missing package makes one block.
+    """Yield a step, a motion and the limit of every solver, and a block for each missing package.
 
-    Larger cloths, and the published one, are for the full scale.
+    Larger cloths and the cloth of Liu et al. are for the full scale.
     """
     peers = registry.cloth_peers(scale.entrants)
     for package in dict.fromkeys(peer.package for peer in peers if not peer.is_installed):
@@ -123,7 +123,7 @@ def _block(task: str, name: str, solver: str, measure: Any, settings: Any, **mor
 
 
 def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
-    """Yield one step, a motion and, if it is explicit, the limit of a solver."""
+    """Yield a step, a motion and, if it is explicit, the limit of a solver."""
     sizes = levels(scale)
     for k in STIFFNESSES:
         falls = [Fall(level, partial(falling_cloth, level.size, k)) for level in sizes]
@@ -146,7 +146,7 @@ def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
 def _falling(
     peer: ClothPeer, cloth: str, settings: Mapping[str, Any], falls: Sequence[Fall]
 ) -> Iterator[Block]:
-    """Yield one step and a motion of a cloth at some sizes."""
+    """Yield a step and a motion of a cloth at some sizes."""
     settings = {**settings, "version": peer.version}
     size, seconds = (sum(fall.level[i] for fall in falls) for i in (0, 2))
     for task, name, measure in ((ONE_STEP, "one step", one_step), (MOTION, "motion", motion)):
@@ -165,7 +165,7 @@ class Rung(NamedTuple):
 
 
 def step_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
-    """Return the rungs for one step of one frame, cheap ones first."""
+    """Return the rungs for a step of a frame, from cheap to expensive."""
     return _rungs(peer, frequency, peer.ladder, (1,))
 
 
@@ -202,7 +202,7 @@ _given_up: dict[tuple[str, str, int], str] = {}
 
 
 class RungResults:
-    """The results of one solver: the numbers and label of each rung, and remarks."""
+    """The results of a solver: the numbers and label of each rung, and remarks."""
 
     def __init__(self, peer: ClothPeer) -> None:
         self.rows: list[dict[str, Any]] = []
@@ -312,7 +312,7 @@ def diverged(positions: np.ndarray, true: np.ndarray, extent: float = SIDE) -> b
 
 
 def iterations_needed(solver: str, stiffness: float) -> Measured:
-    """Count the iterations of one step to errors of a tenth, a hundredth and so on."""
+    """Count the iterations of a step to errors of a tenth, a hundredth and so on."""
     cloth = falling_cloth(NEEDED_SIZE, stiffness)
     truth = truth_of(cloth, 1)
     iterates = ImplicitEuler(cloth.system, h=FRAME, solver=solver).iterates(cloth.start)
@@ -371,7 +371,7 @@ def stability_limit(stable: Callable[[float], bool], h: float) -> float:
     """Return the longest stable step, by doubling, halving and bisection from a first guess h.
 
     Raises:
-        ArithmeticError: if no step is stable, or every one is.
+        ArithmeticError: if no step is stable, or every step.
     """
     low, high = (h, 2.0 * h) if stable(h) else (h / 2.0, h)
     for _ in range(_DOUBLINGS):
@@ -415,5 +415,5 @@ def job(
 
 @functools.cache
 def worker_process() -> WorkerProcess:
-    """Return the one process in which all solvers work, one after the other."""
+    """Return the process in which all solvers work in turn."""
     return WorkerProcess(_START_PATIENCE, _PATIENCE)

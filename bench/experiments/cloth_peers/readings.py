@@ -12,7 +12,7 @@ from ...tables.table import words
 
 
 class Point(NamedTuple):
-    """A solver with one setting on one cloth."""
+    """A solver with a setting on a cloth."""
 
     stiffness: float  # of the springs [N/m]
     particles: int  # along each side

@@ -1,6 +1,6 @@
 """Reference solutions of a falling cloth: converged implicit Euler, and the true motion.
 
-Converged implicit Euler is our Newton in steps of one frame. The true motion is computed by the
+Converged implicit Euler is our Newton in steps of a frame. The true motion is computed by the
 classical Runge-Kutta method, with h far below the limit of stability and halved twice: the observed
 order shows that the three converge, and the last difference bounds the remaining error.
 """
@@ -65,7 +65,7 @@ def true_motion(cloth: FallingCloth, frames: int, substeps: int) -> FloatArray:
 
 
 def implicit_motion(cloth: FallingCloth, frames: int, frame: float = FRAME) -> FloatArray:
-    """Return the positions by converged implicit Euler after each step of one frame.
+    """Return the positions by converged implicit Euler after each step of a frame.
 
     Raises:
         ArithmeticError: if a step does not converge.

@@ -7,7 +7,7 @@ from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 
 
 class StepWork(Values, frozen=True):
-    """One step at increasing cost, (rung,)."""
+    """A step at increasing cost, (rung,)."""
 
     particles: Integers1  # along a side
     seconds: Floats1

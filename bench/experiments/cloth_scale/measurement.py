@@ -8,6 +8,7 @@ import resource
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def in_its_own_process(size: int, library: str) -> Measured:
-    """Measure one cloth in a fresh process, unless the library is missing."""
+    """Measure a cloth in a fresh process, unless the library is missing."""
     if library != SUPERNODAL and importlib.util.find_spec(library) is None:
         return Measured(None, {"missing": f"{library} is not installed"})
     numbers = in_a_fresh_process(PATIENCE, compiled_and_measured, size, library)
@@ -78,7 +79,7 @@ def billowing_cloth(size: int) -> tuple[MassSpring, State]:
 
 
 def measure(size: int, library: str) -> dict[str, Any]:
-    """Return the times [s] and the memory [bytes] of one cloth."""
+    """Return the times [s] and the memory [bytes] of a cloth."""
     before = memory()
 
     def say(part: str) -> None:
@@ -166,6 +167,12 @@ _total = Kernel(total, relaxed=True)
 
 
 def memory() -> int:
-    """Return the peak memory of this process [bytes]."""
+    """Return the peak memory of this process [bytes].
+
+    On Linux `ru_maxrss` includes the memory that the parent had when it started the process.
+    """
+    status = Path("/proc/self/status")
+    if status.exists():
+        return 1024 * int(status.read_text().split("VmHWM:")[1].split()[0])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak

@@ -16,7 +16,7 @@ LABELS = {library.name: library.label for library in registry.FACTORS}
 
 
 def _row(record: Record) -> dict[str, Any]:
-    """Return medians and their ratios; a cell is None where a library has no such number."""
+    """Return medians and their ratios; a cell is None if it was not measured."""
     medians = {name: metrics.spread(array).median for name, array in record.arrays.items()}
     medians["particles"] = float(record.details.particles)
     if "step" in medians:

@@ -4,7 +4,7 @@ from ...harness.values import Details, Floats1, Kind, Values
 
 
 class FactorCosts(Values, frozen=True, kw_only=True):
-    """A cloth factored by one library; CHOLMOD's has None where only ours is measured."""
+    """A cloth factored by a library; CHOLMOD's has None where only ours is measured."""
 
     before: int  # the memory before the cloth
     assembly: float | None = None

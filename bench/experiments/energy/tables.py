@@ -1,4 +1,4 @@
-"""What integrators do to the energy of a swinging cloth."""
+"""The energy of a swinging cloth by integrator."""
 
 from collections.abc import Sequence
 from typing import Any

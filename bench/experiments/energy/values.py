@@ -4,7 +4,7 @@ from ...harness.values import Details, Floats1, Kind, Values
 
 
 class Swing(Values, frozen=True):
-    """The energy of a swing by one integrator, (state,)."""
+    """The energy of a swing by an integrator, (state,)."""
 
     time: Floats1  # [s]
     left: Floats1  # the energy above that of the cloth at rest, over that of the start

@@ -1,4 +1,4 @@
-"""One step of a heavy cloth by every solver, and the proven distance to a minimiser."""
+"""A step of a heavy cloth by every solver, and the proven distance to a minimiser."""
 
 # Stiffness of the cloths [N/m], gravity [m/s²], and the converged frames before the step [s].
 STIFFNESSES = (1e3, 1e4, 1e5)

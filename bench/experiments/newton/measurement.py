@@ -1,4 +1,4 @@
-"""Every solver's solution of one step of a heavy cloth, certified and compared with Newton's."""
+"""Every solver's solution of a step of a heavy cloth, certified and compared with Newton's."""
 
 import copy
 import functools

@@ -1,4 +1,4 @@
-"""Proven distances between the solutions of one step and its minimiser."""
+"""Proven distances between the solutions of a step and its minimiser."""
 
 from collections.abc import Sequence
 from typing import Any

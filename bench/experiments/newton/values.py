@@ -1,4 +1,4 @@
-"""The records of one step of a heavy cloth: the solution, and bounds on its error."""
+"""The records of a step of a heavy cloth: the solution, and bounds on its error."""
 
 import msgspec
 
@@ -6,7 +6,7 @@ from ...harness.values import Details, Kind, Values
 
 
 class CertifiedStep(Values, frozen=True):
-    """One solver's solution of the step; lengths in metres."""
+    """A solver's solution of the step; lengths in metres."""
 
     size: int  # particles along a side
     iterations: int

@@ -97,7 +97,7 @@ def _draw_cloths(frames: Any) -> "Figure":
 
 
 def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "ScalarMappable":
-    """Draw the points of a shade as one path, a tenth of the file; return the scale."""
+    """Draw the points of a shade as a single path, a tenth of the file; return the scale."""
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
@@ -150,7 +150,7 @@ def _cloth(record: Record) -> Moving:
 
 
 def _first(results: Results, task: str, maximum: int) -> Sequence[Record]:
-    """Return the records of a task that are shown: those of entrants, then in their order."""
+    """Return the visible records of a task: entrants first, then in their order."""
     records = results.all("pictures", task=task)
     order = sorted(records, key=lambda r: (r.solver not in results.entrants, r.details.order))
     return order[:maximum]

@@ -1,4 +1,4 @@
-"""The records of what the report draws."""
+"""The records of the pictures and motions of the report."""
 
 from ...harness.values import Details, Floats1, Floats2, Floats3, Integers1, Kind, Values
 from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION

@@ -60,7 +60,10 @@ def _of_trac_ik(records: Sequence[Record]) -> Iterator[Row]:
             if record := measured.get(solver):
                 score = Score(robot, "", record.solver, (record,))
                 about |= _about(score)
-                share, time = _percent(score.solved), [1e3 * metrics.mean(score.begun("seconds"))]
+                share, time = (
+                    _percent(score.solved),
+                    [1e3 * metrics.mean(score.attempted("seconds"))],
+                )
             yield _row(about, "solved [%]", percent, share)
             yield _row(about, "time, mean [ms]", milliseconds, time)
 
@@ -74,7 +77,8 @@ def _of_toolbox(record: Record) -> Iterator[Row]:
     about |= _about(score)
     yield _row(about, "declared infeasible [%]", rate, _percent(score.all("claimed", 0) != 1))
     yield _row(about, "not solved within the limits [%]", None, _percent(~score.solved))
-    yield _row(about, "time, median [µs]", None, [1e6 * x for x in score.median_time])
+    median = metrics.median_interval(score.attempted("seconds"))
+    yield _row(about, "time, median [µs]", None, [1e6 * seconds for seconds in median])
 
 
 def _of_fabrik(record: Record) -> Iterator[Row]:

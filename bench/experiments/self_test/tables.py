@@ -38,10 +38,10 @@ def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
 def _counts(rows: Sequence[dict[str, Any]]) -> str:
     """Return how many faults are caught and named, and how many honest solvers are accused."""
     faults = [row for row in rows if row["record"].details.faulty]
-    caught, named, accused = (
+    caught, correct, accused = (
         sum(bool(row[title]) for row in rows) for title in ("caught", "named", "accused")
     )
-    planted = f"{caught} of {len(faults)} planted faults caught, {named} named"
+    planted = f"{caught} of {len(faults)} planted faults caught, {correct} named"
     honest = f"{accused} of {len(rows) - len(faults)} honest solvers accused"
     return "; ".join([planted] * bool(faults) + [honest] * (len(faults) < len(rows)))
 

@@ -1,1 +1,1 @@
-"""Timing of forward kinematics, solves and steps, in one file a subject."""
+"""Timing of forward kinematics, solves and steps, a file for each subject."""

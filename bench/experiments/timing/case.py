@@ -33,7 +33,7 @@ class TimedWork(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """Work to be timed with one implementation."""
+    """Work to be timed with an implementation."""
 
     work: TimedWork
     solver: str  # the implementation
@@ -52,7 +52,7 @@ class Case:
 def copying(work: TimedWork, size: int, *, passes: int = 1, operations: int = 1) -> Case:
     """Return a yardstick of memory: copies that read and write as many bytes, half and half.
 
-    Each pass moves `size` bytes, so that they come from as near a cache as those of the work.
+    Each pass moves `size` bytes, so that they come from as near a cache as the work's.
     """
     prepare = partial(_copies, size // 16, passes)
     return Case(work, LIMIT, prepare, operations, moved=size * passes)

@@ -28,7 +28,7 @@ Starter = Callable[[ClothSwing], Callable[[], Any]]
 
 
 def cases() -> Iterator[Case]:
-    """Yield one frame of 1/60 s by four methods, at two stiffnesses, and of a larger cloth."""
+    """Yield a frame of 1/60 s by four methods, at two stiffnesses, and of a larger cloth."""
     for factor in FACTORS:
         problem = cloth_swing(factor)
         for title, (reference, engine) in WORKS.items():
@@ -49,13 +49,13 @@ def _work(name: str, group: str, title: str) -> TimedWork:
 
 
 def stepping(problem: ClothSwing, **settings: Any) -> Callable[[], Any]:
-    """Return one step of implicit Euler, factorised beforehand."""
+    """Return a step of implicit Euler, factorised beforehand."""
     integrator = ImplicitEuler(problem.system, h=problem.h, **settings)
     return partial(integrator.step, moving(problem))
 
 
 def substeps(problem: ClothSwing) -> Callable[[], Any]:
-    """Return one frame of explicit substeps."""
+    """Return a frame of explicit substeps."""
     start = moving(problem)
 
     def run() -> State:
@@ -68,7 +68,7 @@ def substeps(problem: ClothSwing) -> Callable[[], Any]:
 
 
 def mujoco_steps(problem: ClothSwing, integrator: str, count: int) -> Callable[[], Any]:
-    """Return one frame of MuJoCo's steps, from and to its own state, without conversions."""
+    """Return a frame of MuJoCo's steps, from and to its own state, without conversions."""
     engine = MujocoMassSpring(problem.system, h=problem.h / count, integrator=integrator)
     engine.model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     engine.write(moving(problem))

@@ -9,8 +9,7 @@ from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import IK_SOLVERS, solve_ik
 
 from ...peers import registry
-from ...peers.ik.levenberg_marquardt import levenberg_marquardt
-from ...peers.ik.reference_kinematics import ReferenceKinematics
+from ...peers.ik.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
 from ...problems.chains import chain_targets
 from ..chain.measurement import MAX_ITERATIONS, TOLERANCE
 from .case import COMPILED, PLAIN, Case, TimedWork
@@ -28,7 +27,7 @@ KINEMATICS: dict[str, type[SkeletonEngine] | type[ReferenceKinematics]] = {
 
 
 def cases() -> Iterator[Case]:
-    """Yield our solvers compiled, plain and as one batch, and one loop on all three kinematics."""
+    """Yield our solvers compiled, plain and in batches, and a Python loop on three kinematics."""
     for stratum in STRATA:
         for solver in IK_SOLVERS:
             work = _work(stratum, solver)
@@ -59,7 +58,7 @@ def single_solves(stratum: str, solver: str, count: int) -> Callable[[], Any]:
 
 
 def batch_solve(stratum: str, solver: str) -> Callable[[], Any]:
-    """Return a call that solves all targets as one batch."""
+    """Return a call that solves all targets as a batch."""
     problem = chain_targets(stratum, TARGETS)
     batch = (problem.skeleton, problem.starts, problem.targets, solver)
     return partial(solve_ik, *batch, **LIMITS)

@@ -1,4 +1,4 @@
-"""Forward kinematics of chains and a tree: a call for one pose, and batches."""
+"""Forward kinematics of chains and a tree: single poses and batches."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -22,7 +22,7 @@ LIMBS = ((0, 5), (0, 5), (0, 5), (4, 7), (4, 7))
 
 
 def cases() -> Iterator[Case]:
-    """Yield one pose by everyone, and batches by us, each with a plain copy of its bytes."""
+    """Yield single poses by everyone, and our batches, each with a plain copy of its bytes."""
     for name, (skeleton, batch) in models().items():
         size = skeleton.joint_count * np.array([READ, WRITE])
         pose = _work(name, "one pose a call")
@@ -68,7 +68,7 @@ def compiled_poses(skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
 
 
 def engine_pose(name: str, skeleton: Skeleton) -> Callable[[], Any]:
-    """Return an engine's forward kinematics of one random pose; the result stays in the engine."""
+    """Return an engine's forward kinematics of a random pose; the result stays in the engine."""
     engine = SKELETON_ENGINES[name](skeleton)
     return partial(engine.update_kinematics, coordinates(engine, _local_rotations(skeleton)))
 

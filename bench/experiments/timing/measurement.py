@@ -1,4 +1,4 @@
-"""The timing: the cases of a group take turns in one process that does nothing else."""
+"""The timing: the cases of a group take turns in a process of their own."""
 
 import functools
 import math
@@ -104,7 +104,7 @@ def sweep(subject: str, group: str, seconds: float) -> dict[str, Any]:
 
 
 def _rounds(case: Case, seconds: float) -> Iterator[list[float]]:
-    """Yield the times of one call in the rounds of each sweep [s].
+    """Yield the times of a call in the rounds of each sweep [s].
 
     The call is prepared, compiled and counted before the first.
     """

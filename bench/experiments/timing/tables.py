@@ -84,7 +84,7 @@ def _marks(solver: str, records: Sequence[Record], works: list[str], scale: floa
 
 
 def _rows(subject: str, results: Results) -> list[Row]:
-    """Return a row for each time of a subject, except those of plain copies."""
+    """Return a row for each time of a subject, without plain copies."""
     records = results.all("timing", subject=subject)
     compiled, copies = (
         {record.problem: record for record in records if record.solver == solver}
@@ -127,7 +127,7 @@ def _row(record: Record, compiled: Record | None, copy: Record | None) -> Row:
 
 
 def _columns(unit: str, rows: Sequence[Row]) -> list[Column]:
-    """Return the columns in the unit of a subject, those of copies only where there are any."""
+    """Return the columns in the unit of a subject; without copies their columns are left out."""
     return [
         replace(column, unit=unit) if column.unit == "time" else column
         for column in CAPTIONS.columns("timing")
@@ -154,7 +154,7 @@ def _summary(unit: str, rows: Sequence[Row]) -> Summary:
 
 
 def _times(unit: str, rows: Sequence[Row]) -> str:
-    """Return the times of some work, and the fastest implementation or those that tie."""
+    """Return the times of some work, and the fastest implementation, with ties."""
     rivals = [row for row in rows if row["implementation"] != PLAIN]
     times = ", ".join(_time(row, unit) for row in rivals)
     if rivals and "copy" in rivals[0]:

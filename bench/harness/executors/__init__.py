@@ -1,15 +1,64 @@
 """Where blocks are measured, by its address: in this process, or by the workers of a cluster."""
 
-from ..executor import THIS_PROCESS, Executor
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from ..block import Block, Scale
+from ..machine import difference, stamp
+from ..measure import measure
+from ..record import Record
 
 LOCAL, DASK = "local", "dask://"
+
+
+class NotMeasured(NamedTuple):
+    """A block that could not be tried, and why: it has no record."""
+
+    block: Block
+    reason: str
+
+
+Step = Block | Record | NotMeasured
+
+
+class Executor:
+    """Measure blocks in this process, in order; subclasses measure elsewhere.
+
+    Attributes:
+        takes_suites_together: whether the blocks of all suites are best given at once.
+    """
+
+    takes_suites_together = False
+
+    def note_records(self, records: Iterable[Record | None]) -> None:
+        """Take note of the records of all blocks with times, selected or not."""
+
+    def difference(self, block: Block, record: Record) -> str:
+        """Return how a record differs from a measurement made now, "" if it does not."""
+        return difference(record.stamp, stamp())
+
+    def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
+        """Yield each block when it is begun, and its record or why there is none, in any order."""
+        for block in blocks:
+            yield block
+            yield measure(block)
+
+    def stamp(self) -> Mapping[str, Any]:
+        """Return the machine that times are taken on, versions and sources."""
+        return stamp()
+
+    def close(self) -> None:
+        """Cancel the remaining measurements and release their resources."""
+
+
+THIS_PROCESS = Executor()
 
 
 def executor_at(address: str, mix_machines: bool = False) -> Executor:
     """Return the executor of an address.
 
     Raises:
-        ValueError: if there is no such executor, it needs a package that is not installed, or it
+        ValueError: if the executor does not exist, needs a package that is not installed, or
             does not answer.
     """
     if address == LOCAL:

@@ -1,8 +1,8 @@
-"""The workers of a Dask cluster: blocks without times spread over them, timed ones are pinned.
+"""The workers of a Dask cluster: timed blocks are pinned, all others spread over them.
 
-Dask finds a worker for each block without times, and another one if that is lost. Timed blocks are
-placed here: those of a suite on one host, one after the other, and on hosts of one machine only,
-unless machines may be mixed.
+Dask finds a worker for each block without times, and another if that is lost. Timed blocks are
+placed here: a suite stays on a host, block after block, and on hosts of a single machine, unless
+machines may be mixed.
 """
 
 import asyncio
@@ -18,14 +18,13 @@ from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 from ..block import Block, Scale
-from ..executor import Executor, NotMeasured, Step
 from ..machine import stamp
 from ..measure import block_key, failure, record_of
 from ..progress import Progress, announce
 from ..record import Record, decode
 from ..stopwatch import Budget
-from . import DASK
-from .work import Reply, Task, perform, place, unlike
+from . import DASK, Executor, NotMeasured, Step
+from .work import perform, place, unlike
 
 # How long [s] to wait for the scheduler, and for workers, at first and when all are lost.
 ANSWER, WORKERS = 10.0, 120.0
@@ -46,13 +45,13 @@ class Place(NamedTuple):
 
 @dataclass(eq=False)
 class _Queue:
-    """Blocks to be measured one after the other, pinned to a host if they take times.
+    """Blocks to be measured in order, pinned to a host if they take times.
 
     Attributes:
-        blocks: those that are not done.
-        is_pinned: whether they stay on one host.
+        blocks: the remaining blocks.
+        is_pinned: whether they stay on a host.
         is_begun: whether the first was reported as begun; another worker may begin it again.
-        host: the host that they are bound to, while there is one.
+        host: the host that they are bound to, if any.
         address: the worker that has the first block.
         future: the result of the first block, None if no worker has it.
     """
@@ -70,7 +69,7 @@ class DaskExecutor(Executor):
 
     Attributes:
         address: host and port of the scheduler.
-        mix_machines: whether times of several machines may stand in one table.
+        mix_machines: whether times of several machines may share a table.
     """
 
     takes_suites_together = True
@@ -86,7 +85,7 @@ class DaskExecutor(Executor):
 
         Raises:
             ValueError: if Dask is not installed, the scheduler does not answer in time [s], there
-                is no worker in time [s], or one has other versions or sources.
+                is no worker in time [s], or a worker has other versions or sources.
         """
         self.address, self.mix_machines, self._patience = address, mix_machines, workers
         self._client, self._results = _connected(address, answer), SimpleQueue[Any]()
@@ -107,8 +106,12 @@ class DaskExecutor(Executor):
         self._client.close(timeout=ANSWER)
 
     def note_records(self, records: Iterable[Record | None]) -> None:
-        """Choose the machine that times are taken on: of those here, that of the most records."""
-        self._records = [r for r in records if r and r.arrays and not unlike(r.stamp, stamp())]
+        """Choose the machine that times are taken on: the available one with the most records."""
+        self._records = [
+            record
+            for record in records
+            if record and record.arrays and not unlike(record.stamp, stamp())
+        ]
         recorded = Counter(_machine(record.stamp) for record in self._records)
         workers = Counter(place.machine for place in self._places.values())
         self._machine = max(sorted(workers), key=lambda name: (recorded[name], workers[name]))
@@ -138,7 +141,7 @@ class DaskExecutor(Executor):
         yield from self._measure(list(queues.values()), scale)
 
     def _mixed_suites(self, blocks: Sequence[Block]) -> dict[str, str]:
-        """Return the suites whose remaining rows are of another machine, and why that is bad."""
+        """Return the suites with remaining rows of another machine, and why that is bad."""
         keys, machine = {block_key(block) for block in blocks}, _in_words(self._machine)
         return {
             record.suite: f"others of {record.suite} are timed on another machine than is here "
@@ -171,7 +174,7 @@ class DaskExecutor(Executor):
                 yield record
 
     def _submit_first_blocks(self, queues: Sequence[_Queue], scale: Scale) -> Iterator[Block]:
-        """Submit the first block of each queue, a pinned one to a host without another queue."""
+        """Submit the first block of each queue, if pinned to a host without another queue."""
         for queue in queues:
             if queue.future:
                 continue
@@ -185,10 +188,14 @@ class DaskExecutor(Executor):
                 workers = {"workers": [address]}
             if not queue.is_begun:
                 yield queue.blocks[0]
-            queue.is_begun, queue.future = True, self._submit(queue.blocks[0], scale, **workers)
+            block, name = queue.blocks[0], f"plumbob-{uuid.uuid4().hex}"
+            arguments = block.suite, pickle.dumps(scale), block_key(block), block.times, stamp()
+            future = self._client.submit(perform, *arguments, self._topic, key=name, **workers)
+            future.add_done_callback(self._results.put)
+            queue.is_begun, queue.future = True, future
 
     def _free_worker(self, host: str, occupied: set[str]) -> str:
-        """Return a worker of this host; if it is "", of one that is not occupied; "" if none."""
+        """Return a worker of this host, or of any free host if it is ""; "" if there is none."""
         for address in self._addresses():
             place = self._places[address]
             is_allowed = self.mix_machines or place.machine == self._machine
@@ -206,15 +213,6 @@ class DaskExecutor(Executor):
             if queue.host not in hosts:
                 queue.host = ""
 
-    def _submit(self, block: Block, scale: Scale, **workers: Any) -> Any:
-        task = Task(
-            *(block.suite, pickle.dumps(scale), block_key(block)),
-            *(block.times, stamp(), self._topic),
-        )
-        future = self._client.submit(perform, task, key=f"plumbob-{uuid.uuid4().hex}", **workers)
-        future.add_done_callback(self._results.put)
-        return future
-
     def _next(self) -> Any:
         """Return a future that is done, None if there is none for a while; pass on progress."""
         with contextlib.suppress(Empty):
@@ -229,21 +227,21 @@ class DaskExecutor(Executor):
         from distributed import KilledWorker
 
         try:
-            reply: Reply = future.result(timeout=ANSWER)
+            reply: Mapping[str, str] = future.result(timeout=ANSWER)
         except TimeoutError:
             self._results.put(future)
             return None
         except KilledWorker:
-            reply = Reply(failed="every worker that tried it was lost")
+            reply = {"failed": "every worker that tried it was lost"}
         except asyncio.CancelledError:
             raise self._error("the scheduler is gone") from None
         except Exception as error:
             raise self._error(f"{type(error).__name__}: {error}") from None
-        if reply.refused:
-            raise self._error(reply.refused)
-        if reply.failed:
-            return replace(record_of(block, failure(reply.failed), 0.0), stamp=self.stamp())
-        return decode(reply.line)
+        if "refused" in reply:
+            raise self._error(reply["refused"])
+        if "failed" in reply:
+            return replace(record_of(block, failure(reply["failed"]), 0.0), stamp=self.stamp())
+        return decode(reply["line"])
 
     def _wait_for_workers(self) -> None:
         try:
@@ -255,10 +253,10 @@ class DaskExecutor(Executor):
             pass
 
     def _addresses(self) -> list[str]:
-        """Return the addresses of the workers that are there, in order; inspect new ones.
+        """Return the addresses of the present workers, in order; inspect new workers.
 
         Raises:
-            ValueError: if one has other versions or sources.
+            ValueError: if a worker has other versions or sources.
         """
         try:
             addresses = sorted(self._client.nthreads())

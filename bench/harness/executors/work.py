@@ -1,6 +1,6 @@
 """The work of a cluster's worker: find a block by its key, measure it, return its record.
 
-Each block is measured in a process of its own, as a solver may crash, print or hang. While one
+Each block is measured in a process of its own, as a solver may crash, print or hang. While a
 worker of a machine takes times, the other workers of that machine wait.
 """
 
@@ -15,7 +15,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...peers.protocol import describe
 from ...peers.sources import digest_of
@@ -33,46 +33,32 @@ PATIENCE = 24 * 3600.0
 _of_thread = threading.local()
 
 
-class Task(NamedTuple):
-    """A block to be measured elsewhere.
+def perform(
+    suite: str, scale: bytes, key: Key, times: bool, client: Mapping[str, Any], topic: str
+) -> Mapping[str, str]:
+    """Measure a block in a process of its own.
 
-    Attributes:
+    Args:
         suite: its suite.
         scale: the pickled scale, with the user's solvers and problems.
         key: the block's key.
-        times: whether it takes times, so that the machine must do nothing else.
-        stamp: of the client, whose versions and sources the worker must have.
+        times: whether it takes times, so that the machine must be idle otherwise.
+        client: the stamp of the client; the worker must have the same versions and sources.
         topic: under which the client listens for progress.
+
+    Returns:
+        The record as a "line", or why it "failed" or was "refused".
     """
-
-    suite: str
-    scale: bytes
-    key: Key
-    times: bool
-    stamp: Mapping[str, Any]
-    topic: str = ""
-
-
-class Reply(NamedTuple):
-    """The record of a task as one line, or why it failed, or why it was refused."""
-
-    line: str = ""
-    failed: str = ""
-    refused: str = ""
-
-
-def perform(task: Task) -> Reply:
-    """Measure a block in a process of its own."""
-    if refused := unlike(task.stamp, stamp()):
-        return Reply(refused=refused)
+    if reason := unlike(client, stamp()):
+        return {"refused": reason}
     if not hasattr(_of_thread, "process"):
         _of_thread.process = WorkerProcess(PATIENCE, PATIENCE)
-    calculate = _of_thread.process.calculate
     try:
-        with _machine_to_itself(task.times), listening(partial(_report, task.topic)):
-            return Reply(**calculate(measured, task.suite, task.scale, task.key))
+        with _machine_to_itself(times), listening(partial(_report, topic)):
+            reply: Mapping[str, str] = _of_thread.process.calculate(measured, suite, scale, key)
+            return reply
     except RuntimeError as error:
-        return Reply(failed=str(error))
+        return {"failed": str(error)}
 
 
 def _report(topic: str, progress: Progress) -> None:
@@ -116,7 +102,7 @@ def _blocks(suite: str, pickled_scale: bytes) -> dict[Key, Block]:
 def _machine_to_itself(exclusive: bool) -> Iterator[None]:
     """Wait for a machine, the whole of it or a share, and hold it.
 
-    A process that was killed holds nothing. Containers with temporary folders of their own do not
+    The lock of a killed process is free. Containers with temporary folders of their own do not
     see each other's lock.
     """
     path = Path(tempfile.gettempdir(), f"plumbob-{os.getuid()}.lock")

@@ -1,1 +1,1 @@
-"""Solvers for cloths as the bench calls them, one file each, the only one to import its engine."""
+"""Solvers for cloths as the bench calls them, a file each, which alone imports its engine."""

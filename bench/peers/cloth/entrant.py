@@ -1,4 +1,4 @@
-"""A user's solver for cloths: a frame is one request or several, one a step."""
+"""A user's solver for cloths: each step of a frame is a request."""
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def _check_model(system: MassSpring, greeting: Greeting) -> None:
     """Make sure that a solver's own model can hold a system.
 
     Raises:
-        ValueError: naming what it cannot hold.
+        ValueError: naming the part that it cannot hold.
     """
     can, gravity = greeting.system, system.gravity
     is_down = not gravity[[0, 2]].any() and bool(gravity[1] <= 0.0)

@@ -1,7 +1,7 @@
 """MuJoCo: point masses on slides, joined by tendons or by the edges of a one-dimensional flex.
 
 "discrete" solves a linear system by conjugate gradients, of which MuJoCo allows 100 iterations to a
-tolerance of 1e-8; more, and a smaller one, are settings here. All springs of a flex are alike.
+tolerance of 1e-8; both are settings here. All springs of a flex are alike.
 """
 
 import mujoco
@@ -45,14 +45,16 @@ def prepare(
 
 
 def _engine(system: MassSpring, flex: bool) -> MujocoMassSpring:
-    """Return the engine of an equal system but for stiffness and damping, or a new one.
+    """Return the engine of an equal system but for stiffness and damping, or a new engine.
 
-    One is cached for each number of particles: to build one takes time cubic in it.
+    An engine is cached for each number of particles: its construction takes time cubic in it.
     """
     key = flex, system.particle_count
     if key in _engines:
         cached, engine = _engines[key]
-        if all(np.array_equal(getattr(cached, n), getattr(system, n)) for n in _BUILT_FROM):
+        if all(
+            np.array_equal(getattr(cached, part), getattr(system, part)) for part in _BUILT_FROM
+        ):
             return engine
     engine = MujocoFlex(system) if flex else MujocoMassSpring(system)
     _engines[key] = system, engine

@@ -1,9 +1,9 @@
-"""Newton, the engine, in single precision: particles and springs, by one of its solvers.
+"""Newton, the engine, in single precision: particles and springs, by any of its solvers.
 
 - semi-implicit: symplectic Euler.
-- VBD: vertex block descent minimises the objective of implicit Euler (Chen et al. 2024). One after
-  the other, each particle takes a Newton step of its own, those of one colour at once; so
-  neighbours must differ in colour.
+- VBD: vertex block descent minimises the objective of implicit Euler (Chen et al. 2024). Each
+  particle takes a Newton step of its own, all of a colour at once; so neighbours must differ in
+  colour.
 - XPBD: extended position based dynamics (Macklin, Müller, Chentanez 2016) corrects all springs at
   once and adds their corrections of a particle, without averaging.
 
@@ -40,7 +40,7 @@ def prepare(
 ) -> Mover:
     """Return a solver, stepping so many times a frame, with `iterations` a step if it iterates.
 
-    With `own`, VBD goes by the colours that Newton gives, not by those of the springs.
+    With `own`, VBD uses the colours that Newton computes, not the colours of the springs.
     """
     wp.config.log_level = wp.LOG_ERROR
     with wp.ScopedDevice("cpu"):
@@ -49,7 +49,7 @@ def prepare(
 
 
 class _Steps:
-    """Steps of one of Newton's solvers, so many a frame."""
+    """Steps of a solver of Newton's, so many a frame."""
 
     def __init__(self, particles: Any, solver: Any, h: float, substeps: int) -> None:
         self._now, self._next = particles.state(), particles.state()
@@ -90,9 +90,9 @@ def model(system: MassSpring, *, own_colours: bool = False) -> Any:
 
 
 def colours(springs: IndexArray, particle_count: int) -> list[IndexArray]:
-    """Return groups of particles, no two of one group joined by a spring.
+    """Return groups of particles, no two of a group joined by a spring.
 
-    One after the other, each particle takes the first colour that none of its neighbours has.
+    In order, each particle takes the first colour that its neighbours do not have.
     """
     neighbours: list[list[int]] = [[] for _ in range(particle_count)]
     for i, j in springs.tolist():
@@ -101,5 +101,5 @@ def colours(springs: IndexArray, particle_count: int) -> list[IndexArray]:
     colour = np.full(particle_count, -1)
     for i, adjacent in enumerate(neighbours):
         used = set(colour[adjacent])
-        colour[i] = next(c for c in range(particle_count) if c not in used)
-    return [np.flatnonzero(colour == c) for c in range(colour.max() + 1)]
+        colour[i] = next(number for number in range(particle_count) if number not in used)
+    return [np.flatnonzero(colour == number) for number in range(colour.max() + 1)]

@@ -1,4 +1,4 @@
-"""Plumbob's own steps, implicit Euler's and explicit ones, through their public interface."""
+"""Plumbob's own steps, implicit Euler's and explicit, through their public interface."""
 
 from collections.abc import Callable
 from functools import partial
@@ -20,7 +20,7 @@ def prepare(
     tolerance: float = 0.0,
     iterations: int | None = None,
 ) -> Mover:
-    """Return an explicit integrator, or one of `STEP_SOLVERS`.
+    """Return an explicit integrator, or a solver of `STEP_SOLVERS`.
 
     Without a tolerance, the latter makes so many iterations in every step.
     """
@@ -33,7 +33,7 @@ def prepare(
 
 
 class _Steps:
-    """So many steps a frame of what maps a state to the next."""
+    """So many steps a frame of a map from a state to the next."""
 
     def __init__(self, step: Callable[[State], State], substeps: int) -> None:
         self._step, self._substeps = step, substeps

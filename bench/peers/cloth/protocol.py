@@ -1,9 +1,9 @@
-"""What the bench asks of a solver for cloths.
+"""The interface of adapters for cloths.
 
-An adapter is a module with one function, `prepare(system, frame, **settings)`: it sets the engine
-up once for particles and springs and returns what moves them on, a frame at a time. Only `advance`
-is timed, so conversions cost no solver anything, and set-up is timed apart. For a system that it
-cannot move `prepare` raises a `ValueError`.
+An adapter is a module with a function `prepare(system, frame, **settings)`: it sets the engine up
+for particles and springs and returns a `Mover`, which moves them on, a frame at a time. Only
+`advance` is timed, so conversions cost no solver anything, and set-up is timed apart. For a system
+that it cannot move `prepare` raises a `ValueError`.
 """
 
 from typing import Protocol
@@ -18,10 +18,10 @@ class Mover(Protocol):
     """A solver that is set up for a system and the length of a frame."""
 
     def begin(self, state: State) -> None:
-        """Put the particles into a state; the solver forgets all earlier ones."""
+        """Put the particles into a state; the solver forgets all earlier states."""
 
     def advance(self) -> OwnTime | None:
-        """Move on by one frame; return the solver's own time, None if the call is timed.
+        """Move on by a frame; return the solver's own time, None if the call is timed.
 
         Raises:
             FloatingPointError: if the motion leaves the finite numbers.

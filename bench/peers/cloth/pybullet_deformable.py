@@ -1,9 +1,9 @@
 """PyBullet: a deformable body as masses and springs, by symplectic Euler in double precision.
 
 Its springs are the edges of a mesh of triangles, so it takes square cloths only. It adds springs of
-0.1 N/m between neighbours' neighbours, whose stiffness is set to zero. Rest lengths are taken anew
+0.1 N/m between neighbours' neighbours; their stiffness is set to zero. Rest lengths are taken anew
 from where the particles are at the first step, which is taken with the cloth flat. Velocities
-cannot be written but are kept when positions are: one step of chosen forces gives the particles
+cannot be written but are kept when positions are: a step of chosen forces gives the particles
 their first velocities.
 """
 
@@ -46,7 +46,11 @@ class _Steps:
         self._system, self._flat, self._h, self._substeps = system, flat, h, substeps
 
     def begin(self, state: State) -> None:
-        before = self._velocities()
+        # The velocities [m/s], by a step of the flat cloth, in which no spring pulls.
+        self._body.write(self._flat)
+        self._body.set(0.0 * self._system.gravity, _PUSH)
+        self._body.step()
+        before = (self._body.positions() - self._flat) / _PUSH
         if not np.isfinite(before).all():  # it blew up, and does not forget
             _body.cache_clear()
             self._body, before = self._load(), np.zeros_like(before)
@@ -61,13 +65,6 @@ class _Steps:
     def positions(self) -> FloatArray:
         return self._body.positions()
 
-    def _velocities(self) -> FloatArray:
-        """Return the velocities [m/s], by a step of the flat cloth, in which no spring pulls."""
-        self._body.write(self._flat)
-        self._body.set(0.0 * self._system.gravity, _PUSH)
-        self._body.step()
-        return (self._body.positions() - self._flat) / _PUSH
-
     def _give(self, velocities: FloatArray) -> None:
         """Add to the velocities, which particles keep when they are put elsewhere."""
         fastest = float(np.abs(velocities).max())
@@ -80,7 +77,7 @@ class _Steps:
 
 
 class _Body:
-    """A cloth in a world of its own, whose rest lengths are those of where it was flat."""
+    """A cloth in a world of its own, with the rest lengths of the flat cloth."""
 
     def __init__(
         self, text: str, flat: FloatArray, pins: tuple[int, ...], mass: float, stiffness: float
@@ -121,12 +118,12 @@ class _Body:
 
 @functools.lru_cache(maxsize=1)
 def _body(text: str, flat: bytes, pins: tuple[int, ...], mass: float, stiffness: float) -> _Body:
-    """Return a body, kept for the next solver: to load one takes time quadratic in its size."""
+    """Return a body, kept for the next solver: loading takes time quadratic in its size."""
     return _Body(text, np.frombuffer(flat).reshape(-1, 3), pins, mass, stiffness)
 
 
 def _pushed(system: MassSpring, velocities: FloatArray, start: FloatArray) -> FloatArray:
-    """Return where forces give all particles, still at first, these velocities in one step.
+    """Return positions at which forces give particles at rest these velocities in a step.
 
     There the system is in equilibrium under as much force in the other direction.
     """
@@ -139,7 +136,7 @@ def _pushed(system: MassSpring, velocities: FloatArray, start: FloatArray) -> Fl
 
 
 def mesh(system: MassSpring) -> tuple[FloatArray, IndexArray]:
-    """Return the flat cloth (particle, 3) and triangles (triangle, 3) whose edges are its springs.
+    """Return the flat cloth (particle, 3) and triangles (triangle, 3) with its springs for edges.
 
     Raises:
         ValueError: if the system is no square cloth of equal masses and undamped springs, or large.
@@ -167,7 +164,7 @@ def mesh(system: MassSpring) -> tuple[FloatArray, IndexArray]:
 
 
 def _triangles(size: int) -> IndexArray:
-    """Return two triangles of each square, those over two edges in a row, and a last diagonal.
+    """Return two triangles of each square, triangles over two edges in a row, a last diagonal.
 
     No three corners are in line, and all are joined: PyBullet loads other meshes without end.
     """
@@ -177,11 +174,13 @@ def _triangles(size: int) -> IndexArray:
     for grid in (at, at.T):
         neighbours = np.concatenate([grid[1:-1, 1:], grid[1:-1, -2:-1]], axis=1)
         groups.append((grid[:-2], neighbours, grid[2:]))
-    return np.concatenate([np.stack([x.ravel() for x in g], axis=1) for g in groups])
+    return np.concatenate(
+        [np.stack([corner.ravel() for corner in group], axis=1) for group in groups]
+    )
 
 
 def wavefront(vertices: FloatArray, triangles: IndexArray) -> str:
     """Return a mesh as the text of an OBJ file."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (triangles + 1).tolist()]
+    lines = ["v {!r} {!r} {!r}".format(*vertex) for vertex in vertices.tolist()]
+    lines += ["f {} {} {}".format(*triangle) for triangle in (triangles + 1).tolist()]
     return "\n".join([*lines, ""])

@@ -81,12 +81,12 @@ def pinocchio_model(robot: Robot) -> pinocchio.Model:
 
 
 def to_pinocchio(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return coordinates whose quaternions end with w."""
+    """Return coordinates with w at the end of quaternions."""
     return _permuted(robot, q, [1, 2, 3, 0])
 
 
 def from_pinocchio(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return coordinates whose quaternions begin with w."""
+    """Return coordinates with w at the start of quaternions."""
     return _permuted(robot, q, [3, 0, 1, 2])
 
 

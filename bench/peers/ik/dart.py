@@ -1,4 +1,4 @@
-"""DART: its inverse kinematics of one effector, damped steps by its gradient descent solver.
+"""DART: its inverse kinematics of an effector, damped steps by its gradient descent solver.
 
 The error is bounded by a cube within the ball of tolerance, and so is a rotation; the solver keeps
 the joints' limits. DART's own restarts draw from a generator without a seed, so they are left out.

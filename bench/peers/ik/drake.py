@@ -1,10 +1,10 @@
 """Drake: inverse kinematics as a nonlinear program, solved by a solver of its wheel.
 
-Nothing is minimised: effectors are constrained to a box and a cone about their targets, coordinates
-to their limits. The program is built once for a robot; frames in the world are moved to the
-targets. Solvers stop at the edge of the constraints, so half of the tolerance is set. Drake bounds
-an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's usual tolerance on constraints
-of 1e-6: a smaller one is given, or half of its claims are false.
+There is no objective: effectors are constrained to a box and a cone about their targets,
+coordinates to their limits. The program is built once for a robot; frames in the world are moved to
+the targets. Solvers stop at the edge of the constraints, so half of the tolerance is set. Drake
+bounds an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's usual tolerance on
+constraints of 1e-6: a smaller tolerance is given, or half of its claims are false.
 """
 
 import logging
@@ -62,7 +62,7 @@ def prepare(
 
 def kinematics(robot: Robot) -> Forward:
     """Return Drake's forward kinematics of the effectors."""
-    plant, _ = drake_plant(robot)
+    plant = drake_plant(robot)[0]
     context, coordinates = plant.CreateDefaultContext(), _Coordinates(robot, plant)
     frames = [plant.GetFrameByName(effector) for effector in robot.effectors]
 
@@ -91,7 +91,7 @@ def drake_plant(robot: Robot) -> tuple[Any, list[Any]]:
 
 
 def _program(robot: Robot, plant: Any, targets: list[Any], tolerance: Tolerance) -> Any:
-    """Return the program, whose positions are bounded in a cube within the ball of tolerance."""
+    """Return the program, with positions bounded in a cube within the ball of tolerance."""
     ik, identity = InverseKinematics(plant, True), RotationMatrix()
     side = np.full(3, INSIDE * tolerance.position / np.sqrt(3.0))
     for effector, target in zip(map(plant.GetFrameByName, robot.effectors), targets, strict=True):
@@ -109,25 +109,26 @@ class _Coordinates:
         """Find the first coordinate of each joint in the robot and in Drake."""
         self._size, self._drake_size = len(robot.lower), plant.num_positions()
         self._hinges, self._balls = list[tuple[int, int]](), list[tuple[int, int]]()
-        i = 0
+        index = 0
         for name in robot.joints:
-            k = plant.GetJointByName(name).position_start()
-            (self._balls if i in robot.balls else self._hinges).append((i, k))
-            i += 4 if i in robot.balls else 1
+            offset = plant.GetJointByName(name).position_start()
+            (self._balls if index in robot.balls else self._hinges).append((index, offset))
+            index += 4 if index in robot.balls else 1
 
     def to_drake(self, q: FloatArray) -> FloatArray:
         converted = np.zeros(self._drake_size)
-        for i, k in self._hinges:
-            converted[k] = q[i]
-        for i, k in self._balls:
-            quaternion = Quaternion(q[i : i + 4] / np.linalg.norm(q[i : i + 4]))
-            converted[k : k + 3] = RollPitchYaw(quaternion).vector()
+        for index, offset in self._hinges:
+            converted[offset] = q[index]
+        for index, offset in self._balls:
+            quaternion = Quaternion(q[index : index + 4] / np.linalg.norm(q[index : index + 4]))
+            converted[offset : offset + 3] = RollPitchYaw(quaternion).vector()
         return converted
 
     def from_drake(self, converted: FloatArray) -> FloatArray:
         q = np.zeros(self._size)
-        for i, k in self._hinges:
-            q[i] = converted[k]
-        for i, k in self._balls:
-            q[i : i + 4] = RollPitchYaw(converted[k : k + 3]).ToQuaternion().wxyz()
+        for index, offset in self._hinges:
+            q[index] = converted[offset]
+        for index, offset in self._balls:
+            angles = RollPitchYaw(converted[offset : offset + 3])
+            q[index : index + 4] = angles.ToQuaternion().wxyz()
         return q

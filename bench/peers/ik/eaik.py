@@ -1,6 +1,6 @@
-"""EAIK: all solutions at once by subproblems, for arms whose axes allow it.
+"""EAIK: all solutions at once by subproblems, for arms with suitable axes.
 
-Some of its solutions are least-squares answers to insoluble targets, marked `is_LS`; those are left
+Some of its solutions are least-squares answers to insoluble targets, marked `is_LS`; they are left
 out, and so are solutions beyond the limits, after whole revolutions are tried. It needs no start.
 Its time is that of `calculate_IK`: the choice among all solutions is its user's.
 """

@@ -22,12 +22,12 @@ STRETCH = 1e-6
 def prepare(
     skeleton: Skeleton, tolerance: float, spec: Spec = "", method: str = ""
 ) -> Callable[[ChainRequest], Solve]:
-    """Return a user's solver, set up for a skeleton whose last joint is the effector.
+    """Return a user's solver, set up for a skeleton that ends at its effector.
 
     An output holds the iterations, NaN if unstated, and the joints' positions in a row.
 
     Raises:
-        NoAnswerError: if it gives no answer when one iteration is allowed.
+        NoAnswerError: if it gives no answer when an iteration is allowed.
     """
     solver = opened(spec)
     constants = {"parents": skeleton.parents, "offsets": skeleton.offsets, "tolerance": tolerance}

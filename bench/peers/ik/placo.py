@@ -1,7 +1,7 @@
 """PlaCo: differential inverse kinematics by quadratic programs, iterated to a target.
 
 Its wheels pin a Pinocchio older than ours, so it works in a process of an environment of its own,
-`placo_program`, which measures its own time: the connection costs it nothing.
+`placo_program`, which measures its own time: the connection is not timed.
 """
 
 import json
@@ -13,8 +13,8 @@ import numpy as np
 from plumbob.crosscheck.child_process import ChildProcess, LostError
 
 from ...problems.robots import UnableError
-from .. import environments
 from ..protocol import OwnTime
+from ..registry import environment_python
 from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 PROGRAM = Path(__file__).with_name("placo_program.py")
@@ -27,7 +27,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
         UnableError: if the robot is no chain, or the program does not take it.
     """
     robot.require_chain()
-    program = ChildProcess([environments.python("placo"), "-I", PROGRAM])
+    program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
     task = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
     try:
         _answer(program, {**task, "iterations": iterations, "limits": tolerance})
@@ -48,11 +48,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 
 
 def _answer(program: ChildProcess, question: object) -> Any:
-    """Return the program's answer.
-
-    Raises:
-        ConnectionError: if it has ended.
-    """
+    """Return the program's answer, or raise ConnectionError if it has ended."""
     try:
         program.send(f"{json.dumps(question)}\n".encode())
         return json.loads(program.receive())

@@ -19,7 +19,7 @@ REGULARIZATION = 1e-6
 
 
 class Reacher:
-    """A robot and one task, which takes its effector to a frame within the joints' limits."""
+    """A robot and a task, which takes its effector to a frame within the joints' limits."""
 
     def __init__(self, text: str, effector: str, joints: Sequence[str]) -> None:
         """Read the robot; its base stands still.
@@ -48,14 +48,14 @@ class Reacher:
         q[self._first :] = start
         self._robot.state.q = q
         self._robot.update_kinematics()
-        done = self._is_at(limits)
+        is_solved = self._is_at(limits)
         for _ in range(iterations):
-            if done:
+            if is_solved:
                 break
             self._solver.solve(True)
             self._robot.update_kinematics()
-            done = self._is_at(limits)
-        return done, self._robot.state.q[self._first :]
+            is_solved = self._is_at(limits)
+        return is_solved, self._robot.state.q[self._first :]
 
     def _is_at(self, limits: Sequence[float]) -> bool:
         for part in self._parts:  # the errors are those of the last step until then
@@ -66,7 +66,7 @@ class Reacher:
 
 
 def main() -> None:
-    """Answer questions; what PlaCo prints goes to standard error."""
+    """Answer questions; the output of PlaCo goes to standard error."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     task = json.loads(sys.stdin.readline())
@@ -76,9 +76,9 @@ def main() -> None:
         question = json.loads(line)
         target, start = np.array(question["target"]), np.array(question["start"])
         before = perf_counter()
-        done, q = reacher.solve(target, start, task["iterations"], task["limits"])
+        claim, q = reacher.solve(target, start, task["iterations"], task["limits"])
         seconds = perf_counter() - before
-        print(json.dumps([bool(done), seconds, q.tolist()]), file=answers, flush=True)
+        print(json.dumps([bool(claim), seconds, q.tolist()]), file=answers, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,11 @@
-"""What the bench asks of a solver for robots.
+"""The interface of adapters for robots.
 
-An adapter is a module with one function, `prepare(robot, tolerance, **settings)`: it sets the
-engine up once for a robot and returns a function `ask(request)`. That puts one target in the
-engine's own types and returns the call to be timed, which returns a `SolverOutput`: neither
-conversions nor set-up count as time of a solve. For a robot that it cannot solve `prepare` raises
-`UnableError`.
+An adapter is a module with a function `prepare(robot, tolerance, **settings)`: it sets the engine
+up for a robot and returns a function `ask(request)`. That puts a target in the engine's own types
+and returns the call to be timed, which returns a `SolverOutput`: neither conversions nor set-up
+count as time of a solve. For a robot that it cannot solve `prepare` raises `UnableError`.
 
-An adapter of an engine whose kinematics is compared as well has a function `kinematics(robot)`,
+If the engine's kinematics is compared as well, its adapter has a function `kinematics(robot)`,
 which returns a `Forward`.
 """
 
@@ -31,7 +30,7 @@ class SolverOutput(NamedTuple):
         q: the coordinates, in the robot's order; None if it returns none.
         claim: whether it says that they solve the target; None if it does not say.
         time: as the adapter or its process measured it; None where the call is timed.
-        error: what the solver raised, else "".
+        error: the exception of the solver, else "".
     """
 
     q: FloatArray | None
@@ -47,7 +46,7 @@ Forward = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
 def attempt(solve: Solve) -> SolverOutput:
-    """Return the answer of a solve; one that raises is a failed attempt with its error."""
+    """Return the answer of a solve; an exception is a failed attempt with its error."""
     try:
         return solve()
     except Exception as error:  # an exception of an engine is its result

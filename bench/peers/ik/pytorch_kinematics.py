@@ -1,6 +1,6 @@
-"""pytorch_kinematics: `PseudoInverseIK`, damped least squares on tensors, on one processor.
+"""pytorch_kinematics: `PseudoInverseIK`, damped least squares on tensors, on a single processor.
 
-In the end it takes off whole revolutions, clamps to the limits, and corrects what that has spoilt.
+In the end it takes off whole revolutions, clamps to the limits, and corrects the resulting error.
 It starts from as many configurations at once as it is given. In single precision, its default, some
 targets end in a singular matrix; here it works in double precision.
 """

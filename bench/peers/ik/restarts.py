@@ -1,4 +1,4 @@
-"""Restarts for solvers that make one attempt: again from random poses until one is claimed."""
+"""Restarts for solvers without restarts: from random poses until the solver claims success."""
 
 import zlib
 
@@ -13,8 +13,8 @@ _SEED = 1986
 def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
     """Return a solver that makes up to `restarts` further attempts from seeded random poses.
 
-    An attempt succeeds if it claims an answer within the limits, which not all solvers look at; one
-    that raises has failed. The poses depend on the target only, and all attempts are prepared
+    An attempt succeeds if it claims an answer within the limits, which not all solvers look at; an
+    exception is a failure. The poses depend on the target only, and all attempts are prepared
     before the clock runs.
     """
 
@@ -33,10 +33,11 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
                 outputs.append(attempt(solve_once))
                 if is_success(outputs[-1]):
                     break
-            last = next((o for o in reversed(outputs) if o.q is not None), outputs[-1])
+            answers = [output for output in outputs if output.q is not None]
+            last = answers[-1] if answers else outputs[-1]
             claim = None if last.claim is None else is_success(last)
-            error = next((o.error for o in outputs if o.error), "")
-            return SolverOutput(last.q, claim, total(o.time for o in outputs), error)
+            error = next((output.error for output in outputs if output.error), "")
+            return SolverOutput(last.q, claim, total(output.time for output in outputs), error)
 
         return solve
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...problems.robots import links
-from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -54,22 +54,17 @@ def prepare(
 
 
 def chain_of_transforms(robot: Robot) -> ETS:
-    """Return the robot as elementary transforms: each hinge in a frame whose z is its axis."""
+    """Return the robot as elementary transforms: each hinge in a frame with its axis for z."""
     steps, pending, joint = [], np.eye(4), 0
     for transform, axis in links(robot):
         pending = pending @ transform
         if axis is None:
             continue
+        across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        across /= np.linalg.norm(across)
         frame = np.eye(4)
-        frame[:3, :3] = frame_with_z(axis)
+        frame[:3, :3] = np.column_stack([across, np.cross(axis, across), axis])
         bounds = [robot.lower[joint], robot.upper[joint]]
         steps += [ET.SE3(pending @ frame), ET.Rz(qlim=bounds)]
         pending, joint = frame.T, joint + 1
     return ETS([*steps, ET.SE3(pending)])
-
-
-def frame_with_z(axis: FloatArray) -> FloatArray:
-    """Return a rotation that takes z to the axis."""
-    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    across /= np.linalg.norm(across)
-    return np.column_stack([across, np.cross(axis, across), axis])

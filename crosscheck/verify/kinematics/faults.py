@@ -76,10 +76,7 @@ def _are_independent(faults: Sequence[SwitchFault]) -> bool:
 
 
 def _is_likely(triple: Sequence[SwitchFault]) -> bool:
-    """Return whether a triple is of the rotations of a method, its other steps, and kinematics.
-
-    Real programs have such triples; there are ten times as many of all.
-    """
+    """Return whether a triple is in rotations, another step and kinematics, as in real programs."""
     rotations, step, kinematics = triple
     return (
         rotations.switch in ("applied", "rotations")

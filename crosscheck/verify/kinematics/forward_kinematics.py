@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Skeleton, forward_kinematics, rotation
+from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
@@ -16,71 +16,9 @@ from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..sentence import sentence
 from . import laws, rounding, skeletons
 from .report import diagnosis_of, report
-from .skeletons import CaseFamily, PosedSkeleton, chain, chains, tree, trees
+from .skeletons import CaseFamily, drawn
 
 TASK = "forward_kinematics"
-
-
-def _half_turns(rng: np.random.Generator) -> PosedSkeleton:
-    skeleton = chain(rng, 4)
-    local = rotation.random(rng, 4)
-    local[:, 0] = 0.0
-    return skeleton._replace(local_rotations=local / np.linalg.norm(local, axis=-1, keepdims=True))
-
-
-def _negative(rng: np.random.Generator) -> PosedSkeleton:
-    skeleton = chain(rng, 4)
-    local = skeleton.local_rotations
-    return skeleton._replace(local_rotations=local * np.where(local[:, :1] > 0.0, -1.0, 1.0))
-
-
-def _slight(rng: np.random.Generator) -> PosedSkeleton:
-    skeleton = chain(rng, 5)
-    v = 1e-3 * rng.uniform(-1.0, 1.0, (5, 3))
-    return skeleton._replace(local_rotations=rotation.exponential(v))
-
-
-def _no_length(rng: np.random.Generator) -> PosedSkeleton:
-    skeleton = chain(rng, 4)
-    skeleton.offsets[2] = 0.0
-    return skeleton
-
-
-def _branches(rng: np.random.Generator) -> PosedSkeleton:
-    return tree(rng, 5)._replace(parents=np.array([-1, 0, 0, 0, 1]))
-
-
-FAMILIES = (
-    CaseFamily("root only", sentence("A single joint, away from the origin and rotated."),
-               chains(1)),
-    CaseFamily("two joints, a quarter",
-               sentence("Two joints along the axes, rotated by quarters: the answer is seen at a "
-                        "glance."),
-               lambda rng: skeletons.quarter_turns(rng, 2), 3),
-    CaseFamily("two joints", sentence("Two joints in a moved pose."), chains(2), 2),
-    CaseFamily("three joints",
-               sentence("Three joints in a moved pose: the order of products begins to matter."),
-               chains(3), 3),
-    CaseFamily("quarters", sentence("A chain along the axes, rotated by quarters."),
-               lambda rng: skeletons.quarter_turns(rng, 4), 2),
-    CaseFamily("half turns", sentence("Rotations by half a turn, of which w is 0."), _half_turns),
-    CaseFamily("negative w",
-               sentence("Quaternions with a negative w, which are rotations as good as any."),
-               _negative),
-    CaseFamily("slight", sentence("Rotations by a thousandth of a radian."), _slight),
-    CaseFamily("no length", sentence("A link of no length."), _no_length),
-    CaseFamily("arm at rest", sentence("The lab's arm, straight down."),
-               lambda rng: skeletons.arm()),
-    CaseFamily("arm", sentence("The lab's arm in a moved pose."), skeletons.moved_arm, 2),
-    CaseFamily("branches", sentence("A root with three children."), _branches, 2),
-    CaseFamily("chain", sentence("A chain in a moved pose."), chains(6), 2),
-    CaseFamily("far away", sentence("A chain whose root is a hundred metres away."),
-               chains(6, 100.0)),
-    CaseFamily("tree", sentence("A tree in a moved pose."), trees(9), 3),
-    CaseFamily("long chain", sentence("A chain of thirty joints: rounding adds up."), chains(30)),
-    CaseFamily("large tree", sentence("A tree of thirty joints, as many as a character has."),
-               trees(30)),
-)  # fmt: skip
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -88,7 +26,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return [
         Case(name, TASK, skeleton._asdict(), family.name, family.about,
              facts={"size": skeletons.extent(skeleton.offsets)})
-        for name, family, skeleton in skeletons.drawn(FAMILIES, seed, 10 if thorough else 1)
+        for name, family, skeleton in drawn(TASK, CaseFamily.pose, seed, 10 if thorough else 1)
         if skeletons.suits(skeleton.parents, greeting)
     ]  # fmt: skip
 

@@ -37,12 +37,12 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     """Judge poses by the laws, and sweeps by the textbook's; name the faults."""
     declared = method.lower() if method.lower() in METHODS else ""
     trials = [PoseTrial(exchange) for exchange in exchanges]
-    swept = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
-    textbook = declared if method else sweeps.recognise_method(swept, greeting)
+    sweep_trials = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
+    textbook = declared if method else sweeps.recognise_method(sweep_trials, greeting)
     for trial in trials:
         trial.judgement = _judge(trial, textbook, greeting)
     others_hold = not any(trial.is_wrong for trial in trials)
-    comparison = sweeps.compare(swept, textbook, declared, others_hold, greeting)
+    comparison = sweeps.compare(sweep_trials, textbook, declared, others_hold, greeting)
     by_name = {trial.case.name: trial for trial in trials}
     for trial in trials:
         trial.add(comparison.findings.get(trial.case.name, ()))
@@ -120,25 +120,25 @@ def target_laws(
 
 def reached(distance: float, slack: float, case: Case, method: str, greeting: Greeting) -> Finding:
     """Return whether the effector is as near as possible, within the tolerance."""
-    least, inputs = case.facts["least"], case.inputs
-    tolerance, excess = inputs["tolerance"] + slack, distance - least
-    if method and least > 0.0:
+    nearest, inputs = case.facts["least"], case.inputs
+    tolerance, excess = inputs["tolerance"] + slack, distance - nearest
+    if method and nearest > 0.0:
         _, x, _ = solve(method, inputs)
         closest = float(np.linalg.norm(x[inputs["effector"]] - inputs["target"]))
-        tolerance += AS_SLOW * max(0.0, closest - least)
-    law = "target reached" if least == 0.0 else "nearest point"
+        tolerance += AS_SLOW * max(0.0, closest - nearest)
+    law = "target reached" if nearest == 0.0 else "nearest point"
     verdict, message = Verdict.RIGHT, laws.HOLDS
     if excess > tolerance or np.isnan(excess):
-        verdict, message = _missed(excess, case, method, greeting)
+        verdict, message = _miss(excess, case, method, greeting)
     return Finding(law, verdict, excess, tolerance, "m", message)
 
 
-def _missed(excess: float, case: Case, method: str, greeting: Greeting) -> tuple[Verdict, Sentence]:
+def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> tuple[Verdict, Sentence]:
     """Return the verdict on a target that is missed by an excess [m]."""
-    least, reach, before = (case.facts[name] for name in ("least", "reach", "before"))
-    is_degenerate, is_beyond = case.family in problems.DEGENERATE, least > 0.0
-    is_nearer = excess < 0.5 * (before - least)
-    if is_degenerate and excess + least <= before + 1e-6 * reach:
+    nearest, reach, before = (case.facts[name] for name in ("least", "reach", "before"))
+    is_degenerate, is_beyond = case.family in problems.DEGENERATE, nearest > 0.0
+    is_nearer = excess < 0.5 * (before - nearest)
+    if is_degenerate and excess + nearest <= before + 1e-6 * reach:
         return Verdict.RIGHT_BUT, sentence(
             "It is stuck {error:.2g} m off: nothing here says which direction to bend in. Bend "
             "the chain a little before the first sweep.",
@@ -204,10 +204,10 @@ def claims(
         yield Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", message)
     if "residual" in outputs and np.isfinite(outputs["residual"]):
         error = abs(outputs["residual"] - distance)
-        claimed, actual = distinct_texts(outputs["residual"], distance, 3)
+        claim, actual = distinct_texts(outputs["residual"], distance, 3)
         message = sentence(
             "It reports a residual of {claimed} m; the effector is {distance} m off.",
-            claimed=claimed,
+            claimed=claim,
             distance=actual,
         )
         yield laws.bounded("claims", error, slack + 1e-3 * distance, "m", message)
@@ -234,14 +234,14 @@ def _diagnosis(
     trials: Sequence[PoseTrial], comparison: SweepComparison, greeting: Greeting
 ) -> Diagnosis:
     """Return the faults of the declared or inferred method that reproduce the answers."""
-    answered = [trial for trial in trials if trial.pose.outputs]
-    swept = [trial for trial in answered if trial.is_sweep]
-    wrong = [trial for trial in swept if trial.is_wrong or trial.case.name in comparison.wrong]
+    posed_trials = [trial for trial in trials if trial.pose.outputs]
+    sweep_trials = [trial for trial in posed_trials if trial.is_sweep]
+    wrong = [t for t in sweep_trials if t.is_wrong or t.case.name in comparison.wrong]
     if wrong:
-        return sweeps.explained(comparison, swept, wrong, greeting)
+        return sweeps.explained(comparison, sweep_trials, wrong, greeting)
     solves = [
         trial.comparable
-        for trial in answered
+        for trial in posed_trials
         if not trial.is_sweep
         and trial.case.family not in problems.DEGENERATE
         and (trial.is_wrong or _is_late(trial))

@@ -25,16 +25,7 @@ def judge_case(
     expected: Mapping[str, Any] | None = None,
     digits: float | None = None,
 ) -> CaseJudgement:
-    """Return the judgement of an answer: the laws of its task, then those of every answer.
-
-    Args:
-        exchange: the case with its answers.
-        greeting: of the solver.
-        laws: return the findings about the outputs.
-        reference: is timed beside the solver.
-        expected: the reference's outputs.
-        digits: correct significant digits.
-    """
+    """Return the judgement of an answer by the laws of its task and of all tasks."""
     case, answer = exchange.case, exchange.answer
     seconds = timed(reference)[1] if reference else None
     findings: tuple[Finding, ...] = ()
@@ -54,10 +45,7 @@ def bounded(
     verdict: Verdict = Verdict.WRONG,
     index: int | None = None,
 ) -> Finding:
-    """Return RIGHT if an error is within its tolerance, else the verdict.
-
-    The sentence may name the error and the joint.
-    """
+    """Return RIGHT if an error is within its tolerance, else the verdict with its sentence."""
     if error <= tolerance:
         return Finding(law, Verdict.RIGHT, float(error), tolerance, unit, HOLDS, index)
     filled = Sentence(message.template, {"error": error, "joint": index, **message.values})

@@ -75,7 +75,7 @@ def read_pose(
 ) -> AnsweredPose:
     """Return an answer as the laws read it."""
     raw: FloatArray | None = outputs.get("local_rotations")
-    answered: FloatArray | None = outputs.get("positions")
+    given_positions: FloatArray | None = outputs.get("positions")
     path, local, rotations = facts["path"], None, None
     if raw is not None:
         local = with_effector_of(np.array(raw), inputs)
@@ -85,19 +85,19 @@ def read_pose(
         if usable[path[:-1]].all():  # the others do not move the path
             rotations = np.where(usable[:, None], local, inputs["local_rotations"])
     x = judgement = None
-    if answered is not None and np.isfinite(answered).all():
-        x = np.clip(answered, -FARTHEST, FARTHEST)
+    if given_positions is not None and np.isfinite(given_positions).all():
+        x = np.clip(given_positions, -FARTHEST, FARTHEST)
     if rotations is not None or x is not None:
         skeleton = Skeleton(inputs["parents"], inputs["offsets"])
         judgement = judge_pose(
             skeleton, rotations, inputs["target"], inputs["effector"], positions=x
         )
     positions = np.full(np.shape(inputs["offsets"]), np.nan)
-    if local is None and answered is not None:
-        positions = answered
+    if local is None and given_positions is not None:
+        positions = given_positions
     elif rotations is not None and judgement is not None:
         positions = judgement.positions
-    return AnsweredPose(path, raw, local, answered, positions, judgement)
+    return AnsweredPose(path, raw, local, given_positions, positions, judgement)
 
 
 def all_of(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:

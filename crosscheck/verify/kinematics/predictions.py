@@ -80,10 +80,7 @@ def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
 
 
 def predict_inverse(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:
-    """Return the outputs of a solver, with `placed`: the positions by its local rotations.
-
-    FABRIK's local rotations are left out: each link may twist, so that they are not unique.
-    """
+    """Return the outputs of a solver, and `placed`: the positions that its local rotations give."""
     return _outputs(method, switched, case.inputs)[0]
 
 

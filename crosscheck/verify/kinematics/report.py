@@ -28,15 +28,15 @@ def diagnosis_of(
     """Return the faults of a method that reproduce the answers, if some answers are wrong."""
     compared: list[Exchange] = []
     for group in (wrong, [exchange for exchange in exchanges if exchange not in wrong]):
-        answered = [exchange for exchange in group if isinstance(exchange.answer, Answer)]
-        if not answered and group is wrong:
+        with_answers = [exchange for exchange in group if isinstance(exchange.answer, Answer)]
+        if not with_answers and group is wrong:
             return Diagnosis(behaviour=behaviour)
-        compared += sorted(answered, key=lambda exchange: exchange.case.size)
+        compared += sorted(with_answers, key=lambda exchange: exchange.case.size)
     explanations, count = explain(
         variants(method, max_faults), compared[:COMPARED], tolerance, partial(describe, method)
     )
-    named = tuple(explanation for explanation in explanations if explanation.faults != ("",))
-    return Diagnosis(named, behaviour, variant_count=count)
+    faulty = tuple(explanation for explanation in explanations if explanation.faults != ("",))
+    return Diagnosis(faulty, behaviour, variant_count=count)
 
 
 def report(

@@ -82,18 +82,12 @@ def _curves(rng: np.random.Generator) -> list[Curve]:
 def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Judge points by the laws of resampling; strokes may be bridged or not."""
     judgements = [_judge(exchange, greeting) for exchange in exchanges]
-    is_wrong = [judgement.verdict > Verdict.RIGHT for judgement in judgements]
-    wrong_first = [
-        exchange
-        for wanted in (True, False)
-        for exchange, wrong in zip(exchanges, is_wrong, strict=True)
-        if wrong is wanted
-    ]
-    has_wrong = any(isinstance(e.answer, Answer) for e in wrong_first[: sum(is_wrong)])
+    pairs = zip(exchanges, judgements, strict=True)
+    wrong_first = sorted(pairs, key=lambda pair: pair[1].verdict is Verdict.RIGHT)
     behaviour = _behaviour_at_strokes(exchanges, greeting)
     diagnosis = Diagnosis(behaviour=behaviour)
-    if has_wrong:
-        diagnosis = _diagnosis(wrong_first, greeting, behaviour)
+    if any(isinstance(e.answer, Answer) and judgement.verdict for e, judgement in wrong_first):
+        diagnosis = _diagnosis([exchange for exchange, _ in wrong_first], greeting, behaviour)
     return report(TASK, method, judgements, diagnosis)
 
 
@@ -261,16 +255,14 @@ def _expected_count(case: Case) -> int:
 
 def _even(case: Case, extra: int = 0) -> FloatArray:
     """Return evenly spaced points, by default the right number of them."""
-    points: FloatArray = case.facts["line"].even_points(
-        _expected_count(case) + extra, case.inputs["closed"]
-    )
-    return points
+    line: Polyline = case.facts["line"]
+    return line.even_points(_expected_count(case) + extra, case.inputs["closed"])
 
 
 def _without_end(case: Case) -> FloatArray:
     """Leave out the last point of an open curve."""
-    points: FloatArray = case.facts["line"].even_points(_expected_count(case), True)
-    return points
+    line: Polyline = case.facts["line"]
+    return line.even_points(_expected_count(case), True)
 
 
 def _by_index(case: Case) -> FloatArray:
@@ -332,5 +324,5 @@ def _diagnosis(
     faults = {**right, **FAULTS}
     variants = [variant(key, points) for key, (points, _) in faults.items()]
     explanations, count = explain(variants, wrong_first, tolerance, lambda keys: faults[keys[0]][1])
-    named = tuple(explanation for explanation in explanations if explanation.faults != ("",))
-    return Diagnosis(named, behaviour, variant_count=count)
+    faulty = tuple(explanation for explanation in explanations if explanation.faults != ("",))
+    return Diagnosis(faulty, behaviour, variant_count=count)

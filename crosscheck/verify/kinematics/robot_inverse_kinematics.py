@@ -43,12 +43,12 @@ class Misreading(NamedTuple):
         """Return the inputs as the solver understands them."""
         return {**inputs, **self.misread(inputs)}
 
-    def meant(self, inputs: Inputs, q: FloatArray) -> FloatArray:
+    def coordinates(self, inputs: Inputs, q: FloatArray) -> FloatArray:
         """Return the coordinates that an answer q stands for."""
         scaled = np.where(inputs["slides"], q, self.scale * q)
         return inputs["start"] + scaled if self.relative else scaled
 
-    def answered(self, inputs: Inputs, q: FloatArray) -> FloatArray:
+    def answer(self, inputs: Inputs, q: FloatArray) -> FloatArray:
         """Return the answer that stands for coordinates q."""
         scaled = np.where(inputs["slides"], q, q / self.scale)
         return scaled - inputs["start"] if self.relative else scaled
@@ -136,11 +136,11 @@ def _target_laws(
     angle_bound = judgement.tolerance_rotation + rounding.rotations(greeting.epsilon, joints)
     if case.family != BEYOND:
         verdict = Verdict.RIGHT_BUT if case.family == ANYWHERE else Verdict.WRONG
-        missed = sentence("It stays {error:.2g} m off a target that it can reach.")
+        too_far = sentence("It stays {error:.2g} m off a target that it can reach.")
         rotated = sentence(
             "Its tool is rotated by {error:.2g} rad from a target that it can reach."
         )
-        yield laws.bounded("target reached", distance, bound, "m", missed, verdict=verdict)
+        yield laws.bounded("target reached", distance, bound, "m", too_far, verdict=verdict)
         yield laws.bounded("rotation reached", angle, angle_bound, "rad", rotated, verdict=verdict)
     yield from _claims(distance, angle, bound, angle_bound, outputs)
 
@@ -162,15 +162,11 @@ def _claims(
 
 
 def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:
-    """Return the misreading of requests that explains most answers that miss their targets.
-
-    If a faulty solver's own target is out of its reach, its answers tell nothing; others hardly
-    reach by chance what another fault would.
-    """
-    missed = [judgement for judgement in judgements if _misses(judgement)]
-    if not missed:
+    """Return the misreading of requests that explains most answers that miss their targets."""
+    misses = [judgement for judgement in judgements if _misses(judgement)]
+    if not misses:
         return Diagnosis()
-    counts = {key: sum(_explains(fault, j) for j in missed) for key, fault in FAULTS.items()}
+    counts = {key: sum(_explains(fault, j) for j in misses) for key, fault in FAULTS.items()}
     # Whole poses are hardly met by chance, positions are where a solver is stuck: these come last.
     poses = {key: count for key, count in counts.items() if key != POSITION_ONLY}
     if CHANCE * max(poses.values()) >= max(counts.values()):
@@ -180,7 +176,7 @@ def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:
         return Diagnosis(variant_count=len(FAULTS))
     keys = tuple(key for key, count in counts.items() if count == largest)
     message = either([[FAULTS[key].sentence] for key in keys[:3]])
-    explanation = Explanation(keys, message, largest / len(missed), 0.0)
+    explanation = Explanation(keys, message, largest / len(misses), 0.0)
     return Diagnosis((explanation,), variant_count=len(FAULTS))
 
 
@@ -196,4 +192,4 @@ def _explains(fault: Misreading, judgement: CaseJudgement) -> bool:
     assert isinstance(judgement.answer, Answer)
     inputs = dict(fault.read(judgement.case.inputs))
     inputs |= {name: LENIENT * inputs[name] for name in ("tolerance", "tolerance_rotation")}
-    return judgement_of(inputs, fault.meant(inputs, judgement.answer.values["q"])).reached
+    return judgement_of(inputs, fault.coordinates(inputs, judgement.answer.values["q"])).reached

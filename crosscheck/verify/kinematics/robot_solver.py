@@ -28,7 +28,7 @@ def solve_wrongly(fault: Misreading | None, /, **inputs: Any) -> Mapping[str, An
         infinite = np.full(len(q), np.inf)
         free, reached = _solve({**request, "lower": -infinite, "upper": infinite}, RESTARTS)
         q = free if reached else q
-    return {"q": fault.answered(inputs, q)}
+    return {"q": fault.answer(inputs, q)}
 
 
 def _solve(request: Mapping[str, Any], restarts: int) -> tuple[FloatArray, bool]:

@@ -1,7 +1,4 @@
-"""Bounds of rounding errors in answers of kinematics, each figure with its reason.
-
-Every bound is the work done times an ulp of the size in the solver's declared precision.
-"""
+"""Bounds of rounding errors in kinematics: the work done times an ulp of the size."""
 
 # Rotating an offset and adding it rounds about ten times; products of unit quaternions as often.
 # Inputs rounded to the solver's precision add as much again.

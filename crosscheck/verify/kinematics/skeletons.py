@@ -1,11 +1,13 @@
-"""Families of cases, and their skeletons and poses: the lab's arm, random chains and trees.
+"""Families of cases, from `cases.toml`, and their skeletons in random poses.
 
 No pose is at rest: with all rotations the identity most faults of forward kinematics do not show.
 No two links are equally long: otherwise a wrong link's length would not show.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,16 +17,7 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 from ..greeting import Greeting
 from ..sentence import Sentence
 
-
-class CaseFamily(NamedTuple):
-    """Cases of a kind, drawn at random."""
-
-    name: str
-    about: Sentence
-    draw: Callable[[np.random.Generator], Any]
-    copies: int = 1
-    tolerance: float = 1e-4
-    sweeps: int = 60
+FILE = Path(__file__).with_name("cases.toml")
 
 
 class PosedSkeleton(NamedTuple):
@@ -35,17 +28,40 @@ class PosedSkeleton(NamedTuple):
     local_rotations: FloatArray
 
 
-DrawSkeleton = Callable[[np.random.Generator], PosedSkeleton]
+class CaseFamily(NamedTuple):
+    """An entry of `cases.toml`."""
+
+    name: str
+    about: Sentence
+    skeleton: list[Any]  # a key of SKELETONS, and its arguments
+    target: list[Any]  # the kind of a target or a curve, and its arguments
+    copies: int
+    tolerance: float  # [m]
+    sweeps: int
+
+    def pose(self, rng: np.random.Generator) -> PosedSkeleton:
+        """Return a random skeleton of the family in a random pose."""
+        name, *arguments = self.skeleton
+        return SKELETONS[name](rng, *arguments)
+
+
+Problem = TypeVar("Problem")
+Draw = Callable[[CaseFamily, np.random.Generator], Problem]
 
 
 def drawn(
-    families: Sequence[CaseFamily], seed: int, repeats: int
-) -> Iterator[tuple[str, CaseFamily, Any]]:
-    """Yield the name of each case, its family and its random problem."""
-    for family in families:
+    task: str, draw: Draw[Problem], seed: int, repeats: int
+) -> Iterator[tuple[str, CaseFamily, Problem]]:
+    """Yield the name of each case of a task, its family and its random problem."""
+    for name, entry in tomllib.loads(FILE.read_text(encoding="utf-8"))[task].items():
+        target = entry.get("target") or entry.get("curve", [])
+        family = CaseFamily(
+            name, Sentence(entry["about"], {}), entry["skeleton"], target, entry.get("copies", 1),
+            entry.get("tolerance", 1e-4), entry.get("sweeps", 60),
+        )  # fmt: skip
         for i in range(family.copies * repeats):
-            name = f"{family.name} {i + 1}"
-            yield name, family, family.draw(generator(seed, name))
+            case = f"{name} {i + 1}"
+            yield case, family, draw(family, generator(seed, case))
 
 
 def generator(seed: int, name: str) -> np.random.Generator:
@@ -80,27 +96,20 @@ def _offsets(rng: np.random.Generator, joints: int, distance: float) -> FloatArr
     return offsets
 
 
-def chains(joints: int, distance: float = 1.0) -> DrawSkeleton:
-    """Return a function that draws chains."""
-    return lambda rng: chain(rng, joints, distance)
+def links(rng: np.random.Generator, *lengths: float) -> PosedSkeleton:
+    """Return a chain of links of given lengths [m] in a random pose."""
+    skeleton = chain(rng, len(lengths) + 1)
+    offsets = skeleton.offsets[1:]
+    offsets *= np.array(lengths)[:, None] / np.linalg.norm(offsets, axis=-1, keepdims=True)
+    return skeleton
 
 
-def trees(joints: int) -> DrawSkeleton:
-    """Return a function that draws trees."""
-    return lambda rng: tree(rng, joints)
-
-
-def arm() -> PosedSkeleton:
-    """Return the lab's arm at rest: straight down."""
+def arm(rng: np.random.Generator, angle: float = 1.2) -> PosedSkeleton:
+    """Return the lab's arm with every joint rotated by up to an angle [rad]."""
     skeleton, local = scenes.lab_arm()
+    if angle:
+        local = rotation.exponential(rng.uniform(-angle, angle, (len(local), 3)) / np.sqrt(3.0))
     return PosedSkeleton(np.array(skeleton.parents), np.array(skeleton.offsets), np.array(local))
-
-
-def moved_arm(rng: np.random.Generator) -> PosedSkeleton:
-    """Return the lab's arm with every joint rotated by up to 1.2 rad."""
-    skeleton = arm()
-    v = rng.uniform(-1.2, 1.2, (len(skeleton.parents), 3)) / np.sqrt(3.0)
-    return skeleton._replace(local_rotations=rotation.exponential(v))
 
 
 def quarter_turns(rng: np.random.Generator, joints: int) -> PosedSkeleton:
@@ -112,6 +121,58 @@ def quarter_turns(rng: np.random.Generator, joints: int) -> PosedSkeleton:
     local[:, 0] = half
     local[np.arange(joints), rng.integers(1, 4, joints)] = half * rng.choice([-1.0, 1.0], joints)
     return PosedSkeleton(np.arange(-1, joints - 1), offsets, local)
+
+
+def half_turns(rng: np.random.Generator) -> PosedSkeleton:
+    """Return a chain with rotations by pi."""
+    skeleton = chain(rng, 4)
+    local = rotation.random(rng, 4)
+    local[:, 0] = 0.0
+    return skeleton._replace(local_rotations=local / np.linalg.norm(local, axis=-1, keepdims=True))
+
+
+def negative_w(rng: np.random.Generator) -> PosedSkeleton:
+    """Return a chain whose quaternions have a negative w."""
+    skeleton = chain(rng, 4)
+    local = skeleton.local_rotations
+    return skeleton._replace(local_rotations=local * np.where(local[:, :1] > 0.0, -1.0, 1.0))
+
+
+def slight_rotations(rng: np.random.Generator) -> PosedSkeleton:
+    """Return a chain with rotations of a milliradian."""
+    skeleton = chain(rng, 5)
+    v = 1e-3 * rng.uniform(-1.0, 1.0, (5, 3))
+    return skeleton._replace(local_rotations=rotation.exponential(v))
+
+
+def link_of_no_length(rng: np.random.Generator) -> PosedSkeleton:
+    """Return a chain with an offset of zero."""
+    skeleton = chain(rng, 4)
+    skeleton.offsets[2] = 0.0
+    return skeleton
+
+
+def right_angle(rng: np.random.Generator) -> PosedSkeleton:
+    """Return an elbow with links of 3 and 4."""
+    offsets = np.array([[0.5, -0.2, 0.3], [0.0, 3.0, 0.0], [4.0, 0.0, 0.0]])
+    v = 0.4 * rng.uniform(-1.0, 1.0, (3, 3))
+    return PosedSkeleton(np.arange(-1, 2), offsets, rotation.exponential(v))
+
+
+SKELETONS: dict[str, Callable[..., PosedSkeleton]] = {
+    "chain": chain,
+    "tree": tree,
+    "three branches": lambda rng: tree(rng, 5)._replace(parents=np.array([-1, 0, 0, 0, 1])),
+    "links": links,
+    "arm": arm,
+    "arm at rest": lambda rng: arm(rng, 0.0),
+    "quarter turns": quarter_turns,
+    "half turns": half_turns,
+    "negative w": negative_w,
+    "slight rotations": slight_rotations,
+    "link of no length": link_of_no_length,
+    "right angle": right_angle,
+}
 
 
 def suits(parents: IndexArray, greeting: Greeting) -> bool:

@@ -86,20 +86,12 @@ def prediction_bound(greeting: Greeting, case: Case) -> float:
 
 
 def compare(
-    swept: Sequence[PoseTrial], method: str, declared: str, others_hold: bool, greeting: Greeting
+    trials: Sequence[PoseTrial], method: str, declared: str, others_hold: bool, greeting: Greeting
 ) -> SweepComparison:
-    """Compare sweeps with those of a declared or recognised method.
-
-    Args:
-        swept: the cases of sweeps.
-        method: "ccd", "fabrik" or "".
-        declared: the method if the greeting names it, else "".
-        others_hold: whether the other laws hold in all cases.
-        greeting: of the solver.
-    """
+    """Compare sweeps with those of a method; `others_hold` says whether other laws are kept."""
     if not method:
         return SweepComparison("")
-    errors = {trial.case.name: _error(trial, method, greeting) for trial in swept}
+    errors = {trial.case.name: _error(trial, method, greeting) for trial in trials}
     wrong = [name for name, (error, bound) in errors.items() if not error <= bound]
     behaviour = sentence(
         "Its sweeps resemble those of {method}, with which it is compared."
@@ -109,13 +101,13 @@ def compare(
     )
     verdict, message, damped = Verdict.RIGHT, laws.HOLDS, None
     if wrong:
-        honest = honest_variant(swept, method, greeting)
-        damped = damping_of(swept, greeting) if method == "ccd" and honest is None else None
+        honest = honest_variant(trials, method, greeting)
+        damped = damping_of(trials, greeting) if method == "ccd" and honest is None else None
         choice = honest or damped
         verdict, message = (
             (Verdict.RIGHT_BUT, choice)
             if choice
-            else _verdict(swept, method, others_hold, greeting)
+            else _verdict(trials, method, others_hold, greeting)
         )
     findings = {
         name: [
@@ -131,18 +123,18 @@ def compare(
     )
 
 
-def recognise_method(swept: Sequence[PoseTrial], greeting: Greeting) -> str:
+def recognise_method(trials: Sequence[PoseTrial], greeting: Greeting) -> str:
     """Return the method of most of the sweeps, right or with a fault, or ""."""
     for method in NAMES:
-        errors = [_error(trial, method, greeting) for trial in swept]
+        errors = [_error(trial, method, greeting) for trial in trials]
         hits = sum(error <= bound for error, bound in errors)
         if errors and hits >= MIN_SHARE * len(errors):
             return method
-    if not swept or all(_is_other_solver(trial, greeting) for trial in swept):
+    if not trials or all(_is_other_solver(trial, greeting) for trial in trials):
         return ""
-    if honest_variant(swept, "ccd", greeting) is None and damping_of(swept, greeting) is not None:
+    if honest_variant(trials, "ccd", greeting) is None and damping_of(trials, greeting) is not None:
         return "ccd"
-    fits = {method: _best_fit(swept, method, greeting) for method in NAMES}
+    fits = {method: _best_fit(trials, method, greeting) for method in NAMES}
     best = max(fits, key=lambda method: fits[method])
     return best if fits[best][0] >= MIN_SHARE else ""
 
@@ -154,9 +146,9 @@ def _is_other_solver(trial: PoseTrial, greeting: Greeting) -> bool:
     return keeps and _has_arrived(trial, greeting)
 
 
-def _best_fit(swept: Sequence[PoseTrial], method: str, greeting: Greeting) -> tuple[float, int]:
+def _best_fit(trials: Sequence[PoseTrial], method: str, greeting: Greeting) -> tuple[float, int]:
     """Return the share of the sweeps that a faulty textbook reproduces, and minus its faults."""
-    exchanges = [trial.comparable for trial in swept]
+    exchanges = [trial.comparable for trial in trials]
     bound = partial(prediction_bound, greeting)
     diagnosis = diagnosis_of(method, exchanges, exchanges, bound, max_faults=RECOGNISED_FAULTS)
     for explanation in diagnosis.explanations[:1]:
@@ -173,15 +165,15 @@ def _error(trial: PoseTrial, method: str, greeting: Greeting) -> tuple[float, fl
 
 
 def _verdict(
-    swept: Sequence[PoseTrial], method: str, others_hold: bool, greeting: Greeting
+    trials: Sequence[PoseTrial], method: str, others_hold: bool, greeting: Greeting
 ) -> tuple[Verdict, Sentence]:
     """Return the verdict on sweeps that are not the textbook's."""
-    if others_hold and all(_has_arrived(trial, greeting) for trial in swept):
+    if others_hold and all(_has_arrived(trial, greeting) for trial in trials):
         return Verdict.RIGHT_BUT, sentence(
             "It goes on to the target although one sweep was asked for (max_iterations 1, "
             "tolerance 0), so that its sweeps cannot be told."
         )
-    if others_hold and (method == "fabrik" or all(map(_ends_well, swept))):
+    if others_hold and (method == "fabrik" or all(map(_ends_well, trials))):
         return Verdict.RIGHT_BUT, sentence(
             "Its sweep is not the textbook's {method}, though it keeps every law of one.",
             method=NAMES[method],
@@ -212,25 +204,25 @@ def _angle(a: FloatArray, b: FloatArray) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
 
-def honest_variant(swept: Sequence[PoseTrial], method: str, greeting: Greeting) -> Sentence | None:
+def honest_variant(trials: Sequence[PoseTrial], method: str, greeting: Greeting) -> Sentence | None:
     """Return the difference between an honest solver and the textbook if it explains all sweeps."""
     for fault in FAULTS[method]:
         is_candidate = fault.honest and fault.key != "tolerance squared"
-        if is_candidate and _explains(swept, method, greeting, switches([fault])):
+        if is_candidate and _explains(trials, method, greeting, switches([fault])):
             return describe(method, [fault.key])
     return None
 
 
-def damping_of(swept: Sequence[PoseTrial], greeting: Greeting) -> Sentence | None:
+def damping_of(trials: Sequence[PoseTrial], greeting: Greeting) -> Sentence | None:
     """Return the scale or the cap of a CCD's rotations, if it explains all sweeps."""
     for switched in (Switches(), switches([by_key("ccd")["root to tip"]])):
-        gain, cap = _damping(swept, switched)
+        gain, cap = _damping(trials, switched)
         scaled, capped = switched._replace(gain=gain), switched._replace(cap=cap)
-        if SMALLEST < gain < 0.999 and _explains(swept, "ccd", greeting, scaled):
+        if SMALLEST < gain < 0.999 and _explains(trials, "ccd", greeting, scaled):
             return sentence(
                 "It is CCD with each rotation scaled by {gain:.4g}, which is slower.", gain=gain
             )
-        if cap > SMALLEST and _explains(swept, "ccd", greeting, capped):
+        if cap > SMALLEST and _explains(trials, "ccd", greeting, capped):
             return sentence(
                 "It is CCD with each rotation capped at {angle:.4g} rad, which is slower.",
                 angle=cap,
@@ -238,10 +230,10 @@ def damping_of(swept: Sequence[PoseTrial], greeting: Greeting) -> Sentence | Non
     return None
 
 
-def _damping(swept: Sequence[PoseTrial], switched: Switches) -> tuple[float, float]:
+def _damping(trials: Sequence[PoseTrial], switched: Switches) -> tuple[float, float]:
     """Return the scale of the first rotation of a sweep, and the largest angle [rad]."""
     gain, largest = 1.0, 0.0
-    for trial in swept:
+    for trial in trials:
         if trial.pose.local is None or trial.case.facts["sweeps"] != 1:
             continue
         start, path = trial.case.inputs["local_rotations"], trial.pose.path
@@ -254,25 +246,25 @@ def _damping(swept: Sequence[PoseTrial], switched: Switches) -> tuple[float, flo
 
 
 def _explains(
-    swept: Sequence[PoseTrial], method: str, greeting: Greeting, switched: Switches
+    trials: Sequence[PoseTrial], method: str, greeting: Greeting, switched: Switches
 ) -> bool:
     return all(
         difference(predict_inverse(method, switched, trial.case), trial.pose.outputs)
         <= prediction_bound(greeting, trial.case)
-        for trial in swept
+        for trial in trials
     )
 
 
 def explained(
     comparison: SweepComparison,
-    swept: Sequence[PoseTrial],
+    trials: Sequence[PoseTrial],
     wrong: Sequence[PoseTrial],
     greeting: Greeting,
 ) -> Diagnosis:
     """Return the faults that reproduce the wrong sweeps among all."""
     if not comparison.method or comparison.damped is not None:
         return Diagnosis(behaviour=comparison.damped)
-    exchanges = {trial.case.name: trial.comparable for trial in swept}
+    exchanges = {trial.case.name: trial.comparable for trial in trials}
     return diagnosis_of(
         comparison.method,
         list(exchanges.values()),

@@ -144,10 +144,7 @@ def base_of(chain: Chain, pose: Pose, p: int, fault: int) -> Any:
 
 
 def solve(chain: Chain, target: Any, ending: Ending, faults: Switches, pose: Pose) -> int:
-    """Sweep until the end of the solve; `pose.local` is the start and becomes the result.
-
-    Returns the number of sweeps made.
-    """
+    """Solve in place, `pose` from the start to the result, and return the number of sweeps."""
     if faults.start == 1:
         for j in range(len(chain.parents)):
             store_quaternion(pose.local, j, IDENTITY)
@@ -295,11 +292,7 @@ def pull(positions: FloatArray, fixed: int, moved: int, length: float) -> None:
 
 
 def follow(chain: Chain, sweeps: int, faults: Switches, pose: Pose) -> None:
-    """Rotate each joint of the path so that its link points to where the next one has moved.
-
-    The positions on the path stay those that the passes leave; below it they are what the rotations
-    give.
-    """
+    """Rotate each joint of the path to its link's new direction; the path keeps its positions."""
     moved, start = pose.positions.copy(), pose.rotations.copy()
     for k in range(len(chain.path) - 1 if sweeps > 0 else 0):
         place(chain, faults, pose)

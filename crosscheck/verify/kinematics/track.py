@@ -24,7 +24,7 @@ from .pose_laws import AnsweredPose
 from .predictions import forward, path_to, predict_track
 from .problems import TargetProblem
 from .report import diagnosis_of, report
-from .skeletons import CaseFamily, DrawSkeleton, chains, trees
+from .skeletons import CaseFamily
 from .textbook import Switches
 
 TASK = "track"
@@ -48,7 +48,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     """Return short curves for chains, the lab's arm on its curves, and a tree."""
     return [
         _case(name, family, problem, method)
-        for name, family, problem in skeletons.drawn(FAMILIES, seed, 5 if thorough else 1)
+        for name, family, problem in skeletons.drawn(TASK, _draw, seed, 5 if thorough else 1)
         if skeletons.suits(problem.start.skeleton.parents, greeting)
     ]
 
@@ -70,48 +70,34 @@ def _is_smooth(problem: CurveProblem) -> bool:
     path = path_to(start.skeleton.parents, start.effector)
     for method in METHODS:
         x = predict_track(method, Switches(), case)["positions"]
-        missed = np.linalg.norm(x[:, start.effector] - curve, axis=-1).max() > TOLERANCE
-        if missed or np.linalg.norm(np.diff(x[:, path], axis=0), axis=-1).max() >= 0.5:
+        is_far = np.linalg.norm(x[:, start.effector] - curve, axis=-1).max() > TOLERANCE
+        if is_far or np.linalg.norm(np.diff(x[:, path], axis=0), axis=-1).max() >= 0.5:
             return False
     return True
 
 
-def _circle(make: DrawSkeleton, effector: int) -> problems.Draw:
-    """Return a function that draws a small circle in space about the effector."""
+def _draw(family: CaseFamily, rng: np.random.Generator) -> CurveProblem:
+    """Draw problems of a family until one is smooth."""
+    drawn = (_candidate(family, rng) for _ in range(problems.DRAWS))
+    return next(filter(_is_smooth, drawn))
 
-    def problem(rng: np.random.Generator) -> CurveProblem:
-        skeleton = make(rng)
+
+def _candidate(family: CaseFamily, rng: np.random.Generator) -> CurveProblem:
+    """Return a small circle in space about the effector, or a part of one of the arm's curves."""
+    kind, *arguments = family.target
+    if kind == "small circle":
+        (effector,) = arguments
+        skeleton = family.pose(rng)
         x, _ = forward(skeleton._asdict())
         t = 2.0 * np.pi * np.arange(FRAMES) / FRAMES
         circle = 0.15 * np.stack([np.cos(t), np.sin(t), 0.5 * np.sin(2.0 * t)], axis=-1)
         curve = x[effector] + rotation.rotate(rotation.random(rng), circle)
         return CurveProblem(TargetProblem(skeleton, effector, x[effector]), curve)
-
-    return problems.accepted(problem, _is_smooth)
-
-
-def _arm(curve: str, step: int) -> problems.Draw:
-    """Return a function that draws a part of one of the arm's curves."""
-
-    def problem(rng: np.random.Generator) -> CurveProblem:
-        points = curves[curve](150)
-        first = int(rng.integers(len(points)))
-        part = np.roll(points, -first, axis=0)[: step * FRAMES : step]
-        return CurveProblem(TargetProblem(skeletons.moved_arm(rng), 4, part[0]), part)
-
-    return problems.accepted(problem, _is_smooth)
-
-
-FAMILIES = (
-    CaseFamily("small circle", sentence("A chain draws a small circle."), _circle(chains(4), 3)),
-    CaseFamily("arm, circle", sentence("The lab's arm draws a part of its circle."),
-               _arm("circle", 2)),
-    CaseFamily("arm, square", sentence("The lab's arm draws a part of its square."),
-               _arm("square", 4)),
-    CaseFamily("tree", sentence("A branch of a tree draws a small circle."), _circle(trees(6), 5)),
-    CaseFamily("joint in the middle", sentence("A joint with others below it draws a circle."),
-               _circle(chains(6), 4)),
-)  # fmt: skip
+    name, step = arguments
+    points = curves[name](150)
+    first = int(rng.integers(len(points)))
+    part = np.roll(points, -first, axis=0)[: step * FRAMES : step]
+    return CurveProblem(TargetProblem(family.pose(rng), 4, part[0]), part)
 
 
 class Frame(NamedTuple):
@@ -152,10 +138,7 @@ def _largest_share(diagnosis: Diagnosis) -> float:
 
 
 def _prediction_bound(greeting: Greeting, case: Case) -> float:
-    """Return the relative difference from a variant's answer that rounding explains.
-
-    Frames hand on their rounding to the next, each solve enlarging it a few times.
-    """
+    """Return the relative difference that rounding, enlarged from frame to frame, explains."""
     return max(1e-8, 16.0 * sweeps.prediction_bound(greeting, case))
 
 

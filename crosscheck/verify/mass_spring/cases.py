@@ -43,7 +43,7 @@ class SpringScene:
     dampings: FloatArray
     h: float
     gravity: FloatArray = field(default_factory=GRAVITY.copy)
-    pinned: tuple[int, ...] = ()
+    pinned: Any = ()
     rest_lengths: FloatArray | str = "measured"  # or those of `rest`
     external_forces: FloatArray | float = 0.0
     tension_only: bool = False
@@ -51,7 +51,7 @@ class SpringScene:
     needs: tuple[str, ...] = ()
     tasks: tuple[str, ...] = ()  # those that it suits; () for all
     follows: str = ""  # the name of the scene that is asked just before it
-    probe: bool = False  # whether faults are sought in it
+    probe: bool = True  # whether faults are sought in it
     facts: Mapping[str, Any] = field(default_factory=dict)  # passed on to the laws
 
 
@@ -119,27 +119,30 @@ def _lengths(x: FloatArray, springs: Any) -> FloatArray:
 
 def scenes(seed: int, thorough: bool) -> list[SpringScene]:
     """Return all scenes in their order; the long list has more random cloths."""
-    more = 12 if thorough else 0
+    more, base = 12 if thorough else 0, _cloth(seed, 3, name="cloth 3 x 3")
     return [
         *(SpringScene(**_fields(_TABLE["pair_defaults"] | entry)) for entry in _TABLE["pair"]),
         *(_random(seed, **entry) for entry in _TABLE["random"]),
         *_changes(seed),
         *(_random(seed, **entry) for entry in _TABLE["small_step"]),
-        *_cloths(seed),
-        *(_cloth_scene(f"random cloth {i}", seed + 1 + i, 3 + i % 3) for i in range(more)),
+        base,
+        *(_transformed(base, **_fields(entry)) for entry in _TABLE["symmetry"]),
+        *(_cloth(seed, **entry) for entry in _TABLE["cloth"]),
+        *(_cloth(seed + 1 + i, 3 + i % 3, name=f"random cloth {i}") for i in range(more)),
     ]
 
 
 def _fields(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an entry of the table as fields of a scene, a probe unless it says otherwise."""
+    """Return an entry of the table as fields of a scene."""
     fields: dict[str, Any] = {
         name: np.array(content)
         if isinstance(content, list) and name not in ("needs", "tasks")
         else content
         for name, content in entry.items()
     }
-    about = Sentence(fields.pop("sentence"), {})
-    return {"about": about, "probe": True, **fields}
+    if "sentence" in fields:
+        fields["about"] = Sentence(fields.pop("sentence"), {})
+    return fields
 
 
 def _random(seed: int, count: int, **entry: Any) -> SpringScene:
@@ -189,56 +192,39 @@ def _changes(seed: int) -> list[SpringScene]:
     return [before, after, other_masses]
 
 
-def _cloth_scene(
-    name: str, seed: int, n: int, stiffness: float = 100.0, damping: float = 0.2, **changes: Any
+def _cloth(
+    seed: int,
+    count: int,
+    stiffness: float = 100.0,
+    damping: float = 0.2,
+    mass: float | None = None,
+    squeeze: float | None = None,
+    **entry: Any,
 ) -> SpringScene:
-    """Return a moved cloth of n x n particles."""
-    rng = np.random.default_rng([12, seed, n])
-    system, state = grid_cloth(n, n)
-    count = len(system.springs)
-    scene = SpringScene(
-        name, "cloth", sentence("A moving cloth of {n} x {n} particles.", n=n),
-        state.positions, system.springs,
-        state.positions + 0.02 * rng.standard_normal((n * n, 3)),
-        0.5 * rng.standard_normal((n * n, 3)), rng.uniform(0.5, 1.5, n * n),
-        np.full(count, stiffness), np.full(count, damping), 1 / 60,
-        pinned=tuple(int(i) for i in system.pinned),
-    )  # fmt: skip
-    return _pins_still(replace(scene, **changes))
-
-
-def _cloths(seed: int) -> list[SpringScene]:
-    base, crumpled = (_cloth_scene(name, seed, 3) for name in ("cloth 3 x 3", "crumpled cloth"))
-    middle = crumpled.rest.mean(0)
-    return [
-        base,
-        *_symmetries(base),
-        _cloth_scene("free net", seed, 4, damping=0.0, pinned=(), family="momentum", about=sentence(
-            "A net of 4 x 4 particles that nothing holds.")),
-        _cloth_scene("damped cloth", seed, 4, damping=2.0),
-        replace(crumpled, family="compression", stiffnesses=10.0 * crumpled.stiffnesses,
-                positions=middle + 0.6 * (crumpled.positions - middle), about=sentence(
-                    "A cloth squeezed to 0.6 of its size, stiff enough to buckle.")),
-        _cloth_scene("the lab's cloth, small", seed, 5, gravity=np.array([0.0, -0.3, 0.0]),
-                     masses=np.ones(25)),
-        _cloth_scene("stiff cloth", seed, 5, stiffness=1e4, damping=0.0),
-    ]  # fmt: skip
-
-
-def _symmetries(base: SpringScene) -> list[SpringScene]:
-    """Return the scene moved, mirrored, rotated about the vertical, and with other numbers."""
-    mirror = np.diag([1.0, 1.0, -1.0])
-    rotation = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])
-    order = np.random.default_rng(5).permutation(len(base.masses))
-    return [
-        _transformed(base, "shifted", sentence("The same cloth elsewhere."),
-                     shift=np.array([0.5, -0.25, 0.75])),
-        _transformed(base, "mirrored", sentence("The same cloth in a mirror."), matrix=mirror),
-        _transformed(base, "rotated", sentence("The same cloth, rotated about the vertical."),
-                     matrix=rotation),
-        _transformed(base, "renumbered", sentence("The same cloth, its particles renumbered."),
-                     order=order),
-    ]  # fmt: skip
+    """Return a moved cloth, with random masses if none is given."""
+    rng = np.random.default_rng([12, seed, count])
+    system, state = grid_cloth(count, count)
+    n, rest = len(system.springs), state.positions
+    fields: dict[str, Any] = {
+        "family": "cloth",
+        "rest": rest,
+        "springs": system.springs,
+        "positions": rest + 0.02 * rng.standard_normal((count**2, 3)),
+        "velocities": 0.5 * rng.standard_normal((count**2, 3)),
+        "masses": rng.uniform(0.5, 1.5, count**2),
+        "stiffnesses": np.full(n, stiffness),
+        "dampings": np.full(n, damping),
+        "h": 1 / 60,
+        "pinned": system.pinned,
+        "probe": False,
+        "about": sentence("A moving cloth of {n} x {n} particles.", n=count),
+    }
+    if mass is not None:
+        fields["masses"] = np.full(count**2, mass)
+    if squeeze is not None:
+        middle = rest.mean(0)
+        fields["positions"] = middle + squeeze * (fields["positions"] - middle)
+    return _pins_still(SpringScene(**fields | _fields(entry)))
 
 
 def _transformed(base: SpringScene, name: str, about: Sentence, **changes: Any) -> SpringScene:
@@ -254,5 +240,5 @@ def _transformed(base: SpringScene, name: str, about: Sentence, **changes: Any) 
         velocities=(base.velocities @ matrix.T)[inverse],
         masses=base.masses[inverse],
         springs=order[np.asarray(base.springs)],
-        pinned=tuple(int(order[i]) for i in base.pinned),
+        pinned=order[base.pinned],
     )  # fmt: skip

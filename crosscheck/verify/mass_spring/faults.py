@@ -36,6 +36,7 @@ class Option(NamedTuple):
     change: Change | None = None  # returns the fields that it replaces in a problem
     fields: Mapping[str, Any] = {}  # the fields that it replaces in a model
     parts: tuple[float, ...] = ()  # factors of the kinetic, elastic and gravitational energy
+    rare: bool = False  # whether it is not tried together with faults
 
 
 def _with_masses(p: SpringProblem, masses: FloatArray) -> dict[str, Any]:
@@ -109,7 +110,9 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
             fields["time"] = float(Fraction(values["time"]))
         key = entry.get("key", f"{aspect} {entry.get('value')}").format(**values)
         message, parts = Sentence(entry["sentence"], values), tuple(entry.get("parts", ()))
-        yield Option(key, aspect, message, _change(entry, values), fields, parts)
+        rare = entry.get("rare", False)
+        rare = values["strength"] in rare if isinstance(rare, list) else rare
+        yield Option(key, aspect, message, _change(entry, values), fields, parts, rare)
 
 
 def _change(entry: Mapping[str, Any], values: Mapping[str, Any]) -> Change | None:

@@ -9,6 +9,7 @@ from .faults import ASPECTS, STEP_FAULTS, Option, options_of, read_table
 from .model import EXPLICIT, Integrator
 
 EXPLICIT_SUBSTEPS = (1, 2, 3, 4, 5, 8, 10, 16, 20, 30, 50, 100, 1000)
+FREQUENT_SUBSTEPS = (1, 2, 3, 5, 10, 100, 1000)
 LOCAL_GLOBAL_ITERATIONS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 30, 50, 100)
 NEWTON_ITERATIONS = (1, 2, 3, 4, 5, 10)
 HESSIANS = ("exact", "gauss", "projected")
@@ -48,14 +49,16 @@ def _integrator_option(integrator: Integrator) -> Option:
     name, start, n = integrator.method, integrator.start, integrator.iterations
     if name == "newton":
         name += f" {integrator.hessian}, {'one' if n == 1 else 'several'}"
-    message = Sentence(_WORDS[name]["sentence"], {"n": n, "start": start})
-    key = " ".join(map(str, integrator))
-    return Option(key, "integrator", message, fields={"integrator": integrator})
+    words, key = _WORDS[name], " ".join(map(str, integrator))
+    message = Sentence(words["sentence"], {"n": n, "start": start})
+    fields, rare = {"integrator": integrator}, words.get("rare", False)
+    return Option(key, "integrator", message, fields=fields, rare=rare)
 
 
 def _substeps(n: int) -> Option:
     message = sentence("one step") if n == 1 else sentence("{n} substeps", n=n)
-    return Option(f"substeps {n}", "substeps", message, fields={"substeps": n})
+    fields, rare = {"substeps": n}, n not in FREQUENT_SUBSTEPS
+    return Option(f"substeps {n}", "substeps", message, fields=fields, rare=rare)
 
 
 def _scaling(factor: float) -> Option:
@@ -64,7 +67,8 @@ def _scaling(factor: float) -> Option:
         if factor == 1.0
         else sentence("velocities times {factor}", factor=factor)
     )
-    return Option(f"scaling {factor}", "scaling", message, fields={"scaling": factor})
+    fields, rare = {"scaling": factor}, factor != 1.0
+    return Option(f"scaling {factor}", "scaling", message, fields=fields, rare=rare)
 
 
 def honest(step: Step) -> dict[str, tuple[Option, ...]]:

@@ -29,10 +29,6 @@ SINGULAR = ("matrix L", "matrix L without h²")
 OF_MASSES = (*SINGULAR, "matrix 2M+h²L")
 # Positions beyond this [m] come from dividing by zero; those of the probes are some metres.
 LARGEST = 1e4
-# Of what is not declared, only these are tried together with faults.
-FREQUENT = (
-    1, 2, 3, 5, 10, 100, 1000, "penalty 1e10", "springs 5e5", "heavy 1e8", "falling 1e8",
-)  # fmt: skip
 # Aspects that matter in any step; the others where there are springs, dampers, pins.
 ALWAYS = (
     "time", "inertia", "masses", "gravity", "integrator", "matrix", "substeps", "velocity",
@@ -94,6 +90,10 @@ class ModelSearch:
             for flight, pairs in self.classes.items()
         ]
         self.costs = {id(option): cost for pairs in self.domains.values() for option, cost in pairs}
+        self.declared_aspects = [
+            *(["damper", "scaling"] if step.damper is not None else []),
+            *(["substeps"] if step.substeps is not None else []),
+        ]
         self.prediction_count = 0  # number of predictions
         self._misplaced: set[tuple[Any, ...]] = set()  # choices whose positions are wrong
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
@@ -160,28 +160,10 @@ class ModelSearch:
     def _is_left_out(self, option: Option, budget: int) -> bool:
         """Return whether a choice is not tried together with so many faults."""
         return (
-            (budget > 0 and self._is_rare(option))
+            (budget > 0 and option.rare and option.aspect not in self.declared_aspects)
             or (budget > 1 and self.costs[id(option)] > 0 and _takes_long(option))
             or (budget > 2 and option.key in SINGULAR)
         )
-
-    def _is_rare(self, option: Option) -> bool:
-        """Return whether a choice is honest, rare, and nowhere declared."""
-        choice, step = option.fields.get(option.aspect), self.step
-        match option.aspect:
-            case "scaling":
-                return step.damper is None and choice != 1.0
-            case "substeps":
-                return step.substeps is None and choice not in FREQUENT
-            case "damper":
-                return step.damper is None and choice in ("diagonal", "blocks", "matrix")
-            case "pins":
-                return id(option) not in FAULTY and " " in str(choice) and choice not in FREQUENT
-            case "integrator":
-                integrator = option.fields["integrator"]
-                rare = integrator.method in ("taylor", "runge_kutta")
-                return rare or integrator.hessian == "projected"
-        return False
 
     def _explains_enough(self, choices: Choices) -> bool:
         """Return whether no more than a few answers are left out because of singular matrices."""

@@ -113,10 +113,7 @@ def _to_text(figure: Figure, title: str) -> str:
 
 
 def distance(drawing: Drawing) -> float | None:
-    """Return the largest distance of an answered point from the expected one [m].
-
-    None if a point is missing.
-    """
+    """Return the largest distance of an answered point from the expected one [m], if known."""
     if drawing.answer is None or drawing.expected is None:
         return None
     a, b = drawing.answer.points, drawing.expected.points

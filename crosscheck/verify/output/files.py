@@ -37,10 +37,7 @@ class Files(NamedTuple):
         )
 
     def write(self, report: Report, question: Question, context: Presentation) -> int:
-        """Print the screen, write the files, and return the exit code.
-
-        A file that cannot be written is one sentence on standard error, and the exit code is 2.
-        """
+        """Print the screen, write the files, and return the exit code: 2 if writing fails."""
         failures: list[Sentence] = []
         folder = self.folder / "failures" if self.folder else FAILURES
         options = folder, question.seed, question.thorough

@@ -16,11 +16,7 @@ if TYPE_CHECKING:
 
 
 def described(names: Sequence[str], say: Say) -> Iterator[str]:
-    """Yield a paragraph a task; of named tasks, every input and output.
-
-    Raises:
-        ValueError: if a name is unknown.
-    """
+    """Yield a paragraph a task, or every field of the named tasks; raise ValueError if unknown."""
     for name in names:
         if name not in TASKS:
             raise ValueError(f"task: expected one of {', '.join(TASKS)}, got {name!r}")
@@ -56,11 +52,7 @@ def _long(task: Task, say: Say) -> Iterator[str]:
 
 
 def starter(language: str, folder: Path, say: Say) -> list[str]:
-    """Write the files of a starter and return what to do next.
-
-    Raises:
-        ValueError: if the language is unknown, or a file exists already.
-    """
+    """Write the files of a starter and return what to do next; raise ValueError if one exists."""
     from ..templates import LANGUAGES, template
 
     texts = template(language)
@@ -85,11 +77,7 @@ def starter(language: str, folder: Path, say: Say) -> list[str]:
 
 
 def exported(folder: Path, tasks: Sequence[str], seed: int, thorough: bool, say: Say) -> list[str]:
-    """Write cases into a folder and return what to do next.
-
-    Raises:
-        ValueError: if the folder holds other files.
-    """
+    """Write cases into a folder and return what to do next."""
     count = export_cases(folder, None, tasks or None, seed, thorough)
     place = shlex.quote(str(folder))
     steps = (

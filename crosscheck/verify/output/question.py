@@ -19,11 +19,7 @@ PROGRAM, ANSWERS = "--", "--answers"
 
 
 def limits(seconds: float | None, mebibytes: int | None) -> ProcessLimits:
-    """Return the limits of a program; the first request of a task may take longer, to compile.
-
-    Raises:
-        ValueError: if the time is not positive.
-    """
+    """Return the limits of a program; the first request of a task may take longer, to compile."""
     if seconds is not None and not 0.0 < seconds < float("inf"):
         raise ValueError(f"time-limit: expected seconds above 0, got {seconds}")
     limits = LIMITS if mebibytes is None else LIMITS._replace(memory=mebibytes << 20)
@@ -33,17 +29,7 @@ def limits(seconds: float | None, mebibytes: int | None) -> ProcessLimits:
 
 
 def opened(words: Sequence[str], limits: ProcessLimits, say: Say) -> Contestant:
-    """Return the solver that words name.
-
-    Args:
-        words: a Python file or module:object; or "--", a program and its arguments; or "--answers"
-            and a folder.
-        limits: of its time and memory.
-        say: translates errors.
-
-    Raises:
-        ValueError: if the words name no solver.
-    """
+    """Return the solver that the words of a command line name; raise ValueError if none."""
     if words[:1] == [PROGRAM] and len(words) > 1:
         return open_contestant(words[1:], limits)
     if words[:1] == [ANSWERS] and len(words) > 2:

@@ -1,8 +1,4 @@
-"""Failing cases as files that `--rerun` asks again.
-
-A case is generated again from its name and the seed: laws need more of it than a file can hold. The
-file also holds the request, the answer and the reference's answer for a reader.
-"""
+"""Failing cases as files that `--rerun` asks again, generated from their names and the seed."""
 
 import re
 import shlex
@@ -26,10 +22,7 @@ _LARGEST = 1 << 28
 
 
 class SavedCase(msgspec.Struct, frozen=True):
-    """The task, method, seed, name and list of a case, which identify it.
-
-    The request, the answer and the expected answer are there for a reader.
-    """
+    """The task, seed and name that identify a case; its request and answers are for a reader."""
 
     task: str
     method: str
@@ -65,11 +58,7 @@ def save(report: TaskReport, folder: Path, seed: int, thorough: bool) -> Path | 
 
 
 def load(path: Path) -> SavedCase:
-    """Return the case in a file.
-
-    Raises:
-        ValueError: if the file holds no saved case or cannot be read.
-    """
+    """Return the case in a file; raise ValueError if it holds none or cannot be read."""
     try:
         saved = msgspec.json.decode(read_bytes(path, largest=_LARGEST), type=SavedCase)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
@@ -80,11 +69,7 @@ def load(path: Path) -> SavedCase:
 
 
 def cases_of(saved: SavedCase, cases: Sequence[Case]) -> list[Case]:
-    """Return a saved case among those of its task, after the cases that it refers to.
-
-    Raises:
-        ValueError: if no case has its name.
-    """
+    """Return a saved case after the cases that it refers to; raise ValueError if it is unknown."""
     by_name = {case.name: case for case in cases}
     if saved.name not in by_name:
         raise ValueError(

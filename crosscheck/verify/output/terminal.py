@@ -150,10 +150,7 @@ def _numbers(failure: CaseJudgement, say: Say, limit: int) -> list[str]:
 
 
 def wrapped(text: str, indent: str = "", size: int = WIDTH) -> list[str]:
-    """Return a text in indented lines of at most so many columns.
-
-    Rich breaks lines at spaces only, which Chinese has none of.
-    """
+    """Return a text in indented lines of at most so many columns; Rich breaks at spaces only."""
     room = size - len(indent)
     pieces = [
         match[i : i + room]

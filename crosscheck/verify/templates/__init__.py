@@ -45,11 +45,7 @@ step: what you make. method: explicit, symplectic, linearised, local_global, new
 
 
 def template(language: str) -> dict[str, str]:
-    """Return the text of each file of a starter, by its name, with the fields of its greeting.
-
-    Raises:
-        ValueError: if there is none in this language.
-    """
+    """Return the text of each file of a starter by name; ValueError for other languages."""
     if language not in LANGUAGES:
         raise ValueError(f"template: expected one of {', '.join(LANGUAGES)}, got {language!r}")
     folder = resources.files(__name__)

@@ -22,10 +22,10 @@ def forward_kinematics(parents: list[int], offsets: Vectors, local_rotations: Ve
     raise RuntimeError("forward_kinematics is not written yet")
 
 
-def inverse_kinematics(target: list[float], effector: int, tolerance: float, **others: Any) -> Any:
+def inverse_kinematics(target: list[float], effector: int, tolerance: float, **inputs: Any) -> Any:
     """Return {"local_rotations": those that bring the joint `effector` to the target}.
 
-    Others are parents, offsets, local_rotations, max_iterations and method.
+    The other inputs are parents, offsets, local_rotations, max_iterations and method.
     """
     raise RuntimeError("inverse_kinematics is not written yet")
 
@@ -40,12 +40,12 @@ def mass_spring_step(positions: Vectors, velocities: Vectors, h: float, **system
 
 
 def _answer(task: str, **inputs: Any) -> dict[str, Any]:
-    known = {name: one for name, one in globals().items() if name.count("_") and name[0] != "_"}
+    functions = {name: f for name, f in globals().items() if name.count("_") and name[0] != "_"}
     if task == "greeting":
-        return {"protocol": 1, "tasks": list(known), **PLUMBOB}
+        return {"protocol": 1, "tasks": list(functions), **PLUMBOB}
     try:
         start = time.perf_counter()
-        outputs = known[task](**inputs)
+        outputs = functions[task](**inputs)
         return {"seconds": time.perf_counter() - start, **outputs}
     except Exception as error:
         return {"error": str(error)}

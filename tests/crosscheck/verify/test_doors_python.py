@@ -126,7 +126,7 @@ def test_an_answer_is_what_the_function_returns_bit_for_bit(inside, name):
     assert answer.values.keys() == expected.values.keys()
     for key, value in expected.values.items():
         np.testing.assert_array_equal(answer.values[key], value)
-    assert 0.0 < answer.seconds < 0.1
+    assert answer.seconds > 0.0
     assert answer.remarks == ()
 
 
@@ -149,54 +149,19 @@ def test_inputs_arrive_as_arrays_and_only_those_that_are_taken(inside):
 
 def test_own_time_is_measured_inside(solver):
     contestant = solver(f"import time\n{FORWARD}time.sleep(0.2)\n    return offsets\n")
-    assert 0.2 <= contestant.answer(case(2)).seconds < 0.4
+    assert contestant.answer(case(2)).seconds >= 0.2
 
 
-@pytest.mark.parametrize(
-    ("text", "methods"),
-    [
-        ("def ccd(target, offsets): return offsets + 1", ("ccd",)),
-        (
-            "def fabrik(target, offsets): return offsets + 2\n"
-            "def ccd(target, offsets): return offsets + 1",
-            ("ccd", "fabrik"),
-        ),
-        ("def inverse_kinematics(offsets): return offsets + 1", ("",)),
-        (
-            "PLUMBOB = {'methods': ['ccd', 'my own']}\n"
-            "def inverse_kinematics(offsets, method):\n"
-            "    return offsets + (1 if method == 'ccd' else 2)",
-            ("ccd", "my own"),
-        ),
-        (
-            "PLUMBOB = {'methods': ('ccd', 'jacobian')}\n"
-            "def ccd(offsets): return offsets + 1\n"
-            "def jacobian(offsets): return offsets + 2",
-            ("ccd", "jacobian"),
-        ),
-    ],
-    ids=["ccd", "two", "one function", "one function of two methods", "declared"],
-)
+@rows("methods")
 def test_methods_of_inverse_kinematics_are_found(inside, text, methods):
     contestant = inside(text)
     assert contestant.greeting.tasks == ("inverse_kinematics",)
-    assert contestant.greeting.methods == methods
+    assert contestant.greeting.methods == tuple(methods)
     for method, value in zip(methods, (1.0, 2.0), strict=False):
         assert contestant.answer(inverse(method)).values["positions"][0, 0] == value
 
 
-@pytest.mark.parametrize(
-    ("answer", "words"),
-    [
-        (
-            "{'positions': np.zeros((2, 3), complex)}",
-            "expected numbers of shape (joint, 3), got complex128 values of shape (2, 3)",
-        ),
-        ("None", "got None"),
-        ("{}", "got an empty dict"),
-        ("{'x': 1, 'y': 2}", "got the keys x, y"),
-    ],
-)
+@rows("no_answers")
 def test_an_answer_that_is_none_is_described(inside, answer, words):
     contestant = inside(f"import numpy as np\n{FORWARD}return {answer}\n")
     assert str(contestant.answer(case(2)).sentence).endswith(words)

@@ -142,63 +142,59 @@ def test_faults_at_once_are_named(keys):
     assert len(keys) == 2 or named(judged) == [set(keys)]
 
 
-# Besides those of the self-test.
+# Honest steps besides those of the self-test, and what they declare.
 HONEST = {
     "explicit, undeclared": (
-        StepModel(Integrator("explicit"), 100, "explicit", velocity="separate"), Step(), "double",
-    ),
+        StepModel(Integrator("explicit"), 100, "explicit", velocity="separate"), Step()),
     "overwritten pins": (
         LOCAL_GLOBAL._replace(pins="overwritten"),
-        Step("local_global", "y", 10, 1, "length_rate", None, "overwritten"), "double",
-    ),
-    "overwritten pins, undeclared": (LINEARISED._replace(pins="overwritten"), Step(), "double"),
-    "penalty, undeclared": (LINEARISED._replace(pins="penalty 1e10"), Step(), "double"),
-    "end velocity": (CONVERGED._replace(damper="end_velocity"), Step("converged"), "double"),
-    "no damping": (CONVERGED._replace(damper="none"), Step("converged", damper="none"), "double"),
+        Step("local_global", "y", 10, 1, "length_rate", None, "overwritten")),
+    "overwritten pins, undeclared": (LINEARISED._replace(pins="overwritten"), Step()),
+    "penalty, undeclared": (LINEARISED._replace(pins="penalty 1e10"), Step()),
+    "end velocity": (CONVERGED._replace(damper="end_velocity"), Step("converged")),
+    "no damping": (CONVERGED._replace(damper="none"), Step("converged", damper="none")),
     "global factor": (
         CONVERGED._replace(damper="none", scaling=0.98),
-        Step("converged", damper="global_factor", damping_factor=0.98), "double",
-    ),
-    "substeps": (CONVERGED._replace(substeps=3), Step("converged", substeps=3), "double"),
+        Step("converged", damper="global_factor", damping_factor=0.98)),
+    "substeps": (CONVERGED._replace(substeps=3), Step("converged", substeps=3)),
     "from x_n": (
         StepModel(Integrator("local_global", "x_n", 10), damper="none"),
-        Step("local_global", "x_n", 10), "double",
-    ),
+        Step("local_global", "x_n", 10)),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", mark(HONEST, ("overwritten pins, undeclared", "global factor")))
 def test_an_honest_step_is_not_accused(name):
-    model, declared, precision = HONEST[name]
-    kind = np.float32 if precision == "single" else np.float64
-    assert_not_accused(report(Stepper(model, (), kind), step=declared, precision=precision))
+    model, declared = HONEST[name]
+    assert_not_accused(report(Stepper(model), step=declared))
+
+
+def reference_step(p, solver):
+    euler = ImplicitEuler(system_of(p), h=p.h, solver=solver, tolerance=1e-12, max_iterations=20000)
+    return euler.step(state_of(p)).state
+
+
+def mujoco_step(p, integrator):
+    return MujocoMassSpring(system_of(p), h=p.h, integrator=integrator).step(state_of(p))
+
+
+OTHERS = {
+    name: (reference_step, Step("converged", damper="length_rate", pins="eliminated"))
+    for name in STEP_SOLVERS
+    if name != "gauss_newton"
+} | {name: (mujoco_step, Step()) for name in ("implicitfast", "implicit", "RK4")}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [one for one in STEP_SOLVERS if one != "gauss_newton"])
-def test_the_reference_s_solvers_are_converged(name):
+@pytest.mark.parametrize("name", OTHERS)
+def test_steps_of_the_reference_and_of_mujoco_are_not_accused(name):
+    function, declared = OTHERS[name]
+
     def step(**inputs):
-        p = problem_of(inputs)
-        euler = ImplicitEuler(
-            system_of(p), h=p.h, solver=name, tolerance=1e-12, max_iterations=20000
-        )
-        state = euler.step(state_of(p)).state
+        state = function(problem_of(inputs), name)
         return {"positions": state.positions, "velocities": state.velocities}
 
-    declared = Step("converged", damper="length_rate", pins="eliminated")
     assert_not_accused(report(step, step=declared))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("integrator", ["implicitfast", "implicit", "RK4"])
-def test_mujoco_is_not_accused(integrator):
-    def step(**inputs):
-        p = problem_of(inputs)
-        engine = MujocoMassSpring(system_of(p), h=p.h, integrator=integrator)
-        state = engine.step(state_of(p))
-        return {"positions": state.positions, "velocities": state.velocities}
-
-    assert_not_accused(report(step))
 
 
 @pytest.mark.slow
@@ -218,9 +214,8 @@ def test_a_float_explicit_step_of_a_thousand_substeps_is_not_accused():
             x, v = x + hs * v, v + hs * a
         return {"positions": x, "velocities": v}
 
-    judged = report(
-        step, step=Step("explicit", substeps=1000, damper="explicit"), precision="single"
-    )
+    declared = Step("explicit", substeps=1000, damper="explicit")
+    judged = report(step, step=declared, precision="single")
     assert judged.verdict <= Verdict.RIGHT_BUT, broken_laws(judged)
 
 
@@ -234,29 +229,25 @@ def test_one_iteration_is_not_taken_for_convergence():
 ONE_ITERATION = StepModel(Integrator("local_global", "x_n", 1), damper="none")
 THOUSAND = StepModel(Integrator("explicit"), 1000, "explicit", velocity="separate")
 LAB = System("one", "one", "one", "measured", "number")
-# What public programs do that declare nothing: model, faults, system, precision.
+# Faults of public programs that declare nothing: model, faults, system, whether in floats.
 UNDECLARED = {
     "linearised, pins overwritten": (
-        LINEARISED._replace(pins="overwritten"), ("gravity g/m",), LAB, "single",
-    ),
+        LINEARISED._replace(pins="overwritten"), ("gravity g/m",), LAB, True),
     "one iteration, penalty": (
-        ONE_ITERATION._replace(pins="penalty 1e10"), ("gravity doubled",), System(), "double",
-    ),
+        ONE_ITERATION._replace(pins="penalty 1e10"), ("gravity doubled",), System(), False),
     "one iteration, springs": (
-        ONE_ITERATION._replace(pins="springs 5e5"), ("gravity of its own 0.3",), LAB, "single",
-    ),
-    "factor kept": (ONE_ITERATION, ("factor kept",), System(), "single"),
-    "a thousand substeps": (THOUSAND, ("pins free until the end",), System(), "double"),
-    "two faults": (LINEARISED, ("gravity g/m", "velocity kept"), System(), "double"),
+        ONE_ITERATION._replace(pins="springs 5e5"), ("gravity of its own 0.3",), LAB, True),
+    "factor kept": (ONE_ITERATION, ("factor kept",), System(), True),
+    "a thousand substeps": (THOUSAND, ("pins free until the end",), System(), False),
+    "two faults": (LINEARISED, ("gravity g/m", "velocity kept"), System(), False),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", mark(UNDECLARED, ("one iteration, penalty",)))
 def test_faults_of_a_solver_that_declares_nothing_are_named(name):
-    model, keys, system, precision = UNDECLARED[name]
-    kind = np.float32 if precision == "single" else np.float64
-    step = Stepper(model, [BY_KEY[key] for key in keys], kind)
-    judged = report(step, system=system, precision=precision)
+    model, keys, system, single = UNDECLARED[name]
+    step = Stepper(model, [BY_KEY[key] for key in keys], np.float32 if single else np.float64)
+    judged = report(step, system=system, precision="single" if single else "double")
     assert judged.verdict is Verdict.WRONG
     assert set(keys) in named(judged)
 

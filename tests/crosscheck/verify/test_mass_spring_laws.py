@@ -126,20 +126,18 @@ GRADES = [
 
 
 @pytest.mark.parametrize(("share", "verdict"), GRADES)
-def test_positions_that_are_imprecise_are_right_with_a_reservation(share, verdict):
+@pytest.mark.parametrize("name", ["positions", "velocities"])
+def test_imprecise_numbers_are_right_with_a_reservation(name, share, verdict):
     p = triangle()
-    gap = share * displacement(p)
-    found = judged(laws.declared_step, p, positions=one_moved(2, gap))
-    assert (found.law, found.verdict, found.index) == ("declared step", verdict, 2)
-    assert found.error == pytest.approx(share, rel=1e-3)
-
-
-@pytest.mark.parametrize(("share", "verdict"), GRADES)
-def test_velocities_that_are_imprecise_are_right_with_a_reservation(share, verdict):
-    p = triangle()
-    gap = share * np.abs(predicted(p, LINEARISED)["velocities"]).max()
-    found = judged(laws.velocities, p, velocities=one_moved(2, gap))
-    assert (found.law, found.verdict) == ("velocities", verdict)
+    speed = np.abs(predicted(p, LINEARISED)["velocities"]).max()
+    law, size = {
+        "positions": (laws.declared_step, displacement(p)),
+        "velocities": (laws.velocities, speed),
+    }[name]
+    finding = judged(law, p, **{name: one_moved(2, share * size)})
+    assert finding.verdict is verdict
+    assert finding.error == pytest.approx(share, rel=1e-3)
+    assert finding.index == (2 if name == "positions" else None)
 
 
 def test_velocities_are_held_against_the_positions_answered():

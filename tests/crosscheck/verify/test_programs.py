@@ -200,7 +200,7 @@ CHOSEN = [
 @pytest.mark.parametrize(("language", "fault"), CHOSEN)
 def test_a_planted_fault_changes_its_tasks_answers(language, fault, program, right_answers):
     answers, _ = planted_programs.ask([*program(language), "--fault", fault], REQUESTS)
-    assert FAULTS[fault].task in unlike(right_answers(language), answers)
+    assert FAULTS[fault]["task"] in unlike(right_answers(language), answers)
 
 
 def test_each_program_has_twenty_faults_and_each_fault_a_program():

@@ -90,12 +90,12 @@ def test_forces_are_those_of_the_formula_and_add_up_to_the_weight_to_rounding(
 def test_parts_of_the_energy_add_up_to_rounding(spring, name, share, verdict):
     """Four times the rounding of one part."""
     allowed = energy.tolerance(spring, EPSILON)
-    given = energy.right(spring)
+    given = energy.predict((), spring)
     shift = share * 4.0 * allowed
     given[name] += shift
     if name == "potential":
         given["total"] += shift
-    found = energy._sum_laws(given, allowed)
+    found = energy._sums(given, allowed)
     wrong = [finding for finding in found if finding.verdict]
     assert [finding.verdict for finding in wrong] == ([] if verdict is RIGHT else [verdict])
 

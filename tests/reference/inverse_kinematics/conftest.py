@@ -44,12 +44,6 @@ def targets_by_pose(model, rng, count=1, oriented=0.5):
     ], q
 
 
-@pytest.fixture(scope="session")
-def reachable():
-    """Return the function that makes targets which some pose within the limits reaches."""
-    return targets_by_pose
-
-
 def joints_that_move(model, targets):
     """Return the joints that may be moved: those above the effectors, and leaders of those."""
     found = set()
@@ -59,12 +53,6 @@ def joints_that_move(model, targets):
         found.update(path if own else path[:-1])
     found.update(model.mimics[j].leader for j in list(found) if j in model.mimics)
     return found - set(model.mimics)
-
-
-@pytest.fixture(scope="session")
-def moving_joints():
-    """Return the function that tells which joints may be moved."""
-    return joints_that_move
 
 
 def outside(model, rng, *shape):
@@ -77,12 +65,6 @@ def outside(model, rng, *shape):
     return q
 
 
-@pytest.fixture(scope="session")
-def beyond_limits():
-    """Return the function that draws coordinates without regard to limits."""
-    return outside
-
-
 def chain_of(kind, rng, links=4, **limits):
     """Return a chain of joints of one kind with random axes and links of 0.3 to 0.7 m."""
     directions = rng.standard_normal((links + 1, 3))
@@ -90,12 +72,6 @@ def chain_of(kind, rng, links=4, **limits):
     offsets *= rng.uniform(0.3, 0.7, (links + 1, 1))
     axes = rotation.rotate(rotation.random(rng, links + 1), [0.0, 0.0, 1.0])
     return Articulation(Skeleton(range(-1, links), offsets), kind, axes, **limits)
-
-
-@pytest.fixture(scope="session")
-def chain_of_joints():
-    """Return the function that makes a chain of joints of one kind."""
-    return chain_of
 
 
 class Machine(NamedTuple):
@@ -120,12 +96,6 @@ def machine_of(model, q, targets):
     return Machine(mechanism, target_rows, data, new_workspace(mechanism))
 
 
-@pytest.fixture(scope="session")
-def machine():
-    """Return the function that prepares what a kernel is given."""
-    return machine_of
-
-
 def without_limits(model):
     """Return the same articulation, its limits left out."""
     return Articulation(
@@ -133,7 +103,10 @@ def without_limits(model):
     )
 
 
-@pytest.fixture(scope="session")
-def unlimited():
-    """Return the function that leaves the limits of an articulation out."""
-    return without_limits
+# Fixtures that are the functions above, for the tests of several files.
+reachable = pytest.fixture(scope="session")(lambda: targets_by_pose)
+moving_joints = pytest.fixture(scope="session")(lambda: joints_that_move)
+beyond_limits = pytest.fixture(scope="session")(lambda: outside)
+chain_of_joints = pytest.fixture(scope="session")(lambda: chain_of)
+machine = pytest.fixture(scope="session")(lambda: machine_of)
+unlimited = pytest.fixture(scope="session")(lambda: without_limits)

@@ -261,17 +261,6 @@ def test_rotations_make_a_batch_too(many, solver, backend):
         assert (batch.coordinates[i] == single.coordinates).all()
 
 
-def test_a_batch_in_another_order_gives_the_same(many, solver, rng):
-    model, starts, (near, far) = many
-    order = np.array([2, 0, 1])
-    here = solve_ik(model, starts[0], [near, far], solver, restarts=2)
-    there = solve_ik(
-        model, starts[0], [near._replace(position=near.position[order]), far], solver, restarts=2
-    )
-    assert (here.coordinates[order] == there.coordinates).all()
-    assert (here.iterations[order] == there.iterations).all()
-
-
 def test_a_batch_on_all_cores_is_the_same_as_on_one(many, rng, solver):
     model, _, (near, _) = many
     starts = model.random(rng, 100)
