@@ -387,7 +387,7 @@ def test_markdown_and_json_hold_what_was_found(capsys, folders):
 
 
 MISUSE = {
-    "one folder": (["old"], "expected OLD and NEW, or --rerun REV, got 1 folders"),
+    "one folder": (["old"], "expected OLD and NEW, or --rerun REV, got 1 folder"),
     "nothing": ([], "expected OLD and NEW, or --rerun REV, got 0 folders"),
     "both": (["old", "new", "--rerun", "HEAD"], "expected OLD and NEW, or --rerun REV"),
     "no records": (["old", "nowhere"], "no records in nowhere"),
