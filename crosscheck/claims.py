@@ -7,11 +7,21 @@ from plumbob.reference import arguments
 from plumbob.reference.inverse_kinematics import IK_SOLVERS
 
 from . import kinematics
-from .engines import SKELETON_ENGINES
+from .engines import ROBOT_ENGINES, SKELETON_ENGINES
 from .mass_spring.claims import MASS_SPRING_CLAIMS
-from .robots.claims import ROBOT_CLAIMS
-from .tolerances import POSITION, ROTATION
+from .robots import comparisons
+from .robots.models import CHARACTERS, PACKAGES, ROBOTS, comparable, models
+from .tolerances import JACOBIAN, POSITION, ROTATION
 from .verdict import Claim, ClaimVerdict, check_claim, each_case
+
+READS = {ROBOTS: "formats.urdf.read", CHARACTERS: "formats.mjcf.read"}
+FILES = {ROBOTS: "the URDFs of example-robot-data", CHARACTERS: "characters in MJCF"}
+POSES = "forward_kinematics in random configurations"
+QUANTITIES = {
+    "positions": (comparisons.positions, POSES, POSITION),
+    "rotations": (comparisons.rotations, POSES, ROTATION),
+    "Jacobians": (comparisons.jacobians, "jacobians.jacobians", JACOBIAN),
+}
 
 
 def skeleton_claims(engine: str) -> list[Claim]:
@@ -34,6 +44,28 @@ def skeleton_claims(engine: str) -> list[Claim]:
     ]
 
 
+def robot_claims(family: str, engine: str) -> list[Claim]:
+    """Return the claims about a family of files against an engine."""
+    return [
+        Claim(
+            f"{family[:-1]} {name}, {engine}",
+            f"{READS[family]}, {function}: all links",
+            f"{FILES[family]} as {engine} reads them, links and joints matched by name",
+            partial(comparisons.compare, quantity, family, engine),
+            tolerance,
+            cases=len(comparable(family, engine, moving=name == "positions")),
+        )
+        for name, (quantity, function, tolerance) in QUANTITIES.items()
+    ]
+
+
+ROBOT_CLAIMS = [
+    claim
+    for family in PACKAGES
+    if models(family)
+    for engine in ROBOT_ENGINES
+    for claim in robot_claims(family, engine)
+]
 CLAIMS: dict[str, Claim] = {
     claim.name: claim
     for claim in [
@@ -47,14 +79,9 @@ CLAIMS: dict[str, Claim] = {
 def run_claims(
     names: Sequence[str] | None = None, progress: Callable[[Claim], None] | None = None
 ) -> list[ClaimVerdict]:
-    """Check the named claims in their order, by default all.
+    """Check the named claims in their order, by default all; call `progress` before each.
 
-    Args:
-        names: of claims, or None for all.
-        progress: called with each claim before it is checked.
-
-    Raises:
-        ValueError: if a name is unknown or the list is empty.
+    Raise a ValueError if a name is unknown or the list is empty.
     """
     claims = [
         CLAIMS[arguments.choice("names", name, CLAIMS)]

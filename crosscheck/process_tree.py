@@ -30,18 +30,12 @@ _GUARD = (
 
 
 class Process(NamedTuple):
-    """A process that runs.
-
-    Attributes:
-        memory: its resident memory [B].
-        seconds: the processor time that it has used [s].
-        runs: whether it uses a processor, or waits for one.
-    """
+    """A process that runs."""
 
     pid: int
-    memory: int
-    seconds: float
-    runs: bool
+    memory: int  # its resident memory [B]
+    seconds: float  # the processor time that it has used [s]
+    runs: bool  # whether it uses a processor, or waits for one
 
 
 def new_marker() -> int:
@@ -63,11 +57,9 @@ def carry(marker: int) -> None:
 
 
 def family(leader: int, marker: int = 0) -> list[Process]:
-    """Return the running processes that a program has started, itself among them.
+    """Return the running processes of a program: its group's leader and all that it has started.
 
-    Args:
-        leader: the program's process, leader of its group and session.
-        marker: that of the program, 0 if it has none.
+    `marker` is that of the program, 0 if it has none.
     """
     members: set[int] = set()
     for pid in [leader, *filter(lambda pid: _belongs(pid, leader, marker), psutil.pids())]:

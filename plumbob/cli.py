@@ -17,7 +17,7 @@ from . import compile_notice, entry_point
 from .commands import bench, check, records, report, show
 from .commands import compare as comparison
 from .commands import verify as verify
-from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh
+from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh, flag, option
 from .help_text import Command, Group, block
 
 _UsageError: Any = typer.BadParameter.__base__
@@ -104,13 +104,10 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
 def plumbob(
     context: typer.Context,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="DIR", help="Folder to write to.  [default: report]"
-        ),
+        Path | None, option("DIR", "Folder to write to.  [default: report]", "--output", "-o")
     ] = None,
     fresh: Fresh = False,
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    version: Annotated[bool, flag("Print the version.", "--version")] = False,
 ) -> int:
     """Validate, measure and report: skeleton kinematics and implicit mass-spring dynamics.
 

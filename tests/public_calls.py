@@ -93,6 +93,7 @@ INTERNAL = {
     "reference.backend.compiled.Kernel": "for kernels",
     "reference.backend.compiled.compile_kernel": "for kernels",
     "reference.backend.compiled.bind": "for kernels",
+    "reference.backend.compiled.digest": "for kernels",
     "reference.backend.compiled.compiled_in": "for kernels",
     "reference.backend.threads.in_slices": "for kernels",
     "crosscheck.verdict.ClaimVerdict": "made only by check_claim",

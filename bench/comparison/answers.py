@@ -17,7 +17,7 @@ from .rows import ChangeVerdict, Pair, RowChange, RowKey
 # Arrays of measured times [s], by suite; the default is for all other suites.
 _DEFAULT_TIMES = frozenset({"seconds", "setup"})
 _TIMES: Mapping[str, frozenset[str]] = {
-    "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"}),
+    "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"})
 }
 # Bytes of memory, which depend on the state of the system.
 _MEMORY = frozenset({("cloth_scale", "before"), ("cloth_scale", "memory")})

@@ -85,7 +85,10 @@ class WorkerProcess:
                             is_silent=is_silent,
                         )
         if any(target.doubt for target in outcome.solved):  # then all times are round trips
-            solved = [t._replace(seconds=max(t.seconds, t.round_trip)) for t in outcome.solved]
+            solved = [
+                target._replace(seconds=max(target.seconds, target.round_trip))
+                for target in outcome.solved
+            ]
             outcome = outcome._replace(solved=solved)
         return outcome
 
@@ -170,7 +173,8 @@ def raised(solved: list[Solved]) -> str:
     """Return the most frequent exception with its count, and why times are doubted; else ""."""
     counts = Counter(target.trouble for target in solved if target.trouble)
     sentences = [
-        f"{trouble}, on {n} of {len(solved)} targets" for trouble, n in counts.most_common(1)
+        f"{trouble}, on {count} of {len(solved)} targets"
+        for trouble, count in counts.most_common(1)
     ]
     sentences += [target.doubt for target in solved if target.doubt][:1]
     return "; ".join(sentences)

@@ -83,9 +83,12 @@ def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return how a stamp differs from another, "" if it does not."""
     for part, title in (("machine", "another machine"), ("versions", "other versions")):
         old, new = before.get(part, {}), now.get(part, {})
-        names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-        if names:
-            changes = (f"{n} {old.get(n) or 'none'}, now {new.get(n) or 'none'}" for n in names)
+        changes = [
+            f"{name} {old.get(name) or 'none'}, now {new.get(name) or 'none'}"
+            for name in {**old, **new}
+            if old.get(name) != new.get(name)
+        ]
+        if changes:
             return f"{title} ({'; '.join(changes)})"
     old, new = before.get("source", "none"), now.get("source", "none")
     return f"other sources ({old}, now {new})" if old != new else ""

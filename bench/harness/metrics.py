@@ -167,7 +167,7 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
         return Ranking((), ())
     first, *rivals = order
     chances = adjusted([chance_of_pairs(scores[first], scores[rival]) for rival in rivals])
-    tied = [r for r, chance in zip(rivals, chances, strict=True) if chance > 1 - CONFIDENCE]
+    tied = [name for name, chance in zip(rivals, chances, strict=True) if chance > 1 - CONFIDENCE]
     return Ranking(tuple(order), (first, *tied))
 
 
@@ -221,14 +221,14 @@ def shifted_geometric_mean(seconds: Floats, shift: float, groups: Sequence[int] 
     else:
         means = _resamples(sizes) @ logs / len(logs)
         low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return Interval(*(float(np.exp(x) - shift) for x in (np.mean(logs), low, high)))
+    return Interval(*(float(np.exp(log) - shift) for log in (np.mean(logs), low, high)))
 
 
 @functools.lru_cache(maxsize=8)
 def _resamples(groups: tuple[int, ...]) -> Floats:
     """Return how often each target is drawn, (resample, target)."""
     rng = np.random.default_rng(_SEED)
-    drawn = [rng.multinomial(n, np.full(n, 1.0 / n), size=RESAMPLES) for n in groups]
+    drawn = [rng.multinomial(size, np.full(size, 1.0 / size), size=RESAMPLES) for size in groups]
     return np.concatenate(drawn, axis=1).astype(float)
 
 
@@ -278,7 +278,7 @@ def paired_ratio(a: Floats, b: Floats) -> PairedRatio:
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
     """Return the spread of counts, as integers where they are."""
-    median, p95, largest = (int(x) if x.is_integer() else x for x in spread(values))
+    median, p95, largest = (int(part) if part.is_integer() else part for part in spread(values))
     return median, p95, largest
 
 

@@ -57,7 +57,7 @@ def run(
     file, choice = RecordFile(folder), chosen(scale)
     with locked(folder):
         present = {record.key: record for record in file.read().records}
-        for group in [suites] if executor.takes_suites_together else [[s] for s in suites]:
+        for group in [suites] if executor.takes_suites_together else [[suite] for suite in suites]:
             begin = time.perf_counter()
             every = [block for suite in group for block in blocks(suite, choice.scale)]
             executor.note_records(present.get(block_key(block)) for block in every if block.times)
@@ -128,7 +128,8 @@ def _extra_records(
     suite: str, suite_keys: Set[Key], file: RecordFile, is_partial: bool
 ) -> Iterator[Event]:
     """Report the records of a suite that were not requested; mark records with old settings."""
-    extra = [r for r in file.read().records if r.suite == suite and r.key not in suite_keys]
+    records = [record for record in file.read().records if record.suite == suite]
+    extra = [record for record in records if record.key not in suite_keys]
     if is_partial:
         if extra:
             yield Event(NOT_RUN, suite, "", f"{_records(len(extra))} of what was not chosen kept")
@@ -140,7 +141,8 @@ def _extra_records(
         if is_remark or record.key[:3] in current:
             old.append(record)
     if newly := [record for record in old if not record.superseded]:
-        file.append([replace(r, notes={**r.notes, "superseded": now()}) for r in newly])
+        notes = {"superseded": now()}
+        file.append([replace(record, notes={**record.notes, **notes}) for record in newly])
     for solver, count in Counter(record.solver for record in old).items():
         why = f"{_records(count)} of {solver} under other settings kept, left out of tables"
         yield Event(NOT_RUN, suite, solver, why)
@@ -156,9 +158,11 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
     """Return a sentence for each recorded claim of the suites that does not hold."""
     if "check" not in suites:
         return []
-    checks = [r for r in RecordFile(folder).read().records if r.suite == "check"]
+    checks = [record for record in RecordFile(folder).read().records if record.suite == "check"]
     missed = [record for record in checks if not np.all(record.arrays.get("held", True))]
-    return [f"claim {r.problem!r} missed: {r.notes.get('missed', '')}" for r in missed]
+    return [
+        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}" for record in missed
+    ]
 
 
 def forget(suites: Sequence[str], scale: str | Choice, folder: Path) -> None:

@@ -42,7 +42,10 @@ class Entrant:
     def titles(self) -> dict[str, str]:
         """The names of its rows, by its methods of inverse kinematics."""
         several = len(self.methods) > 1
-        return {m: f"{self.name}, {m}" if m and several else self.name for m in self.methods}
+        return {
+            method: f"{self.name}, {method}" if method and several else self.name
+            for method in self.methods
+        }
 
     @property
     def facts(self) -> dict[str, Any]:

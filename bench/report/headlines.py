@@ -27,10 +27,7 @@ MAX_NAMED = 2
 SUBJECTS = {"kinematics": "Forward kinematics", "ik": "Inverse kinematics", "cloth": "Cloth step"}
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
 # What the scales of a run mean.
-_SCALES = {
-    "quick": "Quick run: few targets and rounds",
-    "full": "Full run: all targets and rounds",
-}
+_SCALES = {"quick": "Quick run: few targets and rounds", "full": "Full run: all targets and rounds"}
 # Median times by problem and solver [s].
 Times = Mapping[str, Mapping[str, float]]
 

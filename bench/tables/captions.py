@@ -57,9 +57,12 @@ class Captions:
         return {"name": name, **captions, "measured": sentence}
 
     def figure(self, name: str) -> dict[str, Any]:
-        """Return the name, title and caption of a chart, a sketch or a scene."""
-        texts = self._figures[name].items()
-        return {"name": name, **{key: _on_one_line(text, self._constants) for key, text in texts}}
+        """Return the name, title, caption and axes of a chart, a sketch or a scene."""
+        fields = {
+            key: _on_one_line(field, self._constants) if isinstance(field, str) else field
+            for key, field in self._figures[name].items()
+        }
+        return {"name": name, **fields}
 
     def columns(self, name: str) -> tuple[Column, ...]:
         """Return the columns of a table; each shows the cell that a row has under its title."""

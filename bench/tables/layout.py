@@ -19,6 +19,8 @@ _PACKAGES = {
     registry.NEWTON: "newton",
     "CHOLMOD": "cholespy",
 }
+# The cells of a row by the titles of their columns, and the records or scores behind them.
+Row = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

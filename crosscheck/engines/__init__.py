@@ -4,13 +4,7 @@ from .mujoco_mass_spring import MujocoFlex, MujocoJointChain, MujocoMassSpring
 from .mujoco_robot import MujocoRobot
 from .pinocchio_robot import PinocchioRobot
 from .robot_engine import RobotEngine
-from .skeleton_engine import (
-    SKELETON_ENGINES,
-    MujocoSkeleton,
-    PinocchioSkeleton,
-    SkeletonEngine,
-    forward_kinematics_by,
-)
+from .skeleton_engine import SKELETON_ENGINES, SkeletonEngine, forward_kinematics_by
 
 ROBOT_ENGINES: dict[str, type[RobotEngine]] = {
     "Pinocchio": PinocchioRobot,
@@ -24,10 +18,6 @@ __all__ = [
     "MujocoJointChain",
     "MujocoMassSpring",
     "MujocoRobot",
-    "MujocoSkeleton",
-    "PinocchioRobot",
-    "PinocchioSkeleton",
-    "RobotEngine",
     "SkeletonEngine",
     "forward_kinematics_by",
 ]

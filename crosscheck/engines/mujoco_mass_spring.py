@@ -41,10 +41,8 @@ class MujocoMassSpring:
     coupling of different bodies.
 
     Attributes:
-        model: the mujoco.MjModel.
-        data: its mujoco.MjData.
+        model, data: MuJoCo's.
         bodies: MuJoCo's index of each particle's body, found by name.
-        free: whether each particle is free, bool, shape (particle,).
         columns: indices of each free particle's coordinates in qpos and qvel, shape (free, 3).
     """
 
@@ -213,22 +211,12 @@ class MujocoJointChain:
 
     The forces of springs are linear in the coordinates as long as the ends of no spring swap; then
     "discrete" equals implicit Euler.
-
-    Attributes:
-        model: the mujoco.MjModel.
-        data: its mujoco.MjData.
     """
 
     def __init__(self, system: MassSpring, *, h: float, joint: str) -> None:
-        """Build the model for the integrator "discrete".
+        """Build the model for the integrator "discrete", h [s] and a joint of `JOINTS`.
 
-        Args:
-            system: particle 0 pinned, spring i from particle i to i + 1, gravity along x.
-            h: time step [s].
-            joint: one of `JOINTS`.
-
-        Raises:
-            ValueError: if there is no such joint.
+        Particle 0 is pinned, spring i joins particles i and i + 1, and gravity is along x.
         """
         self._weights = system.masses[1:] * system.gravity[0]
         self.model = _nested_joints(system, JOINTS[choice("joint", joint, JOINTS)])

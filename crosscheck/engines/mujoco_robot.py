@@ -47,8 +47,7 @@ class MujocoRobot(RobotEngine):
     leaders.
 
     Attributes:
-        model: the mujoco.MjModel.
-        data: its mujoco.MjData.
+        model, data: MuJoCo's.
         joints: MuJoCo's index of each joint.
         followers: the joints that follow others, each after its leader.
     """

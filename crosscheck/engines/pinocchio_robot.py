@@ -40,8 +40,7 @@ class PinocchioRobot(RobotEngine):
     parts are found from the file.
 
     Attributes:
-        model: the pinocchio.Model.
-        data: its pinocchio.Data.
+        model, data: Pinocchio's.
         joints: the indices of each joint's coordinates and velocities.
     """
 

@@ -40,14 +40,9 @@ class RobotEngine(ABC):
     columns: Mapping[str, int]
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
-        """Read a URDF or MJCF file.
+        """Read a URDF or MJCF file, or raise an UnreadableError if the engine refuses it.
 
-        Args:
-            path: of the file.
-            mimic: whether a URDF's mimic joints follow their leaders.
-
-        Raises:
-            UnreadableError: if the engine refuses.
+        `mimic` says whether a URDF's mimic joints follow their leaders.
         """
         try:
             self._read(path, mimic)
@@ -74,21 +69,16 @@ class RobotEngine(ABC):
         """Return the Jacobians of links with respect to all joints, (link, 6, column)."""
 
     def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
-        """Return the Jacobians of links with respect to the named joints.
+        """Return the Jacobians of links with respect to joints, given with their freedoms.
 
-        Args:
-            links: their names.
-            freedoms: number of freedoms of each joint; columns of unknown joints are zero.
-
-        Returns:
-            (link, 6, freedom): linear [m], then angular velocity, of the links' origins, in the
-            frame of the world.
+        They are the linear [m], then the angular velocity of the links' origins in the frame of the
+        world, (link, 6, freedom); columns of unknown joints are zero.
         """
         J = self._jacobians(links)
-        result, first = np.zeros((*J.shape[:-1], sum(freedoms.values()))), 0
+        matched, first = np.zeros((*J.shape[:-1], sum(freedoms.values()))), 0
         for name, width in freedoms.items():
             if name in self.columns:
                 start = self.columns[name]
-                result[..., first : first + width] = J[..., start : start + width]
+                matched[..., first : first + width] = J[..., start : start + width]
             first += width
-        return result
+        return matched

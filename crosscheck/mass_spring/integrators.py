@@ -109,18 +109,10 @@ def energy_series(
     steps: int,
     every: int = 1,
 ) -> EnergySeries:
-    """Return the energy at the start and after every `every` steps.
+    """Return the energy at the start and after every `every` steps of h [s], without loads.
 
-    Args:
-        integrator: a value of `SIMULATORS` or a similar function.
-        system: particles and springs, without external forces.
-        state: the initial state.
-        h: the step [s].
-        steps: number of steps, a multiple of `every`.
-        every: steps between two samples.
-
-    Raises:
-        ValueError: if `steps` is no multiple of `every`.
+    `integrator` is a value of `SIMULATORS` or a similar function; raise a ValueError if `steps` is
+    no multiple of `every`.
     """
     count, remainder = divmod(integer("steps", steps, least=1), integer("every", every, least=1))
     if remainder:

@@ -17,7 +17,20 @@ from plumbob.bench.text import visible
 
 from ..help_text import block, fitted
 from ..terminal import lines_in_a_pipe, print_ending, print_tables, progress, width
-from .options import FAILED, REPORT, SUCCESS, Fresh, Output, Texts, known, writable
+from .options import (
+    FAILED,
+    REPORT,
+    SUCCESS,
+    Fresh,
+    Output,
+    Text,
+    Texts,
+    argument,
+    flag,
+    known,
+    option,
+    writable,
+)
 from .report import write_report
 from .verify import program_of
 
@@ -57,62 +70,34 @@ _GAP = re.compile(r"( {2,})")
 
 def bench(  # noqa: PLR0913 -- one parameter an option
     context: typer.Context,
-    suites: Annotated[
-        Texts, typer.Argument(metavar="SUITE", help="Suites to measure; all if none.")
-    ] = None,
+    suites: Annotated[Texts, argument("SUITE", "Suites to measure; all if none.")] = None,
     *,
     output: Output = REPORT,
     fresh: Fresh = False,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Measure fewer targets and rounds.")
-    ] = False,
+    quick: Annotated[bool, flag("Measure fewer targets and rounds.", "--quick")] = False,
     entrants: Annotated[
-        Texts,
-        typer.Option(
-            "--with", metavar="SOLVER", help="Your my_ik.py or module:object; repeatable."
-        ),
+        Texts, option("SOLVER", "Your my_ik.py or module:object; repeatable.", "--with")
     ] = None,
-    solver: Annotated[
-        Texts, typer.Option(metavar="NAME", help="Measure only this solver; repeatable.")
-    ] = None,
+    solver: Annotated[Texts, option("NAME", "Measure only this solver; repeatable.")] = None,
     problem: Annotated[
-        Texts,
-        typer.Option(
-            metavar="NAME", help="Measure only this problem, or your .py, model or folder."
-        ),
+        Texts, option("NAME", "Measure only this problem, or your .py, model or folder.")
     ] = None,
-    robot: Annotated[
-        Texts, typer.Option(metavar="NAME", help="Measure only this robot; repeatable.")
-    ] = None,
+    robot: Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")] = None,
     targets: Annotated[
-        int | None, typer.Option(metavar="N", help="Random targets a problem; a tenth for robots.")
+        int | None, option("N", "Random targets a problem; a tenth for robots.")
     ] = None,
     effector: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Link of your models that reaches the target."),
+        Text, option("NAME", "Link of your models that reaches the target.")
     ] = None,
-    pins: Annotated[
-        str | None,
-        typer.Option(metavar="RULE", help="Pins of your OBJ: far, top, or such as 0,10."),
-    ] = None,
-    listing: Annotated[
-        bool, typer.Option("--list", help="List problems and solvers, and stop.")
-    ] = False,
-    dry: Annotated[
-        bool, typer.Option("--dry-run", help="List what would be measured, and stop.")
-    ] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Print every table as well.")] = False,
+    pins: Annotated[Text, option("RULE", "Pins of your OBJ: far, top, or such as 0,10.")] = None,
+    listing: Annotated[bool, flag("List problems and solvers, and stop.", "--list")] = False,
+    dry: Annotated[bool, flag("List what would be measured, and stop.", "--dry-run")] = False,
+    verbose: Annotated[bool, flag("Print every table as well.", "--verbose")] = False,
     executor: Annotated[
-        str,
-        typer.Option(
-            metavar="local|dask://HOST:PORT", help="Where to measure; see docs/cluster.md."
-        ),
+        str, option("local|dask://HOST:PORT", "Where to measure; see docs/cluster.md.")
     ] = "local",
     mix_machines: Annotated[
-        bool,
-        typer.Option(
-            "--mix-machines", help="With Dask: allow times of several machines in a table."
-        ),
+        bool, flag("With Dask: allow times of several machines in a table.", "--mix-machines")
     ] = False,
 ) -> int:
     """Measure problems with solvers. Records are kept, so that a run can be continued.

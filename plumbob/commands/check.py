@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 from typing import Annotated
 
-import typer
-
 from ..help_text import block
 from ..terminal import print_aligned, print_verdicts, progress
-from .options import FAILED, SUCCESS, Texts, known
+from .options import FAILED, SUCCESS, Texts, argument, flag, known
 
 EXAMPLES = block(
     "Examples",
@@ -19,12 +17,11 @@ EXAMPLES = block(
 
 def check(
     claims: Annotated[
-        Texts,
-        typer.Argument(metavar="CLAIM", help="Claims to check, see --list; with --files, paths."),
+        Texts, argument("CLAIM", "Claims to check, see --list; with --files, paths.")
     ] = None,
-    names: Annotated[bool, typer.Option("--list", help="List the claims and stop.")] = False,
+    names: Annotated[bool, flag("List the claims and stop.", "--list")] = False,
     files: Annotated[
-        bool, typer.Option("--files", help="Read files and folders of files with both engines.")
+        bool, flag("Read files and folders of files with both engines.", "--files")
     ] = False,
 ) -> int:
     """Compare the reference with Pinocchio and MuJoCo, claim by claim; exit 1 on a miss."""

@@ -5,11 +5,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from ..help_text import block
 from ..terminal import print_aligned, width
-from .options import FAILED, SUCCESS, OptionalFile, Texts, known, write_text
+from .options import FAILED, SUCCESS, File, Texts, argument, known, option, write_text
 
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import RunComparison
@@ -28,36 +26,23 @@ HISTORY_EXAMPLES = block(
 
 
 def compare(
-    folders: Annotated[
-        list[Path] | None, typer.Argument(metavar="[OLD NEW]", help="Two folders of records.")
-    ] = None,
+    folders: Annotated[list[Path] | None, argument("[OLD NEW]", "Two folders of records.")] = None,
     *,
     fail: Annotated[
-        str,
-        typer.Option(
-            metavar="LIMITS", help="Exit 1 beyond limits, such as accuracy,time:10%,gone."
-        ),
+        str, option("LIMITS", "Exit 1 beyond limits, such as accuracy,time:10%,gone.")
     ] = "",
     rerun: Annotated[
-        str,
-        typer.Option(metavar="REV", help="Measure a revision beside the working copy, in a clone."),
+        str, option("REV", "Measure a revision beside the working copy, in a clone.")
     ] = "",
-    suites: Annotated[
-        Texts, typer.Option("--suite", metavar="NAME", help="With --rerun: measure this suite.")
-    ] = None,
+    suites: Annotated[Texts, option("NAME", "With --rerun: measure this suite.", "--suite")] = None,
     only: Annotated[
-        Texts,
-        typer.Option(metavar="TEXT", help="With --rerun: problems or solvers with this text."),
+        Texts, option("TEXT", "With --rerun: problems or solvers with this text.")
     ] = None,
     pairs: Annotated[
-        int, typer.Option(min=0, help="With --rerun: number of pairs; 0 for as many as needed.")
+        int, option("", "With --rerun: number of pairs; 0 for as many as needed.", min=0)
     ] = 0,
-    markdown: Annotated[
-        OptionalFile, typer.Option(metavar="FILE", help="Write a comment for a pull request.")
-    ] = None,
-    json: Annotated[
-        OptionalFile, typer.Option(metavar="FILE", help="Write all rows as JSON.")
-    ] = None,
+    markdown: Annotated[File, option("FILE", "Write a comment for a pull request.")] = None,
+    json: Annotated[File, option("FILE", "Write all rows as JSON.")] = None,
 ) -> int:
     """Compare two runs or revisions: faster, slower, more or less accurate.
 
@@ -100,18 +85,13 @@ def _side_by_side(
 
 
 def history(
-    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Folders of records.")],
+    folders: Annotated[list[Path], argument("FOLDER...", "Folders of records.")],
     *,
-    quantity: Annotated[
-        str, typer.Option(metavar="NAME", help="Array of the records.")
-    ] = "seconds",
+    quantity: Annotated[str, option("NAME", "Array of the records.")] = "seconds",
     only: Annotated[
-        Texts, typer.Option(metavar="TEXT", help="Problems or solvers with this text; repeatable.")
+        Texts, option("TEXT", "Problems or solvers with this text; repeatable.")
     ] = None,
-    output: Annotated[
-        OptionalFile,
-        typer.Option("--output", "-o", metavar="FILE", help="Write a figure, an .svg."),
-    ] = None,
+    output: Annotated[File, option("FILE", "Write a figure, an .svg.", "--output", "-o")] = None,
 ) -> int:
     """Show a quantity over many runs, the largest change first."""
     from plumbob.bench.comparison import history as course

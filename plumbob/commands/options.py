@@ -4,7 +4,7 @@ import difflib
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,12 +13,27 @@ from ..entry_point import INTERRUPTED as INTERRUPTED
 REPORT = Path("report")
 SUCCESS, FAILED, MISUSED, UNREAD = 0, 1, 2, 141
 
+
+def argument(metavar: str, text: str) -> Any:
+    """Return an argument, by its metavariable and description."""
+    return typer.Argument(metavar=metavar, help=text)
+
+
+def option(metavar: str, text: str, *names: str, min: int | None = None) -> Any:
+    """Return an option with a value, by its metavariable, description, names and least value."""
+    return typer.Option(*names, metavar=metavar or None, help=text, min=min)
+
+
+def flag(text: str, *names: str) -> Any:
+    """Return an option without a value, by its description and names."""
+    return typer.Option(*names, help=text)
+
+
 Texts = list[str] | None
-OptionalFile = Path | None
-Output = Annotated[
-    Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of the records and report.")
-]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Delete the records and measure again.")]
+File = Path | None
+Text = str | None
+Output = Annotated[Path, option("DIR", "Folder of the records and report.", "--output", "-o")]
+Fresh = Annotated[bool, flag("Delete the records and measure again.", "--fresh")]
 
 
 def writable(folder: Path) -> None:

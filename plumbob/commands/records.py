@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..help_text import Command, Group, block
-from .options import REPORT, SUCCESS, Texts
+from .options import REPORT, SUCCESS, Texts, argument, flag, option
 
 if TYPE_CHECKING:
     from plumbob.bench.harness.record import Key, Record
@@ -18,14 +18,12 @@ LIST = "plumbob records list report"
 MERGE = "plumbob records merge laptop desktop --into both"
 DROP = 'plumbob records drop --solver "My solver"'
 
-Folder = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="Folder of the records.")]
-Suites = Annotated[Texts, typer.Option("--suite", metavar="NAME", help="Only this suite.")]
-Solvers = Annotated[Texts, typer.Option("--solver", metavar="NAME", help="Only this solver.")]
-Problems = Annotated[Texts, typer.Option("--problem", metavar="NAME", help="Only this problem.")]
-Failed = Annotated[bool, typer.Option("--failed", help="Only failed measurements.")]
-Superseded = Annotated[
-    bool, typer.Option("--superseded", help="Only records with outdated settings.")
-]
+Folder = Annotated[Path, argument("[FOLDER]", "Folder of the records.")]
+Suites = Annotated[Texts, option("NAME", "Only this suite.", "--suite")]
+Solvers = Annotated[Texts, option("NAME", "Only this solver.", "--solver")]
+Problems = Annotated[Texts, option("NAME", "Only this problem.", "--problem")]
+Failed = Annotated[bool, flag("Only failed measurements.", "--failed")]
+Superseded = Annotated[bool, flag("Only records with outdated settings.", "--superseded")]
 
 
 @app.callback(epilog=block("Examples", LIST, MERGE, DROP))
@@ -57,10 +55,8 @@ def list_records(
 
 @app.command("merge", cls=Command, epilog=block("Examples", MERGE))
 def merge(
-    folders: Annotated[
-        list[Path], typer.Argument(metavar="FOLDER...", help="Folders to take records from.")
-    ],
-    into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder to add to.")],
+    folders: Annotated[list[Path], argument("FOLDER...", "Folders to take records from.")],
+    into: Annotated[Path, option("DIR", "Folder to add to.", "--into")],
 ) -> int:
     """Add the records of folders to another; of two of the same measurement the later counts.
 
@@ -99,7 +95,7 @@ def drop(
     failed: Failed = False,
     superseded: Superseded = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print the number of records, and keep them.")
+        bool, flag("Print the number of records, and keep them.", "--dry-run")
     ] = False,
 ) -> int:
     """Remove the records that match all options, for good."""

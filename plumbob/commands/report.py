@@ -3,13 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from plumbob.bench.text import visible
 
 from ..help_text import block
 from ..terminal import print_lines, print_outcome
-from .options import REPORT, SUCCESS, OptionalFile, Texts, known
+from .options import REPORT, SUCCESS, File, Texts, argument, flag, known, option
 
 if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table
@@ -29,35 +27,25 @@ FORMATS = ("md", "tex", "csv", "html")
 
 def report(  # noqa: PLR0913 -- one parameter an option
     folder: Annotated[
-        OptionalFile,
-        typer.Argument(metavar="[FOLDER]", help="Folder of the records.  [default: report]"),
+        File, argument("[FOLDER]", "Folder of the records.  [default: report]")
     ] = None,
     *,
     output: Annotated[
-        OptionalFile,
-        typer.Option("--output", "-o", metavar="PATH", help="The folder; with --table, a file."),
+        File, option("PATH", "The folder; with --table, a file.", "--output", "-o")
     ] = None,
-    name: Annotated[
-        str, typer.Option("--table", metavar="NAME", help="Print one table; see --list.")
-    ] = "",
-    form: Annotated[
-        str, typer.Option("--format", metavar="FORMAT", help=f"Format: {', '.join(FORMATS)}.")
-    ] = "md",
+    name: Annotated[str, option("NAME", "Print one table; see --list.", "--table")] = "",
+    form: Annotated[str, option("FORMAT", f"Format: {', '.join(FORMATS)}.", "--format")] = "md",
     columns: Annotated[
-        Texts, typer.Option(metavar="COLUMNS", help="Headings or numbers, such as 'solver, 3-5'.")
+        Texts, option("COLUMNS", "Headings or numbers, such as 'solver, 3-5'.")
     ] = None,
     rows: Annotated[
-        Texts, typer.Option(metavar="FILTER", help="Rows: solver=Newton, robot~UR, 'median<10' ...")
+        Texts, option("FILTER", "Rows: solver=Newton, robot~UR, 'median<10' ...")
     ] = None,
-    order: Annotated[
-        str, typer.Option("--sort", metavar="COLUMN", help="Sort rows, the best or least first.")
-    ] = "",
+    order: Annotated[str, option("COLUMN", "Sort rows, the best or least first.", "--sort")] = "",
     width: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Width of LaTeX: column, page, or such as 120mm.")
+        str, option("LENGTH", "Width of LaTeX: column, page, or such as 120mm.")
     ] = "page",
-    names: Annotated[
-        bool, typer.Option("--list", help="List the tables; with --table, its columns.")
-    ] = False,
+    names: Annotated[bool, flag("List the tables; with --table, its columns.", "--list")] = False,
 ) -> int:
     """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records.
 

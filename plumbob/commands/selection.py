@@ -86,10 +86,7 @@ def scale_of(
         raise ValueError(f"targets: expected 1 or more, got {targets}")
     scale = SCALES[name]
     return replace(
-        scale,
-        entrants=tuple(entrants),
-        problems=tuple(problems),
-        targets=targets or scale.targets,
+        scale, entrants=tuple(entrants), problems=tuple(problems), targets=targets or scale.targets
     )
 
 

@@ -8,7 +8,7 @@ from plumbob.bench.text import visible
 
 from ..help_text import block
 from ..terminal import progress
-from .options import REPORT, SUCCESS, OptionalFile, known, writable
+from .options import REPORT, SUCCESS, File, Text, argument, flag, known, option, writable
 from .verify import program_of
 
 EXAMPLES = block(
@@ -25,30 +25,20 @@ EXAMPLES = block(
 def show(
     context: typer.Context,
     scene: Annotated[
-        str | None,
-        typer.Argument(metavar="SCENE", help="arm, cloth, or the curve that the arm draws."),
+        Text, argument("SCENE", "arm, cloth, or the curve that the arm draws.")
     ] = None,
     *,
     file: Annotated[
-        OptionalFile,
-        typer.Option(
-            "--output", "-o", metavar="FILE", help="File ending in .gif, .svg, .html or .bvh."
-        ),
+        File, option("FILE", "File ending in .gif, .svg, .html or .bvh.", "--output", "-o")
     ] = None,
     solver: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="Plumbob's solver: fabrik, ccd, ...; of the cloth newton, ..."
-        ),
+        Text, option("NAME", "Plumbob's solver: fabrik, ccd, ...; of the cloth newton, ...")
     ] = None,
     coherent: Annotated[
-        bool, typer.Option("--coherent", help="Let the arm move as smoothly as it can, in a loop.")
+        bool, flag("Let the arm move as smoothly as it can, in a loop.", "--coherent")
     ] = False,
     yours: Annotated[
-        str | None,
-        typer.Option(
-            "--with", metavar="SOLVER", help="Your solver, my_ik.py; or -- and a program."
-        ),
+        Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")
     ] = None,
 ) -> int:
     """Write an animation, a picture or a page of the arm drawing a curve, or of the cloth.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..help_text import Command
-from .options import OptionalFile, Texts
+from .options import File, Text, Texts, argument, flag, option
 
 if TYPE_CHECKING:
     from plumbob.crosscheck.verify.output.files import Files
@@ -50,56 +50,32 @@ def program_of(context: typer.Context) -> list[str]:
 def verify(  # noqa: PLR0913 -- one parameter an option
     context: typer.Context,
     solver: Annotated[
-        Texts,
-        typer.Argument(metavar="SOLVER", help="my_ik.py, module:object, or -- and a program."),
+        Texts, argument("SOLVER", "my_ik.py, module:object, or -- and a program.")
     ] = None,
     *,
-    task: Annotated[
-        Texts, typer.Option(metavar="NAME", help="Judge only this task; repeatable.")
-    ] = None,
-    names: Annotated[bool, typer.Option("--list", help="List the tasks and stop.")] = False,
+    task: Annotated[Texts, option("NAME", "Judge only this task; repeatable.")] = None,
+    names: Annotated[bool, flag("List the tasks and stop.", "--list")] = False,
     template: Annotated[
-        str | None,
-        typer.Option(metavar="LANGUAGE", help="Write a starter: cpp, rust, javascript, ..."),
+        Text, option("LANGUAGE", "Write a starter: cpp, rust, javascript, ...")
     ] = None,
     export: Annotated[
-        OptionalFile,
-        typer.Option("--export-cases", metavar="DIR", help="Write cases as files, and stop."),
+        File, option("DIR", "Write cases as files, and stop.", "--export-cases")
     ] = None,
-    answers: Annotated[
-        OptionalFile, typer.Option(metavar="DIR", help="Judge the answers to written cases.")
-    ] = None,
-    rerun: Annotated[
-        OptionalFile, typer.Option(metavar="FILE", help="Repeat a saved failing case.")
-    ] = None,
-    thorough: Annotated[
-        bool, typer.Option("--thorough", help="Ask more cases, which takes longer.")
-    ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random cases.")] = 0,
-    time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Time limit of one request.")
-    ] = None,
-    memory_limit: Annotated[
-        int | None, typer.Option(metavar="MIB", min=1, help="Memory limit of the solver.")
-    ] = None,
-    json: Annotated[
-        OptionalFile, typer.Option(metavar="FILE", help="Write the verdict as JSON.")
-    ] = None,
-    junit: Annotated[
-        OptionalFile, typer.Option(metavar="FILE", help="Write the verdict as JUnit XML.")
-    ] = None,
-    html: Annotated[
-        OptionalFile, typer.Option(metavar="FILE", help="Write the verdict as a page.")
-    ] = None,
+    answers: Annotated[File, option("DIR", "Judge the answers to written cases.")] = None,
+    rerun: Annotated[File, option("FILE", "Repeat a saved failing case.")] = None,
+    thorough: Annotated[bool, flag("Ask more cases, which takes longer.", "--thorough")] = False,
+    seed: Annotated[int, option("", "Seed of the random cases.", min=0)] = 0,
+    time_limit: Annotated[float | None, option("SECONDS", "Time limit of one request.")] = None,
+    memory_limit: Annotated[int | None, option("MIB", "Memory limit of the solver.", min=1)] = None,
+    json: Annotated[File, option("FILE", "Write the verdict as JSON.")] = None,
+    junit: Annotated[File, option("FILE", "Write the verdict as JUnit XML.")] = None,
+    html: Annotated[File, option("FILE", "Write the verdict as a page.")] = None,
     output: Annotated[
-        OptionalFile,
-        typer.Option("--output", "-o", metavar="DIR", help="Write all three, and failing cases."),
+        File, option("DIR", "Write all three, and failing cases.", "--output", "-o")
     ] = None,
-    lang: Annotated[
-        str | None, typer.Option(metavar="LANG", help="Language: en or zh; else by the locale.")
-    ] = None,
+    lang: Annotated[Text, option("LANG", "Language: en or zh; else by the locale.")] = None,
     self_test: Annotated[
-        bool, typer.Option("--self-test", help="Test the judge: find every known fault.")
+        bool, flag("Test the judge: find every known fault.", "--self-test")
     ] = False,
 ) -> int:
     """Judge your solver: is it right, how large are its errors, and which mistake is it?

@@ -52,27 +52,23 @@ def watch_numba() -> None:
 
     class Watch(event.Listener):
         def on_start(self, event: Any) -> None:
-            if hasattr(event.data["dispatcher"], "label"):
-                _begin(event.data["dispatcher"].label)
+            _notify(event.data["dispatcher"], begins=True)
 
         def on_end(self, event: Any) -> None:
-            if hasattr(event.data["dispatcher"], "label"):
-                _end(event.data["dispatcher"].label)
+            _notify(event.data["dispatcher"], begins=False)
 
     event.register("numba:compile", Watch())
 
 
-def _begin(label: str) -> None:
-    """Call the listeners and pause the garbage collector, which takes an eighth of the time."""
+def _notify(dispatcher: Any, *, begins: bool) -> None:
+    """Call the listeners; pause the garbage collector, which takes an eighth of the time."""
     global _collecting
-    _collecting = gc.isenabled()
-    gc.disable()
-    for listener in tuple(_listeners):
-        listener(label, True)
-
-
-def _end(label: str) -> None:
-    if _collecting:
+    if not hasattr(dispatcher, "label"):
+        return
+    if begins:
+        _collecting = gc.isenabled()
+        gc.disable()
+    elif _collecting:
         gc.enable()
     for listener in tuple(_listeners):
-        listener(label, False)
+        listener(dispatcher.label, begins)

@@ -11,7 +11,9 @@ files. The rebuilt function therefore has a digest of all its sources in its nam
 
 import contextlib
 import dis
+import enum
 import functools
+import hashlib
 import importlib
 import types
 from collections import Counter
@@ -23,7 +25,9 @@ import numpy as np
 
 from .. import arguments
 from . import compilation
-from .digest import PythonKernel, callees, code_objects, digest, kernels_in, named_globals
+
+# A plain function at module level: it has __code__ and __globals__, which Callable cannot say.
+PythonKernel = Any
 
 BACKENDS = ("numba", "python")
 # Optimisations allowed for relaxed kernels; infinities and NaN keep their meaning.
@@ -107,7 +111,7 @@ def bind(kernel: PythonKernel, **bound: Any) -> PythonKernel:
 
 
 def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
-    """Return a decorator: the compiled version is the function of that name in another module.
+    """Return a decorator of functions whose compiled versions are in another module.
 
     It is for vector instructions. The module is imported when a caller is compiled.
     """
@@ -160,8 +164,8 @@ def _jit(kernel: PythonKernel, relaxed: bool, **options: Any) -> PythonKernel:
     calls = _calls(kernel)
     compiled_globals = {
         name: _compiled_global(value, relaxed, calls[name] == 1)
-        for name, value in named_globals(kernel)
-        if kernels_in(value) and value is not kernel
+        for name, value in _named_globals(kernel)
+        if _kernels_in(value) and value is not kernel
     }
     rebuilt = _rebuild(kernel, kernel.__globals__ | compiled_globals)
     rebuilt.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
@@ -178,16 +182,16 @@ def _compiled_global(value: Any, relaxed: bool, inline: bool) -> Any:
 
 def _calls(kernel: PythonKernel) -> Counter[str]:
     """Return how many times a kernel mentions each of its globals."""
-    codes = map(dis.get_instructions, code_objects(kernel.__code__))
+    codes = map(dis.get_instructions, _code_objects(kernel.__code__))
     return Counter(i.argval for code in codes for i in code if i.opname in GLOBAL_LOADS)
 
 
 @functools.cache
 def _inlined_size(kernel: PythonKernel) -> int:
     """Return the number of instructions of the interpreter, all callees inlined."""
-    own = sum(len(list(dis.get_instructions(code))) for code in code_objects(kernel.__code__))
+    own = sum(len(list(dis.get_instructions(code))) for code in _code_objects(kernel.__code__))
     calls = _calls(kernel)
-    return own + sum(calls[name] * _inlined_size(callee) for name, callee in callees(kernel))
+    return own + sum(calls[name] * _inlined_size(callee) for name, callee in _callees(kernel))
 
 
 @functools.cache
@@ -197,9 +201,9 @@ def allocates(kernel: PythonKernel) -> bool:
     Otherwise it is compiled without counting references to its arguments, which takes half of the
     time where a tuple holds many arrays; numba would report a wrong answer as an error.
     """
-    names = {name for code in code_objects(kernel.__code__) for name in code.co_names}
+    names = {name for code in _code_objects(kernel.__code__) for name in code.co_names}
     return bool(ALLOCATING & names) or any(
-        allocates(callee) for _, callee in callees(kernel) if not hasattr(callee, "compiled_in")
+        allocates(callee) for _, callee in _callees(kernel) if not hasattr(callee, "compiled_in")
     )
 
 
@@ -211,3 +215,85 @@ def _rebuild(kernel: PythonKernel, new_globals: dict[str, Any]) -> PythonKernel:
     rebuilt.__qualname__ = kernel.__qualname__
     rebuilt.__doc__ = kernel.__doc__
     return rebuilt
+
+
+def digest(kernel: PythonKernel) -> str:
+    """Return 16 hex digits of the code, constants and globals of a kernel and all its callees."""
+    parts: list[bytes] = []
+    _collect(kernel, parts, visited=set())
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
+
+
+def _named_globals(kernel: PythonKernel) -> list[tuple[str, Any]]:
+    """Return the globals that a kernel mentions, with their values, in the order of their names."""
+    names = sorted({name for code in _code_objects(kernel.__code__) for name in code.co_names})
+    return [(name, kernel.__globals__[name]) for name in names if name in kernel.__globals__]
+
+
+def _kernels_in(value: Any) -> tuple[PythonKernel, ...]:
+    """Return a kernel, or the kernels in a NamedTuple; none for any other value."""
+    kernels = value if isinstance(value, tuple) else (value,)
+    return tuple(kernel for kernel in kernels if isinstance(kernel, types.FunctionType))
+
+
+def _callees(kernel: PythonKernel) -> list[tuple[str, PythonKernel]]:
+    """Return the other kernels that a kernel calls, by the names under which it does."""
+    return [
+        (name, callee)
+        for name, value in _named_globals(kernel)
+        for callee in _kernels_in(value)
+        if callee is not kernel
+    ]
+
+
+def _code_objects(code: types.CodeType) -> Iterator[types.CodeType]:
+    """Yield a code object and the code objects nested in it, like comprehensions."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _code_objects(constant)
+
+
+def _collect(kernel: PythonKernel, parts: list[bytes], visited: set[Any]) -> None:
+    if kernel in visited:
+        return
+    visited.add(kernel)
+    _collect_code(kernel.__code__, parts)
+    parts.append(repr(kernel.__defaults__).encode())
+    if hasattr(kernel, "compiled_in"):
+        parts.append(_module_fingerprint(kernel.compiled_in))
+    for name, value in _named_globals(kernel):
+        parts.append(name.encode())
+        for callee in _kernels_in(value):
+            _collect(callee, parts, visited)
+        if not _kernels_in(value):
+            parts.append(_fingerprint(value))
+
+
+def _collect_code(whole: types.CodeType, parts: list[bytes]) -> None:
+    for code in _code_objects(whole):
+        constants = [c for c in code.co_consts if not isinstance(c, types.CodeType)]
+        parts += [code.co_code, repr((constants, code.co_names, code.co_varnames)).encode()]
+
+
+@functools.cache
+def _module_fingerprint(name: str) -> bytes:
+    """Return the whole code of a module, as no function refers to its registrations with numba."""
+    module = importlib.import_module(name)
+    loader: Any = module.__loader__
+    parts: list[bytes] = []
+    _collect_code(loader.get_code(name), parts)
+    numbers = {k: v for k, v in vars(module).items() if isinstance(v, int | float)}
+    return b"\0".join([*parts, repr(sorted(numbers.items())).encode()])
+
+
+def _fingerprint(value: Any) -> bytes:
+    if isinstance(value, np.ndarray):
+        return repr((value.dtype.str, value.shape)).encode() + value.tobytes()
+    if isinstance(value, types.ModuleType):
+        return repr((value.__name__, getattr(value, "__version__", ""))).encode()
+    if isinstance(value, enum.EnumMeta):
+        return repr(list(value)).encode()
+    if isinstance(value, type):
+        return repr((value.__qualname__, getattr(value, "_fields", ()))).encode()
+    return repr(value).encode()

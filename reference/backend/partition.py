@@ -18,19 +18,12 @@ REGIONS = 32
 
 
 class Regions(NamedTuple):
-    """The regions of a system.
+    """The regions of a system."""
 
-    Attributes:
-        particles: the first particle of each, and the number of particles, (region + 1,).
-        order: the springs, region after region, then the springs between regions, (spring,).
-        springs: the two particles of each in that order, (spring, 2).
-        starts: where the springs of each, then the springs between, begin, (region + 1,).
-    """
-
-    particles: IndexArray
-    order: np.ndarray
-    springs: np.ndarray
-    starts: IndexArray
+    particles: IndexArray  # the first particle of each, and the number of particles, (region + 1,)
+    order: np.ndarray  # the springs, region after region, then the springs between, (spring,)
+    springs: np.ndarray  # the two particles of each in that order, (spring, 2)
+    starts: IndexArray  # where the springs of each, then the springs between, begin, (region + 1,)
 
 
 def cut(springs: IndexArray, particles: int, count: int = REGIONS) -> Regions:

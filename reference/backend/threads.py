@@ -57,11 +57,7 @@ def in_slices(
 
         in_slices(kernel, len(x), lambda part: (model, x[part], result[part]), least=100)
 
-    Args:
-        kernel: fills its part of the results, most often a Kernel.
-        count: the length of the batch.
-        arguments_of: returns the kernel's arguments for a slice.
-        least: the smallest slice that is worth a thread.
+    `count` is the length of the batch and `least` the smallest slice that is worth a thread.
     """
     threads = (_num_threads.get() or _all_cores()) if count >= 2 * least else 1
     if threads == 1:

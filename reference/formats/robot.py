@@ -8,7 +8,7 @@ from ..articulation import Articulation, Mimic
 from ..quaternion import IDENTITY, between
 from ..skeleton import Skeleton
 
-MOST_JOINTS = 10_000
+MAX_JOINTS = 10_000
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -63,8 +63,8 @@ def assemble(
 
     Too many or invalid links are a ValueError that names the origin.
     """
-    if len(links) > MOST_JOINTS:
-        raise ValueError(f"{origin}: expected at most {MOST_JOINTS:,} joints, got {len(links):,}")
+    if len(links) > MAX_JOINTS:
+        raise ValueError(f"{origin}: expected at most {MAX_JOINTS:,} joints, got {len(links):,}")
     names, parents, offsets, frames, kinds, axes, lower, upper, cones = zip(*links, strict=True)
     try:
         articulation = Articulation(

@@ -16,7 +16,7 @@ from ..arguments import LARGEST_COORDINATE, distinct_texts
 from ..articulation import Mimic
 from ..quaternion import exponential, multiply, rotate
 from . import xml
-from .robot import INFINITY, ORIGIN, Robot, RobotLink, Vector, assemble, upright
+from .robot import INFINITY, ORIGIN, Robot, RobotLink, assemble, upright
 from .source import warn
 from .xml import Element
 
@@ -151,7 +151,10 @@ def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list
     frame = multiply(exponential((0.0, 0.0, yaw)), pitch_roll)
     if joint.type in ("fixed", "floating"):
         return [RobotLink(joint.child, parent, offset, frame, KINDS[joint.type])]
-    axis = _axis(joint.element)
+    tag = joint.element.single("axis")
+    axis = tag.numbers("xyz", X) if tag else X
+    if axis == ORIGIN:
+        raise joint.element.error("expected an <axis> that is not zero, got xyz='0 0 0'")
     if joint.type == "planar":
         plane = upright(axis)
         return [
@@ -161,14 +164,6 @@ def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list
         ]
     limits = _limits(joint, crossed_limits)
     return [RobotLink(joint.child, parent, offset, frame, KINDS[joint.type], axis, *limits)]
-
-
-def _axis(element: Element) -> Vector:
-    tag = element.single("axis")
-    axis = tag.numbers("xyz", X) if tag else X
-    if axis == ORIGIN:
-        raise element.error("expected an <axis> that is not zero, got xyz='0 0 0'")
-    return axis
 
 
 def _limits(joint: _Joint, crossed: str) -> tuple[float, float]:

@@ -15,11 +15,11 @@ from .. import arguments
 from ..arguments import LARGEST_COORDINATE
 from .source import read_text, warn
 
-MOST_ELEMENTS = 100_000
+MAX_ELEMENTS = 100_000
 # The limit of TinyXML2, the parser of MuJoCo and ROS.
-MOST_DEPTH = 500
+MAX_DEPTH = 500
 # In an attribute that is read: a default value is copied to every joint.
-MOST_CHARACTERS = 2000
+MAX_CHARACTERS = 2000
 MISPLACED_DECLARATION = re.compile(r"(\s+)<\?xml\s[^<>]{0,200}\?>")
 
 Numbers = TypeVar("Numbers", bound=tuple[float, ...])
@@ -84,8 +84,8 @@ class Element(NamedTuple):
 
     def _short(self, name: str) -> str:
         value = self.attributes.get(name, "")
-        if len(value) > MOST_CHARACTERS:
-            raise self.error(f"expected at most {MOST_CHARACTERS:,} characters in {name!r}")
+        if len(value) > MAX_CHARACTERS:
+            raise self.error(f"expected at most {MAX_CHARACTERS:,} characters in {name!r}")
         if "${" in value or "$(" in value:
             raise self.error(f"expected a value, got the xacro {value!r:.80}: run xacro first")
         return value
@@ -103,7 +103,7 @@ def parse(text: str, origin: str) -> Element:
     """Return the root element of a text; origin names it in errors.
 
     White space before <?xml ...?> gets a warning. Raise a ValueError if it is not well-formed, has
-    a document type, more than MOST_ELEMENTS elements, or some nested deeper than MOST_DEPTH.
+    a document type, more than MAX_ELEMENTS elements, or some nested deeper than MAX_DEPTH.
     """
     builder, text = _Builder(origin), arguments.text("text", text)
     if match := MISPLACED_DECLARATION.match(text):
@@ -137,11 +137,11 @@ class _Builder:
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         self.count += 1
-        if self.count > MOST_ELEMENTS:
-            raise ValueError(f"{self.location()}: expected at most {MOST_ELEMENTS:,} elements")
-        if len(self.open) > MOST_DEPTH:
+        if self.count > MAX_ELEMENTS:
+            raise ValueError(f"{self.location()}: expected at most {MAX_ELEMENTS:,} elements")
+        if len(self.open) > MAX_DEPTH:
             raise ValueError(
-                f"{self.location()}: expected at most {MOST_DEPTH} elements in each other"
+                f"{self.location()}: expected at most {MAX_DEPTH} elements in each other"
             )
         element = Element(tag, attributes, [], self.location())
         self.open[-1].children.append(element)

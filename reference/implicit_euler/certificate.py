@@ -290,11 +290,7 @@ def rounding_errors(objective: Objective, x: FloatArray) -> RoundingErrors:
 
 
 def _rest_length_terms(objective: Objective) -> FloatArray:
-    """Return the size of the terms in each effective rest length [m], shape (spring,).
-
-    The rounding error of r + share (l_n - r) is relative to r and to the sum itself, which is at
-    least share l_n.
-    """
+    """Return r + effective r [m], to which the rounding of r + share (l_n - r) is relative."""
     return objective.system.with_separate_dampers.rest_lengths + objective.effective.rest_lengths
 
 

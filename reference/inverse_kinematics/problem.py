@@ -13,7 +13,6 @@ from ..arguments import FloatArray, IndexArray
 from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import effector_of
-from ..outcome import Outcome
 from ..skeleton import Skeleton
 from .restarts import Limits
 from .solve_chain import ON_CHAINS
@@ -86,7 +85,7 @@ class IKSolution(NamedTuple):
     positions: FloatArray
     residual: float | FloatArray
     iterations: int | IndexArray
-    outcome: Outcome | IndexArray
+    outcome: Any  # Outcome | IndexArray, which type checkers cannot tell apart
     history: FloatArray
     residual_rotation: float | FloatArray
     coordinates: FloatArray

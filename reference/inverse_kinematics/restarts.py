@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 from ..arguments import FloatArray
-from ..backend.digest import PythonKernel
+from ..backend.compiled import PythonKernel
 from ..outcome import Outcome
 
 # An attempt that others may follow is given up once PATIENCE iterations have not brought the error

@@ -89,10 +89,12 @@ def grid_cloth(
     """
     rows, columns = _shape(rows, columns)
     stiffness = number("stiffness", stiffness, least=0)
+    bending = stiffness if bending_stiffness is None else bending_stiffness
+    shear = stiffness if shear_stiffness is None else shear_stiffness
     parts = [
         (NEIGHBOURS, stiffness),
-        (NEXT_BUT_ONE, _stiffness("bending_stiffness", bending_stiffness, stiffness)),
-        (DIAGONALS, _stiffness("shear_stiffness", shear_stiffness, stiffness)),
+        (NEXT_BUT_ONE, number("bending_stiffness", bending, least=0)),
+        (DIAGONALS, number("shear_stiffness", shear, least=0)),
     ]
     springs_of = [(steps, k) for steps, k in parts if k > 0 or steps is NEIGHBOURS]
     springs = [_springs((rows, columns), steps) for steps, _ in springs_of]
@@ -116,11 +118,8 @@ def grid_triangles(rows: int, columns: int) -> IndexArray:
     """Return the triangles of a `grid_cloth`, two per square, facing up, (triangle, 3)."""
     rows, columns = _shape(rows, columns)
     corner = np.arange(rows * columns).reshape(rows, columns)
-    a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
-    c, d = corner[1:, 1:].ravel(), corner[1:, :-1].ravel()
-    return np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1).reshape(
-        -1, 3
-    )
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
+    return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
 
 def net(
@@ -239,10 +238,6 @@ def at_rest(
     return system.replaced(rest_lengths=lengths(system, positions)), state
 
 
-def _stiffness(name: str, value: float | None, default: float) -> float:
-    return default if value is None else number(name, value, least=0)
-
-
 def _shape(rows: int, columns: int) -> tuple[int, int]:
     """Return the numbers of rows and columns, checked, and their product with them."""
     rows, columns = count("rows", rows, least=1), count("columns", columns, least=1)
@@ -252,11 +247,9 @@ def _shape(rows: int, columns: int) -> tuple[int, int]:
 
 def _springs(counts: tuple[int, ...], steps: Sequence[tuple[int, ...]]) -> IndexArray:
     """Return springs from each particle of a grid to those at each offset, (spring, 2)."""
-    number_of = np.arange(np.prod(counts)).reshape(counts)
-    springs = []
+    grid, springs = np.arange(np.prod(counts)).reshape(counts), []
     for step in steps:
         starts = tuple(slice(max(-s, 0), n - max(s, 0)) for s, n in zip(step, counts, strict=True))
         ends = tuple(slice(max(s, 0), n - max(-s, 0)) for s, n in zip(step, counts, strict=True))
-        pair = number_of[starts].ravel(), number_of[ends].ravel()
-        springs.append(np.stack(pair, axis=1))
+        springs.append(np.stack([grid[starts].ravel(), grid[ends].ravel()], axis=1))
     return np.concatenate(springs)

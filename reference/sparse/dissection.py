@@ -36,19 +36,12 @@ class Graph(NamedTuple):
 
 
 class Search(NamedTuple):
-    """The results of the searches, which the splits read.
+    """The results of the searches, which the splits read."""
 
-    Attributes:
-        region: the piece of each vertex; a search adds one for the vertices that it reaches.
-        axes: the coordinates, shape (axis, vertex).
-        queue: the vertices in the order reached.
-        lowest: the least coordinate among a vertex and its neighbours.
-    """
-
-    region: np.ndarray
-    axes: np.ndarray
-    queue: np.ndarray
-    lowest: np.ndarray
+    region: np.ndarray  # the piece of each vertex; a search adds one for the vertices it reaches
+    axes: np.ndarray  # the coordinates, shape (axis, vertex)
+    queue: np.ndarray  # the vertices in the order reached
+    lowest: np.ndarray  # the least coordinate among a vertex and its neighbours
 
 
 def nested_dissection(graph, order):

@@ -22,10 +22,7 @@ class SymbolicFactor:
     """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
 
     def __init__(self, indptr: Any, indices: Any) -> None:
-        """Order the columns and find the pattern of L.
-
-        Raise a ValueError if the pattern is not symmetric.
-        """
+        """Order the columns and find L's pattern; a ValueError if A's is not symmetric."""
         n = len(indptr) - 1
         pattern = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
         if (pattern != pattern.T).nnz:
@@ -47,10 +44,8 @@ class CholeskyFactor:
         """Factorise a sparse symmetric matrix, both triangles given.
 
         `pattern` is the analysis of an earlier matrix; it is used if the matrix has that pattern.
-
-        Raises:
-            NotPositiveDefiniteError: if a pivot is not positive, or not finite.
-            ValueError: if the matrix is not sparse or square, or its pattern not symmetric.
+        Raise a NotPositiveDefiniteError if a pivot is not positive and finite, another ValueError
+        if the matrix is not sparse or square, or its pattern not symmetric.
         """
         columns = square(matrix).tocsc()
         if not columns.has_canonical_format:
@@ -81,10 +76,7 @@ class CholeskyFactor:
         return len(self._values)
 
     def refactorize(self, matrix: Any) -> "CholeskyFactor":
-        """Return the factor of another matrix, with the same analysis if the pattern is the same.
-
-        Raise a NotPositiveDefiniteError if the matrix is not positive definite.
-        """
+        """Return the factor of another matrix, with the same analysis for the same pattern."""
         return CholeskyFactor(matrix, self.pattern)
 
     def solve(self, b: FloatArray) -> FloatArray:
@@ -135,10 +127,7 @@ def square(matrix: Any) -> Any:
 
 
 def right_sides(b: ArrayLike, n: int) -> FloatArray:
-    """Return right-hand sides, (n,) or (n, right-hand side), as floats.
-
-    Raise a ValueError if they are no numbers or have another shape.
-    """
+    """Return right-hand sides, (n,) or (n, right-hand side), as floats, or raise a ValueError."""
     columns = floats("b", b, "...")
     if columns.ndim not in (1, 2) or len(columns) != n:
         got = shape(columns.shape)

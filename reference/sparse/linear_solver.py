@@ -22,20 +22,14 @@ class Factor(Protocol):
         """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side)."""
 
     def refactorize(self, matrix: Any) -> "Factor":
-        """Return the factor of another matrix, quicker where its pattern is the same.
-
-        Raise a NotPositiveDefiniteError if the matrix is not positive definite.
-        """
+        """Return the factor of another matrix, faster where its pattern is the same."""
 
 
 def factorize(matrix: Any, library: str = "supernodal") -> Factor:
     """Return the factor of a sparse symmetric positive definite matrix, both triangles given.
 
-    `library` is "supernodal", "cholespy" or "scipy".
-
-    Raises:
-        NotPositiveDefiniteError: if the matrix is not positive definite.
-        ValueError: if the library is unknown, or the matrix not sparse, real and square.
+    `library` is "supernodal", "cholespy" or "scipy". Raise a NotPositiveDefiniteError if the matrix
+    is not positive definite, another ValueError if it is not sparse, real and square.
     """
     factor = LIBRARIES[choice("library", library, LIBRARIES)]
     if not np.isfinite(square(matrix).data).all():

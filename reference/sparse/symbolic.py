@@ -21,35 +21,21 @@ ZERO_SHARES = (0.4, 0.15, 0.05, 0.02)
 
 
 class Supernodes(NamedTuple):
-    """The pattern of L in blocks.
+    """The pattern of L in blocks."""
 
-    Attributes:
-        columns: the first column of each supernode, and n; shape (supernode + 1,).
-        starts: where the rows of each begin in `rows`, and their number; shape (supernode + 1,).
-        rows: the rows below the diagonal blocks, ascending, supernode by supernode.
-        tallest: number of rows of the tallest supernode, with its diagonal block.
-    """
-
-    columns: np.ndarray
-    starts: np.ndarray
-    rows: np.ndarray
-    tallest: int
+    columns: np.ndarray  # the first column of each supernode, and n; shape (supernode + 1,)
+    starts: np.ndarray  # where the rows of each begin in `rows`, and their number; likewise
+    rows: np.ndarray  # the rows below the diagonal blocks, ascending, supernode by supernode
+    tallest: int  # number of rows of the tallest supernode, with its diagonal block
 
 
 class UpdateTree(NamedTuple):
-    """The updates that go into each front.
+    """The updates that go into each front."""
 
-    Attributes:
-        starts: where each supernode's children begin in `children`; shape (supernode + 1,).
-        children: of each supernode, last first, as their updates lie on the stack.
-        highest: the height of the stack of updates.
-        entries: the number of entries of L.
-    """
-
-    starts: np.ndarray
-    children: np.ndarray
-    highest: int
-    entries: int
+    starts: np.ndarray  # where the children of each begin in `children`; shape (supernode + 1,)
+    children: np.ndarray  # of each supernode, last first, as their updates lie on the stack
+    highest: int  # the height of the stack of updates
+    entries: int  # the number of entries of L
 
 
 def analyse(graph, order):

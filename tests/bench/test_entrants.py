@@ -160,7 +160,7 @@ def test_a_changed_file_is_measured_again_and_a_part_forgets_nothing(folder, cap
     assert bench(*asked) == 0
     said = capsys.readouterr().out
     assert re.search(
-        r"measured again: 1, for other sources of My FABRIK \(\w{12}, now \w{12}\)", said
+        r"easured again: 1, for other sources of My FABRIK \(\w{12}, now \w{12}\)", said
     )
 
 

@@ -72,7 +72,7 @@ def phrases(path):
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
         parts = [tables[name] for name in tables.keys() - {"columns", "folded", "figures"}]
         for texts in [*parts, *tables.get("figures", {}).values()]:
-            yield from (" ".join(text.split()) for text in texts.values())
+            yield from (" ".join(t.split()) for t in texts.values() if isinstance(t, str))
         return
     tree = ast.parse(path.read_text(encoding="utf-8"))
     bodies = [node.body for node in ast.walk(tree) if isinstance(getattr(node, "body", 0), list)]

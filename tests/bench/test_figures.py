@@ -50,7 +50,7 @@ def charts(results):
     return [s.data for s in made if isinstance(s.data, Chart)]
 
 
-@pytest.mark.parametrize("count", range(2, 21))
+@pytest.mark.parametrize("count", [2, 5, 6, 7, 20])
 def test_at_most_six_curves_are_labelled_and_every_other_can_be_named(records, count):
     made = charts(with_solvers(records, count))
     assert len(made) == CHARTS
@@ -147,12 +147,6 @@ def laid_out(chart):
 def test_no_text_covers_another_and_no_legend_the_data(records, count):
     for chart in charts(with_solvers(records, count)):
         assert faults(laid_out(chart)) == [], chart.name
-
-
-@pytest.mark.parametrize("count", range(2, 21))
-def test_a_chart_of_any_number_of_solvers_is_laid_out(records, count):
-    found = {chart.name: chart for chart in charts(with_solvers(records, count))}
-    assert faults(laid_out(found["energy"])) == []
 
 
 def test_a_legend_on_the_data_and_crowded_texts_would_be_found(records):

@@ -116,18 +116,17 @@ def test_every_table_of_a_suite_is_printed_as_it_is(capsys, tmp_path, records, w
     assert not re.search(r"\\[_*<|]", out)
 
 
-def test_the_tables_of_other_suites_are_not_printed(capsys, tmp_path, records):
-    RecordFile(tmp_path).append(records)
-    terminal.print_tables(["ik"], tmp_path)
-    out = capsys.readouterr().out
-    assert "Robots one by one: success, time and accuracy" in out
-    assert "Claims held" not in out
-
-
-def test_tables_without_rows_are_not_printed(capsys, tmp_path):
-    RecordFile(tmp_path).append([])
-    terminal.print_tables(["ik"], tmp_path)
+def test_only_tables_of_the_suites_with_rows_are_printed_and_brackets_are_no_markup(
+    capsys, tmp_path, records
+):
+    RecordFile(tmp_path / "empty").append([])
+    terminal.print_tables(["ik"], tmp_path / "empty")
     assert capsys.readouterr().out == ""
+    RecordFile(tmp_path).append(records)
+    terminal.print_tables(["timing"], tmp_path)
+    out = capsys.readouterr().out
+    assert "[ns]" in out
+    assert "Robots one by one" not in out
 
 
 def test_records_are_listed_as_counted(capsys, tmp_path, monkeypatch, make, width):
@@ -278,9 +277,3 @@ def test_the_list_of_suites_cuts_no_name_and_counts_those_left_out(capsys, width
     text = " ".join(out.split())
     listed, more = re.search(r"52 problems: (.*?) and (\d+) more", text).groups()
     assert listed.split("; ") == names[: len(names) - int(more)]
-
-
-def test_brackets_are_units_and_no_markup(capsys, tmp_path, records):
-    RecordFile(tmp_path).append(records)
-    terminal.print_tables(["timing"], tmp_path)
-    assert "[ns]" in capsys.readouterr().out

@@ -96,15 +96,6 @@ def test_the_page_is_well_formed_and_every_id_is_its_own(whole):
     assert inner <= set(page.ids)
 
 
-def test_every_name_is_escaped(tmp_path, records):
-    nasty = '<img src=x onerror="alert(1)">&'
-    spoilt = [replace(r, problem=nasty) if r.suite == "check" else r for r in records]
-    result, page = written(tmp_path, spoilt)
-    assert "img" not in page.tags
-    assert nasty in "".join(page.text)
-    assert "<b>slide</b>" not in result.page.read_text(encoding="utf-8")
-
-
 def test_machine_versions_and_date_stand_in_its_head(whole):
     _, page = whole
     text = "".join(page.text)
@@ -113,9 +104,14 @@ def test_machine_versions_and_date_stand_in_its_head(whole):
 
 
 def test_tables_in_three_formats_and_figures_lie_beside_it(whole):
-    result, _ = whole
+    result, page = whole
     folder = result.page.parent
+    text = "".join(page.text)
+    assert "Not measured" not in text
+    assert result.page.read_text().count("<figure>") == len(report.all_figures())
     for table in result.tables:
+        assert table.rows
+        assert table.title in text
         for suffix in ("md", "tex", "csv"):
             assert (folder / "tables" / f"{table.name}.{suffix}").stat().st_size > 0
     drawn = {path.stem for path in (folder / "figures").iterdir()}
@@ -126,35 +122,14 @@ def test_tables_in_three_formats_and_figures_lie_beside_it(whole):
         assert (folder / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_every_table_and_figure_stands_in_the_page(whole):
-    result, page = whole
-    text = "".join(page.text)
-    assert all(table.rows and table.title in text for table in result.tables)
-    wanted = len(report.all_figures())
-    assert "Not measured" not in text
-    assert result.page.read_text().count("<figure>") == wanted
-
-
-def test_a_solver_that_no_figure_knows_is_drawn_all_the_same(tmp_path, records):
-    known = ("ccd", "Pinocchio")
-    new = [replace(r, solver="brand_new") for r in records if r.solver in known]
-    result, page = written(tmp_path, [*records, *new])
-    assert "brand_new" in "".join(page.text)
-
-
 def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
+    """But that nobody entered a solver is no omission."""
     _, page = written(tmp_path, [record for record in records if record.suite == "check"])
     text = "".join(page.text)
     assert text.count("Not measured: ") == 4
+    assert "Which solvers of yours" not in text
     assert "Not measured: Forward kinematics. Inverse kinematics. A step of the cloth. What" in text
     assert "Measured by plumbob bench timing cloth_scale, at full length." in text
-
-
-def test_that_nobody_entered_a_solver_is_nothing_missing(tmp_path, records):
-    _, page = written(tmp_path, [record for record in records if not record.facts.get("entrant")])
-    text = "".join(page.text)
-    assert "Which solvers of yours" not in text
-    assert "Not measured" not in text
 
 
 def test_what_is_missing_is_said(tmp_path, records):
@@ -250,14 +225,6 @@ def hostile_report(folder, records, field, names):
 def test_hostile_names_are_data_in_every_file(tmp_path, records, field):
     few = [r for i, r in enumerate(records) if field == "solver" or i % 3 == 0]
     result, page = hostile_report(tmp_path, few, field, HOSTILE)
-    look_into_everything(tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp", "facts"])
-@pytest.mark.parametrize("name", HOSTILE, ids=[ascii(name)[:20] for name in HOSTILE])
-def test_each_hostile_name_is_data_everywhere(tmp_path, records, field, name):
-    hostile_report(tmp_path, records, field, [name])
     look_into_everything(tmp_path)
 
 

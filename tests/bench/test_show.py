@@ -201,13 +201,7 @@ def test_an_animation_that_is_interrupted_leaves_no_file(capsys, tmp_path, monke
     assert not (tmp_path / "c.gif").exists()
 
 
-def test_without_a_scene_a_solver_is_shown_with_what_it_can(capsys, tmp_path):
-    mine = file(tmp_path, "my_cloth.py", STILL)
-    assert show(capsys, "--with", mine, "-o", "a.html")[:2] == (0, "a.html\n")
-    assert "motion-cloth" in (tmp_path / "a.html").read_text()
-
-
-def test_a_program_behind_two_dashes_is_a_solver(capsys, tmp_path):
+def test_a_program_behind_two_dashes_is_shown_with_the_scene_it_can_do(capsys, tmp_path):
     program = file(
         tmp_path,
         "program.py",
@@ -222,9 +216,12 @@ def test_a_program_behind_two_dashes_is_a_solver(capsys, tmp_path):
             print(json.dumps({"id": asked["id"], **answer}), flush=True)
         """,
     )
-    code, out, err = show(capsys, "heart", "-o", "dot.html", "--", sys.executable, program)
+    code, out, err = show(capsys, "-o", "dot.html", "--", sys.executable, program)
     assert (code, err) == (0, "")
-    assert "The Dot beside Plumbob FABRIK" in (tmp_path / "dot.html").read_text()
+    assert (
+        "The lab’s arm draws the custom curve: The Dot beside Plumbob FABRIK"
+        in (tmp_path / "dot.html").read_text()
+    )
 
 
 @pytest.mark.parametrize("options", [["--coherent"], ["--solver", "ccd"]])

@@ -176,17 +176,6 @@ def test_bar_count_and_time_left_are_there_at_any_width(monkeypatch, width, what
     assert cell_len(line.rstrip()) <= width
 
 
-@pytest.mark.parametrize(
-    ("done", "kept", "text"),
-    [(0, 0, "? left"), (5, 5, "? left"), (10, 5, "0:10 left"), (5, 0, "0:15 left")],
-)
-def test_the_time_left_goes_by_what_took_time(done, kept, text):
-    total = {"0:15 left": 20}.get(text, 15)
-    assert (
-        terminal.time_left(10.0 if done != 5 or kept else 5.0, done, total, {"kept": kept}) == text
-    )
-
-
 def an_outcome(folder, tables=(), **more):
     verdict = ClaimCount(52, 52, "spring forces", 0.462)
     headline = Headline("kinematics", "Fastest", "A", "2.00 × B (1.90–2.10), 400 poses", "robots")
@@ -252,9 +241,13 @@ def test_help_is_no_wider_than_the_terminal(capsys, monkeypatch, command):
 
 
 @pytest.mark.parametrize(
-    ("completed", "kept", "left"),
-    [(8, 0, "? left"), (18, 10, "? left"), (9, 0, "16:11 left"), (450, 0, "0:10 left")],
-)
-def test_no_time_is_told_before_a_hundredth_is_done(completed, kept, left):
+    ("completed", "total", "kept", "left"),
+    [
+        (0, 15, 0, "? left"), (5, 15, 5, "? left"), (10, 15, 5, "0:10 left"),
+        (5, 20, 0, "0:30 left"), (8, 883, 0, "? left"), (18, 883, 10, "? left"),
+        (9, 883, 0, "16:11 left"), (450, 883, 0, "0:10 left"),
+    ],
+)  # fmt: skip
+def test_the_time_left_goes_by_steps_that_took_time_after_a_hundredth(completed, total, kept, left):
     """The first of 883 rows compile: they told hours where minutes were left."""
-    assert terminal.time_left(10.0, completed, 883, {"kept": kept}) == left
+    assert terminal.time_left(10.0, completed, total, {"kept": kept}) == left

@@ -13,9 +13,14 @@ import pytest
 from plumbob.bench.experiments.check.tables import verdicts
 from plumbob.bench.harness.record import Record
 from plumbob.bench.tables.results import Results
-from plumbob.crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skeleton_claims
+from plumbob.crosscheck.claims import (
+    CLAIMS,
+    MASS_SPRING_CLAIMS,
+    ROBOT_CLAIMS,
+    run_claims,
+    skeleton_claims,
+)
 from plumbob.crosscheck.engines import SKELETON_ENGINES
-from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS
 from plumbob.crosscheck.tolerances import TOLERANCES, ClaimTolerance
 from plumbob.crosscheck.verdict import Claim, Comparison, check_claim
 from plumbob.reference.backend.compiled import set_backend

@@ -10,10 +10,10 @@ from functools import partial
 import numpy as np
 import pytest
 
+from plumbob.crosscheck.claims import ROBOT_CLAIMS, robot_claims
 from plumbob.crosscheck.engines import ROBOT_ENGINES, pinocchio_robot
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
 from plumbob.crosscheck.robots import comparisons, models
-from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS, robot_claims
 from plumbob.crosscheck.robots.comparisons import (
     Differences,
     LinkKinematics,

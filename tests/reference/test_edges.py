@@ -6,17 +6,14 @@ import pytest
 from plumbob.reference import (
     Articulation,
     Mimic,
-    Outcome,
     Skeleton,
     Target,
     curves,
     forward_kinematics,
     rotation,
     scenes,
-    solve_ik,
     tracking,
 )
-from plumbob.reference.formats import urdf
 from plumbob.reference.implicit_euler.certificate import Certificate, Coverage
 from plumbob.reference.inverse_kinematics.box_step import activate_limits, take_step
 from plumbob.reference.inverse_kinematics.mechanism import new_data
@@ -159,41 +156,3 @@ def test_links_that_slide_or_move_freely_have_no_length():
     lengthened[3] += 0.1 * (lengthened[3] - lengthened[2])
     found = judge_pose(model, q, pose.positions[3], 3, positions=lengthened)
     assert found.length_error == pytest.approx(0.1 * tree.link_lengths[3])
-
-
-SCREW_AND_RACK = """<robot name="machine">
-<link name="base"/><link name="nut"/><link name="rod"/><link name="rack"/><link name="wheel"/>
-<link name="hand"/>
-<joint name="turn" type="continuous"><parent link="base"/><child link="nut"/>
-<axis xyz="0 0 1"/></joint>
-<joint name="rise" type="prismatic"><parent link="nut"/><child link="rod"/><axis xyz="0 0 1"/>
-<limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="turn" multiplier="0.8"/></joint>
-<joint name="slide" type="prismatic"><parent link="rod"/><child link="rack"/><axis xyz="1 0 0"/>
-<limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
-<joint name="roll" type="revolute"><parent link="rack"/><child link="wheel"/><axis xyz="0 1 0"/>
-<limit lower="-9" upper="9" effort="1" velocity="1"/>
-<mimic joint="slide" multiplier="-0.5"/></joint>
-<joint name="hold" type="fixed"><parent link="wheel"/><child link="hand"/>
-<origin xyz="4 1 2"/></joint></robot>"""
-
-
-def test_a_file_s_screw_and_rack_are_solved_as_fast_as_newton_solves():
-    """A follower in another unit than its leader's has a wrong column, and steps swing or creep."""
-    robot = urdf.parse(SCREW_AND_RACK)
-    goal = forward_kinematics(robot.articulation, [0.6, 0.5])
-    hand = robot.articulation.index("hand")
-    target = Target(goal.positions[hand], goal.rotations[hand], hand)
-    solution = solve_ik(
-        robot,
-        [0.2, 0.1],
-        target,
-        "levenberg_marquardt",
-        tolerance=1e-12,
-        tolerance_rotation=1e-12,
-        record=True,
-    )
-    assert solution.outcome is Outcome.CONVERGED
-    np.testing.assert_allclose(solution.coordinates, [0.6, 0.5], rtol=0, atol=1e-11)
-    errors = solution.history[(solution.history > 1e-12) & (solution.history < 0.1)]
-    assert len(errors) >= 2
-    assert (errors[1:] < 3.0 * errors[:-1] ** 1.7).all()

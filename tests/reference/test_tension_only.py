@@ -44,15 +44,6 @@ class TestSlack:
         np.testing.assert_array_equal(stiffness_matrix(system, x).toarray(), np.zeros((6, 6)))
         np.testing.assert_array_equal(rest_vectors(system, x), [[length, 0.0, 0.0]])
 
-    def test_a_taut_rope_is_a_spring(self, backend):
-        system, x = rope(2.0)
-        spring, _ = rope(2.0, tension_only=False)
-        assert spring_energy(system, x) == spring_energy(spring, x) == 0.5
-        for function in (spring_forces, rest_vectors):
-            np.testing.assert_array_equal(function(system, x), function(spring, x))
-        one, other = (stiffness_matrix(model, x).toarray() for model in (system, spring))
-        np.testing.assert_array_equal(one, other)
-
     def test_a_rope_without_length_is_a_linear_spring_even_at_length_zero(self, backend):
         for length in (0.0, 0.7):
             system, x = rope(length, rest_lengths=0.0)

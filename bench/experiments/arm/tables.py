@@ -1,26 +1,24 @@
 """Success and residuals within reach, on the arm's curves and the chain's targets."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from ...figures.chart import Axis, Chart, Panel, Series, series
-from ...figures.sketch import Sketch, chart_sketch
+from ...figures.chart import Panel, Series, declared_chart, series
+from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.columns import effort, spread_of
-from ...tables.layout import Layout
+from ...tables.columns import quantile_cells, spread_of
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, by_problem, grouped, leaders
 from ...tables.table import Summary, words
 from ..chain import BEYOND, CHAIN
-from ..chain.tables import histories, quantile_cells, solves_row, within_tolerance
+from ..chain.tables import histories, solves_row, within_tolerance
 from . import CURVE
 
 STARTS = {None: "random", False: "rest", True: "last solution"}
-# The cells of a row by the titles of their columns, and its record.
-Row = dict[str, Any]
+_CAPTIONS = Captions(__file__)
 
 
 def _rows(results: Results) -> list[Row]:
@@ -32,14 +30,14 @@ def _rows(results: Results) -> list[Row]:
 
 
 def _row(record: Record) -> Row:
-    hits = within_tolerance(record)
+    hits, seconds = within_tolerance(record), record.arrays.get("seconds")
     return {
         **solves_row(record),
         "start": STARTS[record.details.warm],
         "hits": hits,
         "within tolerance": metrics.share(hits),
         **quantile_cells("residual", spread_of(record, "residual")),
-        "time, median": effort(record).median if "seconds" in record.arrays else None,
+        "time, median": None if seconds is None else metrics.spread(seconds).median,
     }
 
 
@@ -70,24 +68,11 @@ def _ranking(hits: dict[str, dict[tuple[str, str], np.ndarray]]) -> metrics.Rank
 
 def residuals_chart(results: Results) -> Sketch | None:
     """Show the residual against the iteration, median and 10 to 90 % of the targets."""
-    panels = tuple(
+    panels = (
         Panel(group[0].title, tuple(map(_residuals, group)), group[0].details.tolerance)
         for group in histories(results)
     )
-    if not panels:
-        return None
-    return chart_sketch(
-        Chart(
-            "ik_residuals",
-            "Residual against iteration, inverse kinematics",
-            "Line: the median target; band: from the 10th to the 90th percentile; dotted: the "
-            "tolerance, at which a target is done and keeps its residual.",
-            panels,
-            Axis("iteration, log scale", log=True),
-            Axis("residual [m]", log=True),
-            entrants=results.entrants,
-        )
-    )
+    return declared_chart(_CAPTIONS.figure("ik_residuals"), panels, results.entrants)
 
 
 def _residuals(record: Record) -> Series:
@@ -98,7 +83,7 @@ def _residuals(record: Record) -> Series:
 
 
 accuracy = Layout(
-    **Captions(__file__).of("accuracy"),
+    **_CAPTIONS.of("accuracy"),
     subjects=_rows,
     summary=_summary,
     figures=(residuals_chart,),

@@ -143,23 +143,23 @@ def solve_one_by_one(
 ) -> Measured:
     """Have a user's solver solve all targets, for as long as its budget lasts.
 
-    A target without an answer, or never begun, counts as infinitely far from being reached.
+    A target without an answer, or not attempted, counts as infinitely far from being reached.
     """
-    count = len(problem.targets)
-    requests = ChainRequests(problem, np.full(count, limits.max_iterations))
+    total = len(problem.targets)
+    requests = ChainRequests(problem, np.full(total, limits.max_iterations))
     outcome = _performed(requests, peer, limits.tolerance, budget)
-    solves, begun = outcome.solved, len(outcome.solved)
+    solves, count = outcome.solved, len(outcome.solved)
     if not solves:
         raise NoAnswerError(outcome.trouble or "It answered nothing.")
     arrays = _evaluated(problem, limits, *_answers(requests, outcome))
-    answered = np.isfinite(arrays["residual"][:begun])
-    arrays["solved"] = arrays["solved"][:begun]
-    arrays["claimed"] = np.where(answered, [solve.claim for solve in solves], -1)
-    arrays["seconds"] = np.where(answered, [solve.seconds for solve in solves], 0.0)
+    has_answer = np.isfinite(arrays["residual"][:count])
+    arrays["solved"] = arrays["solved"][:count]
+    arrays["claims"] = np.where(has_answer, [solve.claim for solve in solves], -1)
+    arrays["seconds"] = np.where(has_answer, [solve.seconds for solve in solves], 0.0)
     remarks = [outcome.note]
-    if begun < count:
+    if count < total:
         reason = "" if outcome.is_lost else f" by its time budget of {budget:g} s"
-        remarks += [f"cut{reason} at {begun} of {count} targets, the others count as not reached"]
+        remarks += [f"cut{reason} at {count} of {total} targets, the others count as not reached"]
     if followed and not outcome.is_lost:
         history = _history(problem, peer, limits, budget)
         arrays |= history
@@ -197,9 +197,9 @@ def _evaluated(
         "bend": metrics.bend(positions, problem.targets),
         "excess": metrics.excess(residual, distance, reach),
     }
-    answered = np.isfinite(residual)
+    has_answer = np.isfinite(residual)
     return {
-        **{name: np.where(answered, error, np.inf) for name, error in errors.items()},
+        **{name: np.where(has_answer, error, np.inf) for name, error in errors.items()},
         "solved": residual <= limits.tolerance,
         "iterations": np.asarray(iterations),
         "distance": distance,

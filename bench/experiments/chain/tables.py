@@ -1,19 +1,24 @@
 """Targets beyond reach, and the iterations of CCD and FABRIK: two of the lab's questions."""
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from ...figures.chart import GREATER, Axis, Chart, Panel, Series, series
-from ...figures.sketch import Sketch, chart_sketch
+from ...figures.chart import Panel, Series, declared_chart, series
+from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.columns import iterations_said, spread_of, spread_of_iterations, words_in
-from ...tables.layout import Layout
+from ...tables.columns import (
+    quantile_cells,
+    reported_iterations,
+    spread_of,
+    spread_of_iterations,
+    words_in,
+)
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, by_problem, grouped, label
-from ...tables.table import Cell, Summary, words
+from ...tables.table import Summary, words
 from .. import arm
 from . import BEYOND, CHAIN
 from .values import ChainSolves
@@ -23,8 +28,6 @@ STRAIGHT = 0.01
 # Iterations at which targets are counted.
 COUNTED = np.unique(np.logspace(0, 3, 61).round())
 _CAPTIONS = Captions(__file__)
-# The cells of a row by the titles of their columns, and its records.
-Row = dict[str, Any]
 
 
 def solves_row(record: Record) -> Row:
@@ -37,12 +40,6 @@ def solves_row(record: Record) -> Row:
         "iterations allowed": record.settings.get("max_iterations"),
         "remark": record.notes.get("remark", ""),
     }
-
-
-def quantile_cells(title: str, quantiles: Iterable[Cell]) -> Row:
-    """Return the cells of a median, a 95th percentile and a maximum."""
-    names = ("median", "95 %", "largest")
-    return {f"{title}, {name}": cell for name, cell in zip(names, quantiles, strict=True)}
 
 
 def within_tolerance(record: Record) -> np.ndarray:
@@ -138,23 +135,11 @@ def _rival_summary(rows: Sequence[Row]) -> Summary:
 
 def iterations_chart(results: Results) -> Sketch | None:
     """Show the share of the targets that is reached within so many iterations, by stratum."""
-    groups = ([r for r in group if iterations_said(r).size] for group in histories(results))
+    groups = ([r for r in group if reported_iterations(r).size] for group in histories(results))
     panels = [Panel(group[0].title, tuple(map(_reached, group))) for group in groups if group]
-    if not panels:
-        return None
-    return chart_sketch(
-        Chart(
-            "iterations",
-            "Iterations of every solver",
-            "How many of the targets are reached within so many iterations; the band is the 95 % "
-            "interval (Wilson)." + " Entrants claim their iterations." * bool(results.entrants),
-            tuple(panels),
-            Axis("iterations, log scale", log=True),
-            Axis("targets reached [%]", limits=(-3, 103)),
-            better=GREATER,
-            entrants=results.entrants,
-        )
-    )
+    chart = _CAPTIONS.figure("iterations")
+    chart["shows"] += " Entrants claim their iterations." * bool(results.entrants)
+    return declared_chart(chart, panels, results.entrants)
 
 
 def histories(results: Results) -> list[list[Record]]:

@@ -2,6 +2,8 @@
 
 import math
 
+import msgspec
+
 from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
 from . import CHAIN
 
@@ -21,7 +23,8 @@ class ChainSolves(Values, frozen=True):
     history_median: Floats1 | None = None
     history_high: Floats1 | None = None  # 90th percentile
     seconds: Floats1 | None = None  # for a target by itself
-    claimed: Integers1 | None = None  # 1 or 0 as a user's solver claims, or -1 for no claim
+    # 1 or 0 as a user's solver claims, or -1 for no claim
+    claims: Integers1 | None = msgspec.field(default=None, name="claimed")
 
 
 class SolveDetails(Details, frozen=True):

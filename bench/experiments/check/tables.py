@@ -1,7 +1,6 @@
 """Verdicts on the claims of the cross-check."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from plumbob.reference.arguments import distinct_texts
 
@@ -9,7 +8,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers.registry import MUJOCO, PINOCCHIO
 from ...tables.captions import Captions
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import listed
 from ...tables.table import Summary, in_unit, words
 
@@ -17,7 +16,7 @@ from ...tables.table import Summary, in_unit, words
 ENGINES = (PINOCCHIO, MUJOCO)
 
 
-def _row(record: Record) -> dict[str, Any]:
+def _row(record: Record) -> Row:
     claim, details = record.values, record.details
     digits = distinct_texts(claim.difference, claim.tolerance, 2)
     excess = " by {}, more than {}".format(*digits) * (claim.difference > claim.tolerance)
@@ -33,7 +32,7 @@ def _row(record: Record) -> dict[str, Any]:
     }
 
 
-def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+def _summary(rows: Sequence[Row]) -> Summary:
     failures = [row["claim"] for row in rows if row["verdict"] != "held"]
     used = max(metrics.ratio(row["largest difference"], row["tolerance"]) for row in rows)
     engines = sum(

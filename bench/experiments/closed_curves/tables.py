@@ -1,17 +1,16 @@
 """How far joints rotate from frame to frame along closed curves: the lab's third question."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from ...figures.chart import SPAN, Axis, Chart, Panel, series
-from ...figures.sketch import Sketch, chart_sketch
+from ...figures.chart import SPAN, Panel, declared_chart, series
+from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import spread_of, words_in
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, by_problem, grouped, label
 from ...tables.table import Summary, in_unit, words
 from .. import arm
@@ -24,8 +23,7 @@ MODES = (COLD, WARM, COHERENT)
 ALIKE = 0.01
 # Repetitions of the curve that is drawn several times.
 REPETITIONS = (1, 2, 3)
-# The cells of a row by the titles of their columns, and its records by mode.
-Row = dict[str, Any]
+_CAPTIONS = Captions(__file__)
 
 
 def _rows(results: Results) -> list[Row]:
@@ -109,8 +107,6 @@ def _points(rows: Sequence[Row]) -> Iterator[str]:
 def jitter_chart(results: Results) -> Sketch | None:
     """Show the largest rotation of a joint on each curve, from rest and from the last solution."""
     curves = by_problem(results.all("arm", task=arm.CURVE, warm=False))
-    if not curves:
-        return None
     spans = []
     for row, records in enumerate(curves.values()):
         for record in records:
@@ -118,25 +114,13 @@ def jitter_chart(results: Results) -> Sketch | None:
             motions = [motion for motion in (record, warm) if motion is not None]
             angles = [in_unit(motion.values.largest_angle.max(), "°") for motion in motions]
             spans.append(series(record.solver, angles, [row] * len(angles), form=SPAN))
-    return chart_sketch(
-        Chart(
-            "jitter",
-            "Largest rotation of a joint between neighbouring frames",
-            "Hollow: every frame solved from the rest pose; filled: every frame started from the "
-            "last solution.",
-            (Panel("", tuple(spans)),),
-            Axis("largest rotation of a joint between frames [°], log scale", log=True),
-            columns=1,
-            rows=tuple(str(records[0].details.curve) for records in curves.values()),
-            entrants=results.entrants,
-            hollow="from rest",
-            filled="from the last solution",
-        )
-    )
+    rows = tuple(str(records[0].details.curve) for records in curves.values())
+    panels = [Panel("", tuple(spans))] if spans else []
+    return declared_chart(_CAPTIONS.figure("jitter"), panels, results.entrants, rows=rows)
 
 
 jitter = Layout(
-    **Captions(__file__).of("q3_jitter"),
+    **_CAPTIONS.of("q3_jitter"),
     subjects=_rows,
     summary=_summary,
     figures=(jitter_chart,),

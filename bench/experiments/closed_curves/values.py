@@ -1,4 +1,4 @@
-"""The records of closed curves: one round, whose last angles lead back, and repetitions."""
+"""The records of closed curves: a round, whose last angles lead back, and repetitions."""
 
 from ...harness.values import Details, Floats1, Kind, Values
 from ..arm.values import FollowedMotion

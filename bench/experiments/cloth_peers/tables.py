@@ -213,10 +213,13 @@ def _motion_summary(rows: Sequence[Row]) -> Summary:
     if not motions:
         return NO_SUMMARY
     diverged = list(dict.fromkeys(point.solver for point in motions if point.values["diverged"]))
-    sentence = f"Diverged with some settings: {listed(diverged)}." if diverged else "None diverged."
+    sentence = "No motion diverged."
+    if diverged:
+        sentence = f"Diverged with some settings: {listed(diverged)}."
     whole = grouped((point for point in motions if point.is_whole), lambda point: point.cloth)
     sentences = [f"{cloth}: {_nearest(group)}" for cloth, group in whole.items()]
-    return Summary(f"{sentence} Nearest to the truth:", (*sentences, *_stable(rows)))
+    nearest = " Nearest to the truth:" if sentences else ""
+    return Summary(sentence + nearest, (*sentences, *_stable(rows)))
 
 
 def _nearest(whole: Sequence[Point]) -> str:

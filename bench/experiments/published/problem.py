@@ -28,7 +28,7 @@ class PublishedSearch(NamedTuple):
 
 
 class PublishedFrame(NamedTuple):
-    """A time for one frame of a cloth [s], what was done in it, and our settings for the same."""
+    """A time for one frame of a cloth [s], the work done in it, and our settings for the same."""
 
     seconds: float
     done: str

@@ -1,5 +1,7 @@
 """The records of published tables that are measured again."""
 
+import msgspec
+
 from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
 from . import FABRIK, TOOLBOX, TRAC_IK
 
@@ -8,7 +10,7 @@ class RobotSearches(Values, frozen=True, kw_only=True):
     """Searches for targets of a robot, as in `RobotSolves`, without residuals."""
 
     solved: Booleans1 | None = None
-    claimed: Integers1 | None = None
+    claims: Integers1 | None = msgspec.field(default=None, name="claimed")
     seconds: Floats1 | None = None
     setup: float
 

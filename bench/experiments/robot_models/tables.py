@@ -1,21 +1,17 @@
 """Robots and characters: how closely engines that read the same files agree with the reference."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, by_problem, counted, grouped, listed, settings
 from ...tables.table import Summary, words
 from . import PEERS
 from .values import FileDetails
 
 QUANTITIES = ("positions", "rotations", "jacobians")
-# A file in both engines, or a robot of the bench in the engine of a peer, by the titles of the
-# columns; "valid" are the records whose numbers count.
-Row = dict[str, Any]
 
 
 def _rows(results: Results) -> list[Row]:
@@ -31,7 +27,10 @@ def _parted(records: Iterable[Record]) -> tuple[list[Record], list[Record]]:
 
 
 def _of_file(records: Sequence[Record]) -> Row:
-    """Return the row of a file; an engine that leaves mimics free has too many freedoms."""
+    """Return the row of a file, whose numbers are those of the "valid" records.
+
+    An engine that leaves mimics free has too many freedoms.
+    """
     valid = [record for record in records if record.values and not record.details.cause]
     row: Row = {"records": records, "valid": valid, "robot": records[0].title}
     row |= {"engines": listed([record.solver for record in valid]) or "none"}

@@ -1,24 +1,35 @@
 """Shares of targets that solvers solve against time and the fastest, and a map of all robots."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...figures.chart import GREATER, Axis, Chart, Panel, Series, series
-from ...figures.sketch import Sketch, chart_sketch
+from ...figures.chart import Panel, Series, declared_chart, series
+from ...figures.sketch import Sketch
 from ...figures.style import COLOURS, written
 from ...harness import metrics
 from ...harness.metrics import Floats
+from ...problems.robots import LIMIT_TOLERANCE
+from ...tables.captions import Captions
+from ...tables.columns import words_in
 from ...tables.layout import Figure
 from ...tables.results import Results
-from .readings import STARTS, Score, fields_of
+from ...tables.table import words
+from .readings import PENALTY, SHIFT, STARTS, Score, fields_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
+CAPTIONS = Captions(
+    __file__,
+    shift=words_in(SHIFT, "µs"),
+    penalty=words_in(PENALTY, "ms"),
+    resamples=str(metrics.RESAMPLES),
+    limit_tolerance=words(LIMIT_TOLERANCE),
+)
 # So many times the least time is drawn as the palest, and the least time as the fullest.
 SLOWEST = 1000.0
 # Maps of more robots than this are stacked.
@@ -31,12 +42,7 @@ def budgets(start: str, results: Results) -> Sketch | None:
     def rates(field: Sequence[Score], seconds: Floats) -> list[Floats]:
         return [metrics.within_budget(score.seconds, score.solved, seconds) for score in field]
 
-    shows = (
-        "Share of the targets within reach that are solved within so much time for each; the "
-        "band is the 95 % interval (Wilson)."
-    )
-    titles = ("budget", "targets solved within a time", shows, "time for each target [s]")
-    return _chart(titles, rates, np.logspace(-6, 0, 121), start, results)
+    return _chart("budget", rates, np.logspace(-6, 0, 121), fields_of(results, start), results)
 
 
 def performance_profiles(start: str, results: Results) -> Sketch | None:
@@ -46,44 +52,34 @@ def performance_profiles(start: str, results: Results) -> Sketch | None:
         seconds, solved = (np.array([getattr(s, n) for s in field]) for n in ("seconds", "solved"))
         return list(metrics.performance_profiles(seconds, solved, ratios))
 
-    shows = (
-        "Share of the targets that a solver solves within so many times the time of the "
-        "fastest on that target (Dolan and Moré 2002); where a line ends is what it solves at all."
-    )
-    titles = ("profile", "performance profiles", shows, "time relative to the fastest on a target")
-    return _chart(titles, rates, np.logspace(0, 4, 121), start, results, same_targets=True)
+    fields = {
+        robot: [score for score in field if score.has_same_targets]
+        for robot, field in fields_of(results, start).items()
+    }
+    return _chart("profile", rates, np.logspace(0, 4, 121), fields, results)
 
 
 def _chart(
-    titles: tuple[str, str, str, str],
+    name: str,
     rates: Callable[[Sequence[Score], Floats], list[Floats]],
     x: Floats,
-    start: str,
+    fields: Mapping[str, Sequence[Score]],
     results: Results,
-    same_targets: bool = False,
 ) -> Sketch | None:
     """Return a panel of curves for each robot; None if there are no solvers with this start."""
-    name, title, shows, axis = titles
     panels = []
-    for robot, field in fields_of(results, start).items():
-        scores = [score for score in field if score.has_same_targets or not same_targets]
-        curves = zip(scores, rates(scores, x), strict=True)
+    for robot, field in fields.items():
+        curves = zip(field, rates(field, x), strict=True)
         panels.append(Panel(robot, tuple(_share(score, x, curve) for score, curve in curves)))
-    chart = Chart(
-        f"{name}_{start.replace(' ', '_')}",
-        f"Robots, {start}: {title}",
-        shows,
-        tuple(panels),
-        Axis(axis, log=True),
-        Axis("targets [%]", limits=(-3, 103)),
-        better=GREATER,
-        entrants=results.entrants,
-    )
-    return chart_sketch(chart) if panels else None
+    start = next((score.start for field in fields.values() for score in field), "")
+    chart = CAPTIONS.figure(name)
+    chart["name"] = f"{name}_{start.replace(' ', '_')}"
+    chart["title"] = f"Robots, {start}: {chart['title']}"
+    return declared_chart(chart, panels, results.entrants)
 
 
 def _share(score: Score, x: Floats, rates: Floats) -> Series:
-    """Return a share with the interval that holds the true one in 95 % of samples [%]."""
+    """Return a share with its 95 % interval [%]."""
     low, high = metrics.wilson(rates, max(1, score.total))
     return series(score.solver, x, 100 * rates, (100 * low, 100 * high))
 
@@ -101,7 +97,7 @@ class RobotMaps(NamedTuple):
 
 
 def heat_map(start: str, results: Results) -> Sketch | None:
-    """Return the map of solvers of one start and robots, in two panels; None if there are none."""
+    """Return the map of solvers of one start and robots, in two panels; None without solvers."""
     fields = fields_of(results, start)
     scores = {(s.solver, robot): s for robot, field in fields.items() for s in field}
     solvers = tuple(dict.fromkeys(solver for solver, _ in scores))

@@ -65,7 +65,7 @@ class RobotJob(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield each solver on each robot; one block for a solver or a robot that is not installed.
+    """Yield each solver on each robot, and a block for each that is not installed.
 
     The solvers of a robot follow each other in a drawn order, so that a machine that gets slower or
     faster does so to all of them.
@@ -165,7 +165,7 @@ def solve(job: RobotJob, targets: Targets) -> Measured:
 
 
 def _performed(job: RobotJob, targets: Targets, budget: Budget) -> Outcome:
-    """Return the solves of targets; where one costs the process, go on behind it in a new one."""
+    """Return the solves of targets; continue in a new process behind a target that crashes it."""
     peer, entry, robot = job.peer, job.entry, evaluator_of(job.robot).robot
     request = (peer.module, robot, targets, job.tolerance, {**entry.settings, **peer.spec})
     outcome = worker_process().perform(Job(*request, entry.restarts, job.budget, peer.entrant_name))
@@ -186,7 +186,7 @@ def _evaluated(job: RobotJob, targets: Targets, solves: list[Solved]) -> dict[st
     evaluation = evaluator_of(job.robot).evaluate(targets, answers, job.tolerance)
     return {
         "solved": evaluation.solved,
-        "claimed": np.array([solve.claim for solve in solves]),
+        "claims": np.array([solve.claim for solve in solves]),
         "seconds": _rounded([solve.seconds for solve in solves]),
         "position": _rounded(evaluation.position),
         "rotation": _rounded(evaluation.rotation),

@@ -1,4 +1,4 @@
-"""Scores of solvers on robots: how many targets they solve, in what time.
+"""Scores of solvers on robots: the targets that they solve, and their times.
 
 A solver that a budget of time cut short is scored over all targets that it was given: those that it
 never began count as not solved. It has a mark, and is not ranked; nor is one whose record is of
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...harness import metrics
-from ...harness.metrics import Floats, Interval, Ranking, Share
+from ...harness.metrics import Floats, Ranking, Share
 from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
@@ -40,10 +40,10 @@ class Score(NamedTuple):
     """A solver over all targets of one robot, or of several.
 
     Attributes:
-        robots: which ones, in words.
-        start: one start or restarts, "" where solvers are not told apart so.
+        robots: their names, or a phrase.
+        start: `ONE_START` or `RESTARTS`, "" if both are in one field.
         solver: as records call it.
-        records: its record of each robot, in one order for all solvers.
+        records: its record of each robot, in the same order for all solvers.
         has_same_targets: whether it was given the targets of most solvers.
         success: the ranking of the solvers by targets solved.
         time: the ranking by time for the same targets.
@@ -63,16 +63,16 @@ class Score(NamedTuple):
 
     @property
     def total(self) -> int:
-        """How many targets it was given, begun or not."""
-        return sum(map(_total, self.records))
+        """The number of its targets, attempted or not."""
+        return sum(map(total, self.records))
 
-    def begun(self, name: str) -> np.ndarray:
-        """Return an array of the targets that were begun, (target,)."""
+    def attempted(self, name: str) -> np.ndarray:
+        """Return an array of the targets that were attempted, (target,)."""
         return np.concatenate([record.arrays[name] for record in self.records])
 
-    def all(self, name: str, never_begun: float) -> np.ndarray:
-        """Return an array of all targets, with a number for those never begun, (target,)."""
-        return np.concatenate([_padded(record, name, never_begun) for record in self.records])
+    def all(self, name: str, default: float) -> np.ndarray:
+        """Return an array of all targets, with a default for the others, (target,)."""
+        return np.concatenate([_padded(record, name, default) for record in self.records])
 
     @property
     def solved(self) -> np.ndarray:
@@ -81,7 +81,7 @@ class Score(NamedTuple):
 
     @property
     def share(self) -> Share:
-        """How many of all targets are solved."""
+        """The share of all targets that are solved."""
         return metrics.share(self.solved)
 
     def solved_in_stratum(self, stratum: int) -> np.ndarray:
@@ -90,7 +90,7 @@ class Score(NamedTuple):
 
     @property
     def seconds(self) -> Floats:
-        """The time of each target, infinite where it was never begun [s], (target,)."""
+        """The time of each target, infinite if it was not attempted [s], (target,)."""
         return self.all("seconds", np.inf)
 
     @property
@@ -100,33 +100,13 @@ class Score(NamedTuple):
 
     @property
     def mean_time(self) -> float:
-        """The geometric mean of those times [s]."""
+        """The geometric mean of the penalised times [s]."""
         return float(np.exp(np.mean(np.log(self.penalised + SHIFT))) - SHIFT)
-
-    @property
-    def mean_time_interval(self) -> Interval:
-        """The same with its interval [s], targets drawn again within each robot."""
-        return metrics.shifted_geometric_mean(self.penalised, SHIFT, [*map(_total, self.records)])
-
-    @property
-    def median_time(self) -> Interval:
-        """The median time of targets begun, and its interval [s]."""
-        return metrics.median_interval(self.begun("seconds"))
 
     @property
     def relative_time(self) -> float:
         """The geometric mean of times over the least of any solver."""
         return metrics.ratio(self.mean_time, self.least_time)
-
-    @property
-    def claims(self) -> int:
-        """The number of targets on which the solver makes a claim."""
-        return int(np.sum(self.begun("claimed") >= 0))
-
-    @property
-    def false_successes(self) -> Share:
-        """How many of the targets begun are solved as the solver claims, but not evaluated so."""
-        return metrics.share((self.begun("claimed") == 1) & ~self.begun("solved"))
 
     @property
     def outcomes(self) -> Counter[str]:
@@ -135,26 +115,23 @@ class Score(NamedTuple):
 
     @property
     def distances(self) -> Floats:
-        """The distance from each target begun; NaN without an answer that keeps limits [m]."""
-        return np.where(self.begun("beyond") <= LIMIT_TOLERANCE, self.begun("position"), np.nan)
+        """The distance from each target attempted; NaN without an answer that keeps limits [m]."""
+        return np.where(
+            self.attempted("beyond") <= LIMIT_TOLERANCE, self.attempted("position"), np.nan
+        )
 
     @property
     def limits(self) -> str:
         """Why it is not ranked, "" if it is: its time ran out, or its targets differ."""
-        begun = self.begun("solved").size
-        cut = f"cut at {words(begun)} of {words(self.total)}" * (begun < self.total)
-        different = f"other targets, {words(self.total)}" * (not self.has_same_targets)
-        return "; ".join(filter(None, (cut, different)))
+        count = self.attempted("solved").size
+        reasons = [f"cut at {words(count)} of {words(self.total)}"] * (count < self.total)
+        reasons += [f"other targets, {words(self.total)}"] * (not self.has_same_targets)
+        return "; ".join(reasons)
 
     @property
     def is_ranked(self) -> bool:
-        """Whether it began all of its targets, and they are the same as others'."""
+        """Whether it attempted all of its targets, and has the same targets as most solvers."""
         return not self.limits
-
-    @property
-    def trouble(self) -> str:
-        """The first exception, "" if there is none."""
-        return next((record.trouble for record in self.records if record.trouble), "")
 
     @property
     def leads(self) -> str:
@@ -167,37 +144,38 @@ class Score(NamedTuple):
         )
 
 
-def _total(record: Record) -> int:
+def total(record: Record) -> int:
+    """Return the number of targets of a record, attempted or not."""
     return max(int(record.size), record.arrays["solved"].size)
 
 
 def _padded(record: Record, name: str, number: float) -> np.ndarray:
-    begun = record.arrays[name]
-    return np.pad(begun, (0, _total(record) - begun.size), constant_values=number)
+    array = record.arrays[name]
+    return np.pad(array, (0, total(record) - array.size), constant_values=number)
 
 
 def _strata(record: Record) -> np.ndarray:
-    """Return the stratum of every target: they alternate, begun or not."""
-    begun = record.arrays["stratum"]
-    following = np.arange(begun.size, _total(record)) % max(len(record.details.strata), 1)
-    return np.concatenate([begun, following])
+    """Return the stratum of every target: they alternate, attempted or not."""
+    strata = record.arrays["stratum"]
+    following = np.arange(strata.size, total(record)) % max(len(record.details.strata), 1)
+    return np.concatenate([strata, following])
 
 
 def _outcomes(record: Record) -> Counter[str]:
     solves, details = record.values, record.details
-    answered = np.isfinite(solves.position)
-    reached = answered & (solves.position <= details.tolerance)
+    has_answer = np.isfinite(solves.position)
+    reached = has_answer & (solves.position <= details.tolerance)
     reached &= solves.rotation <= details.tolerance_rotation
-    raised = np.zeros_like(answered) if solves.exception is None else solves.exception
-    success = answered & (solves.claimed == 1)
-    conditions = [solves.solved, reached, success, answered, raised]
+    raised = np.zeros_like(has_answer) if solves.exception is None else solves.exception
+    success = has_answer & (solves.claims == 1)
+    conditions = [solves.solved, reached, success, has_answer, raised]
     *outcomes, no_answer, not_begun = OUTCOMES
     counts = Counter(np.select(conditions, outcomes, no_answer).tolist())
-    return counts + Counter({not_begun: _total(record) - answered.size})
+    return counts + Counter({not_begun: total(record) - has_answer.size})
 
 
 def scores(results: Results, task: str = REACHABLE) -> list[Score]:
-    """Return every solver on every robot, robot by robot, those with one start first."""
+    """Return every solver on every robot, robot by robot, single starts before restarts."""
     fields = [fields_of(results, start, task) for start in STARTS]
     robots = dict.fromkeys(robot for by_robot in fields for robot in by_robot)
     return [score for robot in robots for by_robot in fields for score in by_robot.get(robot, [])]
@@ -209,7 +187,7 @@ def fields_of(results: Results, start: str, task: str = REACHABLE) -> dict[str, 
 
 
 def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score]]:
-    """Return the solvers that have solves on record: as registered, and then those unknown."""
+    """Return the solvers that have solves on record: registered ones first, in order."""
     registered = [peer.label_of(entry) for peer in registry.PEERS for entry in peer.entries]
     places = {solver: place for place, solver in enumerate(registered)}
     robots = grouped((r for r in records if "solved" in r.arrays), lambda record: record.title)
@@ -220,9 +198,9 @@ def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score
 
 def _field(robot: str, start: str, records: Sequence[Record]) -> list[Score]:
     """Return solvers on one robot; of equally many sets of targets the larger one counts."""
-    counts = Counter(map(_total, records))
+    counts = Counter(map(total, records))
     size = max(counts, key=lambda size: (counts[size], size))
-    return _ranked([Score(robot, start, r.solver, (r,), _total(r) == size) for r in records])
+    return _ranked([Score(robot, start, r.solver, (r,), total(r) == size) for r in records])
 
 
 def _ranked(field: Sequence[Score]) -> list[Score]:
@@ -230,8 +208,8 @@ def _ranked(field: Sequence[Score]) -> list[Score]:
     ranked = [score for score in field if score.is_ranked]
     success = metrics.ranking({score.solver: score.solved for score in ranked})
     time = metrics.ranking({s.solver: -np.log(s.penalised + SHIFT) for s in ranked})
-    least = min((score.mean_time for score in field), default=np.nan)
-    return [s._replace(success=success, time=time, least_time=least) for s in field]
+    least_time = min((score.mean_time for score in field), default=np.nan)
+    return [s._replace(success=success, time=time, least_time=least_time) for s in field]
 
 
 def overall(results: Results) -> list[Score]:
@@ -255,11 +233,11 @@ def together(robots: Collection[str], fields: dict[str, list[Score]]) -> list[Sc
     names = [robot for robot in fields if robot in robots]
     title = title_of(names, [robot for robot in fields if robot not in robots])
     takers = [by_robot for by_robot in _by_solver(fields) if by_robot.keys() >= {*names}]
-    return _ranked([_joined(title, [by_robot[name] for name in names]) for by_robot in takers])
+    return _ranked([_over_robots(title, [by_robot[name] for name in names]) for by_robot in takers])
 
 
 def title_of(names: Sequence[str], remaining: Sequence[str]) -> str:
-    """Return the title of a set of robots: by those left out, if these are fewer."""
+    """Return the title of a set of robots: by the remaining ones if these are fewer."""
     if len(names) == 1:
         return names[0]
     if not remaining:
@@ -274,7 +252,7 @@ def _by_solver(fields: dict[str, list[Score]]) -> list[dict[str, Score]]:
     return [{score.robots: score for score in group} for group in groups.values()]
 
 
-def _joined(title: str, parts: Sequence[Score]) -> Score:
+def _over_robots(title: str, parts: Sequence[Score]) -> Score:
     """Return the score of a solver over several robots."""
     records = tuple(record for part in parts for record in part.records)
     same = all(part.has_same_targets for part in parts)

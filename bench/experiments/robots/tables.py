@@ -11,29 +11,19 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import Peer, PeerEntry
-from ...problems.robots import LIMIT_TOLERANCE
-from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.entered import entered
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, counted, grouped, leaders, listed, steadiness
 from ...tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from . import REACHABLE, readings
-from .figures import FIGURES
+from .figures import CAPTIONS, FIGURES
 from .readings import OUTCOMES, STARTS, Score, title_of
 from .values import RobotDetails
 
-_CAPTIONS = Captions(
-    __file__,
-    shift=words_in(readings.SHIFT, "µs"),
-    penalty=words_in(readings.PENALTY, "ms"),
-    resamples=str(metrics.RESAMPLES),
-    limit_tolerance=words(LIMIT_TOLERANCE),
-)
 # The rule for solvers that a budget of time cut short.
-RULE = _CAPTIONS.shared["rule"]
-# The cells of a row by the titles of their columns, and the score or the records behind them.
-Row = dict[str, Any]
+RULE = CAPTIONS.shared["rule"]
+MEAN = "time, geometric mean"
 
 
 # Participants.
@@ -59,7 +49,7 @@ def _as_peer(record: Record) -> Peer:
 
 
 def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Record]) -> Row:
-    """Return the row of a solver; `robots` has one record of each robot of all."""
+    """Return the row of a solver; `robots` holds a record of each robot of all."""
     version = str(records[0].details.version)
     names = {record.title for record in records if "solved" in record.arrays}
     robot_names = [
@@ -103,7 +93,7 @@ def _robot(record: Record) -> str:
 
 
 participants = Layout(
-    **_CAPTIONS.of("participants"), subjects=_participants, summary=_participant_summary
+    **CAPTIONS.of("participants"), subjects=_participants, summary=_participant_summary
 )
 
 
@@ -112,61 +102,67 @@ participants = Layout(
 
 def _row(score: Score) -> Row:
     """Return the cells that all tables of scores have."""
-    seconds = score.begun("seconds")
+    seconds, claims = score.attempted("seconds"), score.attempted("claimed")
+    false_successes = metrics.share((claims == 1) & ~score.attempted("solved"))
+    trouble = next((record.trouble for record in score.records if record.trouble), "")
     return {
         "score": score,
+        "claims": int(np.sum(claims >= 0)),
+        "false success rate": false_successes,
+        "trouble": trouble,
         "robots": score.robots,
         "starts": score.start,
         "solver": score.solver,
         "targets": score.total,
-        "false successes": score.false_successes.hits if score.claims else None,
-        "mark": "; ".join(filter(None, (score.limits, score.leads, score.trouble))),
+        "false successes": false_successes.hits if (claims >= 0).any() else None,
+        "mark": "; ".join(filter(None, (score.limits, score.leads, trouble))),
         **_interval("time, median", metrics.median_interval(seconds)),
-        "time, 95 %": _known(metrics.effort(seconds).p95),
-        "time, mean": _known(metrics.mean(seconds)),
+        "time, 95 %": _cell(metrics.effort(seconds).p95),
+        "time, mean": _cell(metrics.mean(seconds)),
         **{name: score.outcomes[name] for name in OUTCOMES},
     }
 
 
 def _reachable_row(score: Score) -> Row:
-    reached = score.begun("solved")
+    reached, sizes = score.attempted("solved"), [readings.total(r) for r in score.records]
+    mean = metrics.shifted_geometric_mean(score.penalised, readings.SHIFT, sizes)
     return {
         **_row(score),
         "solved": score.share,
-        **_interval("time, geometric mean", score.mean_time_interval),
-        "time relative to fastest": _known(score.relative_time),
-        **_spread("position residual", score.begun("position")[reached]),
-        **_spread("rotation residual", score.begun("rotation")[reached]),
+        **_interval(MEAN, mean),
+        "time relative to fastest": _cell(score.relative_time),
+        **_spread("position residual", score.attempted("position")[reached]),
+        **_spread("rotation residual", score.attempted("rotation")[reached]),
         "set-up": score.records[0].values.setup,
     }
 
 
 def _unreachable_row(score: Score) -> Row:
-    distances = score.distances
+    row, distances = _row(score), score.distances
     bounds = np.hstack([record.arrays.get("bound", np.nan) for record in score.records])
     return {
-        **_row(score),
-        "mark": "; ".join(filter(None, (score.limits, score.trouble))),
+        **row,
+        "mark": "; ".join(filter(None, (score.limits, row["trouble"]))),
         **_spread("distance above best", distances - score.best_distances[: distances.size]),
         **_spread("distance above lower bound", distances - bounds),
-        **_spread("distance to target", score.begun("position")),
+        **_spread("distance to target", score.attempted("position")),
         "answers within limits": int(np.isfinite(distances).sum()),
     }
 
 
-def _known(number: float) -> float | None:
+def _cell(number: float) -> float | None:
     return None if math.isnan(number) else number
 
 
 def _interval(title: str, interval: metrics.Interval) -> Row:
     titles = (title, f"{title}, 95 % low", f"{title}, 95 % high")
-    return dict(zip(titles, map(_known, interval), strict=True))
+    return dict(zip(titles, map(_cell, interval), strict=True))
 
 
 def _spread(title: str, numbers: metrics.Floats) -> Row:
     """Return the cells of the median and the largest of the finite numbers."""
     spread = metrics.spread(numbers[np.isfinite(numbers)])
-    return {f"{title}, median": _known(spread.median), f"{title}, largest": _known(spread.largest)}
+    return {f"{title}, median": _cell(spread.median), f"{title}, largest": _cell(spread.largest)}
 
 
 def _measured(rows: Sequence[Row]) -> dict[str, str]:
@@ -185,7 +181,7 @@ def _layout(
 ) -> Layout:
     """Return a table of scores; solvers with the same robots and starts are compared."""
     return Layout(
-        **{**_CAPTIONS.of(name, _measured), **fields},
+        **{**CAPTIONS.of(name, _measured), **fields},
         subjects=lambda results: map(row, scores(results)),
         compared=2,
         ranked=lambda row: row["score"].is_ranked,
@@ -199,11 +195,11 @@ def _points(rows: Sequence[Row]) -> Iterator[str]:
         if success.order:
             solvers = {row["solver"]: row for row in field}
             fastest = solvers[time.order[0]]
-            mean, low, high = fastest["score"].mean_time_interval
+            low, high = (fastest[f"{MEAN}, 95 % {bound}"] for bound in ("low", "high"))
             yield (
                 f"{robots}, {start}: {leaders(success)}, "
                 f"{words(solvers[success.order[0]]['solved'])}; least time "
-                f"{leaders(time)}, {words_in(mean, 'µs')} ({words(in_unit(low, 'µs'))}–"
+                f"{leaders(time)}, {words_in(fastest[MEAN], 'µs')} ({words(in_unit(low, 'µs'))}–"
                 f"{words(in_unit(high, 'µs'))}, n = {words(fastest['targets'])})"
             )
 
@@ -234,14 +230,14 @@ def _stratum(stratum: int, *scores: Score) -> metrics.Share:
 
 
 def _outcome_columns(rows: Sequence[Row]) -> list[Column]:
-    """Return a column for each outcome, folded if it never occurs, and one for each stratum."""
+    """Return the columns of outcomes, folded if they never occur, and of strata."""
 
     def column(title: str, **looks: Any) -> Column:
         return Column(title, read=lambda row: row[title], **looks)
 
     strata = [title for title in (rows[0] if rows else ()) if title.startswith("solved, ")]
     return [
-        *_CAPTIONS.columns("robots_outcomes"),
+        *CAPTIONS.columns("robots_outcomes"),
         *(column(name, folded=not any(row[name] for row in rows)) for name in OUTCOMES),
         column("targets"),
         *(column(title, note=INTERVAL, best="greatest", folded=True) for title in strata),
@@ -277,14 +273,17 @@ outcomes = _layout(
 
 
 def _unreachable_summary(rows: Sequence[Row]) -> Summary:
-    liars = [row["score"] for row in rows if row["false successes"]]
-    if liars:
-        points = (f"{s.robots}, {s.solver}: {words(s.false_successes)}" for s in liars)
+    points = [
+        f"{row['robots']}, {row['solver']}: {words(row['false success rate'])}"
+        for row in rows
+        if row["false successes"]
+    ]
+    if points:
         return listing("Claimed as solved though out of reach:", points)
-    count = sum(row["score"].claims for row in rows)
+    count = sum(row["claims"] for row in rows)
     silent = list(dict.fromkeys(row["solver"] for row in rows if row["false successes"] is None))
     without_claims = f" These make no claims: {listed(silent)}." if silent else ""
-    sentence = "No solver that makes claims claims a target that is out of reach"
+    sentence = "No solver claims that a target out of reach is solved"
     return Summary(f"{sentence} (n = {words(count)}).{without_claims}")
 
 

@@ -12,7 +12,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
 
     Attributes:
         solved: whether the evaluation finds the target solved.
-        claimed: 1 or 0 as the solver claims, or -1 if it makes no claims.
+        claims: 1 or 0 as the solver claims, or -1 if it makes no claims.
         seconds: how long each took [s].
         position, rotation: distance of the effectors from the target [m], [rad]; NaN without an
             answer.
@@ -24,7 +24,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
     """
 
     solved: Booleans1 | None = None
-    claimed: Integers1 | None = None
+    claims: Integers1 | None = msgspec.field(default=None, name="claimed")
     seconds: Floats1 | None = None
     position: Floats1 | None = None
     rotation: Floats1 | None = None
@@ -36,7 +36,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         """Refuse records of which some arrays are missing, or of other lengths."""
-        names = ("solved", "claimed", "seconds", "position", "rotation", "beyond", "stratum")
+        names = ("solved", "claims", "seconds", "position", "rotation", "beyond", "stratum")
         if len({np.shape(getattr(self, name)) for name in names}) > 1:
             raise ValueError("solved: expected as many entries in every array")
 

@@ -1,4 +1,4 @@
-"""Faulty and honest solvers, judged by `plumbob verify` one by one."""
+"""Faulty and honest solvers, each judged by `plumbob verify`."""
 
 from collections.abc import Iterator
 from functools import partial

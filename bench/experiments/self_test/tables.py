@@ -1,16 +1,15 @@
 """Which planted faults `plumbob verify` catches and names, and which honest solvers it accuses."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import grouped, listed
 from ...tables.table import Summary
 
 
-def _row(record: Record) -> dict[str, Any]:
+def _row(record: Record) -> Row:
     """Return a row; an honest solver has no fault, and a faulty one is not accused."""
     trial, details = record.values, record.details
     return {
@@ -24,7 +23,7 @@ def _row(record: Record) -> dict[str, Any]:
     }
 
 
-def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+def _summary(rows: Sequence[Row]) -> Summary:
     families = grouped(rows, lambda row: str(row["solvers"]))
     failures = [
         f"{row['solvers']}: {row['fault or honest solver']}"
@@ -35,13 +34,13 @@ def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
     return Summary(f"{_counts(rows)}:", (*failures, *points))
 
 
-def _counts(rows: Sequence[dict[str, Any]]) -> str:
+def _counts(rows: Sequence[Row]) -> str:
     """Return how many faults are caught and named, and how many honest solvers are accused."""
     faults = [row for row in rows if row["record"].details.faulty]
-    caught, named, accused = (
+    caught, correct, accused = (
         sum(bool(row[title]) for row in rows) for title in ("caught", "named", "accused")
     )
-    planted = f"{caught} of {len(faults)} planted faults caught, {named} named"
+    planted = f"{caught} of {len(faults)} planted faults caught, {correct} named"
     honest = f"{accused} of {len(rows) - len(faults)} honest solvers accused"
     return "; ".join([planted] * bool(faults) + [honest] * (len(faults) < len(rows)))
 

@@ -107,7 +107,11 @@ class DaskExecutor(Executor):
 
     def note_records(self, records: Iterable[Record | None]) -> None:
         """Choose the machine that times are taken on: the available one with the most records."""
-        self._records = [r for r in records if r and r.arrays and not unlike(r.stamp, stamp())]
+        self._records = [
+            record
+            for record in records
+            if record and record.arrays and not unlike(record.stamp, stamp())
+        ]
         recorded = Counter(_machine(record.stamp) for record in self._records)
         workers = Counter(place.machine for place in self._places.values())
         self._machine = max(sorted(workers), key=lambda name: (recorded[name], workers[name]))

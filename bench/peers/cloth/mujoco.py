@@ -52,7 +52,9 @@ def _engine(system: MassSpring, flex: bool) -> MujocoMassSpring:
     key = flex, system.particle_count
     if key in _engines:
         cached, engine = _engines[key]
-        if all(np.array_equal(getattr(cached, n), getattr(system, n)) for n in _BUILT_FROM):
+        if all(
+            np.array_equal(getattr(cached, part), getattr(system, part)) for part in _BUILT_FROM
+        ):
             return engine
     engine = MujocoFlex(system) if flex else MujocoMassSpring(system)
     _engines[key] = system, engine

@@ -101,5 +101,5 @@ def colours(springs: IndexArray, particle_count: int) -> list[IndexArray]:
     colour = np.full(particle_count, -1)
     for i, adjacent in enumerate(neighbours):
         used = set(colour[adjacent])
-        colour[i] = next(c for c in range(particle_count) if c not in used)
-    return [np.flatnonzero(colour == c) for c in range(colour.max() + 1)]
+        colour[i] = next(number for number in range(particle_count) if number not in used)
+    return [np.flatnonzero(colour == number) for number in range(colour.max() + 1)]

@@ -174,11 +174,13 @@ def _triangles(size: int) -> IndexArray:
     for grid in (at, at.T):
         neighbours = np.concatenate([grid[1:-1, 1:], grid[1:-1, -2:-1]], axis=1)
         groups.append((grid[:-2], neighbours, grid[2:]))
-    return np.concatenate([np.stack([x.ravel() for x in g], axis=1) for g in groups])
+    return np.concatenate(
+        [np.stack([corner.ravel() for corner in group], axis=1) for group in groups]
+    )
 
 
 def wavefront(vertices: FloatArray, triangles: IndexArray) -> str:
     """Return a mesh as the text of an OBJ file."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (triangles + 1).tolist()]
+    lines = ["v {!r} {!r} {!r}".format(*vertex) for vertex in vertices.tolist()]
+    lines += ["f {} {} {}".format(*triangle) for triangle in (triangles + 1).tolist()]
     return "\n".join([*lines, ""])

@@ -62,7 +62,7 @@ def prepare(
 
 def kinematics(robot: Robot) -> Forward:
     """Return Drake's forward kinematics of the effectors."""
-    plant, _ = drake_plant(robot)
+    plant = drake_plant(robot)[0]
     context, coordinates = plant.CreateDefaultContext(), _Coordinates(robot, plant)
     frames = [plant.GetFrameByName(effector) for effector in robot.effectors]
 
@@ -109,25 +109,26 @@ class _Coordinates:
         """Find the first coordinate of each joint in the robot and in Drake."""
         self._size, self._drake_size = len(robot.lower), plant.num_positions()
         self._hinges, self._balls = list[tuple[int, int]](), list[tuple[int, int]]()
-        i = 0
+        index = 0
         for name in robot.joints:
-            k = plant.GetJointByName(name).position_start()
-            (self._balls if i in robot.balls else self._hinges).append((i, k))
-            i += 4 if i in robot.balls else 1
+            offset = plant.GetJointByName(name).position_start()
+            (self._balls if index in robot.balls else self._hinges).append((index, offset))
+            index += 4 if index in robot.balls else 1
 
     def to_drake(self, q: FloatArray) -> FloatArray:
         converted = np.zeros(self._drake_size)
-        for i, k in self._hinges:
-            converted[k] = q[i]
-        for i, k in self._balls:
-            quaternion = Quaternion(q[i : i + 4] / np.linalg.norm(q[i : i + 4]))
-            converted[k : k + 3] = RollPitchYaw(quaternion).vector()
+        for index, offset in self._hinges:
+            converted[offset] = q[index]
+        for index, offset in self._balls:
+            quaternion = Quaternion(q[index : index + 4] / np.linalg.norm(q[index : index + 4]))
+            converted[offset : offset + 3] = RollPitchYaw(quaternion).vector()
         return converted
 
     def from_drake(self, converted: FloatArray) -> FloatArray:
         q = np.zeros(self._size)
-        for i, k in self._hinges:
-            q[i] = converted[k]
-        for i, k in self._balls:
-            q[i : i + 4] = RollPitchYaw(converted[k : k + 3]).ToQuaternion().wxyz()
+        for index, offset in self._hinges:
+            q[index] = converted[offset]
+        for index, offset in self._balls:
+            angles = RollPitchYaw(converted[offset : offset + 3])
+            q[index : index + 4] = angles.ToQuaternion().wxyz()
         return q

@@ -33,10 +33,11 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
                 outputs.append(attempt(solve_once))
                 if is_success(outputs[-1]):
                     break
-            last = next((o for o in reversed(outputs) if o.q is not None), outputs[-1])
+            answers = [output for output in outputs if output.q is not None]
+            last = answers[-1] if answers else outputs[-1]
             claim = None if last.claim is None else is_success(last)
-            error = next((o.error for o in outputs if o.error), "")
-            return SolverOutput(last.q, claim, total(o.time for o in outputs), error)
+            error = next((output.error for output in outputs if output.error), "")
+            return SolverOutput(last.q, claim, total(output.time for output in outputs), error)
 
         return solve
 

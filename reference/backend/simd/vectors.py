@@ -14,8 +14,7 @@ changed and stored whole. Three right-hand sides leave the fourth at zero.
 import numpy as np
 
 from ...quaternion import load_quaternion, load_vector, made_unit, store_quaternion, store_vector
-from ..compiled import bind, compiled_in
-from ..digest import PythonKernel
+from ..compiled import PythonKernel, bind, compiled_in
 
 # Doubles in a register of AVX-512, or two of AVX.
 LANES = 8

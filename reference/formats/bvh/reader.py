@@ -15,13 +15,13 @@ from ...articulation import Articulation
 from ...kinematics import forward_kinematics
 from ...quaternion import IDENTITY, multiply
 from ...skeleton import Pose, Skeleton, checked_skeleton
-from ..robot import MOST_JOINTS, ORIGIN
+from ..robot import MAX_JOINTS, ORIGIN
 from ..source import read_text, warn
 
 # Frames times joints, so that a motion needs at most about a gigabyte.
-MOST_POSES = 20_000_000
+MAX_POSES = 20_000_000
 # In a line of the hierarchy.
-MOST_CHARACTERS = 100_000
+MAX_CHARACTERS = 100_000
 CHANNEL = re.compile(r"([XYZ])(POSITION|ROTATION)", re.IGNORECASE)
 COUNT = re.compile(r"[0-9]{1,9}")
 LINE = re.compile(r"\S[^\n]*")
@@ -128,10 +128,13 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
     tree = _Tree()
     for line in lines:
         if line.upper() == "MOTION":
-            tree.check_complete()
+            if tree.path or not tree.joints:
+                path = [tree.joints[j].name for j in tree.path]
+                got = f"{path[-1]!r:.40} still open" if path else "none"
+                raise ValueError(f"expected complete joints before MOTION, got {got}")
             return tree.joints
-        if len(line) > MOST_CHARACTERS:
-            raise ValueError(f"expected lines of at most {MOST_CHARACTERS:,} characters")
+        if len(line) > MAX_CHARACTERS:
+            raise ValueError(f"expected lines of at most {MAX_CHARACTERS:,} characters")
         for piece in BRACES.split(line):
             if piece.strip():
                 tree.take(piece.strip())
@@ -181,8 +184,8 @@ class _Tree:
         name = f"{self.joints[parent].name} end" if word == "END" else name
         if not name or name in self.names:
             raise ValueError(f"expected a name of its own, got {name!r:.40}")
-        if len(self.joints) == MOST_JOINTS:
-            raise ValueError(f"expected at most {MOST_JOINTS:,} joints, got more")
+        if len(self.joints) == MAX_JOINTS:
+            raise ValueError(f"expected at most {MAX_JOINTS:,} joints, got more")
         self.path.append(len(self.joints))
         self.names.add(name)
         self.joints.append(_Joint(name, parent, word == "END"))
@@ -195,12 +198,6 @@ class _Tree:
         self.path.pop()
         if joint.is_end and joint.offset == ORIGIN:
             self.names.remove(self.joints.pop().name)
-
-    def check_complete(self) -> None:
-        """Raise a ValueError if there is no joint or a joint is still open."""
-        if self.path or not self.joints:
-            got = f"{self.joints[self.path[-1]].name!r:.40} still open" if self.path else "none"
-            raise ValueError(f"expected complete joints before MOTION, got {got}")
 
 
 def _set_channels(joint: _Joint, text: str = "") -> None:
@@ -238,8 +235,8 @@ def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, Floa
     if frame_time <= 0.0:
         raise ValueError(f"expected a frame time greater than 0, got {frame_time:g}")
     count, width = int(count_text), sum(len(joint.channels or ()) for joint in joints)
-    if count * len(joints) > MOST_POSES:
-        raise ValueError(f"expected at most {MOST_POSES:,} frames times joints, got more")
+    if count * len(joints) > MAX_POSES:
+        raise ValueError(f"expected at most {MAX_POSES:,} frames times joints, got more")
     if count and (width == 0 or 2 * count * width > size):  # two characters a number
         raise ValueError(f"expected {count:,} frames of {width:,} numbers, got a shorter file")
     values = np.empty((count, width))

@@ -65,11 +65,17 @@ def format(
     arguments.choice("order", order, ORDERS)
     frame_time = arguments.number("frame_time", frame_time, above=0.0)
     if isinstance(skeleton, Articulation):
-        x, R = _articulated(skeleton, local_rotations, offsets)
+        if offsets is not None:
+            got = "beside an Articulation's coordinates, got some"
+            raise ValueError(f"offsets: expected none {got}")
+        q = skeleton.checked("local_rotations", local_rotations)
+        x, R = skeleton.local_transforms(_framed("local_rotations", q, 2))
         skeleton = skeleton.skeleton
     else:
         x, R = _rotated(checked_skeleton(skeleton), local_rotations, offsets)
-    _check_names(skeleton)
+    for name in skeleton.names:
+        if name != " ".join(name.split()) or set(name) & set("{}\0"):
+            raise ValueError(f"skeleton: expected names without braces or line ends, got {name!r}")
     shifts = (x != skeleton.offsets).any(axis=(0, 2))
     shifts[0] = True
     ends = _end_sites(skeleton, R, shifts)
@@ -108,17 +114,6 @@ def euler_angles(R: FloatArray, order: str) -> FloatArray:
     return angles - 360.0 * np.round(angles[:1] / 360.0)
 
 
-def _articulated(
-    articulation: Articulation, q: ArrayLike, offsets: ArrayLike | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return offsets and local rotations of each frame from coordinates."""
-    if offsets is not None:
-        raise ValueError("offsets: expected none beside an Articulation's coordinates, got some")
-    return articulation.local_transforms(
-        _framed("local_rotations", articulation.checked("local_rotations", q), 2)
-    )
-
-
 def _rotated(
     skeleton: Skeleton, local_rotations: ArrayLike, offsets: ArrayLike | None
 ) -> tuple[FloatArray, FloatArray]:
@@ -141,12 +136,6 @@ def _framed(name: str, values: FloatArray, axes: int) -> FloatArray:
     if values.ndim not in (axes - 1, axes):
         raise ValueError(f"{name}: expected one pose or a row of frames, got {values.shape}")
     return values if values.ndim == axes else values[None]
-
-
-def _check_names(skeleton: Skeleton) -> None:
-    for name in skeleton.names:
-        if name != " ".join(name.split()) or set(name) & set("{}\0"):
-            raise ValueError(f"skeleton: expected names without braces or line ends, got {name!r}")
 
 
 def _children(skeleton: Skeleton) -> list[list[int]]:

@@ -77,7 +77,11 @@ class CompilerSettings(NamedTuple):
             raise element.error(f"expected one orientation, got {' and '.join(present)}")
         match present:
             case ["quat"]:
-                return _normalised(element, "quat", element.numbers("quat", IDENTITY))
+                q = element.numbers("quat", IDENTITY)
+                if not 0.0 < magnitude(q) < math.inf:
+                    got = repr(element.word("quat"))
+                    raise element.error(f"expected a quaternion in 'quat', got {got:.80}")
+                return normalised(q)
             case ["axisangle"]:
                 x, y, z, angle = element.numbers("axisangle", (0.0, 0.0, 0.0, 0.0))
                 axis = direction(element, "axisangle", (x, y, z))
@@ -141,12 +145,6 @@ def _from_axes(element: Element, axes: Sequence[float]) -> Quaternion:
     y = direction(element, "xyaxes", subtract(y, scale(dot(x, y), x)))
     w, i, j, k = rotation.from_matrix(np.transpose([x, y, cross(x, y)]))
     return float(w), float(i), float(j), float(k)
-
-
-def _normalised(element: Element, name: str, q: Quaternion) -> Quaternion:
-    if not 0.0 < magnitude(q) < math.inf:
-        raise element.error(f"expected a quaternion in {name!r}, got {element.word(name)!r:.80}")
-    return normalised(q)
 
 
 def _classes(root: Element) -> dict[str, dict[str, str]]:

@@ -308,23 +308,17 @@ def test_a_long_chain_is_no_trouble():
 WRONG = {
     "two orientations": ('<body quat="1 0 0 0" euler="0 0 0"/>', "got quat and euler"),
     "no quaternion": ('<body quat="0 0 0 0"/>', "expected a quaternion in 'quat', got '0 0 0 0'"),
-    "no axis of a rotation": ('<body axisangle="0 0 0 1"/>', "expected a direction in 'axisangle'"),
-    "no z axis": ('<body zaxis="0 0 0"/>', "expected a direction in 'zaxis'"),
     "parallel axes": ('<body xyaxes="1 0 0 2 0 0"/>', "expected a direction in 'xyaxes'"),
     "no axis": ('<body><joint axis="0 0 0"/></body>', "expected a direction in 'axis'"),
     "two numbers": ('<body pos="1 2"/>', "expected 3 numbers in 'pos', got '1 2'"),
     "numbers without end": (f'<body pos="{"1 " * 9**6}"/>', "at most 2,000 characters in 'pos'"),
-    "a name without end": (f'<body name="{"a" * 9**6}"/>', "at most 2,000 characters in 'name'"),
-    "not a number": ('<body pos="nan 0 0"/>', "expected 3 numbers in 'pos', got 'nan 0 0'"),
     "another type": ('<body><joint type="screw"/></body>', "one of hinge, slide, ball, free"),
     "a joint of the world": ("<joint/>", "expected no joint in the world"),
     "a free joint inside": ("<body><body><freejoint/></body></body>", "a single free joint"),
     "a free joint and another": ("<body><freejoint/><joint/></body>", "a single free joint"),
     "an aligned joint": ('<body><freejoint align="true"/></body>', "not aligned"),
     "no class": ('<body childclass="c"/>', "expected a default class, got 'c'"),
-    "no class of a joint": ('<body><joint class="c"/></body>', "expected a default class, got 'c'"),
     "a body twice": ('<body name="a"/><body name="a"/>', "a body's name once, got 'a' twice"),
-    "another world": ('<body name="world"/>', "expected a body's name once, got 'world' twice"),
     "a joint twice": (
         '<body><joint name="j"/><joint name="j"/></body>', "a joint's name once, got 'j' twice"
     ),
@@ -336,9 +330,7 @@ WRONG = {
     ),
     "perhaps a limit": ('<body><joint limited="1"/></body>', "one of true, false, auto"),
     "copies": ('<body><replicate count="9"><body/></replicate></body>', "got a rule for some"),
-    "an attachment": ('<attach model="m"/>', "<attach>: expected every body to be written out"),
     "a composite": ('<body><composite type="cable"/></body>', "got a rule for some"),
-    "a flexible body": ('<frame><flexcomp name="f"/></frame>', "got a rule for some"),
     "too many": ("<body/>" * 10_001, "expected at most 10,000 joints, got 10,002"),
 }  # fmt: skip
 WRONG_HEADS = {

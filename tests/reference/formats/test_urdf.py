@@ -166,7 +166,6 @@ WRONG = {
         link("c", "a", "b") + joint("j", "a", "b") + joint("k", "b", "a"),
         "expected a path to the root 'c', got a ring",
     ),
-    "itself": (link("a", "b") + joint("j", "b", "b"), "expected a path to the root 'a'"),
     "a missing link": (link("a") + joint("j", "a", "b"), "a <link> of that name, got none: 'b'"),
     "two parents": (
         link("a", "b") + joint("j", "a", "b") + joint("k", "a", "b"),
@@ -175,7 +174,6 @@ WRONG = {
     "a link twice": (link("a", "a"), "expected a link's name once, got it twice"),
     "a joint twice": (link(*"abc") + joint("j", "a", "b") + joint("j", "a", "c"), "name once"),
     "a link without a name": ("<link/>", "expected an attribute 'name', got none"),
-    "an empty name": ('<link name=""/>', "expected an attribute 'name', got an empty one"),
     "no parent": (
         link("a") + '<joint name="j" type="fixed"><child link="a"/></joint>',
         "expected a <parent>, got none",
@@ -185,16 +183,11 @@ WRONG = {
         "expected at most one <child>, got 2",
     ),
     "another type": (link("a", "b") + joint("j", "a", "b", "hinge"), "expected one of fixed, rev"),
-    "no type": (link("a") + '<joint name="j"/>', "expected an attribute 'type'"),
     "no axis": (link("a", "b") + joint("j", "a", "b", inside='<axis xyz="0 0 0"/>'), "not zero"),
     "no limit": (link("a", "b") + joint("j", "a", "b", limit=""), "<limit> of a revolute joint"),
     "two numbers": (
         link("a", "b") + joint("j", "a", "b", inside='<origin xyz="1 2"/>'),
         "expected 3 numbers in 'xyz', got '1 2'",
-    ),
-    "not a number": (
-        link("a", "b") + joint("j", "a", "b", inside='<origin xyz="1 2 nan"/>'),
-        "expected 3 numbers in 'xyz', got '1 2 nan'",
     ),
     "no leader": (
         link("a", "b") + joint("j", "a", "b", inside='<mimic joint="k"/>'),
@@ -223,10 +216,7 @@ WRONG = {
         '<xacro:macro name="m"/>' + link("a"),
         "<xacro:macro name='m'>: expected a URDF file, got xacro: run xacro first",
     ),
-    "a macro inside": (link("a") + '<link name="b"><xacro:box/></link>', "run xacro first"),
-    "a macro's attribute": ('<link name="a" xacro:if="1"/>', "got xacro: run xacro first"),
     "a name of a macro": ('<link name="${prefix}base"/>', "${prefix}base': run xacro first"),
-    "an argument of a macro": ('<link name="$(arg prefix)"/>', "run xacro first"),
 }  # fmt: skip
 
 

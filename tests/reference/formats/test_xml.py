@@ -41,21 +41,14 @@ BILLION_LAUGHS = '<!DOCTYPE lolz [<!ENTITY a "ha">{}]>'.format(
 )
 HOSTILE = {
     "empty": ("", "well-formed XML, got no element found"),
-    "no XML": ("HIERARCHY\nROOT hip", "well-formed XML, got syntax error"),
     "cut short": ("<{root}><body>", "well-formed XML, got no element found"),
-    "a closing tag too many": ("<{root}></{root}></{root}>", "well-formed XML"),
     "an attribute twice": ('<{root} a="1" a="2"/>', "well-formed XML, got duplicate attribute"),
-    "an unknown entity": ('<{root} a="&b;"/>', "well-formed XML, got undefined entity"),
     "a NUL": ("<{root}>\0</{root}>", "well-formed XML"),
     "half a surrogate": ("<{root}>\ud800<{root}>", "well-formed XML"),
     "entities without end": (BILLION_LAUGHS + '<{root} a="&i;"/>', "no document type"),
     "a file's content": (
         '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><{root} a="b">&x;</{root}>',
         "no document type",
-    ),
-    "a document type from elsewhere": (
-        '<!DOCTYPE r SYSTEM "http://localhost/r.dtd"><{root}/>',
-        "no document type, got <!DOCTYPE r",
     ),
     "a million elements in each other": ("<{root}>" + "<body>" * 10**6, "at most 500"),
     "a million elements in a row": ("<{root}>" + "<link/>" * 10**6, "at most 100,000 elements"),
