@@ -46,7 +46,7 @@ def headlines(report: Report, folder: Path) -> str:
     if verdict := report.answers.verdict:
         rows.append(
             f"| Is the reference right? | {verdict.holding} of {verdict.total} claims hold "
-            f"| the narrowest uses {words(100 * verdict.used)} % of its tolerance |"
+            f"| the largest difference uses {words(100 * verdict.used)} % of its tolerance |"
         )
     rows += [
         f"| {line.chapter.capitalize()}, {line.question.lower()} | {line.answer} | {line.detail} |"

@@ -402,11 +402,11 @@ def test_from_measuring_to_the_page(capsys, empty_folder, monkeypatch):
     assert (code, err) == (0, "")
     count = int(out.split()[0])
     assert count > 0
-    assert f"{count} measured, 0 kept" in out
+    assert f"{count} measured, 0 already on record" in out
     code, out, _ = plumbob(capsys, "bench", "arm", "--quick", "-o", "out")
     assert f"0 measured, {count} kept" in out
     code, out, _ = plumbob(capsys, "bench", "arm", "--quick", "--fresh", "-o", "out")
-    assert f"{count} measured, 0 kept" in out
+    assert f"{count} measured, 0 already on record" in out
     code, out, err = plumbob(capsys, "report", "-o", "out")
     assert (code, err) == (0, "")
     assert re.search("(?s)Missing: Not run: check, .*`plumbob bench check .*` measures", out)

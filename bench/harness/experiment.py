@@ -14,16 +14,16 @@ from .block import Block, Scale
 SUITES = {
     "check": "the reference against Pinocchio and MuJoCo, claim by claim",
     "self_test": "planted faults and honest solvers, judged by plumbob verify",
-    "robot_models": "robots and characters from files of others, beside both engines",
-    "ik": "a chain of ten ball joints, robots and a character, beside every solver installed",
-    "tracking": "closed curves: frames from rest, from the last solution, and coherently",
-    "arm": "the lab's arm on every curve, and reaching for what is too far",
+    "robot_models": "published robot and character files, read by Plumbob and both engines",
+    "ik": "ten ball joints, robots and a character, by every installed solver",
+    "tracking": "closed curves: frames from rest, from the last solution, and all together",
+    "arm": "the lab's arm on every curve and at targets out of reach",
     "pictures": "the poses and cloths that the report draws",
-    "cloth": "the lab's cloth at three stiffnesses: convergence; one cloth for every solver",
-    "newton": "one step of a heavy cloth by every solver: how far from a minimiser, proven",
-    "energy": "what integrators do to the energy of a cloth over 10,000 steps",
-    "timing": "forward kinematics, solves and steps beside both engines",
-    "cloth_scale": "cloths of a thousand particles and more: factors, solves, memory",
+    "cloth": "the lab's cloth at three stiffnesses; a falling cloth by every solver",
+    "newton": "one step of a heavy cloth by every solver, with proven error bounds",
+    "energy": "the energy of a cloth over 10,000 steps of each integrator",
+    "timing": "times of forward kinematics, solves and steps, with both engines",
+    "cloth_scale": "time and memory of factorisations and solves of large cloths",
 }
 
 

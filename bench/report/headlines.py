@@ -145,7 +145,7 @@ def _robot_headlines(results: Results, start: str) -> Iterator[Headline]:
     detail = f"too near to tell{place}"
     if len(fastest) == 1:
         lead = speed(ratio_of_times(scores[second], scores[first]), second)
-        detail = f"{lead}{place}, misses penalised"
+        detail = f"{lead}{place}, failures penalised"
     detail += f", {finishers}" if len(scores) < count else ""
     question = f"Fastest, {start}"
     yield Headline("kinematics", question, _leaders(fastest), detail, "robots_overall")
@@ -224,7 +224,7 @@ def _most_often_first(
         span = "–".join(dict.fromkeys(map(words, metrics.extent(np.array(factors)))))
         sentences.append(f"{span} times faster than the next on {len(factors)} of {total}")
     if unopposed := len(wins) - len(factors):
-        only = f"the only one of {engines} engines to get there in time"
+        only = f"the only one of {engines} engines that reached it in time"
         sentences.append(f"{only} on {unopposed} of {total}")
     return leaders[0], listed(sentences)
 

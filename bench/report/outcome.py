@@ -79,7 +79,7 @@ def _verdict(verdict: ClaimCount | None) -> str:
         return "Right? Not checked yet: run `plumbob bench check`."
     if verdict.holding < verdict.total:
         return f"WRONG: {verdict.total - verdict.holding} of {verdict.total} claims are missed."
-    margin = f"the narrowest uses {words(100.0 * verdict.used)} % of its tolerance"
+    margin = f"the largest difference uses {words(100.0 * verdict.used)} % of its tolerance"
     return f"Right: {verdict.holding} of {verdict.total} claims hold, {margin}."
 
 

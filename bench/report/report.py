@@ -100,7 +100,7 @@ def _missing(results: Results, newest: Record) -> Iterator[str]:
             " that have a wheel for this Python; `plumbob bench ik cloth` then measures them."
         )
     if names := not_asked(results):
-        yield f"Not asked: {listed(names)}. `plumbob bench ik cloth` asks all."
+        yield f"Not selected: {listed(names)}. `plumbob bench ik cloth` measures all."
     if count := sum(record.stamp != newest.stamp for record in results.every):
         yield (
             f"{count} of {len(results.every)} records are from other sources, versions or another "

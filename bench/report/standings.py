@@ -88,16 +88,17 @@ def _rank(row: Score, rows: Mapping[str, Score]) -> tuple[str, str]:
     if len(order) > 1:
         rivals = _fastest([solver for solver in row.time.order if solver != row.solver])
         speeds = [speed(ratio_of_times(rows[rival], row), rival) for rival in rivals]
-        details.append(f"{listed(speeds)}, misses penalised")
+        details.append(f"{listed(speeds)}, failures penalised")
     place = 1 if row.solver in first else order.index(row.solver) + 1
     tie = " (tie)" if row.solver in first and len(first) > 1 else ""
     return f"rank {place} {of_finishers(len(order), len(rows))}{tie}", "; ".join(details)
 
 
 def of_finishers(finished: int, count: int) -> str:
-    """Return "of 5 solvers" or, if fewer finished, "of the 4 of 5 solvers that finished"."""
+    """Return "of 5 solvers" or, if fewer finished, "among the 4 of 5 solvers that finished"."""
     solvers = counted(count, "solver")
-    return f"of {solvers}" if finished == count else f"of the {finished} of {solvers} that finished"
+    among_finished = f"among the {finished} of {solvers} that finished"
+    return f"of {solvers}" if finished == count else among_finished
 
 
 def solved(share: metrics.Share, noun: str) -> str:

@@ -135,8 +135,8 @@ def steadiness(noise: float) -> str:
     """
     if math.isnan(noise):
         return ""
-    variation = f"a fixed loop timed meanwhile varied by ± {round(100 * noise, 1):g} %"
-    aim = f"{100 * PRECISION:g} % that are aimed at"
+    variation = f"the time of a fixed loop varied by ± {round(100 * noise, 1):g} %"
+    goal = f"{100 * PRECISION:g} %"
     if noise > PRECISION:
-        return f"The machine was too noisy for the {aim}: {variation}."
-    return f"The machine was steady within the {aim}: {variation}."
+        return f"The machine was too noisy for a precision of {goal}: {variation}."
+    return f"The machine was steady within {goal}: {variation}."

@@ -190,10 +190,10 @@ def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -
         for finding in judgement.findings:
             if finding.verdict >= Verdict.WRONG:
                 return sentence(
-                    "The first law to break is '{law}', at joint {joint} of the case '{case}': "
+                    "The first violated law is '{law}', at joint {joint} of the case '{case}': "
                     "{why}"
                     if at_joints and finding.index is not None
-                    else "The first law to break is '{law}', in the case '{case}': {why}",
+                    else "The first violated law is '{law}', in the case '{case}': {why}",
                     law=finding.law,
                     joint=finding.index,
                     case=judgement.case.name,
@@ -216,7 +216,7 @@ def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
         ))  # fmt: skip
     if "untouched inputs" in broken:
         hints.append(sentence(
-            "The solver writes into the skeleton that it is given, so that every later answer "
-            "is about another skeleton. Copy what you change."
+            "The solver modifies the skeleton that it receives, so every later answer is for a "
+            "different skeleton. Copy what you change."
         ))  # fmt: skip
     return tuple(hints)

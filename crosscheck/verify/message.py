@@ -169,7 +169,7 @@ def decode_error(fields: Mapping[str, Any]) -> Failure:
         exception, file = (shown(str(fields.get(key, ""))) for key in ("exception", "file"))
         line = fields.get("line")
         return raised(exception, reason, file, line if isinstance(line, int) else 0)
-    return Failure(FailureKind.REFUSED, sentence("It says that it cannot: {why}", why=reason))
+    return Failure(FailureKind.REFUSED, sentence("The solver reports an error: {why}", why=reason))
 
 
 def _why_untimed(own: object, seconds: float) -> Sentence | None:

@@ -50,7 +50,7 @@ EXAMPLES = "\n\n".join([
     ),
     block(
         "Your solver",
-        ("plumbob bench ik --with my_ik.py", "in all tables beside the peers"),
+        ("plumbob bench ik --with my_ik.py", "in all tables, with the peers"),
         "plumbob bench cloth --with my_package.cloth:Solver",
         "plumbob bench ik --with 'Mine 2=my_ik.py' --with my_ik_before.py",
         "plumbob bench ik -- ./my_solver --flag",
@@ -80,16 +80,16 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     ] = None,
     solver: Annotated[Texts, option("NAME", "Measure only this solver; repeatable.")] = None,
     problem: Annotated[
-        Texts, option("NAME", "Measure only this problem, or your .py, model or folder.")
+        Texts, option("NAME", "Only this problem, or your .py, model or folder.")
     ] = None,
     robot: Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")] = None,
     targets: Annotated[
-        int | None, option("N", "Random targets a problem; a tenth for robots.")
+        int | None, option("N", "Random targets per problem; for robots a tenth.")
     ] = None,
     effector: Annotated[
-        Text, option("NAME", "Link of your models that reaches the target.")
+        Text, option("NAME", "Link of your models that must reach the target.")
     ] = None,
-    pins: Annotated[Text, option("RULE", "Pins of your OBJ: far, top, or such as 0,10.")] = None,
+    pins: Annotated[Text, option("RULE", "Pinned vertices of your OBJ: far, top or 0,10.")] = None,
     listing: Annotated[bool, flag("List problems and solvers, and stop.", "--list")] = False,
     dry: Annotated[bool, flag("List what would be measured, and stop.", "--dry-run")] = False,
     verbose: Annotated[bool, flag("Print every table as well.", "--verbose")] = False,
@@ -97,7 +97,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
         str, option("local|dask://HOST:PORT", "Where to measure; see docs/cluster.md.")
     ] = "local",
     mix_machines: Annotated[
-        bool, flag("With Dask: allow times of several machines in a table.", "--mix-machines")
+        bool, flag("With Dask: mix times of several machines in a table.", "--mix-machines")
     ] = False,
 ) -> int:
     """Measure problems with solvers. Records are kept, so that a run can be continued.
@@ -223,7 +223,7 @@ def _print_counts(events: "Sequence[Event]", output: Path) -> None:
     from plumbob.bench.harness.record import RecordFile
 
     counts = Counter(event.state for event in events)
-    unchanged = visible(f"{counts[run.KEPT]} kept as on record, in {output}")
+    unchanged = visible(f"{counts[run.KEPT]} already on record in {output}")
     print(f"{counts[run.MEASURED]} measured, {unchanged}")
     repeats = Counter(e.message for e in events if e.state == run.MEASURING and e.message)
     for reason, count in repeats.items():

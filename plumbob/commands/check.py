@@ -17,14 +17,12 @@ EXAMPLES = block(
 
 def check(
     claims: Annotated[
-        Texts, argument("CLAIM", "Claims to check, see --list; with --files, paths.")
+        Texts, argument("CLAIM", "Claims to check (see --list), or paths with --files.")
     ] = None,
     names: Annotated[bool, flag("List the claims and stop.", "--list")] = False,
-    files: Annotated[
-        bool, flag("Read files and folders of files with both engines.", "--files")
-    ] = False,
+    files: Annotated[bool, flag("Compare how both engines read robot files.", "--files")] = False,
 ) -> int:
-    """Compare the reference with Pinocchio and MuJoCo, claim by claim; exit 1 on a miss."""
+    """Compare the reference with Pinocchio and MuJoCo, claim by claim; exit 1 if one fails."""
     if files:
         return check_files(claims or [])
     from plumbob.crosscheck.claims import CLAIMS, run_claims

@@ -29,10 +29,11 @@ def compare(
     folders: Annotated[list[Path] | None, argument("[OLD NEW]", "Two folders of records.")] = None,
     *,
     fail: Annotated[
-        str, option("LIMITS", "Exit 1 beyond limits, such as accuracy,time:10%,gone.")
+        str,
+        option("LIMITS", "Exit 1 beyond limits, such as accuracy,time:10%,gone."),
     ] = "",
     rerun: Annotated[
-        str, option("REV", "Measure a revision beside the working copy, in a clone.")
+        str, option("REV", "Measure a revision, in a clone, and the working copy.")
     ] = "",
     suites: Annotated[Texts, option("NAME", "With --rerun: measure this suite.", "--suite")] = None,
     only: Annotated[
@@ -46,7 +47,7 @@ def compare(
 ) -> int:
     """Compare two runs or revisions: faster, slower, more or less accurate.
 
-    Answers are compared to the bit, times by confidence intervals. Differences within the drift of
+    Answers are compared bit by bit, times by confidence intervals. Differences within the drift of
     the machine are undecided; --rerun REV decides them. Exit code 1 if a row fails --fail.
     """
     from plumbob.bench.comparison import compare as comparison
@@ -87,7 +88,9 @@ def _side_by_side(
 def history(
     folders: Annotated[list[Path], argument("FOLDER...", "Folders of records.")],
     *,
-    quantity: Annotated[str, option("NAME", "Array of the records.")] = "seconds",
+    quantity: Annotated[
+        str, option("NAME", "Quantity of the records, such as iterations.")
+    ] = "seconds",
     only: Annotated[
         Texts, option("TEXT", "Problems or solvers with this text; repeatable.")
     ] = None,

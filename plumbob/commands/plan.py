@@ -132,7 +132,7 @@ def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
         for block, reason in zip(selection, reasons, strict=True)
         if reason is not None
     ]
-    lines = [f"{len(steps)} to measure, {len(selection) - len(steps)} kept as on record"]
+    lines = [f"{len(steps)} to measure, {len(selection) - len(steps)} already on record"]
     by_solver: dict[tuple[str, str], list[Step]] = {}
     for step in steps:
         by_solver.setdefault((step.block.suite, step.block.solver), []).append(step)

@@ -28,7 +28,7 @@ Superseded = Annotated[bool, flag("Only records with outdated settings.", "--sup
 
 @app.callback(epilog=block("Examples", LIST, MERGE, DROP))
 def records() -> None:
-    """List, merge or drop records; no other command removes any, except --fresh."""
+    """List, merge or drop records. Only `drop` and the option --fresh delete records."""
 
 
 @app.command("list", cls=Command, epilog=block("Examples", LIST))
@@ -58,7 +58,7 @@ def merge(
     folders: Annotated[list[Path], argument("FOLDER...", "Folders to take records from.")],
     into: Annotated[Path, option("DIR", "Folder to add to.", "--into")],
 ) -> int:
-    """Add the records of folders to another; of two of the same measurement the later counts.
+    """Add the records of folders to another; of repeated measurements, the latest counts.
 
     A failed measurement never replaces a successful one. The folders are not changed.
     """

@@ -31,7 +31,7 @@ def report(  # noqa: PLR0913 -- one parameter an option
     ] = None,
     *,
     output: Annotated[
-        File, option("PATH", "The folder; with --table, a file.", "--output", "-o")
+        File, option("PATH", "Output folder; with --table, output file.", "--output", "-o")
     ] = None,
     name: Annotated[str, option("NAME", "Print one table; see --list.", "--table")] = "",
     form: Annotated[str, option("FORMAT", f"Format: {', '.join(FORMATS)}.", "--format")] = "md",
@@ -41,7 +41,7 @@ def report(  # noqa: PLR0913 -- one parameter an option
     rows: Annotated[
         Texts, option("FILTER", "Rows: solver=Newton, robot~UR, 'median<10' ...")
     ] = None,
-    order: Annotated[str, option("COLUMN", "Sort rows, the best or least first.", "--sort")] = "",
+    order: Annotated[str, option("COLUMN", "Sort rows, best or smallest first.", "--sort")] = "",
     width: Annotated[
         str, option("LENGTH", "Width of LaTeX: column, page, or such as 120mm.")
     ] = "page",

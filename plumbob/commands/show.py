@@ -32,16 +32,16 @@ def show(
         File, option("FILE", "File ending in .gif, .svg, .html or .bvh.", "--output", "-o")
     ] = None,
     solver: Annotated[
-        Text, option("NAME", "Plumbob's solver: fabrik, ccd, ...; of the cloth newton, ...")
+        Text, option("NAME", "Plumbob's solver: fabrik, ccd ...; for the cloth: newton ...")
     ] = None,
     coherent: Annotated[
-        bool, flag("Let the arm move as smoothly as it can, in a loop.", "--coherent")
+        bool, flag("Move the arm as smoothly as possible, in a loop.", "--coherent")
     ] = False,
     yours: Annotated[
         Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")
     ] = None,
 ) -> int:
-    """Write an animation, a picture or a page of the arm drawing a curve, or of the cloth.
+    """Write an animation, a picture or a page of the arm or the cloth.
 
     Your solver moves beside Plumbob's, with errors in colour. The motion of the arm can also be
     written as BVH, which animation programs open.

@@ -59,11 +59,11 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         Text, option("LANGUAGE", "Write a starter: cpp, rust, javascript, ...")
     ] = None,
     export: Annotated[
-        File, option("DIR", "Write cases as files, and stop.", "--export-cases")
+        File, option("DIR", "Write the cases as files and stop.", "--export-cases")
     ] = None,
-    answers: Annotated[File, option("DIR", "Judge the answers to written cases.")] = None,
+    answers: Annotated[File, option("DIR", "Judge the answers to exported cases.")] = None,
     rerun: Annotated[File, option("FILE", "Repeat a saved failing case.")] = None,
-    thorough: Annotated[bool, flag("Ask more cases, which takes longer.", "--thorough")] = False,
+    thorough: Annotated[bool, flag("Run more cases; this takes longer.", "--thorough")] = False,
     seed: Annotated[int, option("", "Seed of the random cases.", min=0)] = 0,
     time_limit: Annotated[float | None, option("SECONDS", "Time limit of one request.")] = None,
     memory_limit: Annotated[int | None, option("MIB", "Memory limit of the solver.", min=1)] = None,
@@ -71,14 +71,14 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     junit: Annotated[File, option("FILE", "Write the verdict as JUnit XML.")] = None,
     html: Annotated[File, option("FILE", "Write the verdict as a page.")] = None,
     output: Annotated[
-        File, option("DIR", "Write all three, and failing cases.", "--output", "-o")
+        File, option("DIR", "Write all three formats and failing cases.", "--output", "-o")
     ] = None,
-    lang: Annotated[Text, option("LANG", "Language: en or zh; else by the locale.")] = None,
+    lang: Annotated[Text, option("LANG", "Language: en or zh; default: the locale.")] = None,
     self_test: Annotated[
-        bool, flag("Test the judge: find every known fault.", "--self-test")
+        bool, flag("Test verify itself with all known faults.", "--self-test")
     ] = False,
 ) -> int:
-    """Judge your solver: is it right, how large are its errors, and which mistake is it?
+    """Judge your solver: is it right, how large are its errors, what is the mistake?
 
     Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 for a wrong command
     or a file that could not be written.
@@ -138,7 +138,7 @@ def _judge(
                 row, description=task, completed=count, total=total))  # fmt: skip
     except NoGreetingError as error:
         raise ValueError(say(sentence(
-            "solver: expected one that can be started: {why}", why=error.failure.sentence
+            "solver: it could not be started: {why}", why=error.failure.sentence
         ))) from None  # fmt: skip
     return files.write(report, question, Presentation(say, language, words))
 

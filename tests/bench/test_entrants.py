@@ -153,7 +153,7 @@ def test_a_changed_file_is_measured_again_and_a_part_forgets_nothing(folder, cap
     asked = ("ik", *SMALL, "--with", "my_ik.py", "--solver", "My FABRIK")
     bench(*asked)
     assert bench(*asked) == 0
-    assert "0 measured, 1 kept" in capsys.readouterr().out
+    assert "0 measured, 1 already" in capsys.readouterr().out
     bench("ik", *SMALL, "--solver", "ccd", "--fresh")
     assert {one.solver for one in records()} == {"My FABRIK", "ccd"}
     (folder / "my_ik.py").write_text(IK + "# changed\n", encoding="utf-8")
@@ -426,14 +426,14 @@ def test_a_dry_run_measures_nothing_and_knows_how_long_it_takes(folder, capsys):
     asked = ("ik", *SMALL, "--with", "my_ik.py")
     assert bench(*asked, "--dry-run") == 0
     told = capsys.readouterr().out
-    assert "8 to measure, 0 kept" in told
+    assert "8 to measure, 0 already" in told
     assert "from budgets" in told
     assert not Path("out").exists()
     bench(*asked, "--solver", "ccd")
     capsys.readouterr()
     bench(*asked, "--dry-run")
     told = capsys.readouterr().out
-    assert "7 to measure, 1 kept" in told
+    assert "7 to measure, 1 already" in told
     assert "from records of others" in told
     assert len(records()) == 1
 

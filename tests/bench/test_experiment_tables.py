@@ -54,9 +54,9 @@ def test_every_letter_of_ours_can_be_typeset(records):
 # Numbers of names, of mathematics, of statistics (`metrics.CONFIDENCE`) and of papers.
 FACTS = re.compile(
     r"Q[123]\.|UR5|PR2|RK4|\((?:[^()]* )?20\d\d\)|(?:Lasenby|Corke) 20\d\d|2(?:\.828)? / ω|y = 0"
-    r"|[Bb]oth are 1 at the start|each of 6 components|1e-15|0/|\b95 %|less than 5 %|\b[19]0th\b"
+    r"|[Bb]oth are 1 at the start|each of 6 components|1e-15|0/|\b95 %|\b5 % level|\b[19]0th\b"
     r"|^Published: 6,561|published with (?:10,000|20 runs)|table 1$|at most 5 ms for TRAC-IK"
-    r"|float64|25 digits|; 1 is no better"
+    r"|float64|25 digits|an error of 1 is that"
 )
 SOURCES = sorted(
     path
@@ -280,7 +280,7 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
 def test_a_machine_too_noisy_for_the_precision_aimed_at_is_said_to_be_so(make, noise, mark):
     table = timing.kinematics(Results([swept(make, "MuJoCo", np.ones(9), noise)]))
     assert column(table, "remark") == [mark]
-    assert ("too noisy for the 5 %" in table.measured) == bool(mark)
+    assert ("too noisy for a precision of 5 %" in table.measured) == bool(mark)
     assert table.summary.sentence.startswith("The machine was too noisy") == bool(mark)
 
 

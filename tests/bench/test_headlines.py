@@ -51,7 +51,7 @@ def test_a_solver_cut_short_is_not_ranked(run):
         answer, detail = headline(records, question)[2:4]
         assert answer == "a"
         assert " on the arm, " in detail
-        assert detail.endswith("of the 2 of 3 solvers that finished")
+        assert detail.endswith("among the 2 of 3 solvers that finished")
         assert "slow" not in detail
     assert headlines.headlines(Results([records[0], cut])) == []
 
@@ -97,7 +97,7 @@ def test_the_fastest_leads_by_a_factor_with_its_interval_and_count(run):
     answer, detail = headline(records, FASTEST)[2:4]
     assert answer == "a"
     # 4, but for the shift of 10 µs
-    assert detail == "3.97 times faster than b (3.91–4.03) on the arm, misses penalised"
+    assert detail == "3.97 times faster than b (3.91–4.03) on the arm, failures penalised"
 
 
 def test_who_is_no_faster_beyond_chance_ties(run):

@@ -96,7 +96,9 @@ def test_peers_that_took_part_or_are_missing_are_told_from_those_that_nobody_ask
     table = participants(results)
     versions = {row[0]: row[2] for row in table.rows}
     assert versions == {"Plumbob LM": "1.2", "mink": "not installed", "My solver": "1.2"}
-    assert table.summary.sentence.startswith("2 of 3 that were asked took part; not asked: Pinoc")
+    assert table.summary.sentence.startswith(
+        "2 of 3 selected solvers took part; not selected: Pinoc"
+    )
     assert absent(results) == ["mink"]
     assert "pink" in not_asked(results)
 

@@ -251,8 +251,8 @@ def test_verify_prints_a_line_a_task_under_its_heading():
     ]
     lines = verify_terminal._table(tasks, str)
     assert printed_table.rows(lines) == [
-        ["task", "verdict", "digits", "cases passed", "beside the reference"],
-        ["energy", "RIGHT", "15.3", "28/28", "19 x slower"],
+        ["task", "verdict", "digits", "cases passed", "vs. reference"],
+        ["energy", "RIGHT", "15.3", "28/28", "19 times slower"],
         ["robot_inverse_kinematics", "WRONG", "–", "3/7", "–"],
         ["track", "RIGHT", "–", "7/7", "not timed"],
     ]

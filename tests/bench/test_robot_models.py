@@ -78,7 +78,7 @@ def test_an_engine_with_a_known_cause_is_left_out_of_the_numbers(compared):
     assert column(table, "positions, of the extent")[0] < 1e-14
     assert column(table, "engines") == ["MuJoCo"]
     assert column(table, "remark") == ["Pinocchio differs by 0.250: something is not read"]
-    assert table.summary.points[0].endswith("1 of them otherwise than MuJoCo's documentation says")
+    assert table.summary.points[0].endswith("1 of them differently from MuJoCo's documentation")
 
 
 @pytest.mark.parametrize("name", ALL)

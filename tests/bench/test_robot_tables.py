@@ -88,7 +88,7 @@ def test_one_start_and_restarts_are_never_compared(run, layout):
 def test_a_solver_cut_by_its_budget_is_scored_over_all_targets_and_never_leads(cut, layout):
     table = layout(cut)
     assert shares(table, "solved") == {"steady": (60, MANY), "slow": (2, MANY)}
-    marks = {"slow": "cut at 3 of 120", "steady": "most solved, least time"}
+    marks = {"slow": "cut at 3 of 120", "steady": "most solved, shortest time"}
     assert by_solver(table, "mark") == marks
     (point,) = table.summary.points
     assert "steady" in point
@@ -171,7 +171,7 @@ def test_times_lead_only_where_the_same_targets_tell_them_apart(run, rng):
     for slower, is_tie in ((1.05 * hard, False), (rng.permutation(hard), True)):
         records = [run("slow", MANY, seconds=slower), run("fast", MANY, seconds=hard)]
         (point,) = robot_by_robot(Results(records)).summary.points
-        leader = point.partition("least time ")[2]
+        leader = point.partition("shortest time ")[2]
         assert ("in a tie with" in leader) == is_tie
         assert is_tie or leader.startswith("fast, ")
 
@@ -207,7 +207,7 @@ def test_false_successes_out_of_reach_are_listed(make):
     honest = make.raced("a", ONE, "unreachable", claimed=[0] * 4, **far)
     mute = make.raced("b", ONE, "unreachable", claimed=[-1] * 4, **far)
     sentence = unreachable(Results([honest, mute])).summary.sentence
-    assert "No solver claims" in sentence
+    assert "No solver reports" in sentence
     assert "(n = 4)" in sentence
     assert sentence.endswith(": b.")
 
@@ -216,7 +216,7 @@ def test_over_all_robots_every_target_counts_once(run):
     records = [run("a", 118), run("a", 60, robot="leg"), run("b", 119), run("b", 20, robot="leg")]
     table = over_all(Results(records))
     assert column(table, "robots") == ["all 2 robots"] * 2
-    assert column(table, "mark") == ["most solved, least time", ""]
+    assert column(table, "mark") == ["most solved, shortest time", ""]
     assert shares(table, "solved") == {"a": (178, 240), "b": (139, 240)}
     # 178 of 1e-4 s and 62 of the penalty of 0.1 s, each and the result shifted by 1e-5 s
     mean = 1e6 * (np.exp((178 * np.log(1.1e-4) + 62 * np.log(0.10001)) / 240) - 1e-5)
@@ -225,7 +225,7 @@ def test_over_all_robots_every_target_counts_once(run):
     assert row[f"{MEAN}, 95 % low [µs]"] < mean < row[f"{MEAN}, 95 % high [µs]"]
     (point,) = table.summary.points
     share = "178/240 = 74.2 % (68.3–79.3)"
-    assert point.startswith(f"all 2 robots, one start: a, {share}; least time a, ")
+    assert point.startswith(f"all 2 robots, one start: a, {share}; shortest time a, ")
     assert point.endswith("n = 240)")
 
 
@@ -284,7 +284,8 @@ def test_missing_and_refused_solvers_are_listed_with_the_reason(make):
 
 
 @pytest.mark.parametrize(
-    ("pace", "sentence"), [(1.01e-4, "steady within the 5 %"), (1.5e-4, "too noisy for the 5 %")]
+    ("pace", "sentence"),
+    [(1.01e-4, "steady within 5 %"), (1.5e-4, "too noisy for a precision of 5 %")],
 )
 def test_the_pace_of_the_machine_tells_whether_robots_were_timed_in_peace(make, pace, sentence):
     records = [make.raced(solver, ONE) for solver in "abc"]

@@ -71,7 +71,7 @@ def test_a_solver_that_is_cut_off_has_no_rank_and_one_that_solves_nothing_neithe
 def test_a_rank_is_among_those_that_finished(make):
     rivals = [make.solving("pink", 100), make.solving("mink", 18, begun=18)]
     standing = only([*rivals, make.solving("Mine", 20, mine=True)])
-    assert standing.answer == "rank 2 of the 2 of 3 solvers that finished"
+    assert standing.answer == "rank 2 among the 2 of 3 solvers that finished"
 
 
 def chained(make, solver, residuals, seconds, stratum="near", mine=False):

@@ -134,10 +134,10 @@ def test_a_program_stands_behind_two_hyphens_with_its_own_options(capsys):
 # The time in seconds of each request by its number, of eight: four cases, each asked twice; the
 # reference's is 1e-5 in every case. Then the speed, or why there is none.
 TIMES = {
-    "1e-6": "10 x faster",
-    "2e-6 if number < 5 else 1e-6": "10 x faster",
-    "1e-6 if number < 5 else 2e-6": "10 x faster",
-    "4e-6 if number % 4 == 0 else 0": "10 x faster",
+    "1e-6": "10 times faster",
+    "2e-6 if number < 5 else 1e-6": "10 times faster",
+    "1e-6 if number < 5 else 2e-6": "10 times faster",
+    "4e-6 if number % 4 == 0 else 0": "10 times faster",
     "None": "Not timed: only the round trips of requests are known",
     "None if number == 3 else 1e-6": "Not timed: only the round trips of requests are known",
     "100": "as 0, or a number from 1e-9 to the time that the answer took, got 100.",

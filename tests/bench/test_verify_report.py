@@ -270,7 +270,7 @@ def test_what_is_saved_of_a_broken_task_is_what_it_breaks_on(explained, case):
     task = TaskReport("energy", "", judgements, Diagnosis(why))
     assert task.smallest_failure.case.name == case
     assert TaskReport("energy", "", [], Diagnosis()).smallest_failure is None
-    law = sentence("The first law to break is 'a law', in the case 'large': large is off.")
+    law = sentence("The first violated law is 'a law', in the case 'large': large is off.")
     told = replace(task, diagnosis=replace(task.diagnosis, first_broken=law))
     text = normal(" ".join(terminal.lines(Report(Greeting(1, ("energy",)), [told], 0), shown())))
     assert text.count("large is off.") == 1

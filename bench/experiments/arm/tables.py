@@ -52,7 +52,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
         f"{solver}: {words(metrics.share(np.concatenate([*problems.values()])))}"
         for solver, problems in hits.items()
     )
-    return Summary(f"Solved within tolerance, over all these problems{first}:", tuple(points))
+    return Summary(f"Solved within tolerance, over all problems{first}:", tuple(points))
 
 
 def _ranking(hits: dict[str, dict[tuple[str, str], np.ndarray]]) -> metrics.Ranking | None:

@@ -42,7 +42,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
         f"{len(rows) - len(failures)} of {len(rows)} claims held ({engines} against "
         f"{listed(ENGINES, 'or')}, {len(rows) - engines} against closed forms and invariants), "
         f"over {words(sum(row['cases'] for row in rows))} cases; "
-        f"the smallest margin used {words(in_unit(used, '%'))} % of its tolerance.",
+        f"the largest difference is {words(in_unit(used, '%'))} % of its tolerance.",
         tuple(f"Missed: {name}" for name in failures),
     )
 

@@ -218,7 +218,7 @@ def _motion_summary(rows: Sequence[Row]) -> Summary:
         sentence = f"Diverged with some settings: {listed(diverged)}."
     whole = grouped((point for point in motions if point.is_whole), lambda point: point.cloth)
     sentences = [f"{cloth}: {_nearest(group)}" for cloth, group in whole.items()]
-    nearest = " Nearest to the truth:" if sentences else ""
+    nearest = " Nearest solver to the truth:" if sentences else ""
     return Summary(sentence + nearest, (*sentences, *_stable(rows)))
 
 

@@ -102,7 +102,7 @@ def _points(files: Sequence[Record], robots: Sequence[Record]) -> Iterator[str]:
     for engine, records in grouped(files, lambda record: record.solver).items():
         read = [record for record in records if record.values]
         different = sum(bool(record.details.cause) for record in read)
-        deviation = f", {words(different)} of them otherwise than MuJoCo's documentation says"
+        deviation = f", {words(different)} of them differently from MuJoCo's documentation"
         count = f"{words(len(read))} of {counted(len(records), 'file')} read"
         yield f"{engine}: {count}{deviation * bool(different)}"
     placed = (record for record in robots if record.values)

@@ -125,7 +125,7 @@ class Score(NamedTuple):
     @property
     def leads(self) -> str:
         """The rankings in which it is first, or ties with the first."""
-        rankings = {"most solved": self.success, "least time": self.time}
+        rankings = {"most solved": self.success, "shortest time": self.time}
         return ", ".join(
             f"{name} (tie)" if len(ranking.first) > 1 else name
             for name, ranking in rankings.items()

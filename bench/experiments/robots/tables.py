@@ -74,11 +74,11 @@ def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Rec
 def _participant_summary(rows: Sequence[Row]) -> Summary:
     titles = {row["solver"] for row in rows}
     missing = [peer.title for peer in registry.PEERS if peer.title not in titles]
-    not_asked = f"; not asked: {', '.join(missing)}" if missing else ""
+    not_asked = f"; not selected: {', '.join(missing)}" if missing else ""
     count = sum(row["version"] != "not installed" for row in rows)
     robots = rows[0]["robot_records"].values()
     return Summary(
-        f"{count} of {len(rows)} that were asked took part{not_asked}; "
+        f"{count} of {len(rows)} selected solvers took part{not_asked}; "
         f"{counted(len(robots), 'robot')}:",
         tuple(map(_robot, robots)),
     )
@@ -198,7 +198,7 @@ def _points(rows: Sequence[Row]) -> Iterator[str]:
             low, high = (fastest[f"{MEAN}, 95 % {bound}"] for bound in ("low", "high"))
             yield (
                 f"{robots}, {start}: {leaders(success)}, "
-                f"{words(solvers[success.order[0]]['solved'])}; least time "
+                f"{words(solvers[success.order[0]]['solved'])}; shortest time "
                 f"{leaders(time)}, {words_in(fastest[MEAN], 'µs')} ({words(in_unit(low, 'µs'))}–"
                 f"{words(in_unit(high, 'µs'))}, n = {words(fastest['targets'])})"
             )
@@ -209,7 +209,7 @@ def _fields(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
 
 
 def _summary(rows: Sequence[Row]) -> Summary:
-    sentence = "Who solves the most targets within reach, and who takes the least time for them:"
+    sentence = "Solvers with the most targets solved within reach, and with the shortest time:"
     return listing(sentence, _points(rows))
 
 
@@ -260,7 +260,7 @@ def _outcome_summary(rows: Sequence[Row]) -> Summary:
         strata = [f"{name} {words(shares[name])}" for name in hardest if shares[name].total]
         if strata:
             points.append(f"{start}, strata from the hardest: {', '.join(strata)}")
-    return listing("What was not solved, and which targets are hard:", points)
+    return listing("Outcomes of unsolved targets, and the hardest strata:", points)
 
 
 outcomes = _layout(
@@ -279,11 +279,13 @@ def _unreachable_summary(rows: Sequence[Row]) -> Summary:
         if row["false successes"]
     ]
     if points:
-        return listing("Claimed as solved though out of reach:", points)
+        return listing("Reported as solved, but out of reach:", points)
     count = sum(row["claims"] for row in rows)
     silent = list(dict.fromkeys(row["solver"] for row in rows if row["false successes"] is None))
-    without_claims = f" These make no claims: {listed(silent)}." if silent else ""
-    sentence = "No solver claims that a target out of reach is solved"
+    without_claims = (
+        f" These solvers do not report success or failure: {listed(silent)}." if silent else ""
+    )
+    sentence = "No solver reports a target out of reach as solved"
     return Summary(f"{sentence} (n = {words(count)}).{without_claims}")
 
 

@@ -83,7 +83,7 @@ def _findings(
     if "positions" in outputs:
         tolerance = rounding.positions(greeting.epsilon, joints, size)
         errors = np.linalg.norm(outputs["positions"] - expected.positions, axis=-1)
-        message = sentence("Joint {joint} is {error:.2g} m off its position.")
+        message = sentence("Joint {joint} is {error:.2g} m from its correct position.")
         yield (
             laws.of_joints("positions", errors, tolerance, "m", message)
             if np.isfinite(errors).all()
@@ -104,6 +104,6 @@ def _rotations(rotations: Any, expected: Any, bound: float) -> Iterator[Finding]
         yield Finding("rotations", Verdict.WRONG, np.inf, bound, "rad", message, joint)
         return
     angles = laws.angles(rotations / lengths[:, None], expected)
-    message = sentence("Joint {joint} is rotated {error:.2g} rad off.")
+    message = sentence("The rotation of joint {joint} is wrong by {error:.2g} rad.")
     yield laws.unit(lengths, bound)
     yield laws.of_joints("rotations", angles, bound, "rad", message)

@@ -70,7 +70,10 @@ def _forgive(case: Case, finding: Finding) -> Finding:
 
 
 def _slow(error: float) -> Sentence:
-    return sentence("It is slow: {error:.2g} m are left after the iterations allowed.", error=error)
+    return sentence(
+        "It converges slowly: {error:.2g} m remain after the maximum number of iterations.",
+        error=error,
+    )
 
 
 def _aggravate(finding: Finding) -> Finding:
@@ -140,14 +143,14 @@ def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> tuple[V
     is_nearer = excess < 0.5 * (before - nearest)
     if is_degenerate and excess + nearest <= before + 1e-6 * reach:
         return Verdict.RIGHT_BUT, sentence(
-            "It is stuck {error:.2g} m off: nothing here says which direction to bend in. Bend "
-            "the chain a little before the first sweep.",
+            "It stops {error:.2g} m from the nearest point it could reach: the pose does not "
+            "determine a direction to bend in. Bend the chain a little before the first sweep.",
             error=excess,
         )
     if excess <= rounding.STALL[greeting.precision] * reach:
         return Verdict.RIGHT_BUT, sentence(
-            "It stalls {error:.2g} m off: small rotations are lost. Does the helper that rotates "
-            "one direction into another return the identity for small angles?",
+            "It stalls {error:.2g} m from the target: small rotations are lost. Does the helper "
+            "that rotates one direction into another return the identity for small angles?",
             error=excess,
         )
     if is_beyond and is_nearer:
@@ -158,9 +161,9 @@ def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> tuple[V
     if is_nearer and (not method or is_degenerate):
         return Verdict.RIGHT_BUT, _slow(excess)
     return Verdict.WRONG, sentence(
-        "It stays {error:.2g} m farther from its target than it could be."
+        "It ends {error:.2g} m farther from the target than necessary."
         if is_beyond
-        else "It stays {error:.2g} m off a target that it can reach.",
+        else "It ends {error:.2g} m from a target that it can reach.",
         error=excess,
     )
 
@@ -175,7 +178,7 @@ def in_time(pose: AnsweredPose, case: Case, method: str, greeting: Greeting) -> 
         inputs = {**case.inputs, "tolerance": 0.0, "max_iterations": count}
         if pose.distance_to(solve(method, inputs)[1]) <= bound:
             message = sentence(
-                "It makes {more} sweeps more than its tolerance asks for.", more=count - needed
+                "It makes {more} more sweeps than its tolerance requires.", more=count - needed
             )
             return [Finding(STOPS, Verdict.RIGHT_BUT, count - needed, 0.0, "", message)]
     return []
@@ -197,18 +200,20 @@ def claims(
     """Yield whether `converged` and `residual` are true."""
     tolerance = case.inputs["tolerance"] + slack
     if outputs.get("converged"):
-        message = sentence("It claims to have arrived, but the effector is {error:.2g} m off.")
+        message = sentence("It reports success, but the effector is {error:.2g} m from the target.")
         yield laws.bounded("claims", distance, tolerance, "m", message)
     elif "converged" in outputs and distance <= case.inputs["tolerance"] - slack:
         message = sentence(
-            "It has arrived, {error:.2g} m off, but reports that it has not.", error=distance
+            "The effector is {error:.2g} m from the target, within the tolerance, but it "
+            "reports failure.",
+            error=distance,
         )
         yield Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", message)
     if "residual" in outputs and np.isfinite(outputs["residual"]):
         error = abs(outputs["residual"] - distance)
         claim, actual = distinct_texts(outputs["residual"], distance, 3)
         message = sentence(
-            "It reports a residual of {claimed} m; the effector is {distance} m off.",
+            "It reports a residual of {claimed} m; the effector is {distance} m from the target.",
             claimed=claim,
             distance=actual,
         )
@@ -225,8 +230,8 @@ def _equal_worlds(
     size, amplification = trial.case.facts["size"], trial.case.facts["amplification"]
     tolerance = 2.0 * rounding.sweep(greeting.epsilon, len(x), size, amplification)
     message = sentence(
-        "In another world, rotated, shifted or in other units, the same request has an answer "
-        "{error:.2g} m away: something depends on the origin or on an axis."
+        "After the world is rotated, shifted or scaled, the answer to the same request differs "
+        "by {error:.2g} m: something depends on the origin or on an axis."
     )
     error = trial.pose.distance_to(x)
     return laws.bounded("equal worlds", error, tolerance, "m", message, verdict=verdict)

@@ -113,7 +113,7 @@ def _equal_answers(answer: Answer, repeat: object, size: float, greeting: Greeti
     gaps = [largest_gap(a, repeat.values.get(name)) for name, a in answer.values.items()]
     tolerance = 16.0 * greeting.epsilon * max(size, 1.0)  # threads may add up in another order
     message = sentence(
-        "The repeated request got another answer, {error:.2g} away: state is left over, or "
+        "The repeated request got an answer that differs by {error:.2g}: state is left over, or "
         "memory is not initialised."
     )
     return bounded("equal answers", max(gaps, default=0.0), tolerance, "", message)

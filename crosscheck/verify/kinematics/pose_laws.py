@@ -182,8 +182,8 @@ def _branches(x: FloatArray, parents: IndexArray, offsets: FloatArray, bound: fl
             if change > error:
                 error, joint = change, j
     message = sentence(
-        "Joint {joint} does not keep its distance from another child of the same parent: it is "
-        "{error:.2g} m off. A parent rotates all its children as one body."
+        "The distance from joint {joint} to another child of the same parent changes by "
+        "{error:.2g} m. A parent rotates all its children as one body."
     )
     return laws.bounded("branches", error, bound, "m", message, index=joint)
 

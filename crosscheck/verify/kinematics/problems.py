@@ -205,7 +205,7 @@ def _transformed(cases: list[Case]) -> Iterator[Case]:
         inputs |= {"offsets": offsets, "local_rotations": local, "target": target}
         world = {"like": case.name, "world": (Q, scale, shift)}
         about = sentence(
-            "The case '{case}' in another world, {how}: the answer is the same one there.",
+            "The case '{case}', {how}: the answer must be the same in that frame.",
             case=case.name,
             how=name,
         )

@@ -71,7 +71,8 @@ def _curves(rng: np.random.Generator) -> list[Curve]:
               curves["square"](4), closed=True),
         Curve("repeated points", sentence("A polyline in which a point comes twice."),
               np.repeat(walk[:5], [1, 2, 1, 3, 1], axis=0)),
-        Curve("two strokes", sentence("Two strokes apart: bridged or kept, both are right."),
+        Curve("two strokes", sentence("Two separate strokes: bridging the gap and leaving it "
+                                      "are both right."),
               np.concatenate([walk[:6], walk[6:] + 1.5]), (0, 6)),
         Curve("plumb bob", sentence("A drawing in five strokes with uneven samples."),
               curves["plumb_bob"](100), tuple(range(0, 100, 20))),

@@ -136,9 +136,9 @@ def _target_laws(
     angle_bound = judgement.tolerance_rotation + rounding.rotations(greeting.epsilon, joints)
     if case.family != BEYOND:
         verdict = Verdict.RIGHT_BUT if case.family == ANYWHERE else Verdict.WRONG
-        too_far = sentence("It stays {error:.2g} m off a target that it can reach.")
+        too_far = sentence("It ends {error:.2g} m from a target that it can reach.")
         rotated = sentence(
-            "Its tool is rotated by {error:.2g} rad from a target that it can reach."
+            "The tool's rotation differs by {error:.2g} rad from a target that it can reach."
         )
         yield laws.bounded("target reached", distance, bound, "m", too_far, verdict=verdict)
         yield laws.bounded("rotation reached", angle, angle_bound, "rad", rotated, verdict=verdict)
@@ -152,13 +152,16 @@ def _claims(
     reached = distance <= bound and angle <= angle_bound
     if outputs.get("converged") and not reached:
         message = sentence(
-            "It claims to have arrived, but the tool is {distance:.2g} m and {angle:.2g} rad off.",
+            "It reports success, but the tool is {distance:.2g} m and {angle:.2g} rad from the "
+            "target.",
             distance=distance, angle=angle,
         )  # fmt: skip
         yield Finding("claims", Verdict.WRONG, distance, bound, "m", message)
     if reached and not outputs.get("converged", True):
         message = sentence(
-            "It has arrived, {error:.2g} m off, but reports that it has not.", error=distance
+            "The effector is {error:.2g} m from the target, within the tolerance, but it "
+            "reports failure.",
+            error=distance,
         )
         yield Finding("claims", Verdict.RIGHT_BUT, distance, bound, "m", message)
 

@@ -173,15 +173,15 @@ def _verdict(
         )
     if others_hold and (method == "fabrik" or all(map(_ends_well, trials))):
         return Verdict.RIGHT_BUT, sentence(
-            "Its sweep is not the textbook's {method}, though it keeps every law of one.",
+            "Its sweep satisfies every law of {method}, but differs from the textbook's sweep.",
             method=NAMES[method],
         )
     return Verdict.WRONG, sentence(
-        "Its sweep is not that of {method}, from the effector's parent to the root, each joint "
-        "rotated to bring the effector nearest."
+        "Its sweep is not a sweep of {method}, which goes from the effector's parent to the "
+        "root and rotates each joint until the effector is as near to the target as possible."
         if method == "ccd"
-        else "Its sweep is not that of {method}: backward from the target to the root, then "
-        "forward from the root's place, every link at its length.",
+        else "Its sweep is not a sweep of {method}, which goes backward from the target to the "
+        "root, then forward from the root's position, and keeps the length of every link.",
         method=NAMES[method],
     )
 

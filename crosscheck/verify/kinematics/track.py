@@ -217,7 +217,7 @@ def _on_target(pose: AnsweredPose, case: Case, greeting: Greeting) -> Finding:
     joints, size, error = len(pose.positions), case.facts["size"], pose.distance
     slack = rounding.positions(greeting.epsilon, joints, size, pose.drift)
     share = rounding.STALL[greeting.precision] if case.inputs["method"] in METHODS else SLOW
-    message = sentence("It is {error:.2g} m off a target that it can reach.")
+    message = sentence("It ends {error:.2g} m from a target that it can reach.")
     verdict = Verdict.RIGHT_BUT if error <= share * case.facts["reach"] else Verdict.WRONG
     bound = case.inputs["tolerance"] + slack
     return laws.bounded("target reached", error, bound, "m", message, verdict=verdict)

@@ -61,7 +61,7 @@ def _displaced(case: Case, seed: int) -> Case:
         case,
         name=case.name + ", displaced",
         inputs=dict(case.inputs) | {"positions": x + 0.02 * rng.standard_normal(x.shape)},
-        about=sentence("The case before, its particles displaced."),
+        about=sentence("The previous case with displaced particles."),
         facts=dict(case.facts) | {"from": case.name},
     )
 
@@ -129,7 +129,9 @@ def _judge_case(
 
 
 def _formula(name: str, gap: float, allowed: float) -> Finding:
-    message = sentence("The {name} energy is {gap:.2g} J off its formula.", name=name, gap=gap)
+    message = sentence(
+        "The {name} energy differs by {gap:.2g} J from its formula.", name=name, gap=gap
+    )
     return laws.bounded(name, gap, allowed, "J", message)
 
 
@@ -140,7 +142,9 @@ def _sums(energies: Energies, allowed: float) -> list[Finding]:
         if all(name in energies for name in (whole, *parts)):
             gap = abs(energies[whole] - sum(energies[name] for name in parts))
             message = sentence(
-                "The {whole} energy is {gap:.2g} J off the sum of its parts.", whole=whole, gap=gap
+                "The {whole} energy differs by {gap:.2g} J from the sum of its parts.",
+                whole=whole,
+                gap=gap,
             )
             findings.append(laws.bounded("sum of energies", gap, 4.0 * allowed, "J", message))
     return findings
@@ -156,8 +160,8 @@ def _work(
             continue
         gap = abs((after[name] - before[name]) + work)
         message = sentence(
-            "From one place to another the {name} energy changes by {gap:.2g} J other than by the "
-            "work of the forces.",
+            "Between two configurations, the change of the {name} energy differs by {gap:.2g} J "
+            "from the work of the forces.",
             name=name,
             gap=gap,
         )

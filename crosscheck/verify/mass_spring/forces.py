@@ -90,7 +90,7 @@ def _formula(p: SpringProblem, output: FloatArray, expected: FloatArray, allowed
     gap = np.abs(output - expected).max(axis=1)
     index, worst = int(gap.argmax()), float(gap.max())
     message = sentence(
-        "The force on particle {where} is {gap:.2g} N off {term}.",
+        "The force on particle {where} is wrong by {gap:.2g} N {term}.",
         where=index,
         gap=worst,
         term=_likeness(p, output - expected),
@@ -102,9 +102,9 @@ def _likeness(p: SpringProblem, error: FloatArray) -> Sentence:
     """Return which term's force looks most like the error."""
     x, v = p.positions, p.velocities
     terms = (
-        (p.constant, sentence("(an error like the force of gravity)")),
-        (spring_forces(p, x), sentence("(an error like the force of the springs)")),
-        (damper_forces(p, x, v), sentence("(an error like the force of the dampers)")),
+        (p.constant, sentence("(the error resembles gravity)")),
+        (spring_forces(p, x), sentence("(the error resembles the spring forces)")),
+        (damper_forces(p, x, v), sentence("(the error resembles the damper forces)")),
     )
     size = np.linalg.norm(error)
     cosines = [
@@ -112,13 +112,17 @@ def _likeness(p: SpringProblem, error: FloatArray) -> Sentence:
         for force, _ in terms
     ]
     best = int(np.argmax(cosines))
-    return terms[best][1] if cosines[best] > ALIKE else sentence("(an error like no single term)")
+    return (
+        terms[best][1]
+        if cosines[best] > ALIKE
+        else sentence("(the error resembles no single term)")
+    )
 
 
 def _balance(p: SpringProblem, output: FloatArray, allowed: float) -> Finding:
     """Springs and dampers pull both ends alike: the sum of forces is the weight."""
     gap = float(np.abs(output.sum(0) - p.constant.sum(0)).max())
-    message = sentence("The sum of all forces is {gap:.2g} N off the weight.", gap=gap)
+    message = sentence("The sum of all forces differs by {gap:.2g} N from the weight.", gap=gap)
     limit = allowed * np.sqrt(p.count) * 2.0
     return laws.bounded("momentum balance", gap, limit, "N", message)
 

@@ -181,7 +181,7 @@ def declared_step(context: StepContext) -> Finding | None:
         return None
     if not context.recognised:
         return unsure(
-            law, np.inf, sentence("The step is none of those that are known; none was declared.")
+            law, np.inf, sentence("The step matches no known method, and none was declared.")
         )
     if not context.expected or not np.isfinite(context.expected["positions"]).all():
         return unsure(law, np.inf, sentence("The declared step has no finite result here."))
@@ -239,8 +239,9 @@ def minimiser(context: StepContext) -> Finding | None:
             "It is {distance:.2g} m from the minimiser of implicit Euler.",
             distance=judgement.distance))  # fmt: skip
     message = sentence(
-        "Not converged implicit Euler: the positions miss its minimiser x* by {error:.2g} of "
-        "|y - x*|, what springs move in a step.",
+        "This is not converged implicit Euler: the positions differ from its minimiser x* by "
+        "{error:.2g} |y - x*|, where y - x* is the displacement that the springs cause in a "
+        "step.",
         error=error,
     )
     return Finding(law, Verdict.RIGHT_BUT, error, SOLVED, "", message)
@@ -258,7 +259,9 @@ def velocities(context: StepContext) -> Finding | None:
     gap = coordinate_gap(p, "velocities", expected, context.answers["velocities"])
     size = float(np.abs(expected).max(initial=0.0))
     error = gap / (size + context.allowed.velocities / SOLVED)
-    message = sentence("Velocities are up to {gap:.2g} m/s from what the step makes them.", gap=gap)
+    message = sentence(
+        "Velocities differ by up to {gap:.2g} m/s from those that the step implies.", gap=gap
+    )
     if not np.isfinite(gap):
         return unsure("velocities", error, message)
     verdict = _graded(error, size, context.allowed.velocities)
@@ -296,7 +299,8 @@ def consistency(context: StepContext) -> Finding | None:
     gap = float(np.abs((v - p.velocities) / p.h - expected)[free].max())
     scale = float(np.abs(expected[free]).max())
     message = sentence(
-        "In a small step the acceleration is {gap:.2g} m/s² off f / m, of {scale:.2g} m/s².",
+        "In a small step the acceleration differs from f / m by {gap:.2g} m/s²; f / m is up to "
+        "{scale:.2g} m/s².",
         gap=gap,
         scale=scale,
     )
@@ -308,7 +312,7 @@ def equal_requests(exchange: Exchange, allowed: Mapping[str, float]) -> Finding:
     """Return how far two answers to a request differ in the named outputs."""
     answer, repeat = exchange.answer, exchange.repeat
     if not isinstance(answer, Answer) or not isinstance(repeat, Answer):
-        message = sentence("Asked a second time, it gave no answer.")
+        message = sentence("The repeated request got no answer.")
         return Finding("equal requests", Verdict.BROKEN, np.inf, 0.0, "", message)
     shared = [name for name in allowed if name in answer.values and name in repeat.values]
     gaps = {name: largest_gap(answer.values[name], repeat.values[name]) for name in shared}
@@ -341,8 +345,9 @@ def symmetry(
         if not ratio <= worst:
             worst, index, worst_name = ratio, int(gap.argmax()), name
     message = sentence(
-        "Where space or the numbering is changed, {name} change otherwise than they should, "
-        "most at particle {where}.",
+        "When the scene is shifted, rotated, mirrored or renumbered, {name} do not change "
+        "accordingly; the error is largest at particle {where}.",
         name=worst_name, where=index,
-    ) if worst > 1.0 else sentence("Space and numbering make no difference.")  # fmt: skip
+    ) if worst > 1.0 else sentence("Shifting, rotating, mirroring and renumbering the scene "
+                                   "make no difference.")  # fmt: skip
     return bounded("symmetry", worst, 1.0, "", message, index)

@@ -209,8 +209,8 @@ def _nearest(search: ModelSearch) -> Sentence:
             steps.append((float(np.median(gaps)), max(gaps), tuple(step.values())))
     median, worst, options = min(steps, key=lambda step: step[0])
     return sentence(
-        "The nearest step that is known is {model}; it differs by {median:.2g} of a displacement "
-        "in the median small case, by {worst:.2g} in the worst.",
+        "The nearest known step is {model}; relative to the displacement, it differs by "
+        "{median:.2g} in the median small case and by {worst:.2g} in the worst.",
         model=describe_model(options),
         median=median,
         worst=worst,
@@ -223,7 +223,7 @@ def _laws_that_hold(judgements: Sequence[CaseJudgement]) -> Sentence:
     for finding in chain.from_iterable(judgement.findings for judgement in judgements):
         verdicts[finding.law] = max(finding.verdict, verdicts.get(finding.law, Verdict.RIGHT))
     names = ", ".join(law for law, verdict in verdicts.items() if not verdict)
-    return sentence("What holds in every case: {laws}.", laws=names or "–")
+    return sentence("Laws that hold in every case: {laws}.", laws=names or "–")
 
 
 def _explanation(
@@ -256,7 +256,9 @@ def _gaps(options: tuple[Option, ...], probes: Sequence[Probe], epsilon: float) 
 def _fault_sentence(option: Option) -> Sentence:
     """Return the sentence of a fault, or of an honest choice that the greeting denies."""
     if any(option.key == choice.key for choice in honest(Step()).get(option.aspect, ())):
-        return sentence("Other than declared, it behaves like this: {what}.", what=option.sentence)
+        return sentence(
+            "It differs from the declared step and behaves like this: {what}.", what=option.sentence
+        )
     return option.sentence
 
 
@@ -274,7 +276,9 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
 
 def _with_wrong_step(judgement: CaseJudgement) -> CaseJudgement:
     """Return a judgement with an undecided step judged as wrong, for a fault explains it."""
-    message = sentence("No honest step gives its answers; a faulty one does.")
+    message = sentence(
+        "No correct time step gives these answers, but a step with a known mistake does."
+    )
     findings = [
         replace(finding, verdict=Verdict.WRONG, sentence=message)
         if (finding.law, finding.verdict) == ("declared step", Verdict.UNDECIDED)

@@ -41,7 +41,9 @@ def _name(field: Field) -> str:
 
 
 def _long(task: Task, say: Say) -> Iterator[str]:
-    takes = sentence("Takes (all by keyword, those in brackets only where it asks for them):")
+    takes = sentence(
+        "Arguments, passed by keyword; those in brackets only if the function names them:"
+    )
     returns = sentence("Returns some of these, as a dict, or as a tuple in this order:")
     yield from (task.name, *paragraphs([Sentence(task.about, {})], say, "  "))
     for heading, fields in ((takes, task.inputs), (returns, task.outputs)):

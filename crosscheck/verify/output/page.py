@@ -20,12 +20,12 @@ WORDS = {
     "verdict": sentence("verdict"),
     "digits": sentence("digits"),
     "passed": sentence("cases passed"),
-    "speed": sentence("beside the reference"),
+    "speed": sentence("vs. reference"),
     "smallest": sentence("Smallest failing case"),
     "theirs": sentence("yours"),
     "ours": sentence("expected"),
     "numbers": sentence("Numbers side by side"),
-    "again": sentence("It is saved; ask it again:"),
+    "again": sentence("The case is saved. To run it again:"),
     "cases": sentence("All cases"),
     "case": sentence("case"),
     "found": sentence("findings"),
@@ -62,9 +62,10 @@ def _task(task: TaskReport, context: Presentation) -> dict[str, Any]:
         gap = drawing.distance(shapes)
         if gap is not None and task.task != "mass_spring_forces":  # arrows have no lengths
             caption = sentence(
-                "They are {distance:.2g} m apart at most."
+                "They differ by at most {distance:.2g} m."
                 if factor == 1.0
-                else "They are {distance:.2g} m apart at most, drawn {factor:,.0f} times larger.",
+                else "They differ by at most {distance:.2g} m; the difference is drawn "
+                "{factor:,.0f} times larger.",
                 distance=gap,
                 factor=factor,
             )

@@ -72,7 +72,7 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
 def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
     """Return a line a task, below a heading."""
     headings = [sentence("task"), sentence("verdict"), sentence("digits"),
-                sentence("cases passed"), sentence("beside the reference")]  # fmt: skip
+                sentence("cases passed"), sentence("vs. reference")]  # fmt: skip
     rows = [
         (title(task), say(VERDICTS[task.verdict]), digits(task), passed(task), speed(task, say))
         for task in tasks
@@ -115,7 +115,7 @@ def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:
     case = _shorten(_failing(task, failure, say), max(_COMPLAINT, room // 8))
     rerun = []
     if command:
-        rerun = [f"  {say(sentence('It is saved; ask it again:'))}", f"    {say(command)}"]
+        rerun = [f"  {say(sentence('The case is saved. To run it again:'))}", f"    {say(command)}"]
     room -= 1 + len(case) + len(rerun)
     why = paragraphs(explanations(task), say, "  ")
     why = _shorten(why, max(2, min(why_limit, room - 3)))

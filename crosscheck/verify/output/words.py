@@ -68,7 +68,9 @@ def speed(report: TaskReport, say: Say) -> str:
     if rate < 1.05:
         return say(sentence("as fast"))
     is_slower = report.slowdown > 1.0
-    return say(sentence("{times} x slower" if is_slower else "{times} x faster", times=times))
+    return say(
+        sentence("{times} times slower" if is_slower else "{times} times faster", times=times)
+    )
 
 
 def introduction(report: Report) -> Sentence:
@@ -101,9 +103,11 @@ def remarks(report: Report) -> Iterator[Sentence]:
 def explanations(report: TaskReport) -> Iterator[Sentence]:
     """Yield explanations of wrong answers, nearest first, then the inferred behaviour and hints."""
     diagnosis = report.diagnosis
-    for explanation in diagnosis.explanations:
+    for i, explanation in enumerate(diagnosis.explanations):
         yield sentence(
-            "{what} (explains {share:.0%} of the answers compared)"
+            "Or: {what} (explains {share:.0%} of the answers compared)"
+            if i and explanation.share >= LEAST_SHARE
+            else "{what} (explains {share:.0%} of the answers compared)"
             if explanation.share >= LEAST_SHARE
             else "The nearest known mistake explains only {share:.0%} of the answers: {what}",
             what=explanation.sentence,
@@ -126,15 +130,13 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
             sentence('Next: declare the step that you make, by "step" in the greeting '
                      "(docs/protocol.md).")
             if first.diagnosis.hints
-            else sentence("Next: ask the long list of cases with --thorough.")
+            else sentence("Next: run more cases with --thorough.")
         )  # fmt: skip
-    template = sentence("Next: correct {task}, rerun the saved case, then run all again.")
+    template = sentence("Next: correct {task}, rerun the saved case, then run all cases again.")
     if first.verdict is Verdict.BROKEN and not first.diagnosis.explained:
-        template = sentence(
-            "Next: make {task} answer every case first; the case that breaks it is saved."
-        )
+        template = sentence("Next: make {task} answer every case first; the failing case is saved.")
     elif len(bad) > 1:
         template = sentence(
-            "Next: correct {task} first, since the others may rest on it; then run this again."
+            "Next: correct {task} first, since other tasks may depend on it; then run this again."
         )
     return Sentence(template.template, {"task": title(first)})

@@ -62,7 +62,7 @@ def failure_of(
         lines = [line for line in lines if line and not any(text in line for text in _HIDDEN)]
         if lines:
             message = sentence(
-                "{what} Its last words on standard error: {lines}",
+                "{what} Its last lines on standard error: {lines}",
                 what=message,
                 lines=" / ".join(lines[-STDERR_SHOWN:]),
             )
@@ -106,7 +106,7 @@ def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:
     """End a program's input, then all that still runs; return remarks on how it left."""
     has_left, strays = process.leave(patience)
     if not has_left:
-        return (sentence("It does not leave when its input ends."),)
+        return (sentence("It does not exit when its input ends."),)
     remarks = []
     if strays:
         remarks.append(
@@ -117,6 +117,8 @@ def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:
         )
     if process.code:
         remarks.append(
-            sentence("When its input ended it did not just leave: {how}.", how=ending(process.code))
+            sentence(
+                "When its input ended, it did not exit normally: {how}.", how=ending(process.code)
+            )
         )
     return tuple(remarks)

@@ -140,8 +140,8 @@ LEAVES_A_CHILD = f"if os.fork() == 0:\n    while True: tick()\n{LOOP}"
         (LOOP, None),
         (LOOP.replace("read()\n", "read()\n    print('joint 1')\n", 1), None),
         (finally_do("os._exit(7)"), "exit code 7"),
-        (finally_do("os.abort()"), "it did not just leave: it aborted"),
-        (finally_do("while True: tick()"), "does not leave when its input ends"),
+        (finally_do("os.abort()"), "it did not exit normally: it aborted"),
+        (finally_do("while True: tick()"), "does not exit when its input ends"),
         (LEAVES_A_CHILD, r"left processes running that it had started \(1\)"),
     ],
     ids=["leaves", "prints", "code", "aborts", "stays", "leaves a child"],
@@ -288,7 +288,7 @@ def test_the_rest_of_the_cases_goes_on(start, monkeypatch):
     kinds = [type(question.answer) for question in judged]
     assert kinds == [Answer, Failure, Answer, Failure, Answer]
     assert [type(question.repeat) for question in judged] == kinds
-    assert [str(one) for one in contestant.remarks] == ["It does not leave when its input ends."]
+    assert [str(one) for one in contestant.remarks] == ["It does not exit when its input ends."]
 
 
 def test_a_contestant_that_is_dropped_leaves_nothing(tmp_path):

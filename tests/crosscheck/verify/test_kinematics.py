@@ -153,7 +153,7 @@ def test_sixty_faults_and_their_likely_triples_are_known():
 @pytest.mark.parametrize("key", ["world rotation on the left", "joints not placed anew"])
 def test_inferred_behaviour_does_not_contradict_findings(key):
     report = faulty("ccd", key, declared=False)
-    assert any("Its sweep is not that of CCD" in words for words in told(report))
+    assert any("not a sweep of CCD" in words for words in told(report))
     assert "resemble those of CCD" in str(report.diagnosis.behaviour)
     right = faulty("ccd", declared=False)
     assert "are those of CCD" in str(right.diagnosis.behaviour)

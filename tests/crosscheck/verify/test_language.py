@@ -86,9 +86,9 @@ def test_the_locale_chooses_the_language(environment, language):
 
 def test_sentences_within_sentences_are_translated():
     inner = sentence("exit code {code}", code=3)
-    told = sentence("It ended instead of answering: {how}.", how=inner)
+    told = sentence("It ended without an answer: {how}.", how=inner)
     assert told.text(translator("zh")) == "它没有作答就结束了：退出码 3。"
-    assert told.text(translator("en")) == "It ended instead of answering: exit code 3."
+    assert told.text(translator("en")) == "It ended without an answer: exit code 3."
 
 
 def test_a_language_that_is_unknown_is_refused():
