@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import SUITES
+from plumbob.bench.figures import drawing
 from plumbob.bench.harness.record import FINISHED, Record
 
 SAMPLES = tomllib.loads(Path(__file__).with_name("records.toml").read_text(encoding="utf-8"))
@@ -285,6 +286,14 @@ MAKERS = (
     *(timed, stepped, swung, two_dampers, stepping, certified, raced, solving, lacking),
     *(republished, worked, fell, moved, needed, bounded, as_liu),
 )
+
+
+@pytest.fixture(scope="session", autouse=True)
+def short_pdf():
+    """Leave figures out of PDF files, which take longer than all else of a report."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drawing, "pdf_of", lambda figure, title, mark="": b"%PDF" + mark.encode())
+        yield
 
 
 @pytest.fixture(scope="session")

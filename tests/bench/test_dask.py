@@ -122,7 +122,11 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(one, marks=[] if one in ("nobody", "zeros") else pytest.mark.slow)
+     for one in OTHERS],
+)  # fmt: skip
 def test_another_server_at_the_address_is_misuse(name):
     """A Client waits for its answer for ever, so that this one has a process of its own."""
     pytest.importorskip("distributed", reason=INSTALLED)

@@ -122,10 +122,7 @@ def changed(record, **arrays):
 def test_chains_are_counted_as_straight_only_if_they_are(make):
     table = beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
     assert column(table, "off the line, largest [m]") == [0.5, 1e-9]
-    assert table.summary.points == (
-        "CCD: 1/2 = 50 % (9.5–90.5)",
-        "FABRIK: 2/2 = 100 % (34.2–100)",
-    )
+    assert table.summary.points == ("CCD: 1/2 = 50 % (9.5–90.5)", "FABRIK: 2/2 = 100 % (34.2–100)")
 
 
 def test_targets_without_a_solution_are_not_printed_as_infinite(make):

@@ -13,6 +13,7 @@ from matplotlib.text import Text
 from plumbob.bench.figures import drawing
 from plumbob.bench.figures import sketch as figures
 from plumbob.bench.figures.chart import LOOKS, MAX_LABELLED, Axis, Chart, Panel, looks, series
+from plumbob.bench.figures.drawing import pdf_of  # before its stand-in is in place
 from plumbob.bench.figures.sketch import chart_sketch, drawn
 from plumbob.bench.report import report
 from plumbob.bench.report.page import page
@@ -199,11 +200,14 @@ def test_a_figure_is_drawn_again_only_if_it_shows_something_else(tmp_path, recor
 
 
 def test_a_pdf_has_its_fonts_and_its_text(records):
-    for figure in report.all_figures()[::3]:
-        made = drawn(figure(Results(records)))
-        assert made.pdf.startswith(b"%PDF")
-        assert b"/FontFile2" in made.pdf
-        assert b"/Type3" not in made.pdf
+    hostile = flat([r"$\frac{$", "\x1b[2J", "\ufffe手腕", "right\u202eleft"])
+    sketches = [figure(Results(records)) for figure in report.all_figures()[::5]]
+    for sketch in [*sketches, chart_sketch(hostile)]:
+        with drawing.styled():
+            pdf = pdf_of(sketch.draw(sketch.data), sketch.title)
+        assert pdf.startswith(b"%PDF")
+        assert b"/FontFile2" in pdf
+        assert b"/Type3" not in pdf
 
 
 def test_curves_of_different_lengths_are_no_curve():

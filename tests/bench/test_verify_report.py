@@ -27,20 +27,8 @@ from plumbob.crosscheck.verify.judgement import (
     Verdict,
 )
 from plumbob.crosscheck.verify.language import translator
-from plumbob.crosscheck.verify.output import (
-    comparison,
-    drawing,
-    json_file,
-    junit,
-    page,
-    terminal,
-)
-from plumbob.crosscheck.verify.output.words import (
-    GOOD,
-    Presentation,
-    explanations,
-    speaker,
-)
+from plumbob.crosscheck.verify.output import comparison, drawing, json_file, junit, page, terminal
+from plumbob.crosscheck.verify.output.words import GOOD, Presentation, explanations, speaker
 from plumbob.crosscheck.verify.sentence import Sentence, sentence
 from plumbob.reference import Skeleton, forward_kinematics
 

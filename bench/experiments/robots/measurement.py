@@ -81,9 +81,10 @@ def blocks(scale: Scale) -> Iterator[Block]:
             yield Block(SUITE, f"robots/{name}", "all solvers", absent, _ANY, 0, facts)
     peers = registry.robot_peers(scale.entrants)
     robots = [*installed, *own]
+    groups = ("robots", "unreachable")
+    owners = {f"{group}/{name}": problem for name, problem in own.items() for group in groups}
     for block in _drawn(block for peer in peers for block in _blocks_of(peer, robots, scale)):
-        name = block.problem.partition("/")[2]
-        yield block.on(own[name]) if name in own else block
+        yield block.on(owners[block.problem]) if block.problem in owners else block
     for entrant in scale.entrants:
         if entrant.offers(SUITE) and ROBOT_TASK not in entrant.tasks:
             measure, facts = partial(not_asked, NO_ROBOTS), _facts(REACHABLE, "every robot")
