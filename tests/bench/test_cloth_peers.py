@@ -1,7 +1,6 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
 import importlib
-import pickle
 import sys
 from functools import partial
 
@@ -14,10 +13,9 @@ from plumbob.bench.experiments.cloth_peers import tables, truth
 from plumbob.bench.experiments.cloth_peers.job import Shape
 from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs, step_rungs
 from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_motion, truth_of
-from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import Outcome, WorkerProcess
-from plumbob.bench.harness.worker import Finished, Ready, Solved
+from plumbob.bench.harness.worker import Finished, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from plumbob.bench.problems.falling_cloth import (
@@ -368,14 +366,6 @@ def messages(cloth, manner, frames=5, repeats=1, budget=60.0):
     return list(peers_cloth.job(fake_peer(manner), cloth, {"manner": manner}, shape).perform())
 
 
-def test_a_job_says_when_it_is_ready_each_frame_and_the_end(cloth):
-    sent = messages(cloth, "well", frames=2, repeats=2)
-    assert [type(message) for message in sent] == [Ready, *[Solved] * 4, Finished]
-    ends = [message.q for message in sent if isinstance(message, Solved)]
-    np.testing.assert_array_equal(ends[1], ends[3])
-    assert not np.array_equal(ends[0], ends[1])
-
-
 @pytest.mark.parametrize(
     ("manner", "budget", "finite", "last"),
     [
@@ -606,26 +596,3 @@ def test_the_published_times_stand_beside_ours(make):
     (point,) = table.summary.points
     for part in ("local/global, 10 iterations", "30.0 ms", "50.0 ms", "0.500"):
         assert part in point
-
-
-@pytest.mark.parametrize(
-    ("name", "maker"),
-    [("step_chart", "worked"), ("implicit_chart", "fell"), ("truth_chart", "fell")],
-)
-def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_each_solver(
-    make, name, maker
-):
-    solvers, maker = ("Plumbob Newton", "MuJoCo Euler"), getattr(make, maker)
-    records = [maker(solver, stiffness) for solver in solvers for stiffness in (1e2, 1e4)]
-    svg = drawn(getattr(tables, name)(Results(records))).svg
-    for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", *solvers):
-        assert text in svg
-
-
-def test_a_job_of_a_worker_is_known_by_its_arrays(cloth):
-    """A job that travels between processes keeps the same system, to the last bit."""
-    shape = Shape(1, 1, 1.0)
-    copy = pickle.loads(pickle.dumps(peers_cloth.job(fake_peer("m"), cloth, {}, shape)))
-    system = MassSpring(**copy.system._asdict())
-    for name, values in cloth.system.arrays._asdict().items():
-        np.testing.assert_array_equal(getattr(system.arrays, name), values)

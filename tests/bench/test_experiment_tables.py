@@ -103,10 +103,6 @@ def test_every_declared_column_has_a_cell(records, make):
             ] == []
 
 
-def test_every_section_has_a_name_of_its_own():
-    assert len({section.name for section in SECTIONS}) == len(SECTIONS)
-
-
 def test_a_missed_claim_is_named_in_table_and_answer(make):
     table = check.verdicts(Results([make.claim(), make.claim("damper forces", held=False)]))
     assert column(table, "verdict") == ["held", "MISSED: they differ"]

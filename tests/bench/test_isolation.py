@@ -138,17 +138,6 @@ def test_a_perfect_solver_is_perfect_in_its_own_process_whatever_it_prints(worke
     assert evaluation(targets, outcome.solved).solved.all()
 
 
-@pytest.mark.parametrize(
-    ("manner", "trouble"),
-    [("hangs", "ended after 0.5 s of silence"), ("crashes", "its process ended with code 3")],
-)
-def test_a_lost_solver_keeps_its_answers_and_costs_no_other(worker, targets, manner, trouble):
-    outcome = worker.perform(job(targets, manner))
-    assert (len(outcome.solved), outcome.is_lost, outcome.trouble) == (2, True, trouble)
-    outcome = worker.perform(job(targets, "perfect"))
-    assert (len(outcome.solved), outcome.trouble) == (COUNT, "")
-
-
 def test_a_quick_solve_is_repeated_before_the_next_and_a_slow_one_is_not(targets, monkeypatch):
     """Times are those of a loop of solves and nothing else."""
     monkeypatch.setattr(job_module, "QUICK", 0.1)

@@ -244,25 +244,3 @@ def test_a_caption_says_how_many_on_which_machine_with_what(records):
 def test_a_width_that_is_none_is_refused(width):
     with pytest.raises(ValueError, match="--width: expected column, page or a length"):
         latex.paper(width)
-
-
-FAULTS = {
-    "scaled": r"\resizebox{40pt}{!}{a table that is far wider than this}",
-    "tiny": r"{\tiny small print}",
-    "narrow": r"\begin{tabular}{S[table-format=1.0]@{}S[table-format=1.0]@{}S[table-format=1.0]}"
-    r"1.23456789 & 1.23456789 & 1.23456789 \end{tabular}",
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_the_checks_of_a_document_notice_what_they_are_for(fault, tmp_path):
-    if not shutil.which("pdftotext"):
-        pytest.skip("pdftotext is not installed")
-    end, filler = r"\end{document}", "words " * 1200
-    text = document([], "page").replace(end, rf"{filler} {FAULTS[fault]}{end}")
-    compiled = typeset(tmp_path, text.replace("{lmodern,", "{graphicx,lmodern,"))
-    laws = [test_no_text_is_smaller_than_eight_points, test_no_word_stands_upon_another]
-    with pytest.raises(AssertionError):
-        laws[fault == "narrow"](compiled)
-    if fault != "narrow":
-        test_no_word_stands_upon_another(compiled)

@@ -276,9 +276,3 @@ def test_a_fault_of_a_table_is_an_error_and_no_fault_of_a_record(tmp_path, recor
     with pytest.raises(KeyError, match="a fault of ours"):
         written(tmp_path, records)
     assert len(RecordFile(tmp_path).read().records) == len(records)
-
-
-def test_without_records_there_is_no_report(tmp_path):
-    with pytest.raises(ValueError, match="no records"):
-        report.write(tmp_path / "empty")
-    assert not (tmp_path / "empty").exists()
