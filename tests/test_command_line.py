@@ -144,14 +144,6 @@ def test_a_path_of_another_kind_exits_2_and_is_named(capsys, empty_folder, comma
     assert (code, err) == (2, f"plumbob: {path}: expected a {expected}, got a {kind}\n")
 
 
-@pytest.mark.parametrize("command", ["report", "bench"])
-def test_a_folder_of_the_system_exits_2(capsys, command):
-    code, _, err = plumbob(capsys, command, "-o", "/proc/nothing-of-ours")
-    assert code == 2
-    assert "/proc/nothing-of-ours" in err
-    assert err.count("\n") == 1
-
-
 def test_damaged_lines_cost_a_sentence_and_nothing_else(capsys, empty_folder):
     file = RecordFile("out")
     file.append([a_record()])

