@@ -433,31 +433,6 @@ def test_every_suite_gives_the_same_tables_on_two_workers(executor, monkeypatch,
     assert_same_tables([suite], executor, tmp_path)
 
 
-CLIENT = """
-import os, sys, signal
-from plumbob.bench.experiments import SCALES, Scale
-from plumbob.bench.harness.executors import executor_at
-from plumbob.bench.harness import run
-from pathlib import Path
-SCALES["quick"] = Scale(targets=3, seconds=0.001)
-done = 0
-for event in run.run(["arm"], "quick", Path(sys.argv[1]), executor_at(sys.argv[2])):
-    done += event.state == run.MEASURED
-    if done == 5:
-        os.kill(os.getpid(), signal.SIGKILL)
-"""
-
-
-def test_a_killed_client_continues_where_it_was(cluster, executor, tmp_path):
-    command = [sys.executable, "-c", CLIENT, str(tmp_path), address(cluster)]
-    done = subprocess.run(command, cwd=ROOT, check=False, stderr=subprocess.DEVNULL)
-    assert done.returncode == -signal.SIGKILL
-    assert len(rows(tmp_path)) == 5
-    events = list(run.run(["arm"], "quick", tmp_path, executor))
-    assert states(events)[run.KEPT] == 5
-    assert rows(tmp_path) == dict.fromkeys((block_key(b) for b in blocks("arm", TINY)), 1)
-
-
 def pids(cluster):
     from distributed import Client
 
