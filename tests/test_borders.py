@@ -4,7 +4,6 @@ import inspect
 import json
 import math
 import os
-import re
 import subprocess
 import sys
 import typing
@@ -71,14 +70,6 @@ def test_every_argument_of_numbers_has_some_in_a_call():
     }
     assert len(arguments_of_numbers) >= 150
     assert arguments_of_numbers - given == WITHOUT_NUMBERS.keys()
-
-
-def test_what_is_unchecked_says_so():
-    public = dict(public_calls.public_names())
-    unchecked = [name for name, why in public_calls.INTERNAL.items() if "unchecked" in why]
-    assert unchecked
-    said = re.compile("unchecked|not checked|neither checked")
-    assert all(said.search(public[name].__doc__) for name in unchecked)
 
 
 # By default every so-manieth trial, of each function others; all of them are slow.

@@ -161,8 +161,3 @@ def test_a_step_that_fails_is_a_failure(pythons, stand_in, monkeypatch, tmp_path
     python = stand_in("x/bin/python", f"sys.exit({failing!r} in sys.argv)")
     monkeypatch.setattr(pythons, "VENVS", tmp_path)
     assert pythons.test("x", python, LOCKS[0], ["-q"]) == (failing is None)
-
-
-def test_no_such_check_is_said(pythons, capsys):
-    assert pythons.main("nothing") == 2
-    assert "wheels" in capsys.readouterr().out

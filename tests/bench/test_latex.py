@@ -141,14 +141,6 @@ def test_no_word_stands_upon_another(compiled):
                 assert not upon, (word, other)
 
 
-@pytest.mark.parametrize("width", ["page", "column", "120mm", "7in"])
-def test_no_table_is_scaled_or_set_below_eight_points(every_table, width):
-    for made in every_table:
-        text = latex.latex(made, width)
-        assert not re.search(r"resizebox|scalebox|\\(tiny|scriptsize|footnotesize)\b", text)
-        assert min(map(int, re.findall(r"\\fontsize\{(\d+)\}", text))) >= 8
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_braces_and_environments_close_in_turn_whatever_a_name_is(name):
     made = Table(
@@ -174,12 +166,6 @@ def test_a_text_is_data_of_letters_that_every_tex_has(text):
     assert "\n" not in made
     rest = re.sub(r"\\(text\w+|ensuremath|hspace|raisebox|num|[a-zA-Z]+)\b|\\[{}$&#%_]", "", made)
     assert not set(re.sub(r"\{.*?\}", "", rest)) & set("$&#%^~\\")
-
-
-@pytest.mark.parametrize("name", ["[red]x", "*", "*[2cm]"])
-def test_a_row_is_no_option_of_the_row_before(name):
-    text = latex.latex(table(("a", 1), ("a", 2), (name, 1.0)))
-    assert not re.search(r"(\\\\|\\midrule|\\addlinespace)\s*[\[*]", text)
 
 
 def test_numbers_are_aligned_by_siunitx_and_the_best_are_bold_ties_too():

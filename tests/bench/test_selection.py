@@ -183,15 +183,6 @@ def test_a_table_goes_to_standard_output_or_to_a_file(capsys, folder, form, begi
     assert not (folder / "report" / "index.html").exists()
 
 
-def test_columns_rows_and_order_can_be_chosen(capsys, folder):
-    arguments = ["--columns", "solver, within tolerance", "--columns", "1", "--sort", "solver"]
-    code, out, _ = run(capsys, "--table", "accuracy", *arguments, "--rows", "problem~circle")
-    assert code == 0
-    lines = [line for line in out.splitlines() if line.startswith("|")]
-    assert lines[0].startswith("| solver | within tolerance (95 % interval) | problem |")
-    assert [line.split(" |")[0] for line in lines[2:]] == ["| CCD"] * 2 + ["| FABRIK"] * 2
-
-
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -22,32 +22,9 @@ from plumbob.bench.problems.chains import BEYOND, chain_targets
 from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
-from plumbob.reference import Skeleton, forward_kinematics, rotation, solve_ik
+from plumbob.reference import forward_kinematics, solve_ik
 
 KINEMATICS = {"Plumbob": ReferenceKinematics, **SKELETON_ENGINES}
-
-
-@pytest.fixture
-def tree(rng):
-    """Two branches of three joints, in a random pose."""
-    skeleton = Skeleton([-1, 0, 1, 2, 1, 4, 5], rng.standard_normal((7, 3)))
-    return skeleton, rotation.random(rng, 7)
-
-
-def test_the_jacobian_is_the_derivative_of_the_position(tree, rng):
-    """Central differences at 1e-6 err by about 1e-10: their step squared, and rounding over it."""
-    skeleton, local = tree
-    kinematics = ReferenceKinematics(skeleton)
-    q, h = local.ravel(), 1e-6
-    J = kinematics.jacobian(q, 6)
-    for i in range(J.shape[1]):
-        v = np.zeros(J.shape[1])
-        v[i] = h
-        ends = [forward_kinematics(skeleton, kinematics.integrate(q, s * v).reshape(-1, 4))
-                for s in (1, -1)]  # fmt: skip
-        slope = (ends[0].positions[6] - ends[1].positions[6]) / (2 * h)
-        np.testing.assert_allclose(J[:, i], slope, atol=1e-9)
-    assert np.abs(J).max() > 0.1
 
 
 def solved(kind, problem, **limits):

@@ -94,23 +94,6 @@ def test_a_claim_is_judged_as_by_the_cross_check():
     assert notes["missed"] == ""
 
 
-def test_resampling_evens_the_gaps_out():
-    raw, even = (
-        found("pictures", "arm/plumb_bob", "ccd", evened=evened).measure().arrays
-        for evened in (False, True)
-    )
-    assert np.ptp(even["spacing"]) < np.ptp(raw["spacing"])
-    assert even["spacing"].max() <= 0.02 * (1 + 1e-12)
-
-
-@pytest.mark.slow
-def test_one_step_of_the_cloth_starts_at_one_and_converges():
-    for solver, last in (("newton", 12), ("local_global", 1000)):
-        arrays = found("cloth", "cloth/x1/one step", solver).measure().arrays
-        assert arrays["residual"][0] == arrays["error"][0] == 1.0
-        assert arrays["error"][last] < 1e-10
-
-
 def test_newtons_error_is_printed_as_it_is_in_fifty_digits(extended_precision):
     """Measured against Newton's own answer it was 1e-17, which no float64 can be."""
     swing, k = cloth_swing(1, size=4), 10
