@@ -12,7 +12,7 @@ class Page(html.parser.HTMLParser):
     Attributes:
         tags: every tag, in order; `open` those left open and `wrong` ends of others.
         ids, links: the values of `id`, and of `href` and `src`.
-        texts: the texts but of styles; `bold` those in bold.
+        texts: the texts but of styles; `bold` those of cells in bold.
         rows: the cells of each row of its tables.
     """
 
@@ -58,5 +58,4 @@ class Page(html.parser.HTMLParser):
             self.texts.append(data)
         if {*CELLS} & {*self.open}:
             self.rows[-1][-1] += data
-        if "b" in self.open:
-            self.bold.append(data)
+            self.bold += [data] if "b" in self.open else []

@@ -1,7 +1,6 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
 import importlib
-import sys
 from functools import partial
 
 import numpy as np
@@ -350,15 +349,8 @@ def prepare(system, frame, manner="well"):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def fakes(tmp_path_factory):
-    """Let this process and the worker import the fakes."""
-    folder = tmp_path_factory.mktemp("fakes")
-    (folder / "fake_cloth_solvers.py").write_text(FAKES)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(folder))
-        patch.syspath_prepend(folder)
-        yield
-    sys.modules.pop("fake_cloth_solvers", None)
+def fakes(importable):
+    importable("fake_cloth_solvers", FAKES)
 
 
 def messages(cloth, manner, frames=5, repeats=1, budget=60.0):
@@ -427,16 +419,9 @@ def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, los
     assert facts == {"rungs": ["as it is"], "remarks": remarks, "trouble": why}
 
 
-class InThisProcess(WorkerProcess):
-    """A worker process that is none."""
-
-    def stream(self, job):
-        return job.perform()
-
-
 @pytest.fixture
-def here(monkeypatch):
-    monkeypatch.setattr(peers_cloth, "worker_process", InThisProcess)
+def here(monkeypatch, in_this_process):
+    monkeypatch.setattr(peers_cloth, "worker_process", in_this_process)
 
 
 def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch):

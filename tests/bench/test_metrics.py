@@ -14,6 +14,7 @@ from plumbob.reference import rotation
 
 @pytest.mark.parametrize("total", [1, 7, 200, 100_000])
 def test_wilsons_interval_is_that_of_scipy(total):
+    """Newcombe 1998, method 3."""
     for hits in {0, 1, total // 3, total - 1, total}:
         found = metrics.share(np.arange(total) < hits)
         low, high = stats.binomtest(hits, total).proportion_ci(0.95, method="wilson")

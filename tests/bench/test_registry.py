@@ -16,7 +16,6 @@ from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots import tables as robot_tables
 from plumbob.bench.harness import run
 from plumbob.bench.harness.experiment import Experiment
-from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
@@ -68,19 +67,14 @@ def prepare(robot, tolerance):
 """
 
 
-class InThisProcess(WorkerProcess):
-    """A worker process that is none."""
-
-    def stream(self, job):
-        return job.perform()
-
-
-def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, monkeypatch):
+def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(
+    tmp_path, monkeypatch, in_this_process
+):
     (tmp_path / "stays_put.py").write_text(ADAPTER)
     monkeypatch.syspath_prepend(tmp_path)
     line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (PeerEntry(ONE_START),))
     monkeypatch.setattr(registry, "PEERS", (*registry.PEERS, line))
-    monkeypatch.setattr(robots, "worker_process", InThisProcess)
+    monkeypatch.setattr(robots, "worker_process", in_this_process)
     name = ("robots/character", "Stays put")
     (block,) = [b for b in blocks("ik", TINY) if (b.problem, b.solver) == name]
     record = run.measure(block)

@@ -17,7 +17,7 @@ from plumbob.bench.tables import aligned
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Table, naming, without_empty, words
 
-WIDTHS = range(40, 201)
+WIDTHS = (*range(40, 110, 5), 133, 160, 200)
 FEW = (40, 57, 80, 133, 200)
 
 
