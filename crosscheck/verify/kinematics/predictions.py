@@ -12,7 +12,7 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 from ..case import Case
 from ..explain import Variant
 from .faults import combinations, switches
-from .textbook import SOLVERS, Chain, Ending, Pose, Switches, place_all
+from .textbook import SOLVERS, Ending, Pose, Switches, TextbookChain, place_all
 
 RIGHT = Switches()
 
@@ -28,7 +28,7 @@ def path_to(parents: IndexArray, effector: int) -> IndexArray:
 def forward(inputs: Mapping[str, Any], switched: Switches = RIGHT) -> tuple[FloatArray, FloatArray]:
     """Return positions and global rotations of all joints."""
     pose = _read(inputs, switched)
-    chain = Chain(inputs["parents"], inputs["offsets"], np.zeros(0, dtype=np.int64))
+    chain = TextbookChain(inputs["parents"], inputs["offsets"], np.zeros(0, dtype=np.int64))
     place_all(chain, switched, pose)
     return pose.positions, pose.rotations
 
@@ -40,7 +40,7 @@ def solve(
     parents = inputs["parents"]
     pose = _read(inputs, switched)
     effector = len(parents) - 1 if switched.effector == 1 else inputs["effector"]
-    chain = Chain(parents, inputs["offsets"], path_to(parents, effector))
+    chain = TextbookChain(parents, inputs["offsets"], path_to(parents, effector))
     target = tuple(inputs["target"].tolist())
     ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]))
     sweeps = SOLVERS[method](chain, target, ending, switched, pose)
