@@ -12,7 +12,7 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 from ..case import Case
 from ..explain import Variant
 from .faults import combinations, switches
-from .textbook import SOLVERS, Ending, Pose, Switches, TextbookChain, place_all
+from .textbook import SOLVERS, Ending, Switches, TextbookChain, TextbookPose, place_all
 
 RIGHT = Switches()
 
@@ -47,12 +47,12 @@ def solve(
     return _reordered(pose.local, switched), pose.positions, sweeps
 
 
-def _read(inputs: Mapping[str, Any], switched: Switches) -> Pose:
+def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
     """Return the start, its quaternions in the order that the solver expects."""
     local = np.array(inputs["local_rotations"])
     if switched.numbers in (1, 2):
         local = np.roll(local, 1, axis=-1)
-    return Pose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
+    return TextbookPose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
 
 
 def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:
