@@ -29,7 +29,7 @@ def compile_kernels() -> None:
     """Solve one small problem with each solver, the slowest to compile and last needed first."""
     import numpy as np
 
-    from plumbob import (
+    from plumbob.reference import (
         IK_SOLVERS,
         STEP_SOLVERS,
         Articulation,
