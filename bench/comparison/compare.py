@@ -49,21 +49,13 @@ METHOD = (
 
 
 class RunComparison(NamedTuple):
-    """Differences between two runs.
+    """Differences between two runs."""
 
-    Attributes:
-        rows: the worst first.
-        drift: of the machine between both runs.
-        method: a sentence on how times were compared.
-        is_rerun: whether both were measured side by side.
-        short: number of times with too few rounds to be compared.
-    """
-
-    rows: list[RowChange]
-    drift: Drift
-    method: str
-    is_rerun: bool = False
-    short: int = 0
+    rows: list[RowChange]  # the worst first
+    drift: Drift  # of the machine between both runs
+    method: str  # a sentence on how times were compared
+    is_rerun: bool = False  # whether both were measured side by side
+    short: int = 0  # number of times with too few rounds to be compared
 
 
 def compare(old: Iterable[Record], new: Iterable[Record]) -> RunComparison:

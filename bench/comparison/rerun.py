@@ -44,23 +44,14 @@ METHOD = (
 
 
 class Plan(NamedTuple):
-    """A comparison of two revisions.
+    """A comparison of two revisions."""
 
-    Attributes:
-        revision: the name of the other revision in git.
-        suites: to measure.
-        words: only problems or solvers that contain one of these; all if empty.
-        pairs: number of pairs; 0 for as many as the number of rows needs.
-        scale: of each measurement.
-        seed: of the order.
-    """
-
-    revision: str
-    suites: tuple[str, ...]
-    words: tuple[str, ...] = ()
-    pairs: int = 0
-    scale: str = "quick"
-    seed: int = SEED
+    revision: str  # the name of the other revision in git
+    suites: tuple[str, ...]  # to measure
+    words: tuple[str, ...] = ()  # only problems or solvers that contain one of these; all if empty
+    pairs: int = 0  # number of pairs; 0 for as many as the number of rows needs
+    scale: str = "quick"  # of each measurement
+    seed: int = SEED  # of the order
 
 
 def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) -> RunComparison:

@@ -48,23 +48,14 @@ class Pair(NamedTuple):
 
 @dataclass(frozen=True)
 class RowChange:
-    """Difference of a quantity of a row between two runs.
+    """Difference of a quantity of a row between two runs."""
 
-    Attributes:
-        key: suite, problem, solver, and settings as JSON without the version.
-        quantity: the array that decided; "" for the whole record.
-        verdict: of this quantity.
-        change: relative size of the difference, for sorting.
-        why: a sentence.
-        ratio: of the new to the old time, where times are compared.
-    """
-
-    key: RowKey
-    quantity: str
-    verdict: ChangeVerdict
-    change: float = 0.0
-    why: str = ""
-    ratio: TimeRatio | None = None
+    key: RowKey  # suite, problem, solver, and settings as JSON without the version
+    quantity: str  # the array that decided; "" for the whole record
+    verdict: ChangeVerdict  # of this quantity
+    change: float = 0.0  # relative size of the difference, for sorting
+    why: str = ""  # a sentence
+    ratio: TimeRatio | None = None  # of the new to the old time, where times are compared
 
     @property
     def title(self) -> str:

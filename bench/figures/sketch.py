@@ -40,21 +40,13 @@ class Drawing(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A figure before it is drawn.
+    """A figure before it is drawn."""
 
-    Attributes:
-        name: the stem of its files.
-        title: heading.
-        shows: a sentence on its contents.
-        data: of the figure: arrays, words, numbers, and tuples of such.
-        draw: returns the figure of the data; imports matplotlib only then.
-    """
-
-    name: str
-    title: str
-    shows: str
-    data: Any
-    draw: Callable[[Any], "Figure"]
+    name: str  # the stem of its files
+    title: str  # heading
+    shows: str  # a sentence on its contents
+    data: Any  # of the figure: arrays, words, numbers, and tuples of such
+    draw: Callable[[Any], "Figure"]  # returns the figure of the data; imports matplotlib only then
 
     def digest(self) -> str:
         """Return a cache key of the data and the drawing code."""

@@ -33,19 +33,12 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True)
 class Scale:
-    """How much is measured.
+    """How much is measured."""
 
-    Attributes:
-        targets: random targets a problem.
-        seconds: of a benchmark.
-        entrants: the user's solvers, beside the registered ones.
-        problems: the user's problems, likewise.
-    """
-
-    targets: int
-    seconds: float
-    entrants: tuple[Entrant, ...] = ()
-    problems: "tuple[OwnProblem, ...]" = ()
+    targets: int  # random targets a problem
+    seconds: float  # of a benchmark
+    entrants: tuple[Entrant, ...] = ()  # the user's solvers, beside the registered ones
+    problems: "tuple[OwnProblem, ...]" = ()  # the user's problems, likewise
 
     def is_as_short_as(self, name: str) -> bool:
         """Return whether benchmarks are as short as at a named scale."""
@@ -60,31 +53,22 @@ class Block:
     """One problem for one solver with the settings that change the answer, and how to measure it.
 
     The numbers are made only when `measure` is called.
-
-    Attributes:
-        suite: the family of problems.
-        problem: the name of the problem; with suite, solver and settings it is the block's key.
-        solver: the name of the solver.
-        measure: measures it.
-        settings: numbers, words and truth values that change the answer.
-        size: how much is measured, where that varies: targets, or seconds of a benchmark.
-        facts: the names as values: numbers, words, truth values and lists of words. "title" is how
-            the problem is written, "task" the kind of its numbers, see `harness.values`.
-        times: whether times are among the numbers, or end the work: see `Experiment`.
-        conditions: of its solver, beside the conditions of every record.
-        budget: the time that bounds the work [s]; 0 if none does.
     """
 
-    suite: str
-    problem: str
-    solver: str
-    measure: Callable[[], Measured]
+    suite: str  # the family of problems
+    problem: str  # the name of the problem; with suite, solver and settings it is the block's key
+    solver: str  # the name of the solver
+    measure: Callable[[], Measured]  # measures it
+    # numbers, words and truth values that change the answer
     settings: Mapping[str, Any] = field(default_factory=dict)
-    size: float = 0
+    size: float = 0  # how much is measured, where that varies: targets, or seconds of a benchmark
+    # the names as values: numbers, words, truth values and lists of words. "title" is how the
+    # problem is written, "task" the kind of its numbers, see `harness.values`.
     facts: Mapping[str, Any] = field(default_factory=dict)
-    times: bool = True
+    times: bool = True  # whether times are among the numbers, or end the work: see `Experiment`
+    # of its solver, beside the conditions of every record
     conditions: Mapping[str, Any] = field(default_factory=dict)
-    budget: float = 0.0
+    budget: float = 0.0  # the time that bounds the work [s]; 0 if none does
 
     def of(self, entrant: Entrant | None) -> "Block":
         """Return the block of a user's solver, with its version, facts and conditions."""
@@ -104,21 +88,13 @@ class Block:
 
 @dataclass(frozen=True)
 class Choice:
-    """The blocks of a run: all of them, or the user's selection.
+    """The blocks of a run: all of them, or the user's selection."""
 
-    Attributes:
-        name: of the scale, "quick" or "full".
-        scale: how much is measured, and the user's solvers and problems.
-        solvers: only these, by the names in records; all if none.
-        problems: only these.
-        is_partial: whether it leaves out something that the scale has.
-    """
-
-    name: str
-    scale: Scale
-    solvers: tuple[str, ...] = ()
-    problems: tuple[str, ...] = ()
-    is_partial: bool = False
+    name: str  # of the scale, "quick" or "full"
+    scale: Scale  # how much is measured, and the user's solvers and problems
+    solvers: tuple[str, ...] = ()  # only these, by the names in records; all if none
+    problems: tuple[str, ...] = ()  # only these
+    is_partial: bool = False  # whether it leaves out something that the scale has
 
     def takes(self, block: Block) -> bool:
         """Return whether a block is selected."""

@@ -28,19 +28,13 @@ SUITES = {
 
 
 class Experiment(NamedTuple):
-    """A folder of `bench/experiments`, without importing it.
+    """A folder of `bench/experiments`, without importing it."""
 
-    Attributes:
-        package: the folder, by its full name as a package.
-        suite: its name on the command line; experiments may share a suite.
-        chapter: the section of the report that shows it.
-        times: whether times are among its numbers, or a budget of time ends its work; timed blocks
-            share no machine with others while they are measured.
-    """
-
-    package: str
-    suite: str
-    chapter: str
+    package: str  # the folder, by its full name as a package
+    suite: str  # its name on the command line; experiments may share a suite
+    chapter: str  # the section of the report that shows it
+    # whether times are among its numbers, or a budget of time ends its work; timed blocks share no
+    # machine with others while they are measured
     times: bool = True
 
     def blocks(self, scale: Scale) -> Iterator[Block]:

@@ -25,25 +25,15 @@ _START = "import plumbob.bench.harness.worker as w; w.main()"
 
 
 class Outcome(NamedTuple):
-    """The result of a job.
+    """The result of a job."""
 
-    Attributes:
-        setup: how long the set-up of the solver took [s].
-        solved: the answers, in the order of the targets.
-        trouble: why there are no more, or the most frequent exception; else "".
-        is_lost: whether the worker was lost over the next target.
-        numbers: the result of a calculation.
-        is_silent: whether the worker was ended for its silence.
-        remark: the remark of the solver's adapter, else "".
-    """
-
-    setup: float
-    solved: list[Solved]
-    trouble: str
-    is_lost: bool = False
-    numbers: Mapping[str, Any] | None = None
-    is_silent: bool = False
-    remark: str = ""
+    setup: float  # how long the set-up of the solver took [s]
+    solved: list[Solved]  # the answers, in the order of the targets
+    trouble: str  # why there are no more, or the most frequent exception; else ""
+    is_lost: bool = False  # whether the worker was lost over the next target
+    numbers: Mapping[str, Any] | None = None  # the result of a calculation
+    is_silent: bool = False  # whether the worker was ended for its silence
+    remark: str = ""  # the remark of the solver's adapter, else ""
 
     @property
     def note(self) -> str:

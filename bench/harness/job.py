@@ -24,29 +24,19 @@ QUICK, REPEATS = 1e-3, 4
 
 
 class Job(NamedTuple):
-    """Targets and the solver that solves them.
+    """Targets and the solver that solves them."""
 
-    Attributes:
-        module: the adapter's module, by its full name.
-        model: the robot or skeleton that the adapter is prepared for.
-        targets: solved in order: `request(i)` is the request of a target, `shape` the number
-            of targets and of the numbers of an answer.
-        tolerance: when a target counts as reached.
-        settings: of the adapter.
-        restarts: further attempts from random poses, made here for solvers without restarts.
-        budget: no further target is begun after so long [s].
-        entrant: the name of a user's solver, to announce its first trouble; else "".
-        warms_up: whether the first target is solved, and quick solves are repeated, uncounted.
-    """
-
-    module: str
-    model: Any
+    module: str  # the adapter's module, by its full name
+    model: Any  # the robot or skeleton that the adapter is prepared for
+    # solved in order: `request(i)` is the request of a target, `shape` the number of targets and of
+    # the numbers of an answer
     targets: Any
-    tolerance: Any
-    settings: Mapping[str, Any]
-    restarts: int
-    budget: float
-    entrant: str = ""
+    tolerance: Any  # when a target counts as reached
+    settings: Mapping[str, Any]  # of the adapter
+    restarts: int  # further attempts from random poses, made here for solvers without restarts
+    budget: float  # no further target is begun after so long [s]
+    entrant: str = ""  # the name of a user's solver, to announce its first trouble; else ""
+    # whether the first target is solved, and quick solves are repeated, uncounted
     warms_up: bool = True
 
     def perform(self) -> Iterator[Message]:

@@ -77,35 +77,26 @@ _DECODER = msgspec.json.Decoder(_Line)
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """The results of a block.
+    """The results of a block."""
 
-    Attributes:
-        suite: the family of problems, for example "arm".
-        problem: the name of the problem.
-        solver: the name of the solver.
-        settings: numbers, words and truth values that change the answer.
-        size: how much was measured, for example the number of random targets.
-        arrays: the results, arrays of numbers with an entry for each target, frame or step.
-        notes: words that belong to it; "failed" says why there are no arrays.
-        stamp: machine, versions and digest of the sources, see `plumbob.bench.harness.machine`.
-        when: the moment it was produced, ISO 8601 with time zone.
-        seconds: how long it took to produce.
-        facts: for tables to select and sort by: numbers, words, truth values and lists of words.
-        conditions: of the measurement, which do not invalidate it: the commit of the
-            sources, affinity, load, pace.
-    """
-
-    suite: str
-    problem: str
-    solver: str
+    suite: str  # the family of problems, for example "arm"
+    problem: str  # the name of the problem
+    solver: str  # the name of the solver
+    # numbers, words and truth values that change the answer
     settings: Mapping[str, Any] = field(default_factory=dict)
-    size: float = 0.0
+    size: float = 0.0  # how much was measured, for example the number of random targets
+    # the results, arrays of numbers with an entry for each target, frame or step
     arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
+    # words that belong to it; "failed" says why there are no arrays
     notes: Mapping[str, str] = field(default_factory=dict)
+    # machine, versions and digest of the sources, see `plumbob.bench.harness.machine`
     stamp: Mapping[str, Any] = field(default_factory=dict)
-    when: str = ""
-    seconds: float = 0.0
+    when: str = ""  # the moment it was produced, ISO 8601 with time zone
+    seconds: float = 0.0  # how long it took to produce
+    # for tables to select and sort by: numbers, words, truth values and lists of words
     facts: Mapping[str, Any] = field(default_factory=dict)
+    # of the measurement, which do not invalidate it: the commit of the sources, affinity, load,
+    # pace
     conditions: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -25,20 +25,14 @@ NOT_RUN = "not run"
 
 
 class Event(NamedTuple):
-    """A step of a run.
+    """A step of a run."""
 
-    Attributes:
-        state: "kept" if a record of it was there, "measuring", "measured", "failed", or "not run"
-            for records of a solver that are not part of this run.
-        suite: the suite.
-        subject: problem and solver.
-        message: why it is measured again, why it failed, or how many were not run; else "".
-    """
-
+    # "kept" if a record of it was there, "measuring", "measured", "failed", or "not run" for
+    # records of a solver that are not part of this run
     state: str
-    suite: str
-    subject: str
-    message: str = ""
+    suite: str  # the suite
+    subject: str  # problem and solver
+    message: str = ""  # why it is measured again, why it failed, or how many were not run; else ""
 
 
 def run(

@@ -19,35 +19,21 @@ class Begun(NamedTuple):
 
 
 class Ready(NamedTuple):
-    """The solver is set up and has solved a target that does not count.
+    """The solver is set up and has solved a target that does not count."""
 
-    Attributes:
-        setup: how long the set-up took, without imports [s].
-        remark: how to read the solver's numbers, else "".
-    """
-
-    setup: float
-    remark: str = ""
+    setup: float  # how long the set-up took, without imports [s]
+    remark: str = ""  # how to read the solver's numbers, else ""
 
 
 class Solved(NamedTuple):
-    """The answer for a target.
+    """The answer for a target."""
 
-    Attributes:
-        q: the coordinates, NaN if there are none.
-        claim: 1 if the solver says that it solved the target, 0 if not, -1 if it does not say.
-        seconds: how long it took.
-        trouble: the exception that the solver raised, else "".
-        round_trip: duration of the request, 0 without a request [s].
-        doubt: why the seconds that the solver counted cannot be right, else "".
-    """
-
-    q: np.ndarray
-    claim: int
-    seconds: float
-    trouble: str
-    round_trip: float = 0.0
-    doubt: str = ""
+    q: np.ndarray  # the coordinates, NaN if there are none
+    claim: int  # 1 if the solver says that it solved the target, 0 if not, -1 if it does not say
+    seconds: float  # how long it took
+    trouble: str  # the exception that the solver raised, else ""
+    round_trip: float = 0.0  # duration of the request, 0 without a request [s]
+    doubt: str = ""  # why the seconds that the solver counted cannot be right, else ""
 
     @property
     def overhead(self) -> float:
@@ -62,17 +48,11 @@ class Numbers(NamedTuple):
 
 
 class Finished(NamedTuple):
-    """The last message: the end of the job, of its solver, or of the process.
+    """The last message: the end of the job, of its solver, or of the process."""
 
-    Attributes:
-        trouble: why the job was not done, "" if it was.
-        is_lost: whether the process ended.
-        is_silent: whether it was ended for its silence.
-    """
-
-    trouble: str = ""
-    is_lost: bool = False
-    is_silent: bool = False
+    trouble: str = ""  # why the job was not done, "" if it was
+    is_lost: bool = False  # whether the process ended
+    is_silent: bool = False  # whether it was ended for its silence
 
 
 Message = Begun | Ready | Progress | Solved | Numbers | Finished

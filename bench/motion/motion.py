@@ -37,47 +37,28 @@ _MAX_COORDINATE, _MAX_SHADE = 65535, 255
 
 
 class Moving(NamedTuple):
-    """The motion of a solver.
+    """The motion of a solver."""
 
-    Attributes:
-        label: name of the solver.
-        positions: [m], (frame, point, 3).
-        errors: of each frame [m], (frame,).
-        distances: of each point from its right position [m], (frame, point); None for an arm.
-    """
-
-    label: str
-    positions: Floats
-    errors: Floats
+    label: str  # name of the solver
+    positions: Floats  # [m], (frame, point, 3)
+    errors: Floats  # of each frame [m], (frame,)
+    # of each point from its right position [m], (frame, point); None for an arm
     distances: Floats | None = None
 
 
 class Scene(NamedTuple):
-    """Motions of solvers with the same frames.
+    """Motions of solvers with the same frames."""
 
-    Attributes:
-        name: within the page.
-        title: heading.
-        shows: a sentence on its contents.
-        motions: by solver; the first are shown first.
-        seconds: from frame to frame [s].
-        measure: name of the error, such as "distance to the target".
-        view: azimuth and height of the camera [rad].
-        panes: number of motions beside each other.
-        curve: that an arm follows [m], (point, 3); None for a cloth.
-        marked: pinned points.
-    """
-
-    name: str
-    title: str
-    shows: str
-    motions: Sequence[Moving]
-    seconds: float
-    measure: str
-    view: tuple[float, float]
-    panes: int = 1
-    curve: Floats | None = None
-    marked: Sequence[int] = ()
+    name: str  # within the page
+    title: str  # heading
+    shows: str  # a sentence on its contents
+    motions: Sequence[Moving]  # by solver; the first are shown first
+    seconds: float  # from frame to frame [s]
+    measure: str  # name of the error, such as "distance to the target"
+    view: tuple[float, float]  # azimuth and height of the camera [rad]
+    panes: int = 1  # number of motions beside each other
+    curve: Floats | None = None  # that an arm follows [m], (point, 3); None for a cloth
+    marked: Sequence[int] = ()  # pinned points
 
     def checked(self) -> "Scene":
         """Return the scene if all its motions have the same frames and points.

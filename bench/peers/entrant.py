@@ -14,29 +14,17 @@ SUITE_TASKS = {"ik": (CHAIN_TASK, ROBOT_TASK), "cloth": (STEP_TASK, MOTION_TASK)
 
 @dataclass(frozen=True)
 class Entrant:
-    """A solver that was opened once to describe itself.
+    """A solver that was opened once to describe itself."""
 
-    Attributes:
-        name: its own, or the user's name for it.
-        door: its address as the user gave it.
-        spec: the argument that opens it.
-        version: its own; "" if it states none.
-        commit: of its sources, and whether they were changed since; "" outside of git.
-        digest: twelve hex digits over its sources.
-        tasks: that it offers.
-        methods: of inverse kinematics.
-        step: the method of its time step, None if it declares none.
-    """
-
-    name: str
-    door: str
-    spec: Spec
-    version: str = ""
-    commit: str = ""
-    digest: str = ""
-    tasks: tuple[str, ...] = ()
-    methods: tuple[str, ...] = ("",)
-    step: str | None = None
+    name: str  # its own, or the user's name for it
+    door: str  # its address as the user gave it
+    spec: Spec  # the argument that opens it
+    version: str = ""  # its own; "" if it states none
+    commit: str = ""  # of its sources, and whether they were changed since; "" outside of git
+    digest: str = ""  # twelve hex digits over its sources
+    tasks: tuple[str, ...] = ()  # that it offers
+    methods: tuple[str, ...] = ("",)  # of inverse kinematics
+    step: str | None = None  # the method of its time step, None if it declares none
 
     @property
     def titles(self) -> dict[str, str]:

@@ -5,17 +5,11 @@ from typing import Any, NamedTuple
 
 
 class OwnTime(NamedTuple):
-    """The time that a solver, or its adapter, has measured itself.
+    """The time that a solver, or its adapter, has measured itself."""
 
-    Attributes:
-        seconds: by its own clock [s].
-        round_trip: of its requests, 0 without any [s].
-        doubt: why its clock cannot be right, else "".
-    """
-
-    seconds: float
-    round_trip: float = 0.0
-    doubt: str = ""
+    seconds: float  # by its own clock [s]
+    round_trip: float = 0.0  # of its requests, 0 without any [s]
+    doubt: str = ""  # why its clock cannot be right, else ""
 
     @property
     def overhead(self) -> float:

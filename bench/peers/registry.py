@@ -49,42 +49,26 @@ _LINES: tuple[Any, ...] = ((0, (8, 2)), (0, (3, 1, 1, 1)), (0, (8, 2, 2, 2)))
 
 @dataclass(frozen=True)
 class Solver:
-    """A solver as tables and figures show it.
+    """A solver as tables and figures show it."""
 
-    Attributes:
-        name: in records.
-        label: how it is written.
-        engine: its engine; "" if that is not known.
-        style: how it is drawn where each solver has a style of its own.
-    """
-
-    name: str
-    label: str
-    engine: str = PLUMBOB
-    style: Style = OTHER
+    name: str  # in records
+    label: str  # how it is written
+    engine: str = PLUMBOB  # its engine; "" if that is not known
+    style: Style = OTHER  # how it is drawn where each solver has a style of its own
 
 
 @dataclass(frozen=True)
 class StepSolver(Solver):
-    """A solver of implicit Euler's steps, and its iterations in each experiment.
+    """A solver of implicit Euler's steps, and its iterations in each experiment."""
 
-    Attributes:
-        is_linear: whether it solves a linear system, and so makes a single iteration.
-        converges: whether it solves a step to the end, in few iterations.
-        followed: iterations of a step with recorded residual and error; 0 for none.
-        counted: the maximum of a step in which powers of ten of the error are counted.
-        certified: the maximum before an answer is certified.
-        ladder: iterations of a step in a work-precision diagram.
-        motion: iterations of a frame there.
-    """
-
-    is_linear: bool = False
-    converges: bool = False
-    followed: int = 200
-    counted: int = 2000
-    certified: int = 3000
+    is_linear: bool = False  # whether it solves a linear system, and so makes a single iteration
+    converges: bool = False  # whether it solves a step to the end, in few iterations
+    followed: int = 200  # iterations of a step with recorded residual and error; 0 for none
+    counted: int = 2000  # the maximum of a step in which powers of ten of the error are counted
+    certified: int = 3000  # the maximum before an answer is certified
+    # iterations of a step in a work-precision diagram
     ladder: tuple[int, ...] = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-    motion: tuple[int, ...] = (1, 10, 100)
+    motion: tuple[int, ...] = (1, 10, 100)  # iterations of a frame there
 
 
 _Row = TypeVar("_Row")
@@ -130,20 +114,14 @@ def version(package: str) -> str:
 
 @dataclass(frozen=True)
 class Adapter:
-    """A solver behind an adapter.
+    """A solver behind an adapter."""
 
-    Attributes:
-        title: how it is written.
-        module: its adapter.
-        package: the package that must be installed.
-        environment: of its own, with the Python that runs it; "" if it works in ours.
-        entrant: the user's solver, if any, which is always there.
-    """
-
-    title: str
-    module: str
-    package: str
+    title: str  # how it is written
+    module: str  # its adapter
+    package: str  # the package that must be installed
+    # of its own, with the Python that runs it; "" if it works in ours
     environment: str = field(default="", kw_only=True)
+    # the user's solver, if any, which is always there
     entrant: Entrant | None = field(default=None, kw_only=True)
 
     @property
@@ -183,37 +161,24 @@ _RESTART_COUNT = 20
 
 @dataclass(frozen=True)
 class PeerEntry:
-    """A peer with settings, as it enters the tables.
+    """A peer with settings, as it enters the tables."""
 
-    Attributes:
-        kind: `ONE_START` or `RESTARTS`.
-        settings: of its adapter.
-        restarts: further attempts from random poses, for solvers without restarts.
-        note: tells it from another entry of the same solver and kind.
-    """
-
-    kind: str
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    restarts: int = 0
-    note: str = ""
+    kind: str  # `ONE_START` or `RESTARTS`
+    settings: Mapping[str, Any] = field(default_factory=dict)  # of its adapter
+    restarts: int = 0  # further attempts from random poses, for solvers without restarts
+    note: str = ""  # tells it from another entry of the same solver and kind
 
 
 @dataclass(frozen=True)
 class Peer(Adapter):
-    """A solver for robots.
+    """A solver for robots."""
 
-    Attributes:
-        license: of the package.
-        can: the robots that it takes.
-        entries: its settings.
-        kinematics: whether its forward kinematics is compared with ours.
-        precision: how exact that is, where it is not in double precision.
-    """
-
-    license: str
-    can: str
-    entries: tuple[PeerEntry, ...]
+    license: str  # of the package
+    can: str  # the robots that it takes
+    entries: tuple[PeerEntry, ...]  # its settings
+    # whether its forward kinematics is compared with ours
     kinematics: bool = field(default=False, kw_only=True)
+    # how exact that is, where it is not in double precision
     precision: str = field(default="", kw_only=True)
 
     def label_of(self, entry: PeerEntry) -> str:
@@ -241,23 +206,15 @@ _EXPLICIT_METHODS = ("explicit", "symplectic")
 
 @dataclass(frozen=True)
 class ClothPeer(Adapter):
-    """A solver for cloths.
+    """A solver for cloths."""
 
-    Attributes:
-        engine: its engine.
-        kind: how its settings differ from try to try.
-        settings: the constant settings of its adapter.
-        ladder: iterations in a step, where it iterates.
-        motion: iterations a frame of a motion.
-        converges: whether it solves a step to the end.
-    """
-
-    engine: str
-    kind: str
+    engine: str  # its engine
+    kind: str  # how its settings differ from try to try
+    # the constant settings of its adapter
     settings: Mapping[str, Any] = field(default_factory=dict)
-    ladder: tuple[int, ...] = ()
-    motion: tuple[int, ...] = ()
-    converges: bool = False
+    ladder: tuple[int, ...] = ()  # iterations in a step, where it iterates
+    motion: tuple[int, ...] = ()  # iterations a frame of a motion
+    converges: bool = False  # whether it solves a step to the end
 
 
 _IK_ADAPTERS, _CLOTH_ADAPTERS = f"{__package__}.ik", f"{__package__}.cloth"

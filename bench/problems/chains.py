@@ -18,21 +18,13 @@ _SEED = 1986
 
 @dataclass(frozen=True)
 class TargetsForSkeleton:
-    """A batch of independent position targets for the last joint.
+    """A batch of independent position targets for the last joint."""
 
-    Attributes:
-        name: of the problem.
-        title: how it is written.
-        skeleton: the chain.
-        starts: local rotations to start from, (target, joint, 4) or (joint, 4) for all.
-        targets: global positions [m], (target, 3).
-    """
-
-    name: str
-    title: str
-    skeleton: Skeleton
-    starts: FloatArray
-    targets: FloatArray
+    name: str  # of the problem
+    title: str  # how it is written
+    skeleton: Skeleton  # the chain
+    starts: FloatArray  # local rotations to start from, (target, joint, 4) or (joint, 4) for all
+    targets: FloatArray  # global positions [m], (target, 3)
 
     @property
     def every_start(self) -> FloatArray:
@@ -50,15 +42,10 @@ class ChainRequest(NamedTuple):
 
 
 class ChainRequests(NamedTuple):
-    """Targets as requests to a user's solver.
+    """Targets as requests to a user's solver."""
 
-    Attributes:
-        problem: the targets.
-        iterations: how many are allowed for each of them, (target,).
-    """
-
-    problem: TargetsForSkeleton
-    iterations: IndexArray
+    problem: TargetsForSkeleton  # the targets
+    iterations: IndexArray  # how many are allowed for each of them, (target,)
 
     @property
     def shape(self) -> tuple[int, int]:

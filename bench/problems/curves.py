@@ -34,21 +34,13 @@ DRIFT_FRAMES = 60
 
 @dataclass(frozen=True)
 class FollowedCurve:
-    """A curve that an effector follows, frame by frame.
+    """A curve that an effector follows, frame by frame."""
 
-    Attributes:
-        name: of the problem.
-        title: how it is written.
-        model: the arm.
-        start: its initial pose: local rotations of a Skeleton, else coordinates.
-        curve: the target of the effector in each frame [m], (frame, 3).
-    """
-
-    name: str
-    title: str
-    model: Skeleton | Articulation
-    start: FloatArray
-    curve: FloatArray
+    name: str  # of the problem
+    title: str  # how it is written
+    model: Skeleton | Articulation  # the arm
+    start: FloatArray  # its initial pose: local rotations of a Skeleton, else coordinates
+    curve: FloatArray  # the target of the effector in each frame [m], (frame, 3)
 
 
 def arm_curves() -> list[FollowedCurve]:

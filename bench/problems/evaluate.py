@@ -26,17 +26,11 @@ class Tolerance(NamedTuple):
 
 
 class PoseRequest(NamedTuple):
-    """A target.
+    """A target."""
 
-    Attributes:
-        positions: of the effectors [m], (effector, 3).
-        rotations: of the effectors, (effector, 3, 3).
-        start: coordinates to start from, (coordinate,).
-    """
-
-    positions: FloatArray
-    rotations: FloatArray
-    start: FloatArray
+    positions: FloatArray  # of the effectors [m], (effector, 3)
+    rotations: FloatArray  # of the effectors, (effector, 3, 3)
+    start: FloatArray  # coordinates to start from, (coordinate,)
 
     @property
     def poses(self) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -57,19 +51,12 @@ class PoseRequest(NamedTuple):
 
 
 class Targets(NamedTuple):
-    """The targets of a robot's effectors.
+    """The targets of a robot's effectors."""
 
-    Attributes:
-        positions: [m], (target, effector, 3).
-        rotations: matrices, (target, effector, 3, 3).
-        starts: coordinates to start from, (target, coordinate).
-        strata: the number of each target's stratum, (target,).
-    """
-
-    positions: FloatArray
-    rotations: FloatArray
-    starts: FloatArray
-    strata: np.ndarray
+    positions: FloatArray  # [m], (target, effector, 3)
+    rotations: FloatArray  # matrices, (target, effector, 3, 3)
+    starts: FloatArray  # coordinates to start from, (target, coordinate)
+    strata: np.ndarray  # the number of each target's stratum, (target,)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -86,20 +73,14 @@ class Targets(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """The errors of the answers, an entry for each target.
+    """The errors of the answers, an entry for each target."""
 
-    Attributes:
-        position: the largest distance of an effector from its target [m]; NaN without an answer.
-        rotation: the largest angle of an effector from its target [rad]; zero without a target
-            rotation.
-        beyond: by how much the worst joint is beyond its limit [rad].
-        solved: whether all three are within tolerance.
-    """
-
+    # the largest distance of an effector from its target [m]; NaN without an answer
     position: FloatArray
+    # the largest angle of an effector from its target [rad]; zero without a target rotation
     rotation: FloatArray
-    beyond: FloatArray
-    solved: np.ndarray
+    beyond: FloatArray  # by how much the worst joint is beyond its limit [rad]
+    solved: np.ndarray  # whether all three are within tolerance
 
 
 def mujoco_model(robot: Robot) -> Any:

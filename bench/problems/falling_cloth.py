@@ -32,25 +32,15 @@ _FALL_MARGIN, _FALL_DAMPING, _UNEVEN = 1.5, 20.0, 1e-3
 
 @dataclass(frozen=True, eq=False)
 class FallingCloth:
-    """A cloth in mid-fall.
+    """A cloth in mid-fall."""
 
-    Attributes:
-        size: particles along each side.
-        stiffness: of each spring [N/m].
-        system: particles and springs.
-        start: the state in mid-fall.
-        frequency: the highest there [rad/s].
-        frame: the length of a frame [s].
-        extent: how wide it is [m].
-    """
-
-    size: int
-    stiffness: float
-    system: MassSpring
-    start: State
-    frequency: float
-    frame: float = FRAME
-    extent: float = SIDE
+    size: int  # particles along each side
+    stiffness: float  # of each spring [N/m]
+    system: MassSpring  # particles and springs
+    start: State  # the state in mid-fall
+    frequency: float  # the highest there [rad/s]
+    frame: float = FRAME  # the length of a frame [s]
+    extent: float = SIDE  # how wide it is [m]
 
     @property
     def beat(self) -> float:

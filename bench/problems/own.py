@@ -20,25 +20,15 @@ def clean(name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class OwnProblem:
-    """A problem that a user entered: targets of balls, a chain of hinges, or a cloth.
+    """A problem that a user entered: targets of balls, a chain of hinges, or a cloth."""
 
-    Attributes:
-        name: as it stands in tables.
-        digest: twelve hex digits over its contents.
-        suite: "ik" or "cloth".
-        targets: of a skeleton of balls, its last joint the effector.
-        robot: a chain of hinges.
-        cloth: particles, springs and the initial state.
-        h: the frame of a cloth [s].
-    """
-
-    name: str
-    digest: str
-    suite: str
-    targets: TargetsForSkeleton | None = None
-    robot: Robot | None = None
-    cloth: tuple[MassSpring, State] | None = None
-    h: float = 1 / 60
+    name: str  # as it stands in tables
+    digest: str  # twelve hex digits over its contents
+    suite: str  # "ik" or "cloth"
+    targets: TargetsForSkeleton | None = None  # of a skeleton of balls, its last joint the effector
+    robot: Robot | None = None  # a chain of hinges
+    cloth: tuple[MassSpring, State] | None = None  # particles, springs and the initial state
+    h: float = 1 / 60  # the frame of a cloth [s]
 
     @property
     def recorded(self) -> list[str]:

@@ -40,31 +40,19 @@ class UnableError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot or character, as text that any reader understands.
+    """A robot or character, as text that any reader understands."""
 
-    Attributes:
-        name: of the robot.
-        title: how it is written.
-        text: URDF of a chain, or MJCF of a tree.
-        root: the link or body that stands still.
-        effectors: the links or bodies that have targets.
-        joints: the joints that move, in the order of the coordinates.
-        lower: the lower limits of the coordinates [rad], (coordinate,); -inf for balls.
-        upper: the upper limits.
-        balls: where the quaternions of balls, w first, begin among the coordinates.
-        oriented: whether the effectors have target rotations as well as target positions.
-    """
-
-    name: str
-    title: str
-    text: str
-    root: str
-    effectors: tuple[str, ...]
-    joints: tuple[str, ...]
-    lower: FloatArray
-    upper: FloatArray
+    name: str  # of the robot
+    title: str  # how it is written
+    text: str  # URDF of a chain, or MJCF of a tree
+    root: str  # the link or body that stands still
+    effectors: tuple[str, ...]  # the links or bodies that have targets
+    joints: tuple[str, ...]  # the joints that move, in the order of the coordinates
+    lower: FloatArray  # the lower limits of the coordinates [rad], (coordinate,); -inf for balls
+    upper: FloatArray  # the upper limits
+    # where the quaternions of balls, w first, begin among the coordinates
     balls: tuple[int, ...] = ()
-    oriented: bool = True
+    oriented: bool = True  # whether the effectors have target rotations as well as target positions
 
     @property
     def is_chain(self) -> bool:

@@ -17,23 +17,14 @@ from ..tables.table import Table
 
 
 class Section(NamedTuple):
-    """A chapter of the report.
+    """A chapter of the report."""
 
-    Attributes:
-        name: in experiments, and in addresses within the page.
-        short: text of links.
-        title: heading.
-        about: introduction.
-        main: name of its unfolded table; "" if it has none.
-        figure: name of the figure beside it.
-    """
-
-    name: str
-    short: str
-    title: str
-    about: str
-    main: str = ""
-    figure: str = ""
+    name: str  # in experiments, and in addresses within the page
+    short: str  # text of links
+    title: str  # heading
+    about: str  # introduction
+    main: str = ""  # name of its unfolded table; "" if it has none
+    figure: str = ""  # name of the figure beside it
 
     @property
     def experiments(self) -> list[Experiment]:

@@ -17,17 +17,11 @@ _PARTS = (24, 10, 5)
 
 
 class AlignedTable(NamedTuple):
-    """A table as styled lines.
+    """A table as styled lines."""
 
-    Attributes:
-        lines: of text.
-        widths: of the columns, with `GAP` between them.
-        left_out: the headings of the columns that did not fit.
-    """
-
-    lines: list[Text]
-    widths: list[int]
-    left_out: list[str]
+    lines: list[Text]  # of text
+    widths: list[int]  # of the columns, with `GAP` between them
+    left_out: list[str]  # the headings of the columns that did not fit
 
 
 def aligned(table: Table, width: int) -> AlignedTable:

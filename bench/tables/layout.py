@@ -25,35 +25,24 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A table without rows, called with results to fill it.
+    """A table without rows, called with results to fill it."""
 
-    Attributes:
-        question: that the table answers, in the report.
-        name: the stem of its files.
-        title: its heading.
-        subjects: of the rows, such as records.
-        columns: of the table, or a function that makes them from all subjects.
-        shows: a sentence on the contents, or a function of all subjects.
-        measured: a sentence on how the numbers were measured, or a function of all subjects.
-        summary: of the numbers, called with all subjects if there are any.
-        figures: beside the table.
-        compared: rows with so many equal first cells are compared; 0: all are.
-        ranked: whether a subject may be best in its group.
-        optional: whether an empty table is no omission.
-    """
-
-    question: str
-    name: str
-    title: str
-    subjects: Callable[[Results], Iterable[Any]]
+    question: str  # that the table answers, in the report
+    name: str  # the stem of its files
+    title: str  # its heading
+    subjects: Callable[[Results], Iterable[Any]]  # of the rows, such as records
+    # of the table, or a function that makes them from all subjects
     columns: Sequence[Column] | Callable[[Any], Sequence[Column]]
-    shows: str | Callable[[Any], str]
+    shows: str | Callable[[Any], str]  # a sentence on the contents, or a function of all subjects
+    # a sentence on how the numbers were measured, or a function of all subjects
     measured: str | Callable[[Any], str]
+    # of the numbers, called with all subjects if there are any
     summary: Callable[[Any], Summary] = lambda subjects: NO_SUMMARY
-    figures: tuple[Figure, ...] = ()
-    compared: int = 1
+    figures: tuple[Figure, ...] = ()  # beside the table
+    compared: int = 1  # rows with so many equal first cells are compared; 0: all are
+    # whether a subject may be best in its group
     ranked: Callable[[Any], bool] = lambda subject: True
-    optional: bool = False
+    optional: bool = False  # whether an empty table is no omission
 
     def __call__(self, results: Results) -> Table:
         """Return the table with a row for each subject."""

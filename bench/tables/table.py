@@ -42,29 +42,19 @@ def _identity(subject: Any) -> Any:
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading, and how a cell is read from the subject of a row.
+    """A column: its heading, and how a cell is read from the subject of a row."""
 
-    Attributes:
-        title: of the column.
-        unit: of its numbers.
-        words: whether the cells are text, aligned left.
-        note: format of a cell, such as `INTERVAL`; left out where its parts have own columns.
-        read: returns the cell of a subject, in SI units or as a share of one.
-        factor: of the cell, if not that of the unit.
-        best: "least" or "greatest", "" if no cell is best.
-        group: common heading of neighbouring columns.
-        folded: whether the column is shown on demand only.
-    """
-
-    title: str
-    unit: str = ""
-    words: bool = False
+    title: str  # of the column
+    unit: str = ""  # of its numbers
+    words: bool = False  # whether the cells are text, aligned left
+    # format of a cell, such as `INTERVAL`; left out where its parts have own columns
     note: str = ""
+    # returns the cell of a subject, in SI units or as a share of one
     read: Callable[[Any], Any] = field(default=_identity, compare=False)
-    factor: float | None = None
-    best: str = ""
-    group: str = ""
-    folded: bool = False
+    factor: float | None = None  # of the cell, if not that of the unit
+    best: str = ""  # "least" or "greatest", "" if no cell is best
+    group: str = ""  # common heading of neighbouring columns
+    folded: bool = False  # whether the column is shown on demand only
 
     def cell(self, subject: Any) -> Cell:
         """Return the cell of the row of this subject, in the column's unit."""
@@ -117,34 +107,21 @@ def cells(columns: Sequence[Column], subjects: Iterable[Any]) -> tuple[tuple[Cel
 
 @dataclass(frozen=True)
 class Table:
-    """A named table.
+    """A named table."""
 
-    Attributes:
-        name: the stem of its files.
-        title: its heading.
-        columns: with distinct headings; the first names the row.
-        rows: the cells; None without measurements.
-        shows: a sentence on the contents.
-        measured: a sentence on how the numbers were measured.
-        summary: generated from the numbers.
-        compared: rows with so many equal first cells are compared; 0: all are.
-        unranked: numbers of rows that are never best, such as those of a solver cut short.
-        sources: the measurements behind each row; empty if unknown.
-        provenance: number of samples, machine and versions.
-        best: row and column of the best cells, if not by the columns.
-    """
-
-    name: str
-    title: str
-    columns: tuple[Column, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    shows: str = ""
-    measured: str = ""
-    summary: Summary = NO_SUMMARY
-    compared: int = 1
+    name: str  # the stem of its files
+    title: str  # its heading
+    columns: tuple[Column, ...]  # with distinct headings; the first names the row
+    rows: tuple[tuple[Cell, ...], ...]  # the cells; None without measurements
+    shows: str = ""  # a sentence on the contents
+    measured: str = ""  # a sentence on how the numbers were measured
+    summary: Summary = NO_SUMMARY  # generated from the numbers
+    compared: int = 1  # rows with so many equal first cells are compared; 0: all are
+    # numbers of rows that are never best, such as those of a solver cut short
     unranked: frozenset[int] = frozenset()
-    sources: tuple[Source, ...] = ()
-    provenance: str = ""
+    sources: tuple[Source, ...] = ()  # the measurements behind each row; empty if unknown
+    provenance: str = ""  # number of samples, machine and versions
+    # row and column of the best cells, if not by the columns
     best: frozenset[tuple[int, int]] | None = None
 
     def __post_init__(self) -> None:

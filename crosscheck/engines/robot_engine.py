@@ -30,14 +30,10 @@ class RobotEngine(ABC):
     or slide [m], (w, x, y, z) for a ball, and for a free joint a position [m] and (w, x, y, z),
     both in the frame of its zero configuration. Velocities are the angular velocity of a ball in
     its own frame and, of a free joint, the rate of its position followed by its angular velocity.
-
-    Attributes:
-        links: the engine's index of each link or body, by name.
-        columns: the first column of the Jacobian of each movable joint, by name.
     """
 
-    links: Mapping[str, int]
-    columns: Mapping[str, int]
+    links: Mapping[str, int]  # the engine's index of each link or body, by name
+    columns: Mapping[str, int]  # the first column of the Jacobian of each movable joint, by name
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
         """Read a URDF or MJCF file, or raise an UnreadableError if the engine refuses it.

@@ -21,12 +21,9 @@ class SkeletonEngine(Protocol):
 
     In both engines a velocity consists of the angular velocities of the balls, each in the frame of
     its own joint: `integrate` multiplies rotations from the right.
-
-    Attributes:
-        columns: indices of each joint's (w, x, y, z) in q, shape (joint, 4).
     """
 
-    columns: np.ndarray
+    columns: np.ndarray  # indices of each joint's (w, x, y, z) in q, shape (joint, 4)
 
     def __init__(self, skeleton: Skeleton) -> None: ...
 

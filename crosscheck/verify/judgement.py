@@ -62,7 +62,9 @@ class CaseJudgement:
         if isinstance(self.answer, Failure):
             return [self.answer.sentence]
         broken = [finding for finding in self.findings if finding.verdict is not Verdict.RIGHT]
-        return [finding.sentence for finding in sorted(broken, key=lambda f: -f.verdict)]
+        return [
+            finding.sentence for finding in sorted(broken, key=lambda finding: -finding.verdict)
+        ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,7 +64,8 @@ def laws(
 
 def _check(report: TaskReport, name: str) -> None:
     """Fail if a case is not right; skip it if it is undecided."""
-    judgement = next((j for j in report.judgements if j.case.name == name), None)
+    judgements = {judgement.case.name: judgement for judgement in report.judgements}
+    judgement = judgements.get(name)
     if judgement is None:
         reason = "it was not asked, since too many answers before were waited for"
         pytest.fail(reason, pytrace=False)

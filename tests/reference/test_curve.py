@@ -94,7 +94,7 @@ def can_be_spaced(points, least):
     return first[-1] >= least or (np.minimum(first, last) >= least).any()
 
 
-@given(points=clouds, least=spacings, factor=factors)
+@given(points=clouds, minimum=spacings, factor=factors)
 def test_every_gap_lies_within_the_two_spacings_and_the_ends_are_kept(points, least, factor):
     assume(can_be_spaced(points, least))
     even = resample(points, min_spacing=least, max_spacing=factor * least)
@@ -104,14 +104,14 @@ def test_every_gap_lies_within_the_two_spacings_and_the_ends_are_kept(points, le
     assert (even[-1] == points[-1]).all()
 
 
-@given(points=clouds, least=spacings)
+@given(points=clouds, minimum=spacings)
 def test_a_curve_shorter_than_the_least_spacing_keeps_its_ends(points, least):
     points = points * (0.2 * least / max(1.0, np.abs(points).max()))
     even = resample(points, min_spacing=least, max_spacing=2 * least)
     assert (even == points[[0, -1]][: len(points)]).all()
 
 
-@given(points=clouds, least=spacings)
+@given(points=clouds, minimum=spacings)
 def test_a_closed_curve_is_spaced_across_its_wrap_too(points, least):
     assume(can_be_spaced(np.concatenate([points, points[:1]]), least))
     even = resample(points, min_spacing=least, max_spacing=2 * least, closed=True)

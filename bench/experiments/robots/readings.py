@@ -37,28 +37,17 @@ _NO_RANKING = Ranking((), ())
 
 
 class Score(NamedTuple):
-    """A solver over all targets of one robot, or of several.
+    """A solver over all targets of one robot, or of several."""
 
-    Attributes:
-        robots: their names, or a phrase.
-        start: `ONE_START` or `RESTARTS`, "" if both are in one field.
-        solver: as records call it.
-        records: its record of each robot, in the same order for all solvers.
-        has_same_targets: whether it was given the targets of most solvers.
-        success: the ranking of the solvers by targets solved.
-        time: the ranking by time for the same targets.
-        least_time: the least geometric mean of times of any solver [s].
-        best_distances: the least distance within limits of any solver, out of reach [m], (target,).
-    """
-
-    robots: str
-    start: str
-    solver: str
-    records: tuple[Record, ...]
-    has_same_targets: bool = True
-    success: Ranking = _NO_RANKING
-    time: Ranking = _NO_RANKING
-    least_time: float = np.nan
+    robots: str  # their names, or a phrase
+    start: str  # `ONE_START` or `RESTARTS`, "" if both are in one field
+    solver: str  # as records call it
+    records: tuple[Record, ...]  # its record of each robot, in the same order for all solvers
+    has_same_targets: bool = True  # whether it was given the targets of most solvers
+    success: Ranking = _NO_RANKING  # the ranking of the solvers by targets solved
+    time: Ranking = _NO_RANKING  # the ranking by time for the same targets
+    least_time: float = np.nan  # the least geometric mean of times of any solver [s]
+    # the least distance within limits of any solver, out of reach [m], (target,)
     best_distances: Floats = np.zeros(0)
 
     @property

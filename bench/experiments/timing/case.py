@@ -100,4 +100,4 @@ def _streams(read: int, write: int, minimum: int) -> Callable[[], Any]:
 
     if minimum == 0:
         return partial(_stream, source, sink)
-    return partial(in_slices, _stream, read, share, least=minimum)
+    return partial(in_slices, _stream, read, share, minimum=minimum)

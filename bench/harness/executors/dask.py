@@ -45,23 +45,15 @@ class Place(NamedTuple):
 
 @dataclass(eq=False)
 class _Queue:
-    """Blocks to be measured in order, pinned to a host if they take times.
+    """Blocks to be measured in order, pinned to a host if they take times."""
 
-    Attributes:
-        blocks: the remaining blocks.
-        is_pinned: whether they stay on a host.
-        is_begun: whether the first was reported as begun; another worker may begin it again.
-        host: the host that they are bound to, if any.
-        address: the worker that has the first block.
-        future: the result of the first block, None if no worker has it.
-    """
-
-    blocks: deque[Block]
-    is_pinned: bool
+    blocks: deque[Block]  # the remaining blocks
+    is_pinned: bool  # whether they stay on a host
+    # whether the first was reported as begun; another worker may begin it again
     is_begun: bool = False
-    host: str = ""
-    address: str = ""
-    future: Any = None
+    host: str = ""  # the host that they are bound to, if any
+    address: str = ""  # the worker that has the first block
+    future: Any = None  # the result of the first block, None if no worker has it
 
 
 class DaskExecutor(Executor):

@@ -24,19 +24,13 @@ __all__ = ["FloatArray", "PoseRequest", "Robot", "Tolerance", "UnableError"]
 
 
 class SolverOutput(NamedTuple):
-    """The answer of a solver.
+    """The answer of a solver."""
 
-    Attributes:
-        q: the coordinates, in the robot's order; None if it returns none.
-        claim: whether it says that they solve the target; None if it does not say.
-        time: as the adapter or its process measured it; None where the call is timed.
-        error: the exception of the solver, else "".
-    """
-
-    q: FloatArray | None
-    claim: bool | None
+    q: FloatArray | None  # the coordinates, in the robot's order; None if it returns none
+    claim: bool | None  # whether it says that they solve the target; None if it does not say
+    # as the adapter or its process measured it; None where the call is timed
     time: OwnTime | None = None
-    error: str = ""
+    error: str = ""  # the exception of the solver, else ""
 
 
 Solve = Callable[[], SolverOutput]

@@ -41,29 +41,17 @@ class Contents(NamedTuple):
 
 
 class Chapter(NamedTuple):
-    """A chapter on the page.
+    """A chapter on the page."""
 
-    Attributes:
-        section: name, title and introduction.
-        headlines: on the first screen.
-        figure: unfolded; None if it has none.
-        main: the unfolded table; None if it has none.
-        folds: the other tables.
-        scene: the motion that can be played; None if it has none.
-        player: of the motion, as markup.
-        unmeasured: questions of tables without records.
-        command: that measures them.
-    """
-
-    section: Section
-    headlines: list[Headline]
-    figure: Drawing | None
-    main: PageTable | None
-    folds: list[PageTable]
-    scene: motion.Scene | None
-    player: Markup
-    unmeasured: list[str]
-    command: str
+    section: Section  # name, title and introduction
+    headlines: list[Headline]  # on the first screen
+    figure: Drawing | None  # unfolded; None if it has none
+    main: PageTable | None  # the unfolded table; None if it has none
+    folds: list[PageTable]  # the other tables
+    scene: motion.Scene | None  # the motion that can be played; None if it has none
+    player: Markup  # of the motion, as markup
+    unmeasured: list[str]  # questions of tables without records
+    command: str  # that measures them
 
 
 def render(contents: Contents, newest: Record, missing: Sequence[str]) -> str:

@@ -48,29 +48,18 @@ class PageRow(NamedTuple):
 
 
 class PageTable(NamedTuple):
-    """A table on the page.
+    """A table on the page."""
 
-    Attributes:
-        name: its address within the page.
-        question: that it answers.
-        table: whose cells it shows.
-        groups: name and span of headings above several columns; empty if there are none.
-        heads: headings of the columns.
-        rows: its rows.
-        best: "best" if some cells are best, "ties" if some of them tie, else "".
-        gist: its message in a line.
-        drawings: figures beside it.
-    """
-
-    name: str
-    question: str
-    table: Table
+    name: str  # its address within the page
+    question: str  # that it answers
+    table: Table  # whose cells it shows
+    # name and span of headings above several columns; empty if there are none
     groups: list[tuple[str, int]]
-    heads: list[PageHead]
-    rows: list[PageRow]
-    best: str
-    gist: str
-    drawings: list[Drawing]
+    heads: list[PageHead]  # headings of the columns
+    rows: list[PageRow]  # its rows
+    best: str  # "best" if some cells are best, "ties" if some of them tie, else ""
+    gist: str  # its message in a line
+    drawings: list[Drawing]  # figures beside it
 
 
 def page_table(

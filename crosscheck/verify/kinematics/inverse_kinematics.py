@@ -238,7 +238,8 @@ def _diagnosis(
     """Return the faults of the declared or inferred method that reproduce the answers."""
     posed_trials = [trial for trial in trials if trial.pose.outputs]
     sweep_trials = [trial for trial in posed_trials if trial.is_sweep]
-    wrong = [t for t in sweep_trials if t.is_wrong or t.case.name in comparison.wrong]
+    names = comparison.wrong
+    wrong = [trial for trial in sweep_trials if trial.is_wrong or trial.case.name in names]
     if wrong:
         return sweeps.explained(comparison, sweep_trials, wrong, greeting)
     solves = [

@@ -92,7 +92,7 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     wrong_first = sorted(pairs, key=lambda pair: pair[1].verdict is Verdict.RIGHT)
     behaviour = _behaviour_at_strokes(exchanges, greeting)
     diagnosis = Diagnosis(behaviour=behaviour)
-    if any(isinstance(e.answer, Answer) and judgement.verdict for e, judgement in wrong_first):
+    if any(judgement.verdict and isinstance(judgement.answer, Answer) for judgement in judgements):
         diagnosis = _diagnosis([exchange for exchange, _ in wrong_first], greeting, behaviour)
     return report(TASK, method, judgements, diagnosis)
 

@@ -168,7 +168,7 @@ def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:
     misses = [judgement for judgement in judgements if _misses(judgement)]
     if not misses:
         return Diagnosis()
-    counts = {key: sum(_explains(fault, j) for j in misses) for key, fault in FAULTS.items()}
+    counts = {key: sum(map(partial(_explains, fault), misses)) for key, fault in FAULTS.items()}
     # Whole poses are hardly met by chance, positions are where a solver is stuck: these come last.
     poses = {key: count for key, count in counts.items() if key != POSITION_ONLY}
     if CHANCE * max(poses.values()) >= max(counts.values()):

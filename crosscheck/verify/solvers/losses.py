@@ -19,23 +19,16 @@ _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="u
 
 
 class ProcessLimits(NamedTuple):
-    """The limits of a program.
+    """The limits of a program."""
 
-    Attributes:
-        first: for the greeting, and for the first request of each task, when it compiles [s].
-        request: for any other request [s].
-        leave: to end once its input has ended [s].
-        memory: together with all that it starts [B].
-        line: the longest line that it may answer, read within seconds whatever it holds [B].
-        prints: the most lines beside an answer.
-    """
-
+    # for the greeting, and for the first request of each task, when it compiles [s]
     first: float = 30.0
-    request: float = 10.0
-    leave: float = 2.0
-    memory: int = 4 << 30
+    request: float = 10.0  # for any other request [s]
+    leave: float = 2.0  # to end once its input has ended [s]
+    memory: int = 4 << 30  # together with all that it starts [B]
+    # the longest line that it may answer, read within seconds whatever it holds [B]
     line: int = 1 << 24
-    prints: int = 10_000
+    prints: int = 10_000  # the most lines beside an answer
 
 
 LIMITS = ProcessLimits()
