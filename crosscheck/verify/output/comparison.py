@@ -35,7 +35,7 @@ class Shape(NamedTuple):
     lines: FloatArray
 
 
-class Drawing(NamedTuple):
+class CaseDrawing(NamedTuple):
     """The shapes of a failing case; None where there is no shape."""
 
     request: Shape | None  # a curve, or the system that forces act on
@@ -140,7 +140,7 @@ def texts(row: NumberRow) -> tuple[str, str]:
     return answer, expected
 
 
-def drawing_of(judgement: CaseJudgement) -> Drawing | None:
+def drawing_of(judgement: CaseJudgement) -> CaseDrawing | None:
     """Return the shapes of a case, or None if there is nothing to draw."""
     inputs, task = judgement.case.inputs, judgement.case.task
     answer, expected = (_shape(task, inputs, outputs) for outputs in _outputs(judgement))
@@ -155,7 +155,7 @@ def drawing_of(judgement: CaseJudgement) -> Drawing | None:
         marks = np.asarray(inputs["target"], dtype=float)[None]
     elif "pinned" in inputs and "positions" in inputs:
         marks = np.asarray(inputs["positions"])[np.asarray(inputs["pinned"], dtype=int)]
-    return Drawing(request, answer, expected, marks)
+    return CaseDrawing(request, answer, expected, marks)
 
 
 def _shape(task: str, inputs: Outputs, outputs: Outputs) -> Shape | None:
