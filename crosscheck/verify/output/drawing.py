@@ -14,7 +14,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from plumbob.reference.arguments import FloatArray
 
-from .comparison import CaseDrawing, Shape
+from .comparison import CaseDrawing, Wireframe
 
 # Differences below the first share of the extent are magnified to about the second.
 _VISIBLE, _MAGNIFIED = 0.02, 0.2
@@ -133,4 +133,4 @@ def magnified(drawing: CaseDrawing) -> tuple[CaseDrawing, float]:
         return drawing, 1.0
     factor = float(f"{_MAGNIFIED * extent / gap:.0e}")
     points = expected + factor * (drawing.answer.points - expected)
-    return drawing._replace(answer=Shape(points, drawing.answer.lines)), factor
+    return drawing._replace(answer=Wireframe(points, drawing.answer.lines)), factor
