@@ -21,7 +21,7 @@ ALIKE = ("stiffnesses", "dampings")
 
 def generator(quantity: str, case: int) -> np.random.Generator:
     """Return the random numbers of a quantity of a case, independent of all others."""
-    whole = arguments.integer("case", case, least=0)
+    whole = arguments.integer("case", case, minimum=0)
     return np.random.default_rng([20130, *quantity.encode(), whole])
 
 
@@ -115,7 +115,7 @@ def drifting(case: int) -> StepProblem:
 
 def _resolved(quantity: str, case: int, **options: Any) -> StepProblem:
     """Return a problem of 5 or 23 particles with a step that resolves it."""
-    count = particles(arguments.integer("case", case, least=0) % 2)
+    count = particles(arguments.integer("case", case, minimum=0) % 2)
     problem = _random_problem(quantity, case, count, **options)
     return problem._replace(h=RESOLVED / highest_rate(problem.system))
 
@@ -154,7 +154,7 @@ def line(case: int) -> StepProblem:
 
 def particles(case: int) -> int:
     """Return the number of particles of a case, spread evenly on a logarithmic scale."""
-    share = arguments.integer("case", case, least=0) * 3 % SIZES / (SIZES - 1)
+    share = arguments.integer("case", case, minimum=0) * 3 % SIZES / (SIZES - 1)
     return round(MINIMUM_PARTICLES * (MAXIMUM_PARTICLES / MINIMUM_PARTICLES) ** share)
 
 

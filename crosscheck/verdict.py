@@ -64,7 +64,7 @@ def check_claim(claim: Claim, cases: int | None = None) -> ClaimVerdict:
     Raise a ValueError if it is no claim, or the number not an integer of at least 0.
     """
     arguments.instance("claim", claim, Claim)
-    count = claim.cases if cases is None else arguments.integer("cases", cases, least=0)
+    count = claim.cases if cases is None else arguments.integer("cases", cases, minimum=0)
     comparisons = list(claim.compare(count))
     differences = [_relative_difference(c.actual, c.expected, c.scale) for c in comparisons]
     displacements = [_relative_difference(c.actual, c.baseline, c.scale) for c in comparisons]

@@ -85,15 +85,15 @@ def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
 
 
 def number(
-    name: str, value: Any, *, least: float = -LARGEST_COORDINATE, above: float = -np.inf
+    name: str, value: Any, *, minimum: float = -LARGEST_COORDINATE, above: float = -np.inf
 ) -> float:
-    """Return a finite float, at least `least`, greater than `above`, and at most 1e75.
+    """Return a finite float, at least `minimum`, greater than `above`, and at most 1e75.
 
     If the range has no negative numbers it is a size: 0, where that is in the range, or at least
     1e-75.
     """
-    is_size = max(least, above) >= 0.0
-    lowest = max(least, SMALLEST_POSITIVE) if is_size else least  # of numbers other than 0
+    is_size = max(minimum, above) >= 0.0
+    lowest = max(minimum, SMALLEST_POSITIVE) if is_size else minimum  # of numbers other than 0
     if type(value) is float and lowest <= value <= LARGEST_COORDINATE and value > above:
         return value
     if isinstance(value, str | bool):
@@ -105,10 +105,10 @@ def number(
         raise ValueError(f"{name}: expected a finite number, got {value}")
     if result <= above:
         raise ValueError(f"{name}: expected a number greater than {above:g}, got {value}")
-    if result < least:
-        raise ValueError(f"{name}: expected a number of at least {least:g}, got {value}")
+    if result < minimum:
+        raise ValueError(f"{name}: expected a number of at least {minimum:g}, got {value}")
     if result < lowest and result != 0.0:
-        zero = "0 or " if least == 0.0 > above else ""
+        zero = "0 or " if minimum == 0.0 > above else ""
         raise ValueError(f"{name}: expected {zero}a number of at least {lowest:g}, got {value}")
     if result > LARGEST_COORDINATE:
         raise ValueError(
@@ -117,22 +117,22 @@ def number(
     return float(result)
 
 
-def integer(name: str, value: Any, *, least: int, below: int = LARGEST_INTEGER + 1) -> int:
-    """Return an int, at least `least` and less than `below`."""
-    if type(value) is int and least <= value < below:
+def integer(name: str, value: Any, *, minimum: int, below: int = LARGEST_INTEGER + 1) -> int:
+    """Return an int, at least `minimum` and less than `below`."""
+    if type(value) is int and minimum <= value < below:
         return value
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
         raise ValueError(f"{name}: expected an integer, got {shown(value)}")
-    if not least <= value < below:
+    if not minimum <= value < below:
         upper = "" if below > LARGEST_INTEGER >= value else f" and at most {below - 1}"
         got = shown(int(value))
-        raise ValueError(f"{name}: expected an integer of at least {least}{upper}, got {got}")
+        raise ValueError(f"{name}: expected an integer of at least {minimum}{upper}, got {got}")
     return int(value)
 
 
-def count(name: str, value: Any, *, least: int) -> int:
-    """Return an int, at least `least` and at most LARGEST_COUNT: a length of arrays."""
-    result = integer(name, value, least=least)
+def count(name: str, value: Any, *, minimum: int) -> int:
+    """Return an int, at least `minimum` and at most LARGEST_COUNT: a length of arrays."""
+    result = integer(name, value, minimum=minimum)
     if result > LARGEST_COUNT:
         raise ValueError(f"{name}: expected at most {LARGEST_COUNT:,}, got {shown(result)}")
     return result
@@ -140,7 +140,7 @@ def count(name: str, value: Any, *, least: int) -> int:
 
 def lengths(name: str, value: Sequence[Any], width: int) -> tuple[int, ...]:
     """Return the leading axes, of 0 or more, of an array that ends with an axis of a width."""
-    axes = tuple(integer(name, length, least=0) for length in value)
+    axes = tuple(integer(name, length, minimum=0) for length in value)
     if len(axes) > LARGEST_RANK or math.prod(max(n, 1) for n in (*axes, width)) > LARGEST_ARRAY:
         raise ValueError(
             f"{name}: expected at most {LARGEST_RANK} lengths, of an array of at most "
@@ -150,17 +150,19 @@ def lengths(name: str, value: Sequence[Any], width: int) -> tuple[int, ...]:
 
 
 def indices(
-    name: str, value: ArrayLike, *trailing: int | str, least: int, below: int
+    name: str, value: ArrayLike, *trailing: int | str, minimum: int, below: int
 ) -> IndexArray:
-    """Return a C-contiguous int64 array of indices, at least `least` and less than `below`."""
+    """Return a C-contiguous int64 array of indices, at least `minimum` and less than `below`."""
     integers = _converted(name, value)
     if integers.dtype.kind not in ("iu" if integers.size else "iuf"):  # an empty list is of floats
         raise ValueError(f"{name}: expected integer indices, got {integers.dtype} values")
     check_shape(name, integers, *trailing)
     result = copied(name, integers, np.int64)
-    outside = integers[(result < least) | (result >= below)]
+    outside = integers[(result < minimum) | (result >= below)]
     if outside.size:
-        raise ValueError(f"{name}: expected indices from {least} to {below - 1}, got {outside[0]}")
+        raise ValueError(
+            f"{name}: expected indices from {minimum} to {below - 1}, got {outside[0]}"
+        )
     return result
 
 
@@ -305,15 +307,15 @@ def shown(value: Any) -> str:
         return type(value).__name__
 
 
-def digits_apart(number: float, bound: float, least: int = 6) -> int:
-    """Return the fewest significant digits, at least `least`, by which two numbers differ."""
-    counts = (n for n in range(least, 17) if f"{number:.{n}g}" != f"{bound:.{n}g}")
+def digits_apart(number: float, bound: float, minimum: int = 6) -> int:
+    """Return the fewest significant digits, at least `minimum`, by which two numbers differ."""
+    counts = (n for n in range(minimum, 17) if f"{number:.{n}g}" != f"{bound:.{n}g}")
     return next(counts, 17)
 
 
-def distinct_texts(number: float, bound: float, least: int = 6) -> tuple[str, str]:
+def distinct_texts(number: float, bound: float, minimum: int = 6) -> tuple[str, str]:
     """Write a number and its bound, for a message, with as many digits as tell them apart."""
-    digits = digits_apart(number, bound, least)
+    digits = digits_apart(number, bound, minimum)
     return f"{number:.{digits}g}", f"{bound:.{digits}g}"
 
 

@@ -257,7 +257,7 @@ class Articulation(KeepsReadOnly):
         q = self.checked("q", q)
         excess = np.empty(q.shape[:-1])
         _excess(self.joints, one_batch(q), excess.reshape(-1))
-        return excess <= arguments.number("tolerance", tolerance, least=0.0)
+        return excess <= arguments.number("tolerance", tolerance, minimum=0.0)
 
     def local_transforms(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return positions (..., joint, 3) [m] and rotations (..., joint, 4) in parents' frames."""

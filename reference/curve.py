@@ -53,7 +53,7 @@ def plumb_bob(count: int = 1200) -> FloatArray:
     length is s = u + sin(2 pi n u) / (2 pi n) for evenly spaced u, so that samples are dense in
     some parts and sparse in others, as in hand-drawn input.
     """
-    count = arguments.count("count", count, least=1)
+    count = arguments.count("count", count, minimum=1)
     parts = np.array_split(np.arange(count), len(_BOB_STROKES))
     return np.concatenate(
         [stroke(_uneven(len(part))) for stroke, part in zip(_BOB_STROKES, parts, strict=True)]
@@ -93,7 +93,7 @@ def resample(
     points = arguments.array("curve", curve, "point", 3)
     closed = arguments.boolean("closed", closed)
     min_spacing = arguments.number("min_spacing", min_spacing, above=0.0)
-    max_spacing = arguments.number("max_spacing", max_spacing, least=2.0 * min_spacing)
+    max_spacing = arguments.number("max_spacing", max_spacing, minimum=2.0 * min_spacing)
     if len(points) == 0:
         raise ValueError("curve: expected at least one point, got none")
     if closed:
@@ -160,7 +160,7 @@ def _divide_gaps(points: FloatArray, gaps: FloatArray, max_spacing: float) -> Fl
 
 
 def _angles(count: int) -> FloatArray:
-    return 2.0 * np.pi * np.arange(arguments.count("count", count, least=1)) / count
+    return 2.0 * np.pi * np.arange(arguments.count("count", count, minimum=1)) / count
 
 
 def _in_plane(x: ArrayLike, z: ArrayLike) -> FloatArray:
@@ -169,7 +169,7 @@ def _in_plane(x: ArrayLike, z: ArrayLike) -> FloatArray:
 
 def _polygon(corners: ArrayLike, count: int) -> FloatArray:
     """Return samples, evenly spaced along the closed polygon of corners (corner, 2)."""
-    count = arguments.count("count", count, least=1)
+    count = arguments.count("count", count, minimum=1)
     closed = np.concatenate([corners, np.asarray(corners)[:1]])
     return _stroke(closed)(np.arange(count) / count)
 

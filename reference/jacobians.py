@@ -67,7 +67,7 @@ def jacobians(articulation: Model, q: ArrayLike, joints: ArrayLike | None = None
     model, coordinates = _coordinates("q", articulation, q)
     count = model.joint_count
     effectors = np.arange(count) if joints is None else joints
-    effectors = arguments.indices("joints", effectors, "joint", least=0, below=count)
+    effectors = arguments.indices("joints", effectors, "joint", minimum=0, below=count)
     J = np.zeros((*coordinates.shape[:-1], len(effectors), 6, model.freedom_count))
     _fill(model.joints, effectors, one_batch(coordinates), one_batch(J, 3))
     return J

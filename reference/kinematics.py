@@ -87,7 +87,7 @@ def _in_slices(kernel: Kernel, tree: SkeletonArrays, *poses: FloatArray) -> bool
     def arguments_of(part: slice) -> tuple[Any, ...]:
         return (*tree, *(values[part] for values in flat))
 
-    return all(in_slices(kernel, len(flat[0]), arguments_of, least=length))
+    return all(in_slices(kernel, len(flat[0]), arguments_of, minimum=length))
 
 
 def forward_pose(parents, offsets, local, positions, rotations):

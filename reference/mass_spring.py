@@ -124,7 +124,7 @@ class MassSpring(KeepsReadOnly):
                 _per_spring("stiffnesses", stiffnesses, len(ends)),
                 _per_spring("dampings", dampings, len(ends)),
                 flags("tension_only", tension_only, len(ends)),
-                np.unique(indices("pinned", pinned, "pinned", least=0, below=len(mass))),
+                np.unique(indices("pinned", pinned, "pinned", minimum=0, below=len(mass))),
                 array("gravity", gravity, 3).copy(),
             )
         )
@@ -502,7 +502,7 @@ def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
 def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:
     if isinstance(springs, list | tuple) and len(springs) == 0:
         springs = np.empty((0, 2))
-    ends = indices("springs", springs, "spring", 2, least=0, below=particle_count)
+    ends = indices("springs", springs, "spring", 2, minimum=0, below=particle_count)
     loops = np.flatnonzero(ends[:, 0] == ends[:, 1])
     if len(loops):
         raise ValueError(

@@ -81,7 +81,7 @@ class Skeleton(KeepsReadOnly):
         argument = arguments.text("argument", argument) or "joint"
         if isinstance(joint, str):
             return self._numbers[arguments.choice(argument, joint, self._numbers)]
-        return arguments.integer(argument, joint, least=-count, below=count) % count
+        return arguments.integer(argument, joint, minimum=-count, below=count) % count
 
     @functools.cached_property
     def _numbers(self) -> dict[str, int]:
@@ -135,7 +135,7 @@ def _checked_tree(parents: ArrayLike, offsets: ArrayLike) -> tuple[IndexArray, F
     links = np.linalg.norm(offsets, axis=-1)
     links[0] = 0.0
     arguments.sizes("offsets", links, "joint")
-    parents = arguments.indices("parents", parents, count, least=-1, below=count)
+    parents = arguments.indices("parents", parents, count, minimum=-1, below=count)
     roots = np.flatnonzero(parents == -1)
     if len(roots) != 1:
         raise ValueError(f"parents: expected one root (parent -1), got {len(roots)}")

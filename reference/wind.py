@@ -53,9 +53,9 @@ def wind_forces(
     air = array("wind", wind, "...", 3)
     if air.shape != (3,):
         air = array("wind", wind, n, 3)
-    corners = indices("triangles", triangles, "triangle", 3, least=0, below=n)
-    half = number("density", density, least=0) / 2
-    coefficients = number("drag", drag, least=0) * half, number("lift", lift, least=0) * half
+    corners = indices("triangles", triangles, "triangle", 3, minimum=0, below=n)
+    half = number("density", density, minimum=0) / 2
+    coefficients = number("drag", drag, minimum=0) * half, number("lift", lift, minimum=0) * half
     with np.errstate(over="ignore", invalid="ignore"):
         forces = _forces(np.array(state.positions), air - state.velocities, corners, *coefficients)
     if not np.isfinite(forces).all():

@@ -103,7 +103,7 @@ def test_fifty_thousand_calls_at_random_end_well(checked, pytestconfig):
 
 def right(x, n=1):
     """Return what is right: a copy of numbers that are checked."""
-    return integer("n", n, least=1) * array("x", x, "row", 3)
+    return integer("n", n, minimum=1) * array("x", x, "row", 3)
 
 
 def unchecked(x, n=1):

@@ -114,7 +114,9 @@ def energy_series(
     `integrator` is a value of `SIMULATORS` or a similar function; raise a ValueError if `steps` is
     no multiple of `every`.
     """
-    count, remainder = divmod(integer("steps", steps, least=1), integer("every", every, least=1))
+    count, remainder = divmod(
+        integer("steps", steps, minimum=1), integer("every", every, minimum=1)
+    )
     if remainder:
         raise ValueError(f"steps: expected a multiple of {every}, got {steps}")
     simulate = integrator(system, h)

@@ -35,7 +35,9 @@ def set_num_threads(count: int | None) -> Iterator[None]:
     Raises:
         ValueError: if the count is not a positive integer.
     """
-    token = _num_threads.set(None if count is None else arguments.integer("count", count, least=1))
+    token = _num_threads.set(
+        None if count is None else arguments.integer("count", count, minimum=1)
+    )
     try:
         yield
     finally:
@@ -47,22 +49,22 @@ def in_slices(
     count: int,
     arguments_of: Callable[[slice], tuple[Any, ...]],
     *,
-    least: int,
+    minimum: int,
 ) -> list[Any]:
     """Call a kernel on slices of a batch in parallel; return its results, slice by slice.
 
-    A batch of less than two slices of `least` is a single call in the caller's thread. At an error
-    or an interrupt, slices not yet begun are dropped. Calls of this function within a slice do not
-    divide it again.
+    A batch of less than two slices of `minimum` is a single call in the caller's thread. At an
+    error or an interrupt, slices not yet begun are dropped. Calls of this function within a slice
+    do not divide it again.
 
-        in_slices(kernel, len(x), lambda part: (model, x[part], result[part]), least=100)
+        in_slices(kernel, len(x), lambda part: (model, x[part], result[part]), minimum=100)
 
-    `count` is the length of the batch and `least` the smallest slice that is worth a thread.
+    `count` is the length of the batch and `minimum` the smallest slice that is worth a thread.
     """
-    threads = (_num_threads.get() or _all_cores()) if count >= 2 * least else 1
+    threads = (_num_threads.get() or _all_cores()) if count >= 2 * minimum else 1
     if threads == 1:
         return [kernel(*arguments_of(slice(0, count)))]
-    slices = min(count // least, SLICES_PER_CORE * threads)
+    slices = min(count // minimum, SLICES_PER_CORE * threads)
     pool, parts = _pool(threads), []
     try:
         for begin, end in pairwise(count * i // slices for i in range(slices + 1)):

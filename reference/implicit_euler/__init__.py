@@ -105,10 +105,10 @@ class ImplicitEuler:
         """
         instance("system", self.system, MassSpring)
         object.__setattr__(self, "h", number("h", self.h, above=0))
-        object.__setattr__(self, "tolerance", number("tolerance", self.tolerance, least=0))
+        object.__setattr__(self, "tolerance", number("tolerance", self.tolerance, minimum=0))
         method = STEP_SOLVERS[choice("solver", self.solver, STEP_SOLVERS)]
         limit = method.default_iterations if self.max_iterations is None else self.max_iterations
-        object.__setattr__(self, "_iteration_limit", integer("max_iterations", limit, least=0))
+        object.__setattr__(self, "_iteration_limit", integer("max_iterations", limit, minimum=0))
         starts = STARTS[1:] if self.solver == "gauss_newton" else STARTS
         start = starts[0] if self.start is None else choice("start", self.start, starts)
         object.__setattr__(self, "start", start)

@@ -122,7 +122,7 @@ class Certificate:
         when one of the certificates has no bound.
         """
         instance("other", other, Certificate)
-        return self.shares_minimiser_within(other, number("apart", apart, least=0.0))
+        return self.shares_minimiser_within(other, number("apart", apart, minimum=0.0))
 
     def shares_minimiser_within(self, other: "Certificate", apart: float) -> bool | None:
         """Do what `shares_minimiser` does, of a distance that is not checked."""

@@ -311,7 +311,7 @@ def _evaluate_in_parallel(
     gradient, sums = np.empty(x.shape), np.empty((len(regions.particles) - 1, 2))
     terms = x, y, external, h, masses, *elastic, regions
     in_slices(
-        _regions, len(sums), lambda part: (*terms, part.start, part.stop, gradient, sums), least=1
+        _regions, len(sums), lambda part: (*terms, part.start, part.stop, gradient, sums), minimum=1
     )
     return gradient, *_join(x, h, constant, *elastic, pinned, regions, gradient, sums)
 

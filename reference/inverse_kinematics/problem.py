@@ -219,18 +219,18 @@ def _settings(
 ) -> Settings:  # fmt: skip
     within_reach, out_of_reach = MAX_ITERATIONS, FAR_ITERATIONS
     if max_iterations is not None:
-        count = arguments.integer("max_iterations", max_iterations, least=0)
+        count = arguments.integer("max_iterations", max_iterations, minimum=0)
         within_reach = out_of_reach = min(count, LARGEST_COUNT)
     kernels = IK_SOLVERS[arguments.choice("solver", solver, IK_SOLVERS)]
     limits = Limits(
-        arguments.number("tolerance", tolerance, least=0.0),
-        arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
+        arguments.number("tolerance", tolerance, minimum=0.0),
+        arguments.number("tolerance_rotation", tolerance_rotation, minimum=0.0),
         within_reach,
         out_of_reach,
-        arguments.count("restarts", restarts, least=0),
+        arguments.count("restarts", restarts, minimum=0),
         chained,
     )
-    seed = arguments.integer("seed", seed, least=0)
+    seed = arguments.integer("seed", seed, minimum=0)
     return Settings(kernels, limits, seed, arguments.boolean("record", record))
 
 

@@ -214,7 +214,7 @@ def run(
             parts = [values if len(values) == 1 else values[part] for values in rows]
             return (*arrays, settings.numbers, *parts)
 
-        valid = all(in_slices(kernel, n, arguments_of, least=slice_length))
+        valid = all(in_slices(kernel, n, arguments_of, minimum=slice_length))
     return (local, positions, figures, history, q) if valid else ()
 
 

@@ -144,8 +144,8 @@ def judge_pose(
     return PoseJudgement(
         max(distances), max(angles), frozen(np.array(distances)), frozen(np.array(angles)),
         deviation, frozen(excess), errors, lengths, placed.positions, tree.names,
-        arguments.number("tolerance", tolerance, least=0.0),
-        arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
+        arguments.number("tolerance", tolerance, minimum=0.0),
+        arguments.number("tolerance_rotation", tolerance_rotation, minimum=0.0),
     )  # fmt: skip
 
 

@@ -38,8 +38,8 @@ def lab_cloth(
 
     `size` particles, 2 or more, along each side [m]. The lab's own cloth has a damping of 0.2.
     """
-    size = count("size", size, least=2)
-    count("size", size * size, least=1)
+    size = count("size", size, minimum=2)
+    count("size", size * size, minimum=1)
     return grid_cloth(
         size,
         size,
@@ -88,13 +88,13 @@ def grid_cloth(
         gravity: downwards [m/s²].
     """
     rows, columns = _shape(rows, columns)
-    stiffness = number("stiffness", stiffness, least=0)
+    stiffness = number("stiffness", stiffness, minimum=0)
     bending = stiffness if bending_stiffness is None else bending_stiffness
     shear = stiffness if shear_stiffness is None else shear_stiffness
     parts = [
         (NEIGHBOURS, stiffness),
-        (NEXT_BUT_ONE, number("bending_stiffness", bending, least=0)),
-        (DIAGONALS, number("shear_stiffness", shear, least=0)),
+        (NEXT_BUT_ONE, number("bending_stiffness", bending, minimum=0)),
+        (DIAGONALS, number("shear_stiffness", shear, minimum=0)),
     ]
     springs_of = [(steps, k) for steps, k in parts if k > 0 or steps is NEIGHBOURS]
     springs = [_springs((rows, columns), steps) for steps, _ in springs_of]
@@ -168,14 +168,14 @@ def lattice(
     tetrahedra around its diagonal.
     """
     along = sequence("counts", counts, 3, "an axis")
-    nx, ny, nz = (count("counts", number_of, least=1) for number_of in along)
-    count("counts", nx * ny * nz, least=1)
+    nx, ny, nz = (count("counts", number_of, minimum=1) for number_of in along)
+    count("counts", nx * ny * nz, minimum=1)
     cells = np.indices((nx, ny, nz)).reshape(3, -1).T.astype(np.float64)
     return at_rest(
         number("spacing", spacing, above=0) * cells,
         _springs((nx, ny, nz), TETRAHEDRA),
         masses=np.full(nx * ny * nz, number("mass", mass, above=0)),
-        stiffnesses=number("stiffness", stiffness, least=0),
+        stiffnesses=number("stiffness", stiffness, minimum=0),
         damping=damping,
         pinned=np.arange(ny * nz),
         gravity=gravity,
@@ -197,14 +197,14 @@ def hanging_rope(
     It has 2 or more particles, number 0 pinned. In equilibrium spring i, counted from the top,
     carries the particles below it and is stretched by (particles - 1 - i) mass gravity / stiffness.
     """
-    particles = count("particles", particles, least=2)
+    particles = count("particles", particles, minimum=2)
     positions = np.zeros((particles, 3))
     positions[:, 1] = -np.linspace(0, number("length", length, above=0), particles)
     return at_rest(
         positions,
         _springs((particles, 1), [(1, 0)]),
         masses=np.full(particles, number("mass", mass, above=0)),
-        stiffnesses=number("stiffness", stiffness, least=0),
+        stiffnesses=number("stiffness", stiffness, minimum=0),
         damping=damping,
         pinned=[0],
         gravity=gravity,
@@ -229,7 +229,7 @@ def at_rest(
         springs=springs,
         rest_lengths=0.0,
         stiffnesses=stiffnesses,
-        dampings=number("damping", damping, least=0),
+        dampings=number("damping", damping, minimum=0),
         pinned=pinned,
         gravity=(0.0, -number("gravity", gravity), 0.0),
         tension_only=tension_only,
@@ -240,8 +240,8 @@ def at_rest(
 
 def _shape(rows: int, columns: int) -> tuple[int, int]:
     """Return the numbers of rows and columns, checked, and their product with them."""
-    rows, columns = count("rows", rows, least=1), count("columns", columns, least=1)
-    count("rows, columns", rows * columns, least=1)
+    rows, columns = count("rows", rows, minimum=1), count("columns", columns, minimum=1)
+    count("rows, columns", rows * columns, minimum=1)
     return rows, columns
 
 

@@ -39,9 +39,9 @@ def cloth_from_mesh(
     """
     x = array("vertices", vertices, "particle", 3)
     corners = _triangles(triangles, len(x))
-    bending = number("bending_stiffness", bending_stiffness, least=0)
+    bending = number("bending_stiffness", bending_stiffness, minimum=0)
     edges, across = mesh_springs(corners, len(x), bending > 0)
-    stiffnesses = [number("stiffness", stiffness, least=0), bending]
+    stiffnesses = [number("stiffness", stiffness, minimum=0), bending]
     slack = boolean("tension_only", tension_only)
     return at_rest(
         x,
@@ -98,7 +98,7 @@ def _ends(keys: IndexArray, vertex_count: int) -> IndexArray:
 
 
 def _triangles(triangles: ArrayLike, vertex_count: int) -> IndexArray:
-    corners = indices("triangles", triangles, "triangle", 3, least=0, below=vertex_count)
+    corners = indices("triangles", triangles, "triangle", 3, minimum=0, below=vertex_count)
     a, b, c = corners.T
     flat = np.flatnonzero((a == b) | (b == c) | (c == a))
     if len(flat):

@@ -23,9 +23,9 @@ def random_network(
     and a share of the springs from 0 to 1, `tension_only`, goes slack. A number out of range is a
     ValueError.
     """
-    rng = np.random.default_rng(integer("seed", seed, least=0))
-    n = count("particles", particles, least=1)
-    pins = rng.permutation(n)[: integer("pinned", pinned, least=0, below=n + 1)]
+    rng = np.random.default_rng(integer("seed", seed, minimum=0))
+    n = count("particles", particles, minimum=1)
+    pins = rng.permutation(n)[: integer("pinned", pinned, minimum=0, below=n + 1)]
     springs = _connected(rng, n)
     s, x = len(springs), rng.standard_normal((n, 3))
     lengths = np.linalg.norm(np.subtract(*x[springs.T]), axis=-1)
@@ -35,10 +35,10 @@ def random_network(
         springs=springs,
         rest_lengths=lengths * (1.0 + strains),
         stiffnesses=10.0 ** rng.uniform(1.0, 3.0, s),
-        dampings=number("damping", damping, least=0) * rng.uniform(0.1, 1.0, s),
+        dampings=number("damping", damping, minimum=0) * rng.uniform(0.1, 1.0, s),
         pinned=pins,
         gravity=5.0 * rng.standard_normal(3),
-        tension_only=rng.uniform(size=s) < number("tension_only", tension_only, least=0),
+        tension_only=rng.uniform(size=s) < number("tension_only", tension_only, minimum=0),
     )
     return system, State(x, rng.standard_normal((n, 3)))
 

@@ -25,7 +25,7 @@ def ball_chain(*, links: int = 10, link_length: float = 0.1) -> tuple[Skeleton, 
     Each link starts at a ball joint, and the last ends at the effector. No links, or a length that
     is not positive, are a ValueError.
     """
-    links = count("links", links, least=1)
+    links = count("links", links, minimum=1)
     offsets = np.zeros((links + 1, 3))
     offsets[1:, 0] = number("link_length", link_length, above=0.0)
     return Skeleton(np.arange(-1, links), offsets), rotation.identity(links + 1)

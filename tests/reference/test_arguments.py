@@ -47,7 +47,7 @@ def test_a_wrong_array_is_named(given, trailing, message):
         (True, {}, "h: expected a number, got True"),
         ([1.0], {}, "h: expected one number"),
         (0.0, {"above": 0.0}, "h: expected a number greater than 0, got 0.0"),
-        (-1, {"least": 0.0}, "h: expected a number of at least 0, got -1"),
+        (-1, {"minimum": 0.0}, "h: expected a number of at least 0, got -1"),
     ],
 )
 def test_a_wrong_number_is_named(given, limits, message):
@@ -56,9 +56,9 @@ def test_a_wrong_number_is_named(given, limits, message):
 
 
 def test_the_least_of_a_range_belongs_to_it():
-    assert arguments.number("h", 0, least=0.0) == 0.0
-    assert arguments.integer("n", 1, least=1, below=2) == 1
-    assert arguments.indices("i", [0, 2], "pin", least=0, below=3).tolist() == [0, 2]
+    assert arguments.number("h", 0, minimum=0.0) == 0.0
+    assert arguments.integer("n", 1, minimum=1, below=2) == 1
+    assert arguments.indices("i", [0, 2], "pin", minimum=0, below=3).tolist() == [0, 2]
 
 
 def test_coordinates_are_bounded_on_both_sides():
@@ -69,7 +69,7 @@ def test_coordinates_are_bounded_on_both_sides():
 
 def test_indices_are_copied_and_what_is_spread_or_read_only_comes_back_writable():
     given = np.array([0, 1])
-    arguments.indices("i", given, "pin", least=0, below=2)[0] = 1
+    arguments.indices("i", given, "pin", minimum=0, below=2)[0] = 1
     assert given.tolist() == [0, 1]
     shown = arguments.frozen(np.zeros((1, 3)))
     assert arguments.floats("a", shown, "...", 3).flags.writeable
@@ -79,7 +79,7 @@ def test_indices_are_copied_and_what_is_spread_or_read_only_comes_back_writable(
 @pytest.mark.parametrize("given", [True, 1.0, "1", 0, 4])
 def test_only_an_integer_in_range_is_one(given):
     with pytest.raises(ValueError, match="n: expected an integer"):
-        arguments.integer("n", given, least=1, below=4)
+        arguments.integer("n", given, minimum=1, below=4)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_only_an_integer_in_range_is_one(given):
 )
 def test_wrong_indices_are_named(given, message):
     with pytest.raises(ValueError, match=message):
-        arguments.indices("pinned", given, "pin", least=0, below=3)
+        arguments.indices("pinned", given, "pin", minimum=0, below=3)
 
 
 @pytest.mark.parametrize("given", [1e-75, 1e75, 1, np.float32(2.0)])
@@ -108,7 +108,7 @@ def test_a_positive_number_is_within_75_orders_of_one(given):
         (partial(arguments.number, above=0.0), 1e-76, "a number of at least 1e-75, got 1e-76"),
         (partial(arguments.number, above=0.0), 2e75, "a number of at most 1e.75, got 2e.75"),
         (arguments.number, -2e75, "a number of at least -1e.75, got -2e.75"),
-        (partial(arguments.integer, least=0), 2**63, "an integer of at least 0 and at most 92233"),
+        (partial(arguments.integer, minimum=0), 2**63, "an integer of at least 0 and at most 92"),
         (arguments.array, -2e75, "numbers of at most 1e.75, got 2e.75"),
         (arguments.array, np.ma.array([1.0], mask=[True]), "numbers, got one with masked values"),
         (partial(arguments.flags, count=2), [True], r"shape \(2,\), got \(1,\)"),
@@ -126,7 +126,7 @@ def test_a_wrong_value_of_any_kind_is_named(border, given, message):
 
 
 def test_no_indices_are_fine():
-    assert arguments.indices("pinned", (), "pin", least=0, below=3).shape == (0,)
+    assert arguments.indices("pinned", (), "pin", minimum=0, below=3).shape == (0,)
 
 
 def test_an_unknown_choice_is_answered_with_the_valid_ones():
@@ -143,7 +143,7 @@ def test_what_is_frozen_cannot_be_written_to_but_its_owner_can():
     assert view[0] == 1.0
 
 
-SIZE = partial(arguments.number, least=0.0)
+SIZE = partial(arguments.number, minimum=0.0)
 
 
 @pytest.mark.parametrize("border", [SIZE, arguments.sizes])
@@ -190,7 +190,7 @@ def test_the_kind_of_an_array_that_holds_no_numbers_is_named(dtype, kind):
 @pytest.mark.parametrize("kind", [complex, bool, object, "<U1"])
 def test_no_indices_of_another_kind_are_refused(kind):
     with pytest.raises(ValueError, match=r"^springs: expected integer indices, got "):
-        arguments.indices("springs", np.zeros((0, 2), kind), "spring", 2, least=0, below=3)
+        arguments.indices("springs", np.zeros((0, 2), kind), "spring", 2, minimum=0, below=3)
 
 
 @pytest.mark.parametrize("axes", [(10**12,), (2**40, 2**40), (10**9, 0), (1,) * 70])

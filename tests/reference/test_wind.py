@@ -123,25 +123,3 @@ def test_there_is_no_force_on_a_triangle_without_area(backend):
     state = State([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [0, 0, 0]], np.zeros((4, 3)))
     forces = wind_forces(state, [[0, 1, 2], [0, 3, 1]], WIND, **BOTH)
     np.testing.assert_array_equal(forces, np.zeros((4, 3)))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"triangles": [[0, 1, 3]]}, "^triangles: .* from 0 to 2, got 3"),
-        ({"density": -1.0}, "^density: .*at least 0"),
-        ({"lift": "much"}, "^lift: .*number"),
-    ],
-)
-def test_wrong_arguments_are_named(change, message):
-    state, triangles = plate()
-    arguments = {"state": state, "triangles": triangles, "wind": WIND} | change
-    with pytest.raises(ValueError, match=message):
-        wind_forces(**arguments)
-
-
-def test_a_force_that_overflows_is_an_error(backend):
-    state, triangles = plate()
-    vast = State(1e74 * state.positions, state.velocities)
-    with np.errstate(over="ignore"), pytest.raises(FloatingPointError, match=r"^wind_forces: "):
-        wind_forces(vast, triangles, [0, 1e75, 0], density=1e75)

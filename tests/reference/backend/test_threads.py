@@ -12,8 +12,8 @@ from plumbob.reference.backend.threads import SLICES_PER_CORE, in_slices
 CORES = [1, 2, 3]
 
 
-def slices_of(count, least):
-    return in_slices(lambda part: part, count, lambda part: (part,), least=least)
+def slices_of(count, minimum):
+    return in_slices(lambda part: part, count, lambda part: (part,), minimum=minimum)
 
 
 def total(values):
@@ -27,7 +27,7 @@ def total(values):
 @pytest.mark.parametrize("count", [0, 1, 7, 100, 101])
 def test_slices_follow_one_another_from_end_to_end(many, count):
     with set_num_threads(many):
-        parts = slices_of(count, least=5)
+        parts = slices_of(count, minimum=5)
     covered = [i for part in parts for i in range(part.start, part.stop)]
     assert covered == list(range(count))
     assert len(parts) <= max(1, SLICES_PER_CORE * many, count // 5)
@@ -35,17 +35,17 @@ def test_slices_follow_one_another_from_end_to_end(many, count):
 
 def test_slices_are_as_many_as_the_cores_want_and_no_shorter_than_worth_while():
     with set_num_threads(2):
-        assert len(slices_of(1000, least=10)) == 2 * SLICES_PER_CORE
-        assert len(slices_of(35, least=10)) == 3
-        assert len(slices_of(19, least=10)) == 1
+        assert len(slices_of(1000, minimum=10)) == 2 * SLICES_PER_CORE
+        assert len(slices_of(35, minimum=10)) == 3
+        assert len(slices_of(19, minimum=10)) == 1
     with set_num_threads(1):
-        assert len(slices_of(1000, least=10)) == 1
+        assert len(slices_of(1000, minimum=10)) == 1
 
 
 def test_what_slices_return_comes_in_their_order():
     values = np.arange(24.0)
     with set_num_threads(3):
-        sums = in_slices(compiled.Kernel(total), 24, lambda part: (values[part],), least=1)
+        sums = in_slices(compiled.Kernel(total), 24, lambda part: (values[part],), minimum=1)
     assert sums == [a + b for a, b in values.reshape(3 * SLICES_PER_CORE, 2)]
 
 
@@ -54,9 +54,9 @@ def test_threads_are_kept_and_only_used_for_more_than_one_slice():
         return threading.get_ident()
 
     with set_num_threads(2):
-        several = set(in_slices(who, 100, lambda part: (), least=1))
-        again = set(in_slices(who, 100, lambda part: (), least=1))
-        (single,) = in_slices(who, 100, lambda part: (), least=100)
+        several = set(in_slices(who, 100, lambda part: (), minimum=1))
+        again = set(in_slices(who, 100, lambda part: (), minimum=1))
+        (single,) = in_slices(who, 100, lambda part: (), minimum=100)
     assert single == who()
     assert len(several | again) <= 2
     assert single not in several | again
@@ -65,15 +65,15 @@ def test_threads_are_kept_and_only_used_for_more_than_one_slice():
 def test_threads_run_at_the_speed_in_force():
     kernel = compiled.Kernel(total)
     with set_num_threads(2), compiled.set_backend("python"):
-        in_slices(kernel, 100, lambda part: (np.ones(3),), least=1)
+        in_slices(kernel, 100, lambda part: (np.ones(3),), minimum=1)
     assert "compiled" not in vars(kernel)
 
 
 def test_a_slice_is_not_cut_again():
     with set_num_threads(2):
-        counts = in_slices(parallel._num_threads.get, 100, lambda part: (), least=1)
+        counts = in_slices(parallel._num_threads.get, 100, lambda part: (), minimum=1)
         assert counts == [1] * 2 * SLICES_PER_CORE
-        assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
+        assert len(slices_of(100, minimum=1)) == 2 * SLICES_PER_CORE
 
 
 def test_an_error_in_one_slice_is_the_caller_s():
@@ -82,7 +82,7 @@ def test_an_error_in_one_slice_is_the_caller_s():
             raise ZeroDivisionError("in the middle")
 
     with set_num_threads(2), pytest.raises(ZeroDivisionError, match="in the middle"):
-        in_slices(fail, 100, lambda part: (part,), least=10)
+        in_slices(fail, 100, lambda part: (part,), minimum=10)
 
 
 @pytest.fixture
@@ -103,19 +103,19 @@ def test_an_interrupt_reaches_the_caller_and_drops_what_has_not_begun(interrupti
         assert go_on.wait(60)
 
     with set_num_threads(2), pytest.raises(KeyboardInterrupt):
-        in_slices(wait, 100, lambda part: (part,), least=1)
+        in_slices(wait, 100, lambda part: (part,), minimum=1)
     go_on.set()
     with set_num_threads(2):  # all that was begun is over when the same threads have done this
-        in_slices(lambda: None, 100, lambda part: (), least=1)
+        in_slices(lambda: None, 100, lambda part: (), minimum=1)
     assert len(begun) == 2
 
 
 def test_threads_that_are_gone_are_replaced():
     """As in a process that was forked from ours."""
     with set_num_threads(2):
-        slices_of(100, least=1)
+        slices_of(100, minimum=1)
         parallel._pools[2][0].shutdown()
-        assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
+        assert len(slices_of(100, minimum=1)) == 2 * SLICES_PER_CORE
 
 
 def test_the_count_in_force_ends_with_its_block():
@@ -123,10 +123,10 @@ def test_the_count_in_force_ends_with_its_block():
         pass
     with set_num_threads(1):
         with set_num_threads(2):
-            assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
-        assert len(slices_of(100, least=1)) == 1
+            assert len(slices_of(100, minimum=1)) == 2 * SLICES_PER_CORE
+        assert len(slices_of(100, minimum=1)) == 1
         with set_num_threads(None):
-            assert len(slices_of(100, least=1)) == slices_wanted()
+            assert len(slices_of(100, minimum=1)) == slices_wanted()
 
 
 def slices_wanted():
