@@ -9,7 +9,7 @@ from ..tables.table import is_blank, words
 from ..text import visible
 from .headlines import ClaimCount, Overview, overview
 from .page.page_tables import gist
-from .report import Report
+from .report import BenchReport
 from .sections import tables
 from .standings import Headline
 
@@ -19,7 +19,7 @@ _FIRST, HEADLINES = ("Most accurate", "Fastest to"), 3
 LINES, TABLES = 10, 4
 
 
-def outcome(report: Report, width: int) -> list[str]:
+def outcome(report: BenchReport, width: int) -> list[str]:
     """Return a summary of a report: the user's solvers, then at most ten lines of 80 letters."""
     answers = report.answers
     sentences = [_verdict(answers.verdict), *map(_sentence, printed(answers.headlines))]
