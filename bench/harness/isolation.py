@@ -24,7 +24,7 @@ Calculate = Callable[..., Mapping[str, Any]]
 _START = "import plumbob.bench.harness.worker as w; w.main()"
 
 
-class Outcome(NamedTuple):
+class JobOutcome(NamedTuple):
     """The result of a job."""
 
     setup: float  # how long the set-up of the solver took [s]
@@ -54,9 +54,9 @@ class WorkerProcess:
         self._start_patience, self.patience = start_patience, target_patience
         self._child: ChildProcess | None = None
 
-    def perform(self, job: Any) -> Outcome:
+    def perform(self, job: Any) -> JobOutcome:
         """Perform a job and collect its messages, however it ends."""
-        outcome, is_ready = Outcome(0.0, [], ""), False
+        outcome, is_ready = JobOutcome(0.0, [], ""), False
         with contextlib.closing(self.stream(job)) as messages:
             for message in messages:
                 match message:

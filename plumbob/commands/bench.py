@@ -108,11 +108,13 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     """
     from plumbob.bench.harness.executors import executor_at
 
-    from .selection import Request, choose
+    from .selection import MeasurementRequest, choose
 
     names = list(dict.fromkeys(known("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
-    request = Request(entrants or (), program_of(context), *parts, targets, effector, pins)
+    request = MeasurementRequest(
+        entrants or (), program_of(context), *parts, targets, effector, pins
+    )
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:
         from . import plan

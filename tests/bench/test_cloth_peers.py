@@ -16,7 +16,7 @@ from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs
 from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_motion, truth_of
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
-from plumbob.bench.harness.isolation import Outcome, WorkerProcess
+from plumbob.bench.harness.isolation import JobOutcome, WorkerProcess
 from plumbob.bench.harness.worker import Finished, Ready, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
@@ -455,7 +455,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
     class Silent:
         def perform(self, job):
             jobs.append(job)
-            return Outcome(0.0, [], "ended after 300 s of silence", is_silent=True)
+            return JobOutcome(0.0, [], "ended after 300 s of silence", is_silent=True)
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})

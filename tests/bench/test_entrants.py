@@ -233,7 +233,7 @@ def pass_by(monkeypatch):
 def test_a_request_without_a_time_takes_its_round_trip(pass_by, monkeypatch, claimed, counted):
     door = SimpleNamespace(answer=lambda case: pass_by(1.5) or Answer({}, claimed))
     monkeypatch.setattr(contestant, "open_contestant", lambda *_: door)
-    solver = contestant.Contestant("mine")
+    solver = contestant.EntrantSolver("mine")
     assert solver.answer(CHAIN_TASK, {}) == ({}, OwnTime(counted, 1.5))
     assert bool(solver.remark) == (not claimed)
 

@@ -185,7 +185,7 @@ def an_outcome(folder, tables=(), **more):
     )
     answers = answers._replace(**more)
     missing = ["a"] + ["A sentence on what is missing, which is rather long. " * 3] * 20
-    return report.Report(folder / "index.html", list(tables), missing, answers)
+    return report.BenchReport(folder / "index.html", list(tables), missing, answers)
 
 
 @pytest.mark.parametrize("width", [80, 120, 240])

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Outcome, raised
+from ...harness.isolation import JobOutcome, raised
 from ...harness.job import Job, worker_process
 from ...harness.measure import not_asked, not_installed
 from ...harness.stopwatch import Budget
@@ -164,7 +164,7 @@ def solve(job: RobotJob, targets: Targets) -> Measured:
     )
 
 
-def _performed(job: RobotJob, targets: Targets, budget: Budget) -> Outcome:
+def _performed(job: RobotJob, targets: Targets, budget: Budget) -> JobOutcome:
     """Return the solves of targets; continue in a new process behind a target that crashes it."""
     peer, entry, robot = job.peer, job.entry, evaluator_of(job.robot).robot
     request = (peer.module, robot, targets, job.tolerance, {**entry.settings, **peer.spec})
