@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from ..figures.drawing import STYLE
 from ..figures.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
-from ..figures.style import COLOURS, written
+from ..figures.style import COLOURS, plain_label
 from ..figures.view import project
 from ..motion.motion import Moving, Scene, decades, length
 
@@ -96,7 +96,7 @@ def _draw_frame(
 
 def _write_error(ax: Axes, motion: Moving, i: int, title: bool) -> None:
     """Write the solver, and its error in this frame and up to it."""
-    ax.set_title(written(motion.label) if title else "", fontweight="bold", loc="left")
+    ax.set_title(plain_label(motion.label) if title else "", fontweight="bold", loc="left")
     error, largest = length(motion.errors[i]), length(np.max(motion.errors[: i + 1]))
     text = f"error {error}, largest {largest}" if np.isfinite(motion.errors[i]) else "diverged"
     ax.text(0.0, -0.02, text, transform=ax.transAxes, va="top", color=COLOURS["faint"])
