@@ -153,9 +153,9 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
     if "check" not in suites:
         return []
     checks = [record for record in RecordFile(folder).read().records if record.suite == "check"]
-    missed = [record for record in checks if not np.all(record.arrays.get("held", True))]
+    failures = [record for record in checks if not np.all(record.arrays.get("held", True))]
     return [
-        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}" for record in missed
+        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}" for record in failures
     ]
 
 
