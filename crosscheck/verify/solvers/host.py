@@ -243,10 +243,8 @@ class _Watch(threading.Thread):
                 self._note_line()
 
     def _note_line(self) -> None:
-        solver_file, frame = (
-            Path(self._folder) / "solver.py",
-            sys._current_frames().get(self._solver),
-        )
+        solver_file = Path(self._folder) / "solver.py"
+        frame = sys._current_frames().get(self._solver)
         while frame is not None and not is_beside(Path(frame.f_code.co_filename), solver_file):
             frame = frame.f_back
         if frame is not None:
