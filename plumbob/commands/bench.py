@@ -28,7 +28,7 @@ from .options import (
     Texts,
     argument,
     flag,
-    known,
+    valid_name,
     option,
     writable,
 )
@@ -110,7 +110,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
 
     from .selection import MeasurementRequest, choose
 
-    names = list(dict.fromkeys(known("suite", name, SUITES) for name in suites or SUITES))
+    names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
     request = MeasurementRequest(
         entrants or (), program_of(context), *parts, targets, effector, pins
