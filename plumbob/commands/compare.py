@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from ..help_text import block
 from ..terminal import print_aligned, width
-from .options import FAILED, SUCCESS, File, Texts, argument, valid_name, option, write_text
+from .options import FAILED, SUCCESS, File, Texts, argument, option, valid_name, write_text
 
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import RunComparison

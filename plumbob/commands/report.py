@@ -7,7 +7,7 @@ from plumbob.bench.text import visible
 
 from ..help_text import block
 from ..terminal import print_lines, print_outcome
-from .options import REPORT, SUCCESS, File, Texts, argument, flag, valid_name, option
+from .options import REPORT, SUCCESS, File, Texts, argument, flag, option, valid_name
 
 if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table

@@ -8,7 +8,7 @@ from plumbob.bench.text import visible
 
 from ..help_text import block
 from ..terminal import progress
-from .options import REPORT, SUCCESS, File, Text, argument, flag, valid_name, option, writable
+from .options import REPORT, SUCCESS, File, Text, argument, flag, option, valid_name, writable
 from .verify import program_of
 
 EXAMPLES = block(
