@@ -258,6 +258,50 @@ def published_iteration(system, state, given, start):
 
 
 class TestResidual:
+    def residual(self, system, state, x, given):
+        """Return the residual and the floor by their definition, in extended precision."""
+        wide = np.longdouble
+        m = system.masses.astype(wide)[:, None]
+        x_n, free = state.positions.astype(wide), system.free
+        x = x.astype(wide)
+        y = np.where(free[:, None], x_n + wide(h) * state.velocities.astype(wide), x_n)
+        springs, k, r, rope = beside(system, state.positions)
+        i, j = springs.T
+        external = m * system.gravity + given
+
+        def gradient(x):
+            length = np.sqrt(np.sum((x[i] - x[j]) ** 2, axis=1))
+            stretch = np.where(rope, np.maximum(length - r, 0), length - r)
+            pull = (k * stretch / length)[:, None] * (x[i] - x[j])
+            total = np.zeros_like(x)
+            np.add.at(total, i, pull)
+            np.subtract.at(total, j, pull)
+            return np.sqrt(np.sum((m * (x - y) + h * h * (total - external))[free] ** 2))
+
+        reach = np.sqrt(np.sum(x**2, axis=1))
+        size = m[:, 0] * (reach + np.sqrt(np.sum(y**2, axis=1)))
+        size += h * h * np.sqrt(np.sum(external**2, axis=1))
+        for end in (i, j):
+            np.add.at(size, end, h * h * k * (reach[i] + reach[j] + r))
+        floor = 64 * np.finfo(float).eps * np.sqrt(np.sum(size[free] ** 2))
+        return gradient(x), max(gradient(y), floor), floor
+
+    @pytest.mark.parametrize("iterations", [0, 1, 3])
+    def test_it_agrees_with_its_definition(self, network, rng, backend, solver, iterations):
+        given = outer(rng)
+        result = stepped(*network, solver, given, tolerance=0, max_iterations=iterations)
+        norm, scale, floor = self.residual(*network, result.state.positions, given)
+        # The norm in double precision is off by less than the floor, which is an upper bound.
+        assert abs(result.residual - norm / scale) <= floor / scale
+        assert result.residual > 1e-12 or solver != "local_global"
+
+    def test_the_floor_agrees_with_its_definition(self, network, rng, backend):
+        given = outer(rng)
+        objective = ImplicitEuler(network[0], h=h).objective(network[1], given)
+        x = network[1].positions + 0.1
+        _, _, floor = self.residual(*network, x, given)
+        assert objective.evaluate(x).floor == pytest.approx(float(floor), rel=1e-14, abs=0)
+
     def test_the_most_is_no_less_than_the_floor_and_not_far_above(self, network, rng, backend):
         objective = ImplicitEuler(network[0], h=h).objective(network[1], outer(rng))
         for x in (objective.y, objective.x_n + 5.0, 1e-3 * objective.y, np.ones((7, 3))):
