@@ -241,7 +241,7 @@ def test_a_reader_that_leaves_ends_it_without_a_word(arguments, buffered):
 
 
 def test_the_main_job_says_first_what_it_does_and_where(capsys, monkeypatch, empty_folder):
-    monkeypatch.setattr(bench, "run_suites", lambda *_: 1)
+    monkeypatch.setattr(bench, "run_suites", lambda *_, **__: 1)
     monkeypatch.setattr(bench, "write_report", lambda *_: 0)
     code, out, _ = plumbob(capsys, "--output", "here")
     assert code == 1
@@ -250,7 +250,7 @@ def test_the_main_job_says_first_what_it_does_and_where(capsys, monkeypatch, emp
 
 @pytest.mark.parametrize("arguments", [[], ["bench", "arm"], ["check", "spring forces"]])
 def test_ctrl_c_exits_130_and_a_bench_says_what_is_kept(capsys, monkeypatch, arguments):
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     for name in ("plumbob.commands.bench.run_suites", "plumbob.crosscheck.claims.run_claims"):

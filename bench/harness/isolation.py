@@ -15,7 +15,7 @@ from plumbob.crosscheck.child_process import (
 )
 
 from .progress import Progress, announce
-from .worker import Begun, Calculation, Finished, Message, Numbers, Ready, Solved
+from .worker import Calculation, Finished, Message, Numbers, Ready, Solved, Started
 
 # A worker that is silent for so long [s] is ended; before it is ready it may compile.
 START_PATIENCE = 180.0
@@ -106,7 +106,7 @@ class WorkerProcess:
         if is_used and isinstance(first, Finished) and first.is_lost:
             messages = self._messages(job)
             first = next(messages)
-        if not isinstance(first, Begun):
+        if not isinstance(first, Started):
             yield first
         yield from messages
 
@@ -115,7 +115,7 @@ class WorkerProcess:
         try:
             child = self._child = self._child or python_process(_START)
             child.send(pickled(job))
-            message: Message = Begun()
+            message: Message = Started()
             while not isinstance(message, Finished):
                 message = _receive(child, patience)
                 if isinstance(message, Ready):

@@ -40,7 +40,8 @@ def ending(results: Results, suites: Sequence[str], width: int) -> list[str]:
     sentences += remarks_of_entrants(results, suites)
     if not sentences:
         full = [table for table in tables(results, suites) if not is_blank(table)]
-        sentences = [f"{table.title}: {gist(table.summary)}" for table in full[:TABLES]]
+        gists = {table.title: gist(table.summary) for table in full[:TABLES]}
+        sentences = [f"{title}: {text}" if text else title for title, text in gists.items()]
     return _lines([*sentences, *_scale_and_absent(answers, width)], width)
 
 

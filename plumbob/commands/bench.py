@@ -28,8 +28,8 @@ from .options import (
     Texts,
     argument,
     flag,
-    known,
     option,
+    valid_name,
     writable,
 )
 from .report import write_report
@@ -110,7 +110,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
 
     from .selection import MeasurementRequest, choose
 
-    names = list(dict.fromkeys(known("suite", name, SUITES) for name in suites or SUITES))
+    names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
     request = MeasurementRequest(
         entrants or (), program_of(context), *parts, targets, effector, pins
@@ -199,13 +199,13 @@ def _run_with_progress(
     from plumbob.bench.harness.experiment import EXPERIMENTS
 
     events: list[Event] = []
-    timed = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
+    timed_suites = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
     with progress() as bar, lines_in_a_pipe(bar):
         task, counts = bar.add_task("starting", total=run.count(suites, scale)), Counter[str]()
         is_serial = executor in (None, THIS_PROCESS)
         with listening(_listener(bar, task, events if is_serial else ())):
             for event in run.run(suites, scale, output, executor or THIS_PROCESS):
-                if event.state == run.MEASURING and event.suite in timed:
+                if event.state == run.MEASURING and event.suite in timed_suites:
                     before_times()
                 events.append(event)
                 counts[event.state] += 1

@@ -286,7 +286,7 @@ def test_the_machine_with_most_records_continues_and_other_answers_are_kept(made
 def test_rows_of_a_table_are_timed_on_the_same_machine(made_up, monkeypatch):
     made_up(MadeUpCluster(**ONE_KIND))
     some = Choice("quick", TINY, problems=("a", "b"), is_partial=True)
-    monkeypatch.setattr(run, "chosen", lambda scale: some)
+    monkeypatch.setattr(run, "choice_at", lambda scale: some)
     assert states(made_up(MadeUpCluster(**TWO_KINDS)))[run.KEPT] == 6
     elsewhere = made_up(MadeUpCluster(w4="h3/abacus"))
     assert states(elsewhere) == {run.KEPT: 2, run.FAILED: 4, run.NOT_RUN: 3}

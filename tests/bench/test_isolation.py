@@ -291,7 +291,7 @@ def suite(monkeypatch, worker):
 def test_every_manner_becomes_one_record(suite):
     """The target that a solver hangs on costs the time it took; a new process continues."""
     solves, notes, _ = suite["liar", "robots/iiwa14"].measure()
-    assert solves.claimed.tolist() == [1] * 6
+    assert solves.claims.tolist() == [1] * 6
     assert not solves.solved.any()
     assert notes["remark"] == ""
     solves, notes, _ = suite["unable", "robots/iiwa14"].measure()

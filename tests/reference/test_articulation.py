@@ -257,15 +257,11 @@ def test_slightly_long_quaternions_are_normalised_once(arm, q, backend):
     ("arguments", "message"),
     [
         ({"kinds": ["hinge"]}, "kinds: expected 3 kinds, one a joint, got 1"),
-        ({"kinds": "wheel"}, "kinds: expected one of fixed, hinge, .*, got 'wheel'"),
-        ({"axes": [0, 0, 0]}, "axes: expected lengths of at least 1e-75, got 0"),
         ({"axes": np.ones((2, 3))}, r"axes: expected one, or one for each of 3 joints, got \(2,\)"),
-        ({"frames": [1.0, 1.0, 0.0, 0.0]}, "frames: expected unit quaternions"),
         ({"frames": rotation.identity(2)}, "frames: expected one, or one for each of 3 joints"),
         ({"lower": [1.0, 2.0]}, "lower: expected one, or one for each of 3 joints"),
         ({"lower": 3.2}, "lower: expected limits of a ball's twist .* got 3.2 to inf for joint 2"),
         ({"upper": -3.2}, "lower: expected limits of a ball's twist .* got -inf to -3.2"),
-        ({"cones": -1.0}, "cones: expected none below 0, got -1"),
         ({"cones": [1.0, 2.0]}, "cones: expected one, or one for each of 3 joints"),
         ({"mimics": {1: Mimic("hip")}}, "mimics: expected one of .* got 'hip'"),
         ({"mimics": {1: Mimic(2)}}, "mimics: expected hinges or slides, got 'ball' for joint 2"),
@@ -278,10 +274,3 @@ def test_bad_arguments_are_named(arguments, message):
     tree = Skeleton([-1, 0, 1], np.ones((3, 3)))
     with pytest.raises(ValueError, match=message):
         Articulation(**{"skeleton": tree, "kinds": ["hinge", "slide", "ball"]} | arguments)
-
-
-@pytest.mark.parametrize("ask", ["index", "coordinates_of", "freedoms_of"])
-@pytest.mark.parametrize("joint", ["hip", 6, -7, 1.0])
-def test_an_unknown_joint_is_named(ask, joint, arm):
-    with pytest.raises(ValueError, match="joint: expected"):
-        getattr(arm, ask)(joint)

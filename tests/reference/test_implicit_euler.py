@@ -112,7 +112,7 @@ class TestStep:
     @pytest.mark.parametrize("name", ["local_global", "chebyshev", "lbfgs", "newton_cg"])
     def test_g_never_grows_in_an_iteration(self, cloth, backend, name):
         integrator = ImplicitEuler(*cloth[:1], h=h, solver=name)
-        iterates = list(itertools.islice(integrator.iterates(cloth[1]), 60))
+        iterates = list(itertools.islice(integrator.iterates(cloth[1]), 30))
         for before, after in itertools.pairwise(iterates):
             assert after.value <= before.value + after.value_floor
         assert iterates[-1].value < iterates[0].value - 1e-4
@@ -307,13 +307,6 @@ class TestResidual:
         for x in (objective.y, objective.x_n + 5.0, 1e-3 * objective.y, np.ones((7, 3))):
             iterate = objective.evaluate(x)
             assert iterate.floor <= iterate.floor_bound <= 3 * iterate.floor
-
-    def test_at_the_floor_the_gradient_is_rounding(self, network, rng):
-        given = outer(rng)
-        result = stepped(*network, "newton", given, tolerance=1e-75)
-        norm, _, floor = self.residual(*network, result.state.positions, given)
-        assert result.at_floor
-        assert norm <= 2 * floor
 
     @pytest.mark.parametrize("name", ["value", "quadratic_form"])
     def test_an_objective_that_overflows_is_an_error(self, name, backend):
