@@ -64,8 +64,8 @@ def ik_answers(engine: str, case: int) -> Comparison:
 def full_reach(skeleton: Skeleton) -> float:
     """Return the largest distance that any joint can have from the root [m]."""
     distances = np.zeros(skeleton.joint_count)
-    for j in range(1, skeleton.joint_count):
-        distances[j] = distances[skeleton.parents[j]] + skeleton.link_lengths[j]
+    for joint in range(1, skeleton.joint_count):
+        distances[joint] = distances[skeleton.parents[joint]] + skeleton.link_lengths[joint]
     return float(distances.max())
 
 

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from plumbob.bench.harness.record import FILE_NAME, RecordFile
-from plumbob.bench.report.report import Report, write
+from plumbob.bench.report.report import BenchReport, write
 from plumbob.bench.tables.layout import provenance
 from plumbob.bench.tables.results import listed
 from plumbob.bench.tables.table import words
@@ -40,7 +40,7 @@ def write_sample(folder: Path) -> None:
     README.write_text(with_headlines(README.read_text(encoding="utf-8"), text), encoding="utf-8")
 
 
-def headlines(report: Report, folder: Path) -> str:
+def headlines(report: BenchReport, folder: Path) -> str:
     """Return the headlines as a Markdown table, with the machine and the versions below it."""
     rows = ["| question | best | by how much |", "|---|---|---|"]
     if verdict := report.answers.verdict:

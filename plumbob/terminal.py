@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from plumbob.bench.report.report import Report
+    from plumbob.bench.report.report import BenchReport
     from plumbob.bench.tables.results import Results
     from plumbob.bench.tables.table import Table
     from plumbob.crosscheck.verdict import ClaimVerdict
@@ -86,7 +86,7 @@ def print_lines(table: "Table") -> list[str]:
     return left_out
 
 
-def print_outcome(report: "Report") -> None:
+def print_outcome(report: "BenchReport") -> None:
     """Print the summary of a report, in ten lines."""
     from plumbob.bench.report.outcome import outcome
 

@@ -48,7 +48,7 @@ def array(name: str, value: ArrayLike, *trailing: int | str, kind: str = "number
     if largest <= LARGEST_COORDINATE:
         return result
     if not np.isfinite(result).all():
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
+        index = tuple(np.argwhere(~np.isfinite(result))[0].tolist())
         raise ValueError(f"{name}: expected finite numbers, got {result[index]} at index {index}")
     number, bound = distinct_texts(largest, LARGEST_COORDINATE)
     raise ValueError(f"{name}: expected {kind} of at most {bound}, got {number}")
@@ -309,7 +309,9 @@ def shown(value: Any) -> str:
 
 def digits_apart(number: float, bound: float, minimum: int = 6) -> int:
     """Return the fewest significant digits, at least `minimum`, by which two numbers differ."""
-    counts = (n for n in range(minimum, 17) if f"{number:.{n}g}" != f"{bound:.{n}g}")
+    counts = (
+        digits for digits in range(minimum, 17) if f"{number:.{digits}g}" != f"{bound:.{digits}g}"
+    )
     return next(counts, 17)
 
 

@@ -242,8 +242,8 @@ class Articulation(KeepsReadOnly):
         arguments.instance("rng", rng, np.random.Generator)
         shape = arguments.lengths("shape", shape, self.coordinate_count)
         q = np.empty((math.prod(shape), self.coordinate_count))
-        for j in self._leading:
-            q[:, self.coordinates_of(int(j))] = _drawn(rng, self, int(j), len(q))
+        for joint in self._leading:
+            q[:, self.coordinates_of(int(joint))] = _drawn(rng, self, int(joint), len(q))
         return q.reshape(*shape, self.coordinate_count)
 
     def clamp(self, q: ArrayLike) -> FloatArray:
@@ -287,8 +287,8 @@ class Articulation(KeepsReadOnly):
     @functools.cached_property
     def quaternions(self) -> list[slice]:
         """The slices of q that hold quaternions."""
-        rotating = [int(j) for j in self._leading if self.kinds[j] in ("ball", "free")]
-        ends = [self.coordinates_of(j).stop for j in rotating]
+        rotating = [int(joint) for joint in self._leading if self.kinds[joint] in ("ball", "free")]
+        ends = [self.coordinates_of(joint).stop for joint in rotating]
         return [slice(end - 4, end) for end in ends]
 
     @functools.cached_property
@@ -480,17 +480,17 @@ def _checked_limits(
     """Return both limits, in order, and kept by some twist from -pi to pi of each ball."""
     count = len(kinds)
     lower, upper = _checked_bound("lower", lower, count), _checked_bound("upper", upper, count)
-    for j in np.flatnonzero(lower > upper):
-        number, limit = arguments.distinct_texts(lower[j], upper[j])
+    for joint in np.flatnonzero(lower > upper):
+        number, limit = arguments.distinct_texts(lower[joint], upper[joint])
         raise ValueError(
-            f"lower: expected at most the upper limit, {limit}, got {number} for joint {j}"
+            f"lower: expected at most the upper limit, {limit}, got {number} for joint {joint}"
         )
-    for j in np.flatnonzero((kinds == BALL) & ((lower > np.pi) | (upper < -np.pi))):
-        start, _ = arguments.distinct_texts(lower[j], np.pi)
-        end, _ = arguments.distinct_texts(upper[j], -np.pi)
+    for joint in np.flatnonzero((kinds == BALL) & ((lower > np.pi) | (upper < -np.pi))):
+        start, _ = arguments.distinct_texts(lower[joint], np.pi)
+        end, _ = arguments.distinct_texts(upper[joint], -np.pi)
         raise ValueError(
             f"lower: expected limits of a ball's twist within -pi to pi, got {start} to "
-            f"{end} for joint {j}"
+            f"{end} for joint {joint}"
         )
     return lower, upper
 
@@ -525,18 +525,20 @@ def _checked_mimics(
                 raise ValueError(f"mimics: expected a leader, got {name!r} in a ring")
             chain[joint] = None
             joint = leaders[joint]
-        for j in reversed(chain):
-            multiplier = arguments.number("mimics", followers[j].multiplier)
-            shift = arguments.number("mimics", followers[j].shift)
-            first, factor, offset = checked.get(leaders[j], Mimic(leaders[j]))
-            checked[j] = Mimic(
+        for follower in reversed(chain):
+            multiplier = arguments.number("mimics", followers[follower].multiplier)
+            shift = arguments.number("mimics", followers[follower].shift)
+            first, factor, offset = checked.get(leaders[follower], Mimic(leaders[follower]))
+            checked[follower] = Mimic(
                 first,
                 arguments.number("mimics", multiplier * factor),
                 arguments.number("mimics", multiplier * offset + shift),
             )
-    for k in {*followers, *leaders.values()}:
-        if kinds[k] not in ("hinge", "slide"):
-            raise ValueError(f"mimics: expected hinges or slides, got {kinds[k]!r} for joint {k}")
+    for joint in {*followers, *leaders.values()}:
+        if kinds[joint] not in ("hinge", "slide"):
+            raise ValueError(
+                f"mimics: expected hinges or slides, got {kinds[joint]!r} for joint {joint}"
+            )
     return checked
 
 

@@ -42,7 +42,7 @@ from .arguments import (
     sizes,
 )
 from .backend.compiled import Kernel
-from .backend.partition import LARGE, Regions, cut
+from .backend.partition import LARGE, Regions, partition_springs
 from .quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 from .sparse.assembly import BlockSum
 
@@ -187,7 +187,7 @@ class MassSpring(KeepsReadOnly):
     def regions(self) -> Regions | None:
         """The partition of a large system for sums over threads; None for a small system."""
         large = len(self.arrays.springs) >= LARGE
-        return cut(self.arrays.springs, self.particle_count) if large else None
+        return partition_springs(self.arrays.springs, self.particle_count) if large else None
 
     @functools.cached_property
     def free_incidence(self) -> Any:

@@ -33,7 +33,7 @@ def tips(model: Skeleton | Articulation) -> list[int]:
     """Return the joints that have no children."""
     tree = model if isinstance(model, Skeleton) else model.skeleton
     parents = set(tree.parents.tolist())
-    return [j for j in range(tree.joint_count) if j not in parents]
+    return [joint for joint in range(tree.joint_count) if joint not in parents]
 
 
 def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> int:
@@ -49,7 +49,7 @@ def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> i
     if "only_tip" not in cache:
         ends = tips(model)
         if len(ends) > 1:
-            names = ", ".join(model.names[j] for j in ends)
+            names = ", ".join(model.names[tip] for tip in ends)
             raise ValueError(f"effector: expected one of the tips {names}, got none")
         cache["only_tip"] = ends[0]
     return cache["only_tip"]

@@ -50,7 +50,7 @@ def normalise(quaternions: ArrayLike, name: str = "quaternions") -> tuple[FloatA
     q = arguments.array(name, quaternions, "...", 4)
     largest = np.abs(q).max(axis=-1, keepdims=True)
     if not largest.all():
-        index = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
+        index = tuple(np.argwhere(largest[..., 0] == 0.0)[0].tolist())
         raise ValueError(f"{name}: expected lengths above 0, got 0 at index {index}")
     scaled = q / largest  # no square overflows or vanishes
     lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
@@ -61,7 +61,7 @@ def check_unit(name: str, lengths: FloatArray) -> None:
     """Raise a ValueError that names the first length further than 1e-6 from 1."""
     wrong = np.abs(lengths - 1.0) > UNIT_TOLERANCE
     if wrong.any():
-        index = tuple(int(i) for i in np.argwhere(wrong)[0])
+        index = tuple(np.argwhere(wrong)[0].tolist())
         raise ValueError(
             f"{name}: expected unit quaternions (w, x, y, z), "
             f"got one of length {lengths[index]:.9g} at index {index}"

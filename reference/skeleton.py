@@ -85,7 +85,7 @@ class Skeleton(KeepsReadOnly):
 
     @functools.cached_property
     def _numbers(self) -> dict[str, int]:
-        return {name: j for j, name in enumerate(self.names)}
+        return {name: joint for joint, name in enumerate(self.names)}
 
     def path(self, effector: int | str = -1) -> IndexArray:
         """Return the joints from the root to the effector, both included, shape (path,)."""
@@ -150,7 +150,7 @@ def _checked_tree(parents: ArrayLike, offsets: ArrayLike) -> tuple[IndexArray, F
 
 def _checked_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     if names is None:
-        return tuple(f"joint{i}" for i in range(count))
+        return tuple(f"joint{number}" for number in range(count))
     names = arguments.sequence("names", names, count, "a joint")
     for name in names:
         if not arguments.text("names", name):

@@ -7,6 +7,7 @@ on its error stream each call before it is made: where a call ends the process, 
 import copy
 import dataclasses
 import faulthandler
+import itertools
 import json
 import math
 import os
@@ -362,11 +363,15 @@ def fault(call, changed, right):
     return "" if same(result, right) else "gave another answer"
 
 
-def walk(law, table, *options, before=lambda label: None):
-    """Return how many functions and calls were tried, and each that broke the law, in words."""
+def walk(law, table, *options, stride=1, before=lambda label: None):
+    """Return how many functions and calls were tried, and each that broke the law, in words.
+
+    A stride above 1 tries every so-manieth trial, of each function others.
+    """
     tried, broken = 0, []
-    for name, call in table.items():
-        for label, changed, right in TRIALS[law](call, *options):
+    for i, (name, call) in enumerate(table.items()):
+        trials = itertools.islice(TRIALS[law](call, *options), i % stride, None, stride)
+        for label, changed, right in trials:
             before(f"{name}: {label}")
             tried += 1
             said = fault(call, changed, right)
@@ -374,8 +379,8 @@ def walk(law, table, *options, before=lambda label: None):
     return len({name.split(",")[0] for name in table}), tried, broken
 
 
-def main(law, only="", *options):
-    """Walk all public functions, or those whose names hold a word."""
+def main(law, stride="1", *options):
+    """Walk all public functions."""
 
     def before(label):
         faulthandler.dump_traceback_later(PATIENCE, exit=True)
@@ -385,8 +390,8 @@ def main(law, only="", *options):
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     with tempfile.TemporaryDirectory() as folder:  # a wrong path may be written to
         os.chdir(folder)
-        table = {name: call for name, call in calls().items() if only in name}
-        print(json.dumps(walk(law, table, *map(int, options), before=before)))
+        result = walk(law, calls(), *map(int, options), stride=int(stride), before=before)
+        print(json.dumps(result))
         os.chdir("/")
 
 

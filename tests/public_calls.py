@@ -54,53 +54,47 @@ MODULES = [
 ]  # fmt: skip
 
 # What stands in these modules for other modules of ours, and why no user calls it.
-INTERNAL = {
-    "reference.articulation.one_batch": "reshapes what is checked already",
-    "reference.articulation.rotated_by_pi": "of joints that are checked already",
-    "reference.articulation.number_coordinates": "of joints that are checked already",
-    "reference.mass_spring.MassSpring.replaced": "unchecked twin of the constructor",
-    "reference.mass_spring.State.of": "unchecked twin of the constructor",
-    "reference.rotation.check_unit": "of lengths that the caller has computed",
-    "reference.skeleton.checked_skeleton": "is a border itself",
-    "reference.skeleton.Skeleton.path_array": "of an index that is checked already",
-    "reference.articulation.Articulation.checked": "is a border itself",
-    "reference.mass_spring.checked_state": "is a border itself",
-    "reference.mass_spring.pin_targets": "is a border itself",
-    "reference.mass_spring.constant_forces": "is a border itself",
-    "reference.implicit_euler.objective.Objective.iterate_at": "unchecked twin of evaluate",
-    "reference.implicit_euler.objective.Objective.hessian_at": "unchecked twin of hessian",
-    "reference.implicit_euler.objective.Objective.pin_gradient_at": "unchecked twin",
-    "reference.implicit_euler.objective.Iterate": "made only by an Objective",
-    "crosscheck.verdict.each_case": "of a comparison in our own sources",
-    "reference.implicit_euler.objective.Iterate.within": "of a share in our own sources",
-    "reference.judging.step.StepJudgement": "made only by judge_step",
-    "reference.judging.pose.PoseJudgement": "made only by judge_pose",
-    "reference.implicit_euler.objective.Iterate.is_above": "compares what an Objective has made",
-    "reference.implicit_euler.objective.global_matrix": "of a system that is checked already",
-    "reference.implicit_euler.objective.effective_stiffnesses": "likewise",
-    "reference.implicit_euler.StepMethod.iterates": "a protocol",
-    "reference.implicit_euler.StepResult": "made only by a step",
-    "reference.implicit_euler.certificate.Certificate": "made only by certify",
-    "reference.implicit_euler.certificate.Certificate.shares_minimiser_within": "unchecked twin",
-    "reference.implicit_euler.certificate.kantorovich_distance": "a part of the proof",
-    "reference.implicit_euler.certificate.least_curvature": "a part of the proof",
-    "reference.implicit_euler.certificate.newton_length": "a part of the proof",
-    "reference.implicit_euler.certificate.hessian_change": "a part of the proof",
-    "reference.implicit_euler.certificate.laplacian_norm": "a part of the proof",
-    "reference.implicit_euler.certificate.rounding_errors": "a part of the proof",
-    "reference.sparse.linear_solver.Factor.solve": "a protocol",
-    "reference.sparse.linear_solver.Factor.refactorize": "a protocol",
-    "reference.backend.compiled.Kernel": "for kernels",
-    "reference.backend.compiled.compile_kernel": "for kernels",
-    "reference.backend.compiled.bind": "for kernels",
-    "reference.backend.compiled.digest": "for kernels",
-    "reference.backend.compiled.compiled_in": "for kernels",
-    "reference.backend.threads.in_slices": "for kernels",
-    "crosscheck.verdict.ClaimVerdict": "made only by check_claim",
-    "crosscheck.verdict.Claim": "made by claims",
-    "crosscheck.samples.generator": "of names in the sources",
-    "crosscheck.samples.particles": "of a case that is checked already",
+_INTERNAL = {
+    "of what is checked already": """
+        reference.articulation.one_batch reference.articulation.rotated_by_pi
+        reference.articulation.number_coordinates reference.rotation.check_unit
+        reference.skeleton.Skeleton.path_array reference.implicit_euler.objective.global_matrix
+        reference.implicit_euler.objective.effective_stiffnesses crosscheck.samples.particles""",
+    "unchecked twin": """
+        reference.mass_spring.MassSpring.replaced reference.mass_spring.State.of
+        reference.implicit_euler.objective.Objective.iterate_at
+        reference.implicit_euler.objective.Objective.hessian_at
+        reference.implicit_euler.objective.Objective.pin_gradient_at
+        reference.implicit_euler.certificate.Certificate.shares_minimiser_within""",
+    "is a border itself": """
+        reference.skeleton.checked_skeleton reference.articulation.Articulation.checked
+        reference.mass_spring.checked_state reference.mass_spring.pin_targets
+        reference.mass_spring.constant_forces""",
+    "made only by us": """
+        reference.implicit_euler.objective.Iterate reference.judging.step.StepJudgement
+        reference.judging.pose.PoseJudgement reference.implicit_euler.StepResult
+        reference.implicit_euler.certificate.Certificate crosscheck.verdict.Claim""",
+    "of our own sources": """
+        crosscheck.verdict.each_case reference.implicit_euler.objective.Iterate.within
+        reference.implicit_euler.objective.Iterate.is_above crosscheck.samples.generator""",
+    "a protocol": """
+        reference.implicit_euler.StepMethod.iterates reference.sparse.linear_solver.Factor.solve
+        reference.sparse.linear_solver.Factor.refactorize""",
+    "a part of the proof": """
+        reference.implicit_euler.certificate.kantorovich_distance
+        reference.implicit_euler.certificate.least_curvature
+        reference.implicit_euler.certificate.newton_length
+        reference.implicit_euler.certificate.hessian_change
+        reference.implicit_euler.certificate.laplacian_norm
+        reference.implicit_euler.certificate.rounding_errors""",
+    "for kernels": """
+        reference.backend.compiled.Kernel reference.backend.compiled.compile_kernel
+        reference.backend.compiled.bind reference.backend.compiled.digest
+        reference.backend.compiled.compiled_in reference.backend.threads.in_slices""",
+    "made only by check_claim": """
+        crosscheck.verdict.ClaimVerdict""",
 }
+INTERNAL = {name: why for why, names in _INTERNAL.items() for name in names.split()}
 
 
 class Call(NamedTuple):

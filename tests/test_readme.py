@@ -123,11 +123,6 @@ def test_every_path_that_a_page_names_exists(page):
     assert [path for path in named if not (README.parent / path).exists()] == []
 
 
-@pytest.mark.parametrize("picture", sorted((README.parent / "docs").glob("*.svg")))
-def test_pictures_of_pages_are_small(picture):
-    assert picture.stat().st_size < 100_000
-
-
 def test_every_make_target_that_is_named_exists():
     targets = set(
         re.findall(r"^([a-z-]+):", (README.parent / "Makefile").read_text(), re.MULTILINE)

@@ -18,7 +18,8 @@ ENTRY = re.compile(r"^- \*\*(.+?) (\d{4})\.\*\* \*(.+?)\.\* (.+?)\. In (.+?)\.$"
 
 def sources():
     for folder in ("reference", "crosscheck", "bench", "tests"):
-        yield from sorted((ROOT / folder).rglob("*.py"))
+        for ending in ("py", "toml"):
+            yield from sorted((ROOT / folder).rglob(f"*.{ending}"))
     yield from [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 

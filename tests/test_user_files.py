@@ -1,5 +1,6 @@
 """Whatever file a user names, reading it ends: one sentence and exit code 2, and little memory."""
 
+import json
 import os
 import resource
 import subprocess
@@ -17,22 +18,45 @@ SPARSE = 12 << 30
 SOLVER = "def energy(masses): return {'total': 1.0}\n"
 
 
-def plumbob(folder, *words):
-    return subprocess.run(
-        [sys.executable, "-m", "plumbob", *map(str, words)],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY)),
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=PATIENCE,
-    )
+# Runs command lines one after the other; the last one begun is known where one ends the process.
+PROGRAM = """
+import contextlib, io, json, sys
+from plumbob.cli import run_command
+done = {}
+for line in json.loads(sys.argv[1]):
+    print(line, file=sys.stderr, flush=True)
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        with contextlib.redirect_stderr(io.StringIO()) as err:
+            code = run_command(line.split())
+    done[line] = code, out.getvalue(), err.getvalue()
+print(json.dumps(done))
+"""
+REFUSED = {
+    "verify solver.py --rerun /dev/zero": "/dev/zero: expected a regular file",
+    "verify solver.py --rerun /dev/urandom": "/dev/urandom: expected a regular file",
+    "verify solver.py --rerun pipe": "pipe: expected a regular file",
+    "verify solver.py --rerun folder": "folder: expected a regular file",
+    "verify solver.py --rerun nowhere": "nowhere: there is no such file",
+    "verify solver.py --rerun sparse.json": "sparse.json: expected at most 268435456 bytes",
+    "verify --answers answers": "answers/export.json: expected at most 16777216 bytes",
+    "verify --answers greetings": "greetings/greeting.json: expected at most 16777216 bytes",
+    "bench ik --list --problem sparse.urdf": "sparse.urdf: expected at most 268435456 bytes",
+    "bench ik --list --problem sparse.py": "sparse.py: expected at most 268435456 bytes",
+    "bench cloth --list --problem sparse.obj": "sparse.obj: expected at most 268435456 bytes",
+} | {
+    f"{command} records": "records/records.jsonl: expected at most 1073741824 bytes"
+    for command in ("report", "compare records", "history records", "records list")
+}
+COUNTED = "check --files sparse.urdf"
 
 
-@pytest.fixture
-def folder(tmp_path):
-    """A folder with a pipe, a folder, and sparse files of many gigabytes."""
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """Exit code, output and complaint of each command line, by a process of little memory.
+
+    Its folder holds a pipe, a folder, and sparse files of many gigabytes.
+    """
+    tmp_path = tmp_path_factory.mktemp("files")
     os.mkfifo(tmp_path / "pipe")
     for name in ("folder", "records", "answers", "greetings"):
         (tmp_path / name).mkdir()
@@ -45,37 +69,26 @@ def folder(tmp_path):
     for name in sparse:
         with (tmp_path / name).open("wb") as file:
             file.truncate(SPARSE)
-    return tmp_path
+    lines = json.dumps([*REFUSED, COUNTED])
+    process = subprocess.run(
+        [sys.executable, "-c", PROGRAM, lines], cwd=tmp_path, capture_output=True, text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY)),
+        check=False, timeout=PATIENCE,
+    )  # fmt: skip
+    assert process.returncode == 0, process.stderr[-500:]
+    return json.loads(process.stdout)
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        ("verify solver.py --rerun /dev/zero", "/dev/zero: expected a regular file"),
-        ("verify solver.py --rerun /dev/urandom", "/dev/urandom: expected a regular file"),
-        ("verify solver.py --rerun pipe", "pipe: expected a regular file"),
-        ("verify solver.py --rerun folder", "folder: expected a regular file"),
-        ("verify solver.py --rerun nowhere", "nowhere: there is no such file"),
-        ("verify solver.py --rerun sparse.json", "sparse.json: expected at most 268435456 bytes"),
-        ("verify --answers answers", "answers/export.json: expected at most 16777216 bytes"),
-        ("verify --answers greetings", "greetings/greeting.json: expected at most 16777216 bytes"),
-        ("bench ik --list --problem sparse.urdf", "sparse.urdf: expected at most 268435456 bytes"),
-        ("bench ik --list --problem sparse.py", "sparse.py: expected at most 268435456 bytes"),
-        ("bench cloth --list --problem sparse.obj", "sparse.obj: expected at most 268435456 bytes"),
-        ("report records", "records/records.jsonl: expected at most 1073741824 bytes"),
-        ("compare records records", "records/records.jsonl: expected at most 1073741824 bytes"),
-        ("history records records", "records/records.jsonl: expected at most 1073741824 bytes"),
-        ("records list records", "records/records.jsonl: expected at most 1073741824 bytes"),
-    ],
-)
-def test_a_file_without_end_is_refused_in_a_sentence(folder, words, sentence):
-    done = plumbob(folder, *words.split())
-    assert done.returncode == 2, done.stderr[-500:]
-    assert sentence in done.stderr
-    assert done.stderr.count("\n") == 1
+@pytest.mark.parametrize("line", REFUSED)
+def test_a_file_without_end_is_refused_in_a_sentence(done, line):
+    code, _, complaint = done[line]
+    assert code == 2
+    assert REFUSED[line] in complaint
+    assert complaint.count("\n") == 1
 
 
-def test_a_model_file_of_many_gigabytes_is_counted_as_not_read(folder):
-    done = plumbob(folder, "check", "--files", "sparse.urdf")
-    assert done.returncode == 0, done.stderr[-500:]
-    assert "Of 1 files nothing disagrees" in done.stdout
+def test_a_model_file_of_many_gigabytes_is_counted_as_not_read(done):
+    code, output, _ = done[COUNTED]
+    assert code == 0
+    assert "Of 1 files nothing disagrees" in output

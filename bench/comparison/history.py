@@ -124,7 +124,7 @@ def draw(runs: Sequence[RecordedRun], rows: Sequence[Course], quantity: str) -> 
     """Return the courses as SVG: the largest changes in colour, the others grey."""
     from ..figures.chart import LOOKS
     from ..figures.drawing import canvas, styled, svg_of
-    from ..figures.style import COLOURS, written
+    from ..figures.style import COLOURS, plain_label
 
     with styled():
         figure, (ax,) = canvas(4.2, 1)
@@ -133,13 +133,13 @@ def draw(runs: Sequence[RecordedRun], rows: Sequence[Course], quantity: str) -> 
             style: dict[str, Any] = {"color": COLOURS["rule"], "linewidth": 0.8, "marker": "."}
             if i < LABELLED:
                 title = ", ".join(filter(None, course[:3]))
-                style = {"color": COLOURS[look.colour], "label": written(title)}
+                style = {"color": COLOURS[look.colour], "label": plain_label(title)}
                 style |= {"linestyle": look.line, "marker": look.marker}
             ax.plot(range(len(runs)), course.medians, zorder=1 + (i < LABELLED), **style)
         if all((course.finite > 0).all() for course in rows):
             ax.set_yscale("log")
-        ax.set_xticks(range(len(runs)), [written(run.name) for run in runs], rotation=30)
-        ax.set_ylabel(written(quantity))
+        ax.set_xticks(range(len(runs)), [plain_label(run.name) for run in runs], rotation=30)
+        ax.set_ylabel(plain_label(quantity))
         handles, labels = ax.get_legend_handles_labels()
         figure.legend(handles[::-1], labels[::-1], loc="outside lower center")
         return svg_of(figure, f"{quantity} over {counted(len(runs), 'run')}")

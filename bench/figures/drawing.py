@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from ..tables.results import label
 from ..text import shortened
 from .chart import GREY, LINE, SPAN, Axis, Chart, Look, Panel, Series, looks
-from .style import COLOURS, written
+from .style import COLOURS, plain_label
 
 # Width of a figure [inch], at least 38 rem on the page, where letters stay above 7 points.
 WIDTH = 7.0
@@ -126,7 +126,7 @@ def draw_chart(chart: Chart) -> Figure:
             ax.set_xlabel(_two_lines(chart.x.label, WIDTH / columns * _PLAIN))
             ax.tick_params(labelbottom=True)
         if i % columns == 0 and (title := panel.label or chart.y.label):
-            ax.set_ylabel(written(title))
+            ax.set_ylabel(plain_label(title))
     for ax in axes[: len(chart.panels)]:
         drawer.scale(ax)
     for ax in axes[len(chart.panels) :]:
@@ -142,7 +142,7 @@ def _two_lines(text: str, width: float) -> str:
     letters = max(12, int(width))
     lines = textwrap.wrap(text, letters)
     second = [shortened(" ".join(lines[1:]), letters)] if lines[1:] else []
-    return "\n".join(map(written, [*lines[:1], *second]))
+    return "\n".join(map(plain_label, [*lines[:1], *second]))
 
 
 def _style(look: Look, marks: bool) -> dict[str, Any]:
@@ -169,14 +169,16 @@ class _ChartDrawer:
     def legend(self) -> tuple[list[Line2D], list[str]]:
         """Return handles and names of the legend."""
         marks, count = bool(self._chart.rows), len(self._chart.unlabelled)
-        entries = {written(label(name)): _style(self._looks[name], marks) for name in self._order}
+        entries = {
+            plain_label(label(name)): _style(self._looks[name], marks) for name in self._order
+        }
         if count:
             entries[f"{count} other{'s' if count > 1 else ''}"] = _style(GREY, marks)
         faint = COLOURS["faint"]
         for meaning, face in ((self._chart.hollow, "none"), (self._chart.filled, faint)):
             if meaning:
                 plain = {"color": faint, "marker": "o", "linestyle": "none"}
-                entries[written(meaning)] = {**plain, "markerfacecolor": face}
+                entries[plain_label(meaning)] = {**plain, "markerfacecolor": face}
         return [Line2D([], [], **style) for style in entries.values()], list(entries)
 
     def draw(self, ax: Axes, panel: Panel) -> None:

@@ -10,7 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from numpy.typing import NDArray
 
 from .style import COLOURS
-from .view import ARM_VIEW, CLOTH_VIEW, seen
+from .view import ARM_VIEW, CLOTH_VIEW, project
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ COLOUR_MAP = LinearSegmentedColormap.from_list(
 
 def draw_arm(ax: Axes, joints: Floats, alpha: float = 1.0) -> None:
     """Draw a pose of a chain by the positions of its joints, (joint, 3), and mark its root."""
-    x, y, _ = seen(joints, ARM_VIEW)
+    x, y, _ = project(joints, ARM_VIEW)
     ax.plot(x, y, "-", color=COLOURS["blue"], alpha=alpha, linewidth=2.4, zorder=3)
     ax.plot(
         x, y, "o", color=COLOURS["blue"], alpha=alpha, markersize=4.5, markeredgewidth=0, zorder=4
@@ -45,7 +45,7 @@ def draw_cloth(
     i, j = np.divmod(np.arange((size - 1) ** 2), size - 1)
     first = size * i + j
     corners = np.stack([first, first + size, first + size + 1, first + 1], axis=1)
-    x, y, depth = seen(positions, CLOTH_VIEW)
+    x, y, depth = project(positions, CLOTH_VIEW)
     order = np.argsort(depth[corners].mean(axis=1))
     quads = positions[corners]
     normals = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])

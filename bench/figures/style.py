@@ -16,7 +16,7 @@ COLOURS = {
 LONGEST = 60
 
 
-def written(name: str) -> str:
+def plain_label(name: str) -> str:
     """Return a name that matplotlib reads as plain text: neither a formula nor a hidden label."""
     short = shortened(name, LONGEST).replace("$", r"\$")
     return f" {short}" if short.startswith("_") else short or "–"

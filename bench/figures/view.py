@@ -11,7 +11,7 @@ ARM_VIEW = (np.radians(180.0), np.radians(68.0))
 CLOTH_VIEW = (np.radians(-38.0), np.radians(18.0))
 
 
-def seen(points: Floats, view: tuple[float, float]) -> tuple[Floats, Floats, Floats]:
+def project(points: Floats, view: tuple[float, float]) -> tuple[Floats, Floats, Floats]:
     """Return the coordinates of points in the picture: right, up, and towards the camera."""
     azimuth, height = view
     x, y, z = np.moveaxis(points, -1, 0)

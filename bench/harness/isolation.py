@@ -15,7 +15,7 @@ from plumbob.crosscheck.child_process import (
 )
 
 from .progress import Progress, announce
-from .worker import Begun, Calculation, Finished, Message, Numbers, Ready, Solved
+from .worker import Calculation, Finished, Message, Numbers, Ready, Solved, Started
 
 # A worker that is silent for so long [s] is ended; before it is ready it may compile.
 START_PATIENCE = 180.0
@@ -24,7 +24,7 @@ Calculate = Callable[..., Mapping[str, Any]]
 _START = "import plumbob.bench.harness.worker as w; w.main()"
 
 
-class Outcome(NamedTuple):
+class JobOutcome(NamedTuple):
     """The result of a job."""
 
     setup: float  # how long the set-up of the solver took [s]
@@ -54,9 +54,9 @@ class WorkerProcess:
         self._start_patience, self.patience = start_patience, target_patience
         self._child: ChildProcess | None = None
 
-    def perform(self, job: Any) -> Outcome:
+    def perform(self, job: Any) -> JobOutcome:
         """Perform a job and collect its messages, however it ends."""
-        outcome, is_ready = Outcome(0.0, [], ""), False
+        outcome, is_ready = JobOutcome(0.0, [], ""), False
         with contextlib.closing(self.stream(job)) as messages:
             for message in messages:
                 match message:
@@ -106,7 +106,7 @@ class WorkerProcess:
         if is_used and isinstance(first, Finished) and first.is_lost:
             messages = self._messages(job)
             first = next(messages)
-        if not isinstance(first, Begun):
+        if not isinstance(first, Started):
             yield first
         yield from messages
 
@@ -115,7 +115,7 @@ class WorkerProcess:
         try:
             child = self._child = self._child or python_process(_START)
             child.send(pickled(job))
-            message: Message = Begun()
+            message: Message = Started()
             while not isinstance(message, Finished):
                 message = _receive(child, patience)
                 if isinstance(message, Ready):

@@ -48,7 +48,7 @@ def run(
         ValueError: if the result file cannot be read, or another run writes to it; or if the
             executor cannot go on.
     """
-    file, choice = RecordFile(folder), chosen(scale)
+    file, choice = RecordFile(folder), choice_at(scale)
     with locked(folder):
         present = {record.key: record for record in file.read().records}
         for group in [suites] if executor.takes_suites_together else [[suite] for suite in suites]:
@@ -153,9 +153,9 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
     if "check" not in suites:
         return []
     checks = [record for record in RecordFile(folder).read().records if record.suite == "check"]
-    missed = [record for record in checks if not np.all(record.arrays.get("held", True))]
+    failures = [record for record in checks if not np.all(record.arrays.get("held", True))]
     return [
-        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}" for record in missed
+        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}" for record in failures
     ]
 
 
@@ -166,7 +166,7 @@ def forget(suites: Sequence[str], scale: str | Choice, folder: Path) -> None:
         ValueError: if the result file cannot be read, or a run writes to it.
     """
     selected = {key for suite in suites for key in keys(suite, scale)}
-    restarted = () if chosen(scale).is_partial else suites
+    restarted = () if choice_at(scale).is_partial else suites
     with locked(folder):
         RecordFile(folder).drop(
             lambda record: (
@@ -182,11 +182,11 @@ def count(suites: Sequence[str], scale: str | Choice) -> int:
 
 def keys(suite: str, scale: str | Choice) -> set[Key]:
     """Return the keys of the blocks of a suite that are selected."""
-    choice = chosen(scale)
+    choice = choice_at(scale)
     return set(map(block_key, filter(choice.takes, blocks(suite, choice.scale))))
 
 
-def chosen(scale: str | Choice) -> Choice:
+def choice_at(scale: str | Choice) -> Choice:
     """Return everything at a scale by its name; a choice is returned as it is."""
     return scale if isinstance(scale, Choice) else Choice(scale, SCALES[scale])
 

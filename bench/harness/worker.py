@@ -14,7 +14,7 @@ from ..peers.protocol import describe
 from .progress import Progress, listening
 
 
-class Begun(NamedTuple):
+class Started(NamedTuple):
     """The worker has read the job and begins it."""
 
 
@@ -55,7 +55,7 @@ class Finished(NamedTuple):
     is_silent: bool = False  # whether it was ended for its silence
 
 
-Message = Begun | Ready | Progress | Solved | Numbers | Finished
+Message = Started | Ready | Progress | Solved | Numbers | Finished
 
 
 class Calculation(NamedTuple):
@@ -85,6 +85,6 @@ def main() -> None:
             except Exception as error:  # a class that cannot be imported here, or has changed
                 answers.send(Finished(describe(error)))
                 continue
-            answers.send(Begun())
+            answers.send(Started())
             for message in job.perform():
                 answers.send(message)

@@ -20,7 +20,7 @@ _ABOUT = sentence("")
 ROUND_TRIPS = 'timed by the round trip of a request, for want of valid "seconds"'
 
 
-class Contestant:
+class EntrantSolver:
     """A solver behind its door.
 
     Attributes:
@@ -52,15 +52,15 @@ class Contestant:
         return answer.values, OwnTime(answer.seconds or round_trip, round_trip, doubt)
 
 
-_open: dict[Spec, Contestant] = {}
+_open: dict[Spec, EntrantSolver] = {}
 
 
-def opened(spec: Spec) -> Contestant:
+def opened(spec: Spec) -> EntrantSolver:
     """Return an open solver; any other is ended."""
     if spec not in _open:
         while _open:
             _open.popitem()[1].close()
-        _open[spec] = Contestant(spec)
+        _open[spec] = EntrantSolver(spec)
     return _open[spec]
 
 

@@ -63,14 +63,14 @@ def installed() -> list[SolverAddress]:
     ]
 
 
-def opened(entered: Sequence[SolverAddress], suites: Sequence[str]) -> list[Entrant]:
+def opened(addresses: Sequence[SolverAddress], suites: Sequence[str]) -> list[Entrant]:
     """Return the solvers, each started once to describe itself.
 
     Raises:
         ValueError: if a solver cannot be opened, offers no task of the suites, or has the name of
             another.
     """
-    entrants = [_opened(address) for address in entered]
+    entrants = [_opened(address) for address in addresses]
     for entrant in entrants:
         if not any(map(entrant.offers, suites)):
             tasks = [f"{suite} ({', '.join(tasks)})" for suite, tasks in SUITE_TASKS.items()]
@@ -91,10 +91,10 @@ def opened(entered: Sequence[SolverAddress], suites: Sequence[str]) -> list[Entr
 
 
 def opened_where_possible(
-    installed: Sequence[SolverAddress], suites: Sequence[str], entered: Sequence[Entrant]
+    installed: Sequence[SolverAddress], suites: Sequence[str], entrants: Sequence[Entrant]
 ) -> Iterator[Entrant | str]:
     """Yield each installed solver with a task of the suites, or why it takes no part."""
-    names = {entrant.name.casefold() for entrant in entered}
+    names = {entrant.name.casefold() for entrant in entrants}
     for address in installed:
         try:
             entrant = _opened(address)

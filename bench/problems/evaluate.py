@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from plumbob.reference.arguments import FloatArray
 
-from .robots import LIMIT_TOLERANCE, Robot, robot
+from .robots import LIMIT_TOLERANCE, BenchRobot, robot
 
 
 class Tolerance(NamedTuple):
@@ -83,7 +83,7 @@ class Evaluation(NamedTuple):
     solved: np.ndarray  # whether all three are within tolerance
 
 
-def mujoco_model(robot: Robot) -> Any:
+def mujoco_model(robot: BenchRobot) -> Any:
     """Return the robot in MuJoCo with all of its links."""
     tree = ElementTree.fromstring(robot.text)
     if robot.is_chain:
@@ -95,7 +95,7 @@ def mujoco_model(robot: Robot) -> Any:
 class Evaluator:
     """The kinematics of a robot."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: BenchRobot) -> None:
         self.robot = robot
         self.model = mujoco_model(robot)
         self._data = mujoco.MjData(self.model)

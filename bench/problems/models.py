@@ -18,7 +18,7 @@ from plumbob.reference.arguments import FloatArray, IndexArray, name_list
 from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
 
 from .chains import TargetsForSkeleton, random_rotations
-from .robots import TWO_REVOLUTIONS, Robot, chain_of
+from .robots import TWO_REVOLUTIONS, BenchRobot, chain_of
 
 # Springs [N/m] and mass [kg] of cloths from meshes.
 STIFFNESS, MASS = 1000.0, 1.0
@@ -30,7 +30,7 @@ _SEED = 1986
 ANYWHERE, OUTER, INNER = "joint space", "outer shell", "near the root"
 
 
-def robot(path: Path, name: str, effector: str | None) -> Robot:
+def robot(path: Path, name: str, effector: str | None) -> BenchRobot:
     """Return the chain of hinges of a URDF or MJCF file, from its root to the effector.
 
     Raises:

@@ -7,7 +7,7 @@ from plumbob.reference import MassSpring, State
 
 from ..text import visible
 from .chains import TargetsForSkeleton
-from .robots import Robot
+from .robots import BenchRobot
 
 # Letters of a user's name for a problem or a solver.
 _LONGEST = 60
@@ -26,7 +26,7 @@ class OwnProblem:
     digest: str  # twelve hex digits over its contents
     suite: str  # "ik" or "cloth"
     targets: TargetsForSkeleton | None = None  # of a skeleton of balls, its last joint the effector
-    robot: Robot | None = None  # a chain of hinges
+    robot: BenchRobot | None = None  # a chain of hinges
     cloth: tuple[MassSpring, State] | None = None  # particles, springs and the initial state
     h: float = 1 / 60  # the frame of a cloth [s]
 

@@ -39,7 +39,7 @@ class UnableError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class BenchRobot:
     """A robot or character, as text that any reader understands."""
 
     name: str  # of the robot
@@ -115,10 +115,10 @@ IIWA, CHARACTER = "iiwa14", "character"
 ROBOTS = (*_ARMS, CHARACTER)
 ALL = (*_ARMS, IIWA, CHARACTER)
 # Robots of users, by name.
-OWN: dict[str, Robot] = {}
+OWN: dict[str, BenchRobot] = {}
 
 
-def enter(own: Robot) -> None:
+def enter(own: BenchRobot) -> None:
     """Register a user's robot by its name, in place of an earlier robot."""
     if OWN.get(own.name) is not own:
         OWN[own.name] = own
@@ -131,7 +131,7 @@ def seed_of(name: str) -> int:
 
 
 @functools.cache
-def robot(name: str) -> Robot:
+def robot(name: str) -> BenchRobot:
     """Return a robot by name.
 
     Raises:
@@ -170,7 +170,7 @@ def _folder() -> Path:
         raise AbsentError(f"{PACKAGE} is not installed") from None
 
 
-def links(chain: Robot) -> list[Link]:
+def links(chain: BenchRobot) -> list[Link]:
     """Return the steps of an arm from its root to its effector."""
     steps = []
     for joint in ElementTree.fromstring(chain.text).findall("joint"):
@@ -185,7 +185,7 @@ def links(chain: Robot) -> list[Link]:
     return steps
 
 
-def chain_from(name: str, title: str, text: str, root: str, effector: str) -> Robot:
+def chain_from(name: str, title: str, text: str, root: str, effector: str) -> BenchRobot:
     """Return the chain of hinges of a URDF from a root to an effector."""
     above = {
         _link(joint, "child"): joint for joint in ElementTree.fromstring(text).findall("joint")
@@ -198,13 +198,13 @@ def chain_from(name: str, title: str, text: str, root: str, effector: str) -> Ro
     return chain_of(name, title, root, joints)
 
 
-def chain_of(name: str, title: str, root: str, joints: Sequence[ElementTree.Element]) -> Robot:
+def chain_of(name: str, title: str, root: str, joints: Sequence[ElementTree.Element]) -> BenchRobot:
     """Return the chain of these joints of a URDF, in order from a root to the effector."""
     moving = [joint for joint in joints if joint.get("type") != "fixed"]
     lower, upper = np.array([_limits(joint) for joint in moving]).T
     names = tuple(joint.get("name", "") for joint in moving)
     effectors = (_link(joints[-1], "child"),)
-    return Robot(name, title, _urdf(name, root, joints), root, effectors, names, lower, upper)
+    return BenchRobot(name, title, _urdf(name, root, joints), root, effectors, names, lower, upper)
 
 
 def _link(joint: ElementTree.Element, end: str) -> str:
@@ -253,7 +253,7 @@ def _iiwa() -> str:
     return f"<robot>{''.join(parts)}</robot>"
 
 
-def _character() -> Robot:
+def _character() -> BenchRobot:
     """Return the character as MJCF, angles in radians."""
     tree = ElementTree.Element("mujoco", model=CHARACTER)
     ElementTree.SubElement(tree, "compiler", angle="radian")
@@ -278,7 +278,7 @@ def _character() -> Robot:
     text = ElementTree.tostring(tree, encoding="unicode")
     names = (CHARACTER, title(CHARACTER), text, "pelvis", effectors, joints)
     lower, upper = np.array(limits).T
-    return Robot(*names, lower, upper, tuple(balls), oriented=False)
+    return BenchRobot(*names, lower, upper, tuple(balls), oriented=False)
 
 
 def _body(parent: ElementTree.Element, name: str, offset: str) -> ElementTree.Element:

@@ -9,7 +9,7 @@ from ..tables.table import is_blank, words
 from ..text import visible
 from .headlines import ClaimCount, Overview, overview
 from .page.page_tables import gist
-from .report import Report
+from .report import BenchReport
 from .sections import tables
 from .standings import Headline
 
@@ -19,7 +19,7 @@ _FIRST, HEADLINES = ("Most accurate", "Fastest to"), 3
 LINES, TABLES = 10, 4
 
 
-def outcome(report: Report, width: int) -> list[str]:
+def outcome(report: BenchReport, width: int) -> list[str]:
     """Return a summary of a report: the user's solvers, then at most ten lines of 80 letters."""
     answers = report.answers
     sentences = [_verdict(answers.verdict), *map(_sentence, printed(answers.headlines))]
@@ -40,7 +40,8 @@ def ending(results: Results, suites: Sequence[str], width: int) -> list[str]:
     sentences += remarks_of_entrants(results, suites)
     if not sentences:
         full = [table for table in tables(results, suites) if not is_blank(table)]
-        sentences = [f"{table.title}: {gist(table.summary)}" for table in full[:TABLES]]
+        gists = {table.title: gist(table.summary) for table in full[:TABLES]}
+        sentences = [f"{title}: {text}" if text else title for title, text in gists.items()]
     return _lines([*sentences, *_scale_and_absent(answers, width)], width)
 
 

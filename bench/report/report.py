@@ -21,7 +21,7 @@ from .sections import MOTIONS, SECTIONS
 FORMATS = {"md": markdown, "tex": latex, "csv": comma_separated}
 
 
-class Report(NamedTuple):
+class BenchReport(NamedTuple):
     """A written report: its page and tables, sentences on missing parts, the first screen."""
 
     page: Path
@@ -30,7 +30,7 @@ class Report(NamedTuple):
     answers: Overview
 
 
-def write(folder: Path) -> Report:
+def write(folder: Path) -> BenchReport:
     """Write the report of a folder's records into it.
 
     Raises:
@@ -52,7 +52,7 @@ def write(folder: Path) -> Report:
         _write(folder / "figures" / f"{drawing.name}.pdf", drawing.pdf)
     page = folder / "index.html"
     _write(page, render(contents, newest, missing))
-    return Report(page, list(tables.values()), missing, contents.answers)
+    return BenchReport(page, list(tables.values()), missing, contents.answers)
 
 
 def _drawings(results: Results, folder: Path) -> tuple[dict[Figure, Drawing], list[str]]:

@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 from ..figures.drawing import STYLE
 from ..figures.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
-from ..figures.style import COLOURS, written
-from ..figures.view import seen
+from ..figures.style import COLOURS, plain_label
+from ..figures.view import project
 from ..motion.motion import Moving, Scene, decades, length
 
 # Moments of a picture.
@@ -78,7 +78,7 @@ def _draw_frame(
     axes: Sequence[Axes], scene: Scene, i: int, title: bool = True, poses: Sequence[int] = ()
 ) -> tuple[()]:
     """Draw frame i of each motion, and faintly the poses of other frames."""
-    x, y, _ = seen(scene.points(), scene.view)
+    x, y, _ = project(scene.points(), scene.view)
     draw = _draw_cloth if scene.curve is None else _draw_arm
     for ax, motion in zip(axes, scene.motions, strict=True):
         ax.clear()
@@ -96,7 +96,7 @@ def _draw_frame(
 
 def _write_error(ax: Axes, motion: Moving, i: int, title: bool) -> None:
     """Write the solver, and its error in this frame and up to it."""
-    ax.set_title(written(motion.label) if title else "", fontweight="bold", loc="left")
+    ax.set_title(plain_label(motion.label) if title else "", fontweight="bold", loc="left")
     error, largest = length(motion.errors[i]), length(np.max(motion.errors[: i + 1]))
     text = f"error {error}, largest {largest}" if np.isfinite(motion.errors[i]) else "diverged"
     ax.text(0.0, -0.02, text, transform=ax.transAxes, va="top", color=COLOURS["faint"])
@@ -106,9 +106,9 @@ def _draw_arm(ax: Axes, scene: Scene, motion: Moving, i: int) -> None:
     """Draw the curve, the part that the arm has drawn, and the arm."""
     assert scene.curve is not None
     is_single = len(scene.motions) == 1
-    x, y, _ = seen(scene.curve, scene.view)
+    x, y, _ = project(scene.curve, scene.view)
     ax.plot(x, y, color=COLOURS["rule"], linewidth=1 if is_single else 3, zorder=2)
-    x, y, _ = seen(motion.positions[: i + 1, -1], scene.view)
+    x, y, _ = project(motion.positions[: i + 1, -1], scene.view)
     if is_single:
         ax.plot(x, y, color=COLOURS["orange"], linewidth=1.8, zorder=5)
     else:

@@ -38,21 +38,21 @@ class Captions:
         sentence on how they were measured; other braces hold the settings of their records.
         """
         texts = {**self._tables[name]}
-        how = texts.pop("measured")
+        template = texts.pop("measured")
         captions: dict[str, Any] = {
             key: _on_one_line(text, self._constants) for key, text in texts.items()
         }
         if name in self._columns[0]:
             captions["columns"] = self.columns(name)
-        names = {field for _, field, _, _ in Formatter().parse(how) if field}
+        names = {field for _, field, _, _ in Formatter().parse(template) if field}
         if measured is None and names <= self._constants.keys():
-            return {"name": name, **captions, "measured": _on_one_line(how, self._constants)}
+            return {"name": name, **captions, "measured": _on_one_line(template, self._constants)}
 
         def sentence(subjects: Any) -> str:
             numbers = measured(subjects) if measured else {}
             missing = names - {*self._constants, *numbers}
-            written = {field: _setting(list(records_of(subjects)), field) for field in missing}
-            return _on_one_line(how, {**self._constants, **written, **numbers})
+            settings = {field: _setting(list(records_of(subjects)), field) for field in missing}
+            return _on_one_line(template, {**self._constants, **settings, **numbers})
 
         return {"name": name, **captions, "measured": sentence}
 

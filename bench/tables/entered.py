@@ -54,7 +54,7 @@ def _summary(entrants: Sequence[EntrantRecords]) -> Summary:
     return Summary(f"{listed(names)}.")
 
 
-entered = Layout(
+entrant_table = Layout(
     "Which solvers of yours take part?",
     "entered",
     "Your solvers",

@@ -185,12 +185,12 @@ class MujocoFlex(MujocoMassSpring):
         differ in stiffness or in damping, or there are none.
         """
         spec = particles_spec(system)
-        for i in range(system.particle_count):
-            spec.body(particle_name(i)).pos = (i, 0.0, 0.0)
+        for particle in range(system.particle_count):
+            spec.body(particle_name(particle)).pos = (particle, 0.0, 0.0)
         flex = spec.add_flex(name="springs", dim=1, radius=FLEX_RADIUS, contype=0, conaffinity=0)
         flex.edgestiffness = _common("stiffnesses", system.stiffnesses)
         flex.edgedamping = _common("dampings", system.dampings)
-        flex.vertbody = [particle_name(i) for i in range(system.particle_count)]
+        flex.vertbody = [particle_name(particle) for particle in range(system.particle_count)]
         flex.vert = np.zeros(3 * system.particle_count)
         flex.elem = system.springs.ravel()
         model = spec.compile()
@@ -271,9 +271,9 @@ def particles_spec(system: MassSpring) -> mujoco.MjSpec:
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if system.particle_count > LARGE_SYSTEM:
         spec.memory = BASE_MEMORY + PAIR_MEMORY * system.particle_count**2
-    for i, (mass, free) in enumerate(zip(system.masses, system.free, strict=True)):
-        body = add_point_mass(spec.worldbody, particle_name(i), np.zeros(3), mass)
-        body.add_site(name=particle_name(i))
+    for particle, (mass, free) in enumerate(zip(system.masses, system.free, strict=True)):
+        body = add_point_mass(spec.worldbody, particle_name(particle), np.zeros(3), mass)
+        body.add_site(name=particle_name(particle))
         for axis in np.eye(3) if free else ():
             body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     return spec

@@ -62,8 +62,8 @@ class MujocoRobot(RobotEngine):
             mujoco.set_mju_user_warning(before)
         self.followers = _followers(self.model) if is_urdf and mimic else []
         self.data = mujoco.MjData(self.model)
-        bodies = [self.model.body(i).name or f"body#{i}" for i in range(self.model.nbody)]
-        self.links = {name: i for i, name in enumerate(bodies)}
+        bodies = [self.model.body(body).name or f"body#{body}" for body in range(self.model.nbody)]
+        self.links = {name: body for body, name in enumerate(bodies)}
         self.joints = {_joint_name(self.model, bodies, i): i for i in range(self.model.njnt)}
         at = self.model.jnt_dofadr
         self.columns = {name: int(at[joint]) for name, joint in self.joints.items()}

@@ -80,12 +80,12 @@ def _sweep(engine: str, model: RobotFile, part: float, free_mimics: str = "") ->
     robot = model.read(mimic=not free_mimics)
     articulation = robot.articulation
     q = random_coordinates(articulation, samples.generator(model.name, 0), CONFIGURATIONS)
-    matched = [j for j, name in enumerate(articulation.names) if name in adapter.links]
+    matched = [joint for joint, name in enumerate(articulation.names) if name in adapter.links]
     if not matched:
         raise UnreadableError("it gives none of the links its name")
     numbers = len(matched) * CONFIGURATIONS * 6 * articulation.freedom_count
     for links in np.array_split(matched, min(len(matched), math.ceil(numbers / part) or 1)):
-        names = [articulation.names[j] for j in links]
+        names = [articulation.names[link] for link in links]
         yield Sweep(robot, q, links, _engine_kinematics(adapter, robot, q, names), free_mimics)
 
 

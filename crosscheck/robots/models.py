@@ -112,9 +112,9 @@ def moving_joints(robot: Robot) -> list[JointSlices]:
     """Return the joints with coordinates of their own, in the order of their freedoms."""
     model = robot.articulation
     joints = [
-        JointSlices(name, model.coordinates_of(j), model.freedoms_of(j))
-        for name, j in robot.joints.items()
-        if model.kinds[j] != "fixed" and j not in model.mimics
+        JointSlices(name, model.coordinates_of(index), model.freedoms_of(index))
+        for name, index in robot.joints.items()
+        if model.kinds[index] != "fixed" and index not in model.mimics
     ]
     return sorted(joints, key=lambda joint: joint.freedoms.start)
 
@@ -127,9 +127,9 @@ def random_coordinates(model: Articulation, rng: np.random.Generator, count: int
     """
     q = model.random(rng, count)
     equal_limits = [
-        model.coordinates_of(int(j)).start
-        for j in np.flatnonzero(model.lower == model.upper)
-        if model.kinds[j] in ("hinge", "slide") and j not in model.mimics
+        model.coordinates_of(int(joint)).start
+        for joint in np.flatnonzero(model.lower == model.upper)
+        if model.kinds[joint] in ("hinge", "slide") and joint not in model.mimics
     ]
     q[:, equal_limits] = rng.uniform(-1.0, 1.0, (count, len(equal_limits)))
     return q

@@ -53,12 +53,12 @@ def explain(
         tolerance: the relative difference from a prediction that rounding explains.
         describe: puts faults into words, given the keys of a class that no answer tells apart.
     """
-    answered = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
+    answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
     count, matches = 0, list[Match]()
     for _, same_size in groupby(variants, key=lambda variant: len(variant.faults)):
         for variant in same_size:
             count += 1
-            match = _match(variant, answered, tolerance)
+            match = _match(variant, answers, tolerance)
             if match is not None and match.share >= LEAST_SHARE:
                 matches.append(match)
         if any(match.share == 1.0 for match in matches):
@@ -66,7 +66,7 @@ def explain(
     matches = _telling(matches)
     matches.sort(key=lambda match: (-match.share, len(match.variant.faults), match.distance))
     explanations = []
-    for group in _classes(matches, answered, tolerance)[:EXPLANATIONS]:
+    for group in _classes(matches, answers, tolerance)[:EXPLANATIONS]:
         keys = tuple(" + ".join(match.variant.faults) for match in group)
         explanations.append(Explanation(keys, describe(keys), group[0].share, group[0].distance))
     return tuple(explanations), count
@@ -80,11 +80,11 @@ def _telling(matches: Sequence[Match]) -> list[Match]:
 
 
 def _match(
-    variant: Variant, answered: Sequence[Exchange], tolerance: Callable[[Case], float]
+    variant: Variant, answers: Sequence[Exchange], tolerance: Callable[[Case], float]
 ) -> Match | None:
     hits, largest = 0, 0.0
     predictions: list[Mapping[str, Any]] = []
-    for i, exchange in enumerate(answered):
+    for i, exchange in enumerate(answers):
         if i == TRIAL and not hits:
             return None
         assert isinstance(exchange.answer, Answer)
@@ -94,7 +94,7 @@ def _match(
         distance = difference(predictions[-1], outputs)
         if distance <= tolerance(exchange.case):
             hits, largest = hits + 1, max(largest, distance)
-    return Match(variant, hits / len(answered), largest, predictions) if hits else None
+    return Match(variant, hits / len(answers), largest, predictions) if hits else None
 
 
 def _predict(variant: Variant, case: Case) -> Mapping[str, Any]:
@@ -131,14 +131,14 @@ def largest_gap(first: Any, second: Any) -> float:
 
 
 def _classes(
-    matches: Sequence[Match], answered: Sequence[Exchange], tolerance: Callable[[Case], float]
+    matches: Sequence[Match], answers: Sequence[Exchange], tolerance: Callable[[Case], float]
 ) -> list[list[Match]]:
     """Return matches grouped with others of as many faults that no answer tells apart."""
 
     def is_alike(first: Match, second: Match) -> bool:
         return len(first.variant.faults) == len(second.variant.faults) and all(
             difference(a, b) <= tolerance(exchange.case)
-            for a, b, exchange in zip(first.predictions, second.predictions, answered, strict=True)
+            for a, b, exchange in zip(first.predictions, second.predictions, answers, strict=True)
         )
 
     classes: list[list[Match]] = []

@@ -158,7 +158,7 @@ def understand(task: Task, inputs: Mapping[str, Any], returned: object) -> dict[
         names = ", ".join(f"{field.name} {_shape(field.shape)}" for field in task.outputs)
         raise ValueError(f"{task.name}: expected some of {names}, got {summary}")
     for field in task.outputs:
-        is_open = any(isinstance(n, str) and n not in counts for n in field.shape)
+        is_open = any(isinstance(length, str) and length not in counts for length in field.shape)
         if is_open and field.name in outputs and (size := len(outputs[field.name])) > MOST_POINTS:
             raise ValueError(f"{field.name}: expected at most {MOST_POINTS} rows, got {size}")
     count, limit = outputs.get("iterations", 0), inputs.get("max_iterations", np.inf)
@@ -188,7 +188,9 @@ def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
     array = _array(field, value)
     shape = tuple(counts.get(n, n) if isinstance(n, str) else n for n in field.shape)
     if array.size == 0 and array.ndim < len(shape):  # empty nested lists do not show their depth
-        array = array.reshape([0, *(n if isinstance(n, int) else 0 for n in shape[1:])])
+        array = array.reshape(
+            [0, *(length if isinstance(length, int) else 0 for length in shape[1:])]
+        )
     if len(shape) != array.ndim or any(
         isinstance(n, int) and n != m for n, m in zip(shape, array.shape, strict=True)
     ):

@@ -15,7 +15,7 @@ CALLS = 3
 PAUSE = 1e-4
 
 
-def timed(function: Callable[[], Returned]) -> tuple[Returned, float]:
+def time_call(function: Callable[[], Returned]) -> tuple[Returned, float]:
     """Return the result of a function and its shortest time after a pause [s]."""
     shortest = float("inf")
     for _ in range(CALLS):

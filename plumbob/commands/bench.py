@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from plumbob.bench.experiments import SUITES
+from plumbob.bench.harness.compile_ahead import compiling_ahead
 from plumbob.bench.harness.progress import TROUBLE, Progress, listening
 from plumbob.bench.text import visible
 
@@ -27,8 +28,8 @@ from .options import (
     Texts,
     argument,
     flag,
-    known,
     option,
+    valid_name,
     writable,
 )
 from .report import write_report
@@ -107,11 +108,13 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     """
     from plumbob.bench.harness.executors import executor_at
 
-    from .selection import Request, choose
+    from .selection import MeasurementRequest, choose
 
-    names = list(dict.fromkeys(known("suite", name, SUITES) for name in suites or SUITES))
+    names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
-    request = Request(entrants or (), program_of(context), *parts, targets, effector, pins)
+    request = MeasurementRequest(
+        entrants or (), program_of(context), *parts, targets, effector, pins
+    )
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:
         from . import plan
@@ -140,7 +143,8 @@ def main_job(output: Path, fresh: bool) -> int:
         flush=True,
     )
     writable(output)
-    code = run_suites(tuple(SUITES), QUICK, output, fresh)
+    with compiling_ahead() as wait:
+        code = run_suites(tuple(SUITES), QUICK, output, fresh, before_times=wait)
     return max(code, write_report(output))
 
 
@@ -150,8 +154,12 @@ def run_suites(
     output: Path,
     fresh: bool,
     executor: "Executor | None" = None,
+    before_times: Callable[[], object] = bool,
 ) -> int:
-    """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
+    """Run suites with a progress bar; return 1 if a claim is missed or a block failed.
+
+    `before_times` is called before each block of a suite that measures times.
+    """
     from plumbob.bench.harness import run
     from plumbob.bench.harness.record import RecordFile
     from plumbob.reference.backend.compilation import numba_settings
@@ -163,7 +171,7 @@ def run_suites(
         )
     if fresh:
         run.forget(suites, scale, output)
-    events = _run_with_progress(suites, scale, output, executor)
+    events = _run_with_progress(suites, scale, output, executor, before_times)
     _print_counts(events, output)
     reasons: dict[str, list[str]] = {}
     for event in events:
@@ -180,17 +188,25 @@ def run_suites(
 
 
 def _run_with_progress(
-    suites: Sequence[str], scale: "str | Choice", output: Path, executor: "Executor | None"
+    suites: Sequence[str],
+    scale: "str | Choice",
+    output: Path,
+    executor: "Executor | None",
+    before_times: Callable[[], object],
 ) -> "list[Event]":
     from plumbob.bench.harness import run
     from plumbob.bench.harness.executors import THIS_PROCESS
+    from plumbob.bench.harness.experiment import EXPERIMENTS
 
     events: list[Event] = []
+    timed_suites = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
     with progress() as bar, lines_in_a_pipe(bar):
         task, counts = bar.add_task("starting", total=run.count(suites, scale)), Counter[str]()
         is_serial = executor in (None, THIS_PROCESS)
         with listening(_listener(bar, task, events if is_serial else ())):
             for event in run.run(suites, scale, output, executor or THIS_PROCESS):
+                if event.state == run.MEASURING and event.suite in timed_suites:
+                    before_times()
                 events.append(event)
                 counts[event.state] += 1
                 advance = event.state in (run.KEPT, run.MEASURED, run.FAILED)

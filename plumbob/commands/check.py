@@ -5,7 +5,7 @@ from typing import Annotated
 
 from ..help_text import block
 from ..terminal import print_aligned, print_verdicts, progress
-from .options import FAILED, SUCCESS, Texts, argument, flag, known
+from .options import FAILED, SUCCESS, Texts, argument, flag, valid_name
 
 EXAMPLES = block(
     "Examples",
@@ -32,7 +32,7 @@ def check(
         for claim in CLAIMS.values():
             print(f"{claim.name}: {claim.quantity}, against {claim.counterpart}")
         return SUCCESS
-    selection = [known("claim", name, CLAIMS) for name in claims or CLAIMS]
+    selection = [valid_name("claim", name, CLAIMS) for name in claims or CLAIMS]
     with progress() as bar:
         task = bar.add_task("", total=len(selection))
         verdicts = run_claims(

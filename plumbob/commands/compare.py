@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from ..help_text import block
 from ..terminal import print_aligned, width
-from .options import FAILED, SUCCESS, File, Texts, argument, known, option, write_text
+from .options import FAILED, SUCCESS, File, Texts, argument, option, valid_name, write_text
 
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import RunComparison
@@ -80,7 +80,7 @@ def _side_by_side(
     from plumbob.bench.comparison.rerun import Plan, clone_root, rerun
     from plumbob.bench.experiments import SUITES
 
-    names = tuple(known("suite", name, SUITES) for name in suites)
+    names = tuple(valid_name("suite", name, SUITES) for name in suites)
     tell = partial(print, "plumbob:", file=sys.stderr, flush=True)
     return rerun(Plan(revision, names, tuple(words), pairs), clone_root(Path.cwd()), tell)
 

@@ -63,7 +63,7 @@ def write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def known(kind: str, name: str, valid: Iterable[str]) -> str:
+def valid_name(kind: str, name: str, valid: Iterable[str]) -> str:
     """Return a name that is valid.
 
     Raises:

@@ -113,7 +113,7 @@ def _in_short(noun: str, names: Iterable[str]) -> Iterator[str]:
     yield from lines
 
 
-class Step(NamedTuple):
+class PlannedBlock(NamedTuple):
     """A block to be measured, the reason if again, its time [s], and the source of that."""
 
     block: Block
@@ -128,12 +128,12 @@ def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
     selection = [b for suite in suites for b in filter(choice.takes, blocks(suite, choice.scale))]
     reasons = [run.why_again(block, present, THIS_PROCESS) for block in selection]
     steps = [
-        Step(block, reason, *_estimate(block, present))
+        PlannedBlock(block, reason, *_estimate(block, present))
         for block, reason in zip(selection, reasons, strict=True)
         if reason is not None
     ]
     lines = [f"{len(steps)} to measure, {len(selection) - len(steps)} already on record"]
-    by_solver: dict[tuple[str, str], list[Step]] = {}
+    by_solver: dict[tuple[str, str], list[PlannedBlock]] = {}
     for step in steps:
         by_solver.setdefault((step.block.suite, step.block.solver), []).append(step)
     for (suite, solver), group in by_solver.items():
@@ -164,7 +164,7 @@ def _scaled_time(record: Record, block: Block) -> float:
     return record.seconds * (block.size / record.size if block.size and record.size else 1.0)
 
 
-def _total(steps: Sequence[Step]) -> str:
+def _total(steps: Sequence[PlannedBlock]) -> str:
     if not steps:
         return "Nothing would be measured"
     sources = Counter(step.source for step in steps)

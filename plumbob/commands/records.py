@@ -142,7 +142,7 @@ def _machines(records: "Iterable[Record]") -> set[str]:
     from plumbob.bench.text import visible
 
     machines = (record.stamp.get("machine", {}) for record in records if record.stamp)
-    forms = {"cores": lambda n: counted(n, "core"), "memory_gib": "{} GiB".format}
+    forms = {"cores": lambda number: counted(number, "core"), "memory_gib": "{} GiB".format}
     texts = (", ".join(forms.get(name, str)(m[name]) for name in m if m[name]) for m in machines)
     return {visible(text) for text in texts if text}
 
@@ -163,7 +163,9 @@ def _table(folder: Path, records: "list[Record]") -> "Table":
         Column("failed", read=lambda group: sum(bool(record.failed) for record in group)),
         Column("superseded", read=lambda group: sum(record.superseded for record in group)),
         text("latest", lambda group: max(record.when for record in group)),
-        text("commits", lambda group: ", ".join(sorted({r.commit for r in group} - {""}))),
+        text(
+            "commits", lambda group: ", ".join(sorted({record.commit for record in group} - {""}))
+        ),
     )
     machines = "; ".join(sorted(_machines(records))) or "no machine"
     summary = Summary(f"{counted(len(records), 'record')}, measured on {machines}")

@@ -7,7 +7,7 @@ from plumbob.bench.text import visible
 
 from ..help_text import block
 from ..terminal import print_lines, print_outcome
-from .options import REPORT, SUCCESS, File, Texts, argument, flag, known, option
+from .options import REPORT, SUCCESS, File, Texts, argument, flag, option, valid_name
 
 if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table
@@ -51,7 +51,7 @@ def report(  # noqa: PLR0913 -- one parameter an option
 
     With --table, print one table, or some of its columns and rows, for a paper.
     """
-    known("format", form, FORMATS)
+    valid_name("format", form, FORMATS)
     if not name and not names:
         if columns or rows or order:
             raise ValueError("--columns, --rows and --sort: expected --table, which they are of")
@@ -62,7 +62,7 @@ def report(  # noqa: PLR0913 -- one parameter an option
     if not name:
         return _list_tables(tables)
     by_name = {table.name: table for table in tables}
-    table = by_name[known("table", name, by_name)]
+    table = by_name[valid_name("table", name, by_name)]
     if names:
         return _list_columns(table)
     from plumbob.bench.tables import selection

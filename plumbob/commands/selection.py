@@ -23,7 +23,7 @@ ROBOT_TASKS = (REACHABLE, UNREACHABLE, TRAC_IK, TOOLBOX)
 _MAX_LISTED = 12
 
 
-class Request(NamedTuple):
+class MeasurementRequest(NamedTuple):
     """The options on solvers and problems.
 
     Attributes:
@@ -45,7 +45,7 @@ class Request(NamedTuple):
     pins: str | None = None
 
 
-def choose(suites: Sequence[str], scale: str, request: Request) -> Choice:
+def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Choice:
     """Return the measurements that a user asks for, after opening the user's solvers and problems.
 
     Raises:

@@ -8,7 +8,7 @@ from plumbob.bench.text import visible
 
 from ..help_text import block
 from ..terminal import progress
-from .options import REPORT, SUCCESS, File, Text, argument, flag, known, option, writable
+from .options import REPORT, SUCCESS, File, Text, argument, flag, option, valid_name, writable
 from .verify import program_of
 
 EXAMPLES = block(
@@ -57,7 +57,7 @@ def show(
     if scene is None and not words:
         raise ValueError(f"SCENE: expected one of {', '.join(SCENES)}, got none")
     if scene is not None:
-        known("scene", scene, SCENES)
+        valid_name("scene", scene, SCENES)
     entrant = YourSolver(words) if words else None
     try:
         name = scene or (entrant.scene if entrant else "")

@@ -283,7 +283,9 @@ def _module_fingerprint(name: str) -> bytes:
     loader: Any = module.__loader__
     parts: list[bytes] = []
     _collect_code(loader.get_code(name), parts)
-    numbers = {k: v for k, v in vars(module).items() if isinstance(v, int | float)}
+    numbers = {
+        name: number for name, number in vars(module).items() if isinstance(number, int | float)
+    }
     return b"\0".join([*parts, repr(sorted(numbers.items())).encode()])
 
 

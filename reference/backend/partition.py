@@ -26,7 +26,7 @@ class Regions(NamedTuple):
     starts: IndexArray  # where the springs of each, then the springs between, begin, (region + 1,)
 
 
-def cut(springs: IndexArray, particles: int, count: int = REGIONS) -> Regions:
+def partition_springs(springs: IndexArray, particles: int, count: int = REGIONS) -> Regions:
     """Divide a system with springs (spring, 2) into regions."""
     bounds = np.arange(count + 1) * particles // count
     first, second = np.searchsorted(bounds, springs, side="right").T - 1

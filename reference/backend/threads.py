@@ -67,7 +67,7 @@ def in_slices(
     slices = min(count // minimum, SLICES_PER_CORE * threads)
     pool, parts = _pool(threads), []
     try:
-        for begin, end in pairwise(count * i // slices for i in range(slices + 1)):
+        for begin, end in pairwise(count * number // slices for number in range(slices + 1)):
             context = copy_context()  # so that each thread sees the backend in force
             context.run(_num_threads.set, 1)
             parts.append(pool.submit(context.run, kernel, *arguments_of(slice(begin, end))))

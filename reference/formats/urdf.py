@@ -73,7 +73,7 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
         if any(name.startswith("xacro:") for name in (element.tag, *element.attributes)):
             raise element.error("expected a URDF file, got xacro: run xacro first")
     joints: dict[str, _Joint] = {}
-    for joint in map(_joint, root.named("joint")):
+    for joint in map(_joint, root.children_named("joint")):
         if joint.name in joints:
             raise joint.element.error("expected a joint's name once, got it twice")
         joints[joint.name] = joint
@@ -111,7 +111,7 @@ def _link_of(joint: Element, tag: str) -> str:
 def _joints_below(root: Element, joints: Mapping[str, _Joint]) -> dict[str, list[_Joint]]:
     """Return the child joints of each link, in the order of the file."""
     below: dict[str, list[_Joint]] = {}
-    for link in root.named("link"):
+    for link in root.children_named("link"):
         if link.word("name") in below:
             raise link.error("expected a link's name once, got it twice")
         below[link.word("name")] = []

@@ -41,13 +41,13 @@ class Element(NamedTuple):
             yield element
             waiting += reversed(element.children)
 
-    def named(self, tag: str) -> list["Element"]:
+    def children_named(self, tag: str) -> list["Element"]:
         """Return the children of that name."""
         return [child for child in self.children if child.tag == tag]
 
     def single(self, tag: str) -> "Element | None":
         """Return the only child of that name, None if there is none."""
-        matches = self.named(tag)
+        matches = self.children_named(tag)
         if len(matches) > 1:
             raise self.error(f"expected at most one <{tag}>, got {len(matches)}")
         return matches[0] if matches else None

@@ -64,14 +64,14 @@ def _mechanism(
     """Return the mechanism that moves some effectors."""
     whole = articulation.joints
     moving = _moving(articulation, effectors, oriented)
-    number = {int(j): k for k, j in enumerate(moving)}
+    number = {int(joint): index for index, joint in enumerate(moving)}
     joints, columns = _moving_joints(whole, moving, number)
     ends = _attached(whole, effectors, oriented, number)
     moves = np.zeros((len(joints), len(ends)), dtype=bool)
-    for e, j in enumerate(ends["joint"]):
-        while j >= 0:
-            moves[j, e] = True
-            j = joints["parent"][j]
+    for effector, joint in enumerate(ends["joint"]):
+        while joint >= 0:
+            moves[joint, effector] = True
+            joint = joints["parent"][joint]
     ends["first"] = np.where(moves.any(axis=0), moves.argmax(axis=0), -1) if len(joints) else -1
     links = np.linalg.norm(joints["offset"], axis=1)
     links[joints["parent"] < 0] = 0.0
@@ -100,19 +100,19 @@ def _moving(
         moving = has_rotation or kinds[joint] in (SLIDE, FREE)
         needed.update(path(joint).tolist() if moving else path(joint).tolist()[:-1])
     needed.update(articulation.joints["leader"][sorted(needed)].tolist())
-    return np.array([j for j in sorted(needed) if kinds[j] != FIXED], dtype=np.int64)
+    return np.array([joint for joint in sorted(needed) if kinds[joint] != FIXED], dtype=np.int64)
 
 
 def _merged(whole: RecordArray, joint: int, number: dict[int, int]) -> tuple[int, Any, Any]:
     """Return the nearest moving joint above, and this joint's frame in its frame."""
     x, R = load_vector(whole["offset"], joint), load_quaternion(whole["frame"], joint)
-    j = int(whole["parent"][joint])
-    while j >= 0 and j not in number:
-        frame = load_quaternion(whole["frame"], j)
-        x = add(load_vector(whole["offset"], j), rotate(frame, x))
+    ancestor = int(whole["parent"][joint])
+    while ancestor >= 0 and ancestor not in number:
+        frame = load_quaternion(whole["frame"], ancestor)
+        x = add(load_vector(whole["offset"], ancestor), rotate(frame, x))
         R = multiply(frame, R)
-        j = int(whole["parent"][j])
-    return number.get(j, -1), x, R
+        ancestor = int(whole["parent"][ancestor])
+    return number.get(ancestor, -1), x, R
 
 
 def _attached(
@@ -126,11 +126,11 @@ def _attached(
     ends["source"], ends["oriented"] = effectors, oriented
     sizes = np.where(oriented, 6, 3)
     ends["row"] = np.cumsum(sizes) - sizes
-    for e, joint in enumerate(effectors):
+    for index, joint in enumerate(effectors):
         attached = (number.get(joint, -1), (0.0, 0.0, 0.0), IDENTITY)
         if joint not in number:
             attached = _merged(whole, joint, number)
-        ends["joint"][e], ends["position"][e], ends["rotation"][e] = attached
+        ends["joint"][index], ends["position"][index], ends["rotation"][index] = attached
     return ends
 
 
@@ -139,15 +139,17 @@ def _moving_joints(
 ) -> tuple[RecordArray, IndexArray]:
     """Return the joints of the mechanism, and their columns of q."""
     joints, starts = whole[moving], whole["coordinate"][moving]
-    joints["leader"] = [number[int(j)] for j in joints["leader"]]
+    joints["leader"] = [number[int(leader)] for leader in joints["leader"]]
     followers = joints["leader"] != np.arange(len(joints))
     joints["followed"] = False
     joints["followed"][joints["leader"][followers]] = True
     widths = number_coordinates(joints)
-    for k, j in enumerate(moving):
-        joints["parent"][k], joints["offset"][k], joints["frame"][k] = _merged(whole, j, number)
+    for index, joint in enumerate(moving):
+        joints["parent"][index], joints["offset"][index], joints["frame"][index] = _merged(
+            whole, joint, number
+        )
     joints["rotated"] = rotated_by_pi(joints)
-    columns = [np.arange(start, start + n) for start, n in zip(starts, widths, strict=True)]
+    columns = [np.arange(start, start + width) for start, width in zip(starts, widths, strict=True)]
     return joints, np.concatenate([*columns, np.empty(0, dtype=np.int64)])
 
 

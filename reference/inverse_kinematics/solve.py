@@ -230,10 +230,12 @@ def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> RecordA
     """Return targets as records TARGET, (target, effector), the largest weight 1."""
     count, heaviest = len(targets), max([target.weight for target in targets])
     rows = np.empty((*batch, count), TARGET)
-    for e, target in enumerate(targets):
-        rows["position"][..., e, :] = target.position
-        rows["rotation"][..., e, :] = IDENTITY if target.rotation is None else target.rotation
-        rows["weight"][..., e] = target.weight / heaviest
+    for effector, target in enumerate(targets):
+        rows["position"][..., effector, :] = target.position
+        rows["rotation"][..., effector, :] = (
+            IDENTITY if target.rotation is None else target.rotation
+        )
+        rows["weight"][..., effector] = target.weight / heaviest
     return rows.reshape(-1, count)
 
 

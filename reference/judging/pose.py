@@ -126,8 +126,8 @@ def judge_pose(
         unit, deviation = _normalised(model, pose)
         placed = forward_kinematics(model, unit)
         if isinstance(model, Articulation):
-            for j in range(model.joint_count):
-                excess[j] = joint_excess(model.joints, j, unit)
+            for joint in range(model.joint_count):
+                excess[joint] = joint_excess(model.joints, joint, unit)
     elif x is None or any(goal.rotation is not None for goal in targets):
         raise ValueError("pose: expected rotations or coordinates, got None")
     else:
@@ -175,7 +175,7 @@ def _check_single(targets: Sequence[CheckedTarget]) -> None:
 def _length_errors(model: Skeleton | Articulation, tree: Skeleton, x: FloatArray) -> FloatArray:
     """Return how much positions change the lengths of rigid links [m], (joint,)."""
     kinds = ("ball",) * tree.joint_count if isinstance(model, Skeleton) else model.kinds
-    rigid = [j for j in range(1, tree.joint_count) if kinds[j] not in ("slide", "free")]
+    rigid = [joint for joint in range(1, tree.joint_count) if kinds[joint] not in ("slide", "free")]
     errors = np.zeros(tree.joint_count)
     lengths = np.linalg.norm(x[rigid] - x[tree.parents[rigid]], axis=-1)
     errors[rigid] = np.abs(lengths - tree.link_lengths[rigid])

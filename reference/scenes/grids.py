@@ -96,7 +96,9 @@ def grid_cloth(
         (NEXT_BUT_ONE, number("bending_stiffness", bending, minimum=0)),
         (DIAGONALS, number("shear_stiffness", shear, minimum=0)),
     ]
-    springs_of = [(steps, k) for steps, k in parts if k > 0 or steps is NEIGHBOURS]
+    springs_of = [
+        (steps, stiffness) for steps, stiffness in parts if stiffness > 0 or steps is NEIGHBOURS
+    ]
     springs = [_springs((rows, columns), steps) for steps, _ in springs_of]
     spacing, positions = number("spacing", spacing, above=0), np.empty((rows, columns, 3))
     positions[..., 0] = spacing * np.arange(rows)[:, None]
@@ -106,7 +108,9 @@ def grid_cloth(
         positions.reshape(-1, 3),
         np.concatenate(springs),
         masses=np.full(rows * columns, number("mass", mass, above=0)),
-        stiffnesses=np.repeat([k for _, k in springs_of], [len(ends) for ends in springs]),
+        stiffnesses=np.repeat(
+            [stiffness for _, stiffness in springs_of], [len(ends) for ends in springs]
+        ),
         damping=damping,
         pinned=[0, columns - 1] if pinned is None else pinned,
         gravity=gravity,

@@ -111,7 +111,7 @@ class CholeskyFactor:
         lists = []
         for s in range(len(columns) - 1):
             block = np.r_[columns[s] : columns[s + 1], rows[starts[s] : starts[s + 1]]]
-            lists += [block[j:] for j in range(columns[s + 1] - columns[s])]
+            lists += [block[column:] for column in range(columns[s + 1] - columns[s])]
         indptr = np.cumsum([0, *map(len, lists)])
         return scipy.sparse.csc_array((self._values, np.concatenate(lists), indptr))
 

@@ -61,8 +61,8 @@ def new_problem(
 ) -> TrajectoryProblem:
     """Return the problem of a mechanism with the limits of its joints."""
     units, limits = np.ones(mechanism.freedoms), joint_limits(mechanism.joints)
-    for j, joint in enumerate(mechanism.joints):
-        if joint["leader"] == j and joint["kind"] in (SLIDE, FREE):
+    for index, joint in enumerate(mechanism.joints):
+        if joint["leader"] == index and joint["kind"] in (SLIDE, FREE):
             first, count = joint["freedom"], 1 if joint["kind"] == SLIDE else 3
             units[first : first + count] = mechanism.reach
     return TrajectoryProblem(mechanism, units, limits, targets, constrained, closed)

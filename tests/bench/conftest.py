@@ -1,5 +1,7 @@
 """Records made up for the tests, and a stamp that does not depend on the machine."""
 
+import importlib
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +11,8 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import SUITES
+from plumbob.bench.figures import drawing
+from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import FINISHED, Record
 
 SAMPLES = tomllib.loads(Path(__file__).with_name("records.toml").read_text(encoding="utf-8"))
@@ -285,6 +289,38 @@ MAKERS = (
     *(timed, stepped, swung, two_dampers, stepping, certified, raced, solving, lacking),
     *(republished, worked, fell, moved, needed, bounded, as_liu),
 )
+
+
+@pytest.fixture(scope="module")
+def importable(tmp_path_factory):
+    """Return what writes a module that this process and its workers can import."""
+    folder, names = tmp_path_factory.mktemp("modules"), []
+
+    def write(name, text):
+        (folder / f"{name}.py").write_text(text)
+        names.append(name)
+        return importlib.import_module(name)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(folder))
+        patch.syspath_prepend(folder)
+        yield write
+    for name in names:
+        sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def in_this_process():
+    """Return a class of worker processes that are none."""
+    return type("InThisProcess", (WorkerProcess,), {"stream": lambda self, job: job.perform()})
+
+
+@pytest.fixture(scope="session", autouse=True)
+def short_pdf():
+    """Leave figures out of PDF files, which take longer than all else of a report."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drawing, "pdf_of", lambda figure, title, mark="": b"%PDF" + mark.encode())
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,8 +1,6 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
 import importlib
-import pickle
-import sys
 from functools import partial
 
 import numpy as np
@@ -14,10 +12,9 @@ from plumbob.bench.experiments.cloth_peers import tables, truth
 from plumbob.bench.experiments.cloth_peers.job import Shape
 from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs, step_rungs
 from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_motion, truth_of
-from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
-from plumbob.bench.harness.isolation import Outcome, WorkerProcess
-from plumbob.bench.harness.worker import Finished, Ready, Solved
+from plumbob.bench.harness.isolation import JobOutcome, WorkerProcess
+from plumbob.bench.harness.worker import Finished, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from plumbob.bench.problems.falling_cloth import (
@@ -352,28 +349,13 @@ def prepare(system, frame, manner="well"):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def fakes(tmp_path_factory):
-    """Let this process and the worker import the fakes."""
-    folder = tmp_path_factory.mktemp("fakes")
-    (folder / "fake_cloth_solvers.py").write_text(FAKES)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(folder))
-        patch.syspath_prepend(folder)
-        yield
-    sys.modules.pop("fake_cloth_solvers", None)
+def fakes(importable):
+    importable("fake_cloth_solvers", FAKES)
 
 
 def messages(cloth, manner, frames=5, repeats=1, budget=60.0):
     shape = Shape(frames, repeats, budget)
     return list(peers_cloth.job(fake_peer(manner), cloth, {"manner": manner}, shape).perform())
-
-
-def test_a_job_says_when_it_is_ready_each_frame_and_the_end(cloth):
-    sent = messages(cloth, "well", frames=2, repeats=2)
-    assert [type(message) for message in sent] == [Ready, *[Solved] * 4, Finished]
-    ends = [message.q for message in sent if isinstance(message, Solved)]
-    np.testing.assert_array_equal(ends[1], ends[3])
-    assert not np.array_equal(ends[0], ends[1])
 
 
 @pytest.mark.parametrize(
@@ -437,16 +419,9 @@ def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, los
     assert facts == {"rungs": ["as it is"], "remarks": remarks, "trouble": why}
 
 
-class InThisProcess(WorkerProcess):
-    """A worker process that is none."""
-
-    def stream(self, job):
-        return job.perform()
-
-
 @pytest.fixture
-def here(monkeypatch):
-    monkeypatch.setattr(peers_cloth, "worker_process", InThisProcess)
+def here(monkeypatch, in_this_process):
+    monkeypatch.setattr(peers_cloth, "worker_process", in_this_process)
 
 
 def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch):
@@ -455,7 +430,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
     class Silent:
         def perform(self, job):
             jobs.append(job)
-            return Outcome(0.0, [], "ended after 300 s of silence", is_silent=True)
+            return JobOutcome(0.0, [], "ended after 300 s of silence", is_silent=True)
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
@@ -606,26 +581,3 @@ def test_the_published_times_stand_beside_ours(make):
     (point,) = table.summary.points
     for part in ("local/global, 10 iterations", "30.0 ms", "50.0 ms", "0.500"):
         assert part in point
-
-
-@pytest.mark.parametrize(
-    ("name", "maker"),
-    [("step_chart", "worked"), ("implicit_chart", "fell"), ("truth_chart", "fell")],
-)
-def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_each_solver(
-    make, name, maker
-):
-    solvers, maker = ("Plumbob Newton", "MuJoCo Euler"), getattr(make, maker)
-    records = [maker(solver, stiffness) for solver in solvers for stiffness in (1e2, 1e4)]
-    svg = drawn(getattr(tables, name)(Results(records))).svg
-    for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", *solvers):
-        assert text in svg
-
-
-def test_a_job_of_a_worker_is_known_by_its_arrays(cloth):
-    """A job that travels between processes keeps the same system, to the last bit."""
-    shape = Shape(1, 1, 1.0)
-    copy = pickle.loads(pickle.dumps(peers_cloth.job(fake_peer("m"), cloth, {}, shape)))
-    system = MassSpring(**copy.system._asdict())
-    for name, values in cloth.system.arrays._asdict().items():
-        np.testing.assert_array_equal(getattr(system.arrays, name), values)

@@ -8,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.cloth_scale import measurement as suite
 from plumbob.bench.experiments.cloth_scale import tables
 from plumbob.bench.harness.progress import listening
@@ -92,12 +91,6 @@ def test_the_limit_reads_what_it_says():
     assert suite.reading(8 * 1000)() == 1000
     system, _ = suite.billowing_cloth(3)
     assert suite.local_bytes(system) == 26 * (16 + 8 + 8 + 1) + 9 * 144
-
-
-@pytest.mark.parametrize(("scale", "largest"), [("quick", 10_000), ("full", 1_000_000)])
-def test_the_quick_scale_stops_at_ten_thousand(scale, largest):
-    listed = blocks("cloth_scale", SCALES[scale])
-    assert max(block.settings["particles"] for block in listed) == largest
 
 
 def test_our_parts_stand_beside_cholmods(make):

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments import Scale, blocks
 from plumbob.bench.experiments.energy import measurement as suite
 from plumbob.bench.experiments.energy import tables
-from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.tables.results import Results
 
 STEPS = 100
@@ -41,11 +39,6 @@ def test_dampers_take_energy(swings):
     assert damped[-1] < swings["RK4"][-1] - 1e-4
 
 
-def test_blocks_are_listed_without_measuring():
-    listed = list(blocks("energy", Scale(targets=1, seconds=0.1)))
-    assert len(listed) == 2 * len(suite.INTEGRATORS)
-
-
 def test_table_and_sentence_follow_the_records(make):
     left = np.linspace(1.0, 0.5, 11)
     damped = make.swung("discrete", "damped", left)
@@ -55,12 +48,3 @@ def test_table_and_sentence_follow_the_records(make):
     (point,) = table.summary.points
     assert all(part in point for part in ("RK4", "50.0 %", "100 %"))
     assert tables.energy(Results([damped])).summary.sentence == ""
-
-
-def test_figure_has_a_panel_for_each_cloth_and_a_line_for_each_integrator(make):
-    pairs = [(solver, cloth) for cloth in ("undamped", "damped") for solver in ("RK4", "discrete")]
-    records = [make.swung(solver, cloth) for solver, cloth in pairs]
-    svg = drawn(tables.energy_chart(Results(records))).svg
-    for text in ("undamped", "damped", "RK4", "discrete"):
-        assert text in svg
-    assert tables.energy_chart(Results([])) is None

@@ -103,10 +103,6 @@ def test_every_declared_column_has_a_cell(records, make):
             ] == []
 
 
-def test_every_section_has_a_name_of_its_own():
-    assert len({section.name for section in SECTIONS}) == len(SECTIONS)
-
-
 def test_a_missed_claim_is_named_in_table_and_answer(make):
     table = check.verdicts(Results([make.claim(), make.claim("damper forces", held=False)]))
     assert column(table, "verdict") == ["held", "MISSED: they differ"]
@@ -122,10 +118,7 @@ def changed(record, **arrays):
 def test_chains_are_counted_as_straight_only_if_they_are(make):
     table = beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
     assert column(table, "off the line, largest [m]") == [0.5, 1e-9]
-    assert table.summary.points == (
-        "CCD: 1/2 = 50 % (9.5–90.5)",
-        "FABRIK: 2/2 = 100 % (34.2–100)",
-    )
+    assert table.summary.points == ("CCD: 1/2 = 50 % (9.5–90.5)", "FABRIK: 2/2 = 100 % (34.2–100)")
 
 
 def test_targets_without_a_solution_are_not_printed_as_infinite(make):

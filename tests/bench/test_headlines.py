@@ -195,11 +195,7 @@ def test_the_verdict_names_the_claim_with_the_narrowest_margin(make):
 
 
 def test_peers_without_a_measurement_are_absent_or_were_not_asked(make, run):
-    records = [
-        run("pink", 1),
-        run("Plumbob LM", 1),
-        make.lacking("mink", "one start", ""),
-    ]
+    records = [run("pink", 1), run("Plumbob LM", 1), make.lacking("mink", "one start", "")]
     missing = make.record("cloth", "peers/all", "mujoco", facts={"task": "missing"})
     results = Results([*records, make.worked("Plumbob Newton"), missing])
     assert headlines.absent(results) == ["mink", "MuJoCo (cloth)"]

@@ -14,17 +14,12 @@ from plumbob.reference import rotation
 
 @pytest.mark.parametrize("total", [1, 7, 200, 100_000])
 def test_wilsons_interval_is_that_of_scipy(total):
+    """Newcombe 1998, method 3."""
     for hits in {0, 1, total // 3, total - 1, total}:
         found = metrics.share(np.arange(total) < hits)
         low, high = stats.binomtest(hits, total).proportion_ci(0.95, method="wilson")
         assert found[:2] == (hits, total)
         np.testing.assert_allclose([found.low, found.high], [low, high], rtol=1e-12, atol=1e-15)
-
-
-def test_wilsons_interval_of_the_textbook():
-    """81 of 263: Newcombe 1998, table I, method 3 (0.2553 to 0.3662)."""
-    share = metrics.share(np.arange(263) < 81)
-    assert (round(share.low, 4), round(share.high, 4)) == (0.2553, 0.3662)
 
 
 def test_closed_forms():
@@ -155,14 +150,10 @@ def test_pairs_differ_where_two_intervals_overlap(rng):
     assert metrics.ranking(scores).first == ("fast",)
 
 
-@pytest.mark.parametrize("count", [8, 40])
-def test_equals_differ_in_at_most_five_of_a_hundred(rng, count):
+def test_equals_differ_in_at_most_five_of_a_hundred(rng):
     """Four equals, ranked 400 times: rarely does one differ (the error is 0.011)."""
-    differing = sum(
-        len(metrics.ranking(dict(zip("abcd", rng.lognormal(size=(4, count)), strict=True))).first)
-        < 4
-        for _ in range(400)
-    )
+    scores = (dict(zip("abcd", rng.lognormal(size=(4, 40)), strict=True)) for _ in range(400))
+    differing = sum(len(metrics.ranking(score).first) < 4 for score in scores)
     assert differing <= 0.075 * 400
 
 

@@ -11,11 +11,10 @@ import pytest
 from plumbob.bench.experiments import SUITES, blocks
 from plumbob.bench.experiments.arm.tables import accuracy, residuals_chart
 from plumbob.bench.experiments.chain.tables import beyond_reach, iterations_chart
-from plumbob.bench.experiments.robots.tables import participants
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening, registry
-from plumbob.bench.report.headlines import absent, not_asked
+from plumbob.bench.report.headlines import absent
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.entered import remarks_of_entrants
 from plumbob.bench.tables.results import Results, printable
@@ -86,21 +85,6 @@ def test_peers_that_were_not_asked_are_not_said_to_be_missing(printed, records, 
     assert "not installed" not in printed
     assert made["participants"].rows == ()
     assert absent(Results(records)) == []
-
-
-def test_peers_that_took_part_or_are_missing_are_told_from_those_that_nobody_asked(make):
-    mine = make.raced("My solver", "one start")
-    mine.facts["entrant"] = True
-    results = Results([make.raced("Plumbob LM", "one start"), mine,
-                       make.lacking("mink", "one start", "mink is not installed")])  # fmt: skip
-    table = participants(results)
-    versions = {row[0]: row[2] for row in table.rows}
-    assert versions == {"Plumbob LM": "1.2", "mink": "not installed", "My solver": "1.2"}
-    assert table.summary.sentence.startswith(
-        "2 of 3 selected solvers took part; not selected: Pinoc"
-    )
-    assert absent(results) == ["mink"]
-    assert "pink" in not_asked(results)
 
 
 def test_who_offers_no_robots_gets_a_sentence_and_no_table_of_dashes(printed, made):

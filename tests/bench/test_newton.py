@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments import SCALES, Scale, blocks
+from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.newton import STIFFNESSES, tables
 from plumbob.bench.experiments.newton import measurement as suite
 from plumbob.bench.tables.results import Results
@@ -72,15 +72,6 @@ def test_on_thirty_by_thirty_newton_converges_and_the_others_limits_agree(stiffn
     others = set(STEP_SOLVERS) - {"newton", "gauss_newton"}
     start = suite.NEAR_NEWTON if stiffness >= suite.STIFF else suite.FROM_Y
     assert all(answers[solver, start]["covered"] for solver in others)
-
-
-def test_every_solver_has_a_block_at_every_stiffness():
-    listed = list(blocks("newton", Scale(targets=1, seconds=0.1)))
-    for stiffness in STIFFNESSES:
-        here = {b.solver for b in listed if b.problem == f"swing/k{stiffness:g}"}
-        assert here == set(STEP_SOLVERS)
-    assert {b.size for b in listed} == {suite.QUICK}
-    assert {b.size for b in blocks("newton", SCALES["full"])} == {suite.FULL}
 
 
 def test_table_and_sentence_follow_the_records(make, stiff):

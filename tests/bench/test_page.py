@@ -206,8 +206,7 @@ def edge(browser, *arguments):
 
 
 @pytest.mark.parametrize(
-    ("size", "scheme", "scripts"),
-    [(DESK, "light", True), (DESK, "dark", False), (PHONE, "light", False), (PHONE, "dark", True)],
+    ("size", "scheme", "scripts"), [(DESK, "light", True), (PHONE, "dark", False)]
 )
 def test_an_edge_is_shaded_where_a_table_goes_on(browser, address, size, scheme, scripts):
     """And only there: not at its end, and not where all of it is seen."""
@@ -220,14 +219,14 @@ def test_an_edge_is_shaded_where_a_table_goes_on(browser, address, size, scheme,
         browser.run(BARE)
         boxes = browser.run(BOXES)
         wide, tall = (sorted(boxes, key=lambda box: box[i]) for i in (1, 2))
-        for name, *amounts in [*wide[:6], *wide[-6:], *tall[-6:]]:
+        for name, *amounts in [*wide[:2], *wide[-3:], *tall[-3:]]:
             for side, amount in zip(cut, amounts, strict=True):
                 start, end = (edge(browser, name, side, at) for at in (0, amount))
                 is_cut = amount > HALF_A_CELL
                 assert (abs(start - end) > 10) == is_cut, (name, side, amount, start, end)
                 cut[side] += is_cut
-        assert cut["right"] >= 6 * (size == PHONE)
-        assert cut["bottom"] >= 4
+        assert cut["right"] >= 3 * (size == PHONE)
+        assert cut["bottom"] >= 2
     finally:
         browser.send("Emulation.setEmulatedMedia", features=[])
         browser.send("Emulation.setScriptExecutionDisabled", value=False)

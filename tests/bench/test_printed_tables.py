@@ -275,5 +275,5 @@ def test_the_list_of_suites_cuts_no_name_and_counts_those_left_out(capsys, width
     assert "…" not in out
     assert width is None or all(len(line) <= width for line in out.splitlines() if line[0] == " ")
     text = " ".join(out.split())
-    listed, more = re.search(r"52 problems: (.*?) and (\d+) more", text).groups()
+    listed, more = re.search(rf"{len(names)} problems: (.*?) and (\d+) more", text).groups()
     assert listed.split("; ") == names[: len(names) - int(more)]

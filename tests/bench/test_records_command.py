@@ -1,6 +1,5 @@
 """Records are listed, merged and dropped, and by nothing else."""
 
-import re
 from dataclasses import replace
 
 import pytest
@@ -50,14 +49,6 @@ def test_merged_records_are_the_later_ones_and_none_that_failed_before_one_that_
     whole = RecordFile("both").path.read_bytes()
     assert plumbob(capsys, "merge", *order, "--into", "both")[1].startswith("0 added")
     assert RecordFile("both").path.read_bytes() == whole
-
-
-def test_what_is_listed_is_counted_by_suite_and_solver(capsys, here):
-    code, out, _ = plumbob(capsys, "list", "desktop")
-    assert code == 0
-    assert "3 records, measured on" in out
-    assert re.search(r"^arm +b +1 +1 +0 ", out, re.MULTILINE)
-    assert not re.search(r"^arm +b ", plumbob(capsys, "list", "desktop", "--solver", "a")[1], re.M)
 
 
 def test_only_what_fits_all_that_is_given_is_dropped(capsys, here):

@@ -8,7 +8,6 @@ import pytest
 
 import plumbob.bench.experiments
 from plumbob.bench.experiments import Scale, blocks
-from plumbob.bench.experiments.chain import tables as chain_tables
 from plumbob.bench.experiments.cloth import measurement as cloth
 from plumbob.bench.experiments.cloth import tables as cloth_tables
 from plumbob.bench.experiments.cloth.measurement import cloth_swing
@@ -17,15 +16,11 @@ from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots import tables as robot_tables
 from plumbob.bench.harness import run
 from plumbob.bench.harness.experiment import Experiment
-from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
-from plumbob.bench.report import report
 from plumbob.bench.report.sections import tables
-from plumbob.bench.tables.layout import Layout
 from plumbob.bench.tables.results import Results
-from plumbob.bench.tables.table import Column
 from plumbob.reference import STEP_SOLVERS
 from plumbob.reference.implicit_euler.local_global import LocalGlobal
 
@@ -72,19 +67,14 @@ def prepare(robot, tolerance):
 """
 
 
-class InThisProcess(WorkerProcess):
-    """A worker process that is none."""
-
-    def stream(self, job):
-        return job.perform()
-
-
-def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, monkeypatch):
+def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(
+    tmp_path, monkeypatch, in_this_process
+):
     (tmp_path / "stays_put.py").write_text(ADAPTER)
     monkeypatch.syspath_prepend(tmp_path)
     line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (PeerEntry(ONE_START),))
     monkeypatch.setattr(registry, "PEERS", (*registry.PEERS, line))
-    monkeypatch.setattr(robots, "worker_process", InThisProcess)
+    monkeypatch.setattr(robots, "worker_process", in_this_process)
     name = ("robots/character", "Stays put")
     (block,) = [b for b in blocks("ik", TINY) if (b.problem, b.solver) == name]
     record = run.measure(block)
@@ -94,31 +84,6 @@ def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, 
     (row,) = robot_tables.robot_by_robot(results).rows
     assert row[:3] == ("character", ONE_START, "Stays put")
     assert "Stays put" in [row[0] for row in robot_tables.participants(results).rows]
-
-
-counted = Layout(
-    "How many records are there?",
-    "counted",
-    "Records, counted",
-    subjects=lambda results: [results],
-    columns=[Column("records", read=lambda results: len(results.records))],
-    shows="All.",
-    measured="Counted.",
-)
-
-
-def test_a_new_table_is_a_function_and_a_line_and_stands_in_the_page(
-    tmp_path, monkeypatch, records
-):
-    monkeypatch.setattr(chain_tables, "LAYOUTS", (*chain_tables.LAYOUTS, counted))
-    assert "counted" in [table.name for table in tables(Results([]), ["arm"])]
-    monkeypatch.setattr(report, "all_figures", list)
-    RecordFile(tmp_path).append(records)
-    report.write(tmp_path)
-    assert "Records, counted" in (tmp_path / "tables" / "counted.md").read_text()
-    page = (tmp_path / "index.html").read_text()
-    assert "How many records are there?" in page
-    assert "Records, counted" in page
 
 
 FOLDER = {

@@ -1,7 +1,6 @@
 """The report: one page that needs nothing else, from nothing but the records."""
 
 import csv
-import html.parser
 import re
 import unicodedata
 import xml.etree.ElementTree as ET
@@ -10,55 +9,11 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from html_page import Page
 
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.report import report
 from plumbob.bench.tables.results import Results, results_of
-
-VOID = {"meta", "link", "br", "img", "input", "hr"}
-
-
-CELLS = ("td", "th")
-
-
-class Page(html.parser.HTMLParser):
-    """What the tests ask of a page: its ids, links, tags left open, and text."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.ids, self.links, self.open, self.text = [], [], [], []
-        self.tags, self.wrong, self.scripts = set(), [], 0
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.add(tag)
-        self.scripts += tag == "script"
-        self.ids += [value for name, value in attributes if name == "id"]
-        self.links += [value for name, value in attributes if name in ("href", "src")]
-        if tag in CELLS or tag == "tr":
-            self._end_cells(row=tag == "tr")
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def _end_cells(self, row):
-        """End a cell, and its row, which need no tags that say so."""
-        for tags in (CELLS, ("tr",) if row else ()):
-            if self.open and self.open[-1] in tags:
-                self.open.pop()
-
-    def handle_startendtag(self, tag, attributes):
-        self.handle_starttag(tag, attributes)
-        if tag not in VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag):
-        if tag not in CELLS:
-            self._end_cells(row=tag != "tr")
-        if not self.open or self.open.pop() != tag:
-            self.wrong.append(tag)
-
-    def handle_data(self, data):
-        self.text.append(data)
 
 
 def written(folder, records):
@@ -83,8 +38,8 @@ def test_the_page_needs_nothing_from_outside(whole):
     assert all((result.page.parent / link).is_file() for link in files)
     assert not re.search(r"https?://|//[a-z]+\.|@import|url\((?!#)", text)
     assert "xlink" not in text
-    assert page.scripts <= 4  # ours, that of motions, and what two of them show
-    assert not page.tags & {"link", "img", "iframe", "object"}
+    assert page.tags.count("script") <= 4  # ours, that of motions, and two of data
+    assert not {*page.tags} & {"link", "img", "iframe", "object"}
 
 
 def test_the_page_is_well_formed_and_every_id_is_its_own(whole):
@@ -98,7 +53,7 @@ def test_the_page_is_well_formed_and_every_id_is_its_own(whole):
 
 def test_machine_versions_and_date_stand_in_its_head(whole):
     _, page = whole
-    text = "".join(page.text)
+    text = "".join(page.texts)
     for fact in ("a <b>slide</b> rule", "2000-01-02 03:04:05 UTC", "0123456789ab", "numpy 2"):
         assert fact in text
 
@@ -106,7 +61,7 @@ def test_machine_versions_and_date_stand_in_its_head(whole):
 def test_tables_in_three_formats_and_figures_lie_beside_it(whole):
     result, page = whole
     folder = result.page.parent
-    text = "".join(page.text)
+    text = "".join(page.texts)
     assert "Not measured" not in text
     assert result.page.read_text().count("<figure>") == len(report.all_figures())
     for table in result.tables:
@@ -125,7 +80,7 @@ def test_tables_in_three_formats_and_figures_lie_beside_it(whole):
 def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
     """But that nobody entered a solver is no omission."""
     _, page = written(tmp_path, [record for record in records if record.suite == "check"])
-    text = "".join(page.text)
+    text = "".join(page.texts)
     assert text.count("Not measured: ") == 4
     assert "Which solvers of yours" not in text
     assert "Not measured: Forward kinematics. Inverse kinematics. A step of the cloth. What" in text
@@ -144,7 +99,7 @@ def test_what_is_missing_is_said(tmp_path, records):
         "1 of ",
     ):
         assert any(words in sentence for sentence in result.missing)
-    assert all(sentence.replace("`", "") in "".join(page.text) for sentence in result.missing)
+    assert all(sentence.replace("`", "") in "".join(page.texts) for sentence in result.missing)
 
 
 def test_a_complete_report_misses_only_the_package_and_the_peers_that_are_not_there(whole):
@@ -154,7 +109,7 @@ def test_a_complete_report_misses_only_the_package_and_the_peers_that_are_not_th
     assert absent.startswith("Absent peers: pink and PyBullet (cloth). `make peers` ")
     assert others.startswith("Not selected: Pinocchio’s closed loop, mink, ")
     assert "Newton (cloth)" in others
-    assert "Nothing: every suite" not in "".join(page.text)
+    assert "Nothing: every suite" not in "".join(page.texts)
 
 
 def test_the_same_records_give_the_same_files(whole):
@@ -200,8 +155,10 @@ def look_into_everything(folder):
             page = Page(text)
             assert (page.wrong, page.open) == ([], [])
             assert len(page.ids) == len(set(page.ids))
-            assert page.scripts <= 4  # ours, that of motions, and what two of them show
-            assert not page.tags & {"link", "img", "iframe", "object"}
+            assert (
+                page.tags.count("script") <= 4
+            )  # ours, that of motions, and what two of them show
+            assert not {*page.tags} & {"link", "img", "iframe", "object"}
         if path.suffix == ".md":
             rows = [line for line in text.splitlines() if line.startswith("|")]
             assert len({len(re.findall(r"(?<!\\)\|", row)) for row in rows}) <= 1
@@ -215,16 +172,16 @@ def look_into_everything(folder):
             assert len({len(row) for row in csv.reader(text.splitlines())}) <= 1
 
 
-def hostile_report(folder, records, field, names):
-    """A report of good records, and of spoilt ones beside them."""
-    bad = [spoilt(r, field, names[i % len(names)]) for i, r in enumerate(records)]
-    return written(folder, [*records, *bad])
-
-
-@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp", "facts"])
-def test_hostile_names_are_data_in_every_file(tmp_path, records, field):
-    few = [r for i, r in enumerate(records) if field == "solver" or i % 3 == 0]
-    result, page = hostile_report(tmp_path, few, field, HOSTILE)
+@pytest.mark.parametrize(
+    "fields", [("solver", "problem"), ("notes", "settings", "stamp", "facts")], ids="-".join
+)
+def test_hostile_names_are_data_in_every_file(tmp_path, records, fields):
+    """In a report of good records, and of spoilt ones beside them."""
+    bad = [
+        spoilt(record, fields[i % len(fields)], HOSTILE[i // len(fields) % len(HOSTILE)])
+        for i, record in enumerate(records)
+    ]
+    written(tmp_path, [*records, *bad])
     look_into_everything(tmp_path)
 
 
@@ -232,7 +189,7 @@ def test_a_name_stands_letter_by_letter_in_figures_and_tables(tmp_path, make):
     cases = [make.timed(name, 1e-6) for name in (*HOSTILE, "Pinocchio")]
     result, page = written(tmp_path, cases)
     drawn = ET.parse(tmp_path / "figures" / "timing_kinematics.svg").getroot()
-    inline = "".join(page.text)
+    inline = "".join(page.texts)
     for name in KEPT:
         shown = name.encode("unicode_escape").decode() if not name.isprintable() else name
         assert any(shown == "".join(element.itertext()) for element in drawn.iter()), name
@@ -276,9 +233,3 @@ def test_a_fault_of_a_table_is_an_error_and_no_fault_of_a_record(tmp_path, recor
     with pytest.raises(KeyError, match="a fault of ours"):
         written(tmp_path, records)
     assert len(RecordFile(tmp_path).read().records) == len(records)
-
-
-def test_without_records_there_is_no_report(tmp_path):
-    with pytest.raises(ValueError, match="no records"):
-        report.write(tmp_path / "empty")
-    assert not (tmp_path / "empty").exists()

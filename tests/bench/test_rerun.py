@@ -207,7 +207,11 @@ def test_what_cannot_be_measured_is_said_and_nothing_is_left(repository):
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="reads the states of processes in /proc")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, signal.SIGKILL,
+     *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGTERM, signal.SIGHUP))],
+)  # fmt: skip
 def test_a_signal_leaves_no_worktree_no_file_and_no_process(number, repository, temporary, start):
     """Ctrl-C goes to the terminal's whole group; what SIGKILL leaves, the next start removes."""
     measure_endlessly(repository)

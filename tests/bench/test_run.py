@@ -305,7 +305,7 @@ def without_times(folder):
 
 
 @pytest.mark.parametrize(
-    "kills", [5, pytest.param(50, marks=pytest.mark.slow)], ids=lambda kills: f"{kills} kills"
+    "kills", [3, pytest.param(50, marks=pytest.mark.slow)], ids=lambda kills: f"{kills} kills"
 )
 def test_kills_at_random_moments_lose_nothing_finished_and_repeat_nothing(tmp_path, kills):
     chance, measured, folder, undisturbed = random.Random(12), [], tmp_path / "a", tmp_path / "b"

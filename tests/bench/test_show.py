@@ -231,61 +231,29 @@ def test_ours_alone_makes_a_page_of_one_arm(capsys, tmp_path, options):
     assert max(errors(tmp_path / "star.html")[0]) <= 1e-4
 
 
+FORWARD = "def forward_kinematics(parents): return 0"
+TRACKS = "def track(curve): return curve"
+RAISES = "def inverse_kinematics(target): raise KeyError('oh')"
 FAULTS = {
-    "no such function": (
-        "def solve(x): return x",
-        ["circle"],
-        "expected functions named as some of forward_kinematics, inverse_kinematics",
-        "got solve",
-    ),
-    "a function of another task": (
-        "def forward_kinematics(parents): return 0",
-        ["circle"],
-        "expected a solver with a function track or inverse_kinematics for an arm",
-        "which has forward_kinematics; plumbob verify --list",
-    ),
-    "of no scene": (
-        "def forward_kinematics(parents): return 0",
-        [],
-        "track or inverse_kinematics or mass_spring_step or mass_spring_motion",
-        "which has forward_kinematics",
-    ),
-    "an arm for a cloth": (
-        "def track(curve): return curve",
-        ["cloth"],
-        "mass_spring_step or mass_spring_motion for a cloth",
-        "which has track",
-    ),
-    "it raises": (
-        "def inverse_kinematics(target): raise KeyError('oh')",
-        ["circle"],
-        "expected an answer to frame 1 of",
-        "It raised KeyError in line 1 of mine.py: 'oh'",
-    ),
-    "no pose": (
-        "def inverse_kinematics(target): return {'residual': 0.5}",
-        ["circle"],
-        "expected positions in the answer",
-        "got residual",
-    ),
-    "a syntax error": ("def f(:", ["circle"], "expected a solver, got", "SyntaxError in line 1"),
-    "no motions as bones": (
-        "def track(curve): return curve",
-        ["circle", "-o", "a.bvh"],
-        "suffix of the file: expected one of .gif, .svg, .html",
-        "'.bvh'",
-    ),
-}
+    "no such function": ("def solve(x): return x", ["circle"], "inverse_kinematics.*got solve"),
+    "of another task": (FORWARD, ["circle"], "inverse_kinematics for an arm.*has forward_kin"),
+    "of no scene": (FORWARD, [], "mass_spring_motion.*which has forward_kinematics"),
+    "an arm for a cloth": (TRACKS, ["cloth"], "mass_spring_motion for a cloth.*has track"),
+    "it raises": (RAISES, ["circle"], "frame 1 of.*raised KeyError in line 1 of mine.py: 'oh'"),
+    "no pose": ("def inverse_kinematics(target): return {'residual': 0.5}", ["circle"],
+                "expected positions in the answer.*got residual"),
+    "a syntax error": ("def f(:", ["circle"], "expected a solver, got.*SyntaxError in line 1"),
+    "no motions as bones": (TRACKS, ["circle", "-o", "a.bvh"], "one of .gif, .svg, .html.*'.bvh'"),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FAULTS)
-def test_what_is_wrong_with_a_solver_is_said_in_a_sentence(capsys, tmp_path, name):
-    text, arguments, expected, got = FAULTS[name]
-    mine = file(tmp_path, "mine.py", text)
-    code, out, err = show(capsys, "--with", mine, *arguments)
+@pytest.mark.parametrize(("text", "arguments", "words"), FAULTS.values(), ids=FAULTS)
+def test_what_is_wrong_with_a_solver_is_said_in_a_sentence(
+    capsys, tmp_path, text, arguments, words
+):
+    code, out, err = show(capsys, "--with", file(tmp_path, "mine.py", text), *arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert expected in err
-    assert got in err
+    assert re.search(words, err), err
 
 
 def test_a_file_that_is_not_there_and_two_solvers_are_refused(capsys):

@@ -1,6 +1,5 @@
 """The user's solvers come first: where they stand, what they raised, and a bench's last lines."""
 
-import contextlib
 import re
 import sys
 import threading
@@ -8,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from browser import CHROMIUM, Browser
 
 from plumbob import terminal
 from plumbob.bench.harness import metrics
@@ -282,22 +280,3 @@ def test_what_fails_alike_is_said_once_and_counted(tmp_path, monkeypatch, capsys
         "plumbob: ik: chain/near, Mine and 1 more: It raised",
         "plumbob: ik: robots/all, Mine: It crashed",
     ]
-
-
-def test_in_a_browser_the_solver_of_the_user_is_in_sight_at_once(make, tmp_path):
-    """At a desk and on a phone, and nothing scrolls sideways."""
-    if not CHROMIUM:
-        pytest.skip("the page is looked at in Chromium, which is not installed")
-    page = report.write(run_folder(make, tmp_path)).page.as_uri()
-    (tmp_path / "profile").mkdir()
-    with contextlib.closing(Browser(tmp_path / "profile")) as browser:
-        for width, height in ((1440, 900), (390, 844)):
-            browser.open(page, width, height)
-            heading, answer = browser.run(
-                "[...document.querySelectorAll('#answers h1, #answers .card dd:first-of-type')]"
-                ".slice(0, 2).map(e => [e.textContent.trim(), e.getBoundingClientRect().bottom])"
-            )
-            assert heading[0] == "Mine, robots, one start: rank 3 of 3 solvers"
-            assert answer[0].startswith("rank 3 of 3 solvers 75 % of 200 targets solved")
-            assert heading[1] < answer[1] < height
-            assert browser.run("document.documentElement.scrollWidth") <= width

@@ -27,7 +27,3 @@ def test_every_command_of_the_page_on_tables_runs(line, capsys, tmp_path, monkey
     assert out
     if "-o" in words:
         assert (tmp_path / words[words.index("-o") + 1]).stat().st_size > 0
-
-
-def test_there_are_such_commands():
-    assert len(COMMANDS) > 10

@@ -14,7 +14,7 @@ from plumbob.bench.experiments.timing import cloth, kinematics, measurement
 from plumbob.bench.experiments.timing.case import (
     COMPILED,
     LIMIT,
-    Case,
+    TimedCase,
     TimedWork,
     copying,
     stream,
@@ -69,8 +69,8 @@ def fails():
 def compared(monkeypatch):
     """The names of two cases as they are called, compared with a third that fails."""
     called = []
-    made = [Case(WORK, name, lambda name=name: lambda: called.append(name)) for name in "ab"]
-    made.append(Case(WORK, "c", fails))
+    made = [TimedCase(WORK, name, lambda name=name: lambda: called.append(name)) for name in "ab"]
+    made.append(TimedCase(WORK, "c", fails))
     monkeypatch.setattr(measurement, "cases", lambda: tuple(made))
     here = lambda patience, function, *arguments: function(*arguments)  # noqa: E731
     monkeypatch.setattr(measurement, "in_a_fresh_process", here)

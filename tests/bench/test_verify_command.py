@@ -282,13 +282,6 @@ def test_template_is_written_once_with_its_next_commands(capsys, folder, templat
     assert not (folder / "solver.cpp").exists()
 
 
-def test_help_has_examples(capsys):
-    code, out, _ = plumbob(capsys, "--help")
-    assert code == 0
-    assert "plumbob verify my_ik.py" in out
-    assert "plumbob verify -- ./my_solver --flag" in out
-
-
 MISUSE = {
     "no solver": ([], "plumbob verify --template python writes a starter"),
     "nothing behind --": (["--"], "expected a Python file, module:object, or -- and a program"),

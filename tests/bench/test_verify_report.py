@@ -1,6 +1,5 @@
 """What is told about a solver: one screen, JSON, JUnit XML, a page, in two languages."""
 
-import html.parser
 import json
 import re
 import xml.etree.ElementTree as ET
@@ -9,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from html_page import Page
 from rich.cells import cell_len
 from small_discipline import SMALL, own_rotation
 
@@ -27,20 +27,8 @@ from plumbob.crosscheck.verify.judgement import (
     Verdict,
 )
 from plumbob.crosscheck.verify.language import translator
-from plumbob.crosscheck.verify.output import (
-    comparison,
-    drawing,
-    json_file,
-    junit,
-    page,
-    terminal,
-)
-from plumbob.crosscheck.verify.output.words import (
-    GOOD,
-    Presentation,
-    explanations,
-    speaker,
-)
+from plumbob.crosscheck.verify.output import comparison, drawing, json_file, junit, page, terminal
+from plumbob.crosscheck.verify.output.words import GOOD, Presentation, explanations, speaker
 from plumbob.crosscheck.verify.sentence import Sentence, sentence
 from plumbob.reference import Skeleton, forward_kinematics
 
@@ -105,36 +93,6 @@ def every_sentence(report):
 
 def normal(text):
     return " ".join(text.split())
-
-
-class Page(html.parser.HTMLParser):
-    """The tags of a page, those left open, and its text."""
-
-    VOID = ("meta", "link", "br")
-
-    def __init__(self, text):
-        super().__init__()
-        self.tags, self.open, self.texts, self.links = [], [], [], []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-        self.links += [value for name, value in attributes if name in ("href", "src")]
-        assert not any(name.startswith("on") for name, _ in attributes)
-        if tag not in self.VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attributes):
-        self.handle_starttag(tag, attributes)
-        if tag not in self.VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if "style" not in self.open:
-            self.texts.append(data)
 
 
 FILES = {("forward_kinematics", ""): Path("plumbob_failures/forward_kinematics.json")}
@@ -344,7 +302,7 @@ def test_junit_skips_what_nobody_can_tell_and_passes_reservations():
 def test_page_is_self_contained_and_escapes_the_texts_of_a_solver(wrong):
     text = page.render(wrong, shown(files=FILES))
     parsed = Page(text)
-    assert parsed.open == []
+    assert parsed.open == parsed.wrong == []
     assert all(link.startswith("#") for link in parsed.links)
     assert not re.search(r"url\((?!#)", text)
     words = normal(" ".join(parsed.texts))
@@ -441,12 +399,6 @@ def test_rounded_output_is_not_shown_beside_a_wrong_one():
     negated = {"rotations": -ours["rotations"]}
     del ours["positions"]
     assert comparison.rows(answered("forward_kinematics", {}, negated, ours)) == []
-
-
-@pytest.mark.parametrize("gap", [1.0, 1e-6, 1e-14])
-def test_numbers_have_digits_enough_to_differ(gap):
-    answer, expected = comparison.texts(comparison.NumberRow("x", [1.0, 2.0], [1.0, 2.0 + gap]))
-    assert answer != expected
 
 
 def test_lengths_of_answers_of_other_shapes_are_compared():

@@ -95,17 +95,8 @@ QUICK |= {("stranger", "preparing"), ("close", "preparing")}
 
 
 @pytest.fixture(scope="module")
-def jobs(tmp_path_factory):
-    """The module of the jobs, which the worker can import too."""
-    folder = tmp_path_factory.mktemp("jobs")
-    (folder / "dying_jobs.py").write_text(JOBS)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(folder))
-        patch.syspath_prepend(folder)
-        import dying_jobs
-
-        yield dying_jobs
-    sys.modules.pop("dying_jobs", None)
+def jobs(importable):
+    return importable("dying_jobs", JOBS)
 
 
 @pytest.fixture

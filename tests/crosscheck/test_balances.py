@@ -8,26 +8,6 @@ from plumbob.crosscheck.tolerances import TOLERANCES
 from plumbob.reference.implicit_euler import ImplicitEuler
 
 
-def stepped(case, damped, **settings):
-    """A motion, and the end of a step of it."""
-    motion = samples.network(case, damped=damped)
-    integrator = ImplicitEuler(motion.system, h=motion.h, **settings)
-    x = integrator.step(motion.state, motion.external_forces).state.positions
-    assert np.abs(x - motion.state.positions).max() > 1e-3
-    return motion, x
-
-
-def residual(motion, x, external="its own"):
-    given = motion.external_forces if external == "its own" else external
-    return balance_residual(motion.system, motion.state, x, motion.h, given)
-
-
-def test_external_forces_and_gauss_newtons_linearisation_are_seen():
-    motion, x = stepped(0, damped=True, tolerance=1e-14)
-    assert residual(motion, x, external=None) > 1e-6
-    assert residual(*stepped(0, damped=True, solver="gauss_newton")) > 1e-6
-
-
 def test_moved_pins_are_where_the_step_took_them():
     system, state, external, h = samples.network(0, damped=False)
     pins_at = state.positions[system.pinned] + 0.1

@@ -15,11 +15,9 @@ from plumbob.crosscheck.engines import (
 from plumbob.crosscheck.engines.mujoco_mass_spring import add_point_mass
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.crosscheck.tolerances import TOLERANCES
-from plumbob.reference import rotation
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.mass_spring import MassSpring, State
 from plumbob.reference.scenes import lab_cloth
-from plumbob.reference.skeleton import Skeleton
 
 # Second differences of a step of 1e-6 m leave 1e-12; rounding over the step leaves 1e-10.
 DIFFERENCE_STEP = 1e-6
@@ -29,29 +27,6 @@ DIFFERENCE_TOLERANCE = 1e-8
 @pytest.fixture(params=SKELETON_ENGINES)
 def engine_of(request):
     return SKELETON_ENGINES[request.param]
-
-
-def quarter(axis):
-    return rotation.exponential(np.eye(3)[axis] * np.pi / 2)
-
-
-def test_quaternions_rotate_the_links_below(engine_of):
-    skeleton = Skeleton([-1, 0, 1], [[0.0, 0.0, 5.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    local = np.array([quarter(2), quarter(0), rotation.identity()])
-    pose = forward_kinematics_by(engine_of(skeleton), local)
-    assert np.allclose(pose.positions, [[0, 0, 5], [0, 1, 5], [0, 2, 5]], atol=1e-15)
-    assert np.allclose(rotation.angle(pose.rotations[0], quarter(2)), 0.0, atol=1e-15)
-    both = rotation.multiply(quarter(2), quarter(0))
-    assert np.allclose(rotation.angle(pose.rotations[1:], both), 0.0, atol=1e-15)
-
-
-def test_joints_are_found_by_name_where_the_engine_has_another_order(engine_of):
-    """A branch listed breadth-first, which MuJoCo reorders depth-first."""
-    offsets = np.diag([1.0, 2.0, 3.0])[[0, 0, 1, 2, 0]]
-    skeleton = Skeleton([-1, 0, 0, 1, 2], offsets, ["hip", "left", "right", "knee", "foot"])
-    pose = forward_kinematics_by(engine_of(skeleton), rotation.identity(5))
-    expected = [[1, 0, 0], [2, 0, 0], [1, 2, 0], [2, 0, 3], [2, 2, 0]]
-    assert np.array_equal(pose.positions, expected)
 
 
 def test_batches_keep_their_axes(engine_of):

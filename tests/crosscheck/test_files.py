@@ -274,8 +274,8 @@ def tree_of_hinges(count):
 
 
 def test_a_model_of_many_freedoms_is_compared_in_little_memory(folder):
-    """Five Jacobians of 1,001 links by 1,000 freedoms take 240 MB, and are needed several times."""
-    file = find([folder(a_urdf=tree_of_hinges(1000))]).files[0]
+    """Read whole, five Jacobians of 501 links by 500 freedoms would take 480 MB."""
+    file = find([folder(a_urdf=tree_of_hinges(500))]).files[0]
     files.prepare()
     tracemalloc.start()
     try:
@@ -430,16 +430,16 @@ def loud():
 
 
 def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
-    with closing(CallProcess(nothing, patience=0.5)) as child:
+    with closing(CallProcess(nothing, patience=0.3)) as child:
         first = child.call(loud)
         assert child.call(loud) == first != os.getpid()
         with pytest.raises(LostError, match="ends by SIGSEGV"):
             child.call(crash, signal.SIGSEGV)
         with pytest.raises(LostError, match="ends with code 3"):
             child.call(crash, 3)
-        with pytest.raises(LostError, match=r"takes more than 0\.5 s of processor time"):
+        with pytest.raises(LostError, match=r"takes more than 0\.3 s of processor time"):
             child.call(spin, 60.0)
-        with pytest.raises(LostError, match="gives no answer within 5 s"):
+        with pytest.raises(LostError, match="gives no answer within 3 s"):
             child.call(time.sleep, 60)
         assert child.call(loud) not in (first, os.getpid())
         process = child._child._process
@@ -451,8 +451,8 @@ def test_a_call_that_waits_for_the_processor_is_not_lost():
     """Only its own processor time counts: no waiting, no start, nothing between two calls."""
     with closing(CallProcess(partial(spin, 1.0), patience=0.5)) as child:
         process = child.call(os.getpid)
-        for _ in range(3):
-            child.call(time.sleep, 1.0)
+        for _ in range(2):
+            child.call(time.sleep, 0.7)
             child.call(spin, 0.3)
             child.call(str, SlowToReceive(0.3))
         assert child.call(os.getpid) == process

@@ -5,7 +5,6 @@ import pytest
 from drawn_trees import TREES, drawn
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from plumbob.reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
 from plumbob.reference.articulation import KINDS, clamp_ball, swing_twist
@@ -16,47 +15,6 @@ ROUNDING = 1e-13
 ANGLE = 1e-9
 
 at_both_speeds = drawn()
-
-
-def coordinates_by_joint(articulation, q):
-    """Return each joint's coordinates, those of mimic joints by their leaders'."""
-    q, values = list(q), {}
-    for j, kind in enumerate(articulation.kinds):
-        width = {"fixed": 0, "hinge": 1, "slide": 1, "ball": 4, "free": 7}[kind]
-        if j not in articulation.mimics:
-            values[j], q = q[:width], q[width:]
-    for j, (leader, multiplier, shift) in articulation.mimics.items():
-        values[j] = [multiplier * values[leader][0] + shift]
-    assert not q
-    return values
-
-
-def motion(kind, axis, value):
-    """Return the 4 x 4 transform by which coordinates move a joint from its frame."""
-    T = np.eye(4)
-    if kind == "hinge":
-        T[:3, :3] = Rotation.from_rotvec(value[0] * axis).as_matrix()
-    elif kind == "slide":
-        T[:3, 3] = value[0] * axis
-    elif kind == "ball":
-        T[:3, :3] = Rotation.from_quat(value, scalar_first=True).as_matrix()
-    elif kind == "free":
-        T[:3, 3] = value[:3]
-        T[:3, :3] = Rotation.from_quat(value[3:], scalar_first=True).as_matrix()
-    return T
-
-
-def by_matrices(articulation, q):
-    """Return all joints' 4 x 4 transforms, (joint, 4, 4), by other means than ours."""
-    values = coordinates_by_joint(articulation, q)
-    world = np.empty((articulation.joint_count, 4, 4))
-    for j, parent in enumerate(articulation.skeleton.parents):
-        frame = np.eye(4)
-        frame[:3, :3] = Rotation.from_quat(articulation.frames[j], scalar_first=True).as_matrix()
-        frame[:3, 3] = articulation.skeleton.offsets[j]
-        local = frame @ motion(articulation.kinds[j], articulation.axes[j], values[j])
-        world[j] = world[parent] @ local if parent >= 0 else local
-    return world
 
 
 def one(kind, *, axis=(0.0, 0.0, 1.0), offset=(0.0, 0.0, 0.0), **limits):
@@ -76,17 +34,6 @@ def arm(articulated):
 @pytest.fixture
 def q(arm, rng):
     return arm.random(rng)
-
-
-@at_both_speeds
-@given(**TREES)
-def test_forward_kinematics_is_a_product_of_transforms(articulated, backend, kinds, seed):
-    model = articulated(kinds, seed)
-    q = model.random(np.random.default_rng(seed))
-    pose, world = forward_kinematics(model, q), by_matrices(model, q)
-    np.testing.assert_allclose(pose.positions, world[:, :3, 3], rtol=0, atol=ROUNDING)
-    matrices = rotation.to_matrix(pose.rotations)
-    np.testing.assert_allclose(matrices, world[:, :3, :3], rtol=0, atol=ROUNDING)
 
 
 @at_both_speeds
@@ -128,14 +75,6 @@ def test_joints_are_found_by_name(arm):
     assert arm.names == arm.skeleton.names
     assert arm.index("joint3") == arm.index(-3) == 3
     assert arm.coordinates_of("joint3") == slice(2, 6)
-
-
-def test_a_mimic_joint_moves_with_its_leader(arm, q, backend):
-    offsets, _ = arm.local_transforms(q)
-    displacement = rotation.rotate(arm.frames[5], (-0.5 * q[1] + 0.3) * arm.axes[5])
-    np.testing.assert_allclose(
-        offsets[5], arm.skeleton.offsets[5] + displacement, rtol=0, atol=1e-15
-    )
 
 
 def test_a_mimic_of_a_mimic_moves_with_the_first(backend):
@@ -318,15 +257,11 @@ def test_slightly_long_quaternions_are_normalised_once(arm, q, backend):
     ("arguments", "message"),
     [
         ({"kinds": ["hinge"]}, "kinds: expected 3 kinds, one a joint, got 1"),
-        ({"kinds": "wheel"}, "kinds: expected one of fixed, hinge, .*, got 'wheel'"),
-        ({"axes": [0, 0, 0]}, "axes: expected lengths of at least 1e-75, got 0"),
         ({"axes": np.ones((2, 3))}, r"axes: expected one, or one for each of 3 joints, got \(2,\)"),
-        ({"frames": [1.0, 1.0, 0.0, 0.0]}, "frames: expected unit quaternions"),
         ({"frames": rotation.identity(2)}, "frames: expected one, or one for each of 3 joints"),
         ({"lower": [1.0, 2.0]}, "lower: expected one, or one for each of 3 joints"),
         ({"lower": 3.2}, "lower: expected limits of a ball's twist .* got 3.2 to inf for joint 2"),
         ({"upper": -3.2}, "lower: expected limits of a ball's twist .* got -inf to -3.2"),
-        ({"cones": -1.0}, "cones: expected none below 0, got -1"),
         ({"cones": [1.0, 2.0]}, "cones: expected one, or one for each of 3 joints"),
         ({"mimics": {1: Mimic("hip")}}, "mimics: expected one of .* got 'hip'"),
         ({"mimics": {1: Mimic(2)}}, "mimics: expected hinges or slides, got 'ball' for joint 2"),
@@ -339,10 +274,3 @@ def test_bad_arguments_are_named(arguments, message):
     tree = Skeleton([-1, 0, 1], np.ones((3, 3)))
     with pytest.raises(ValueError, match=message):
         Articulation(**{"skeleton": tree, "kinds": ["hinge", "slide", "ball"]} | arguments)
-
-
-@pytest.mark.parametrize("ask", ["index", "coordinates_of", "freedoms_of"])
-@pytest.mark.parametrize("joint", ["hip", 6, -7, 1.0])
-def test_an_unknown_joint_is_named(ask, joint, arm):
-    with pytest.raises(ValueError, match="joint: expected"):
-        getattr(arm, ask)(joint)

@@ -10,21 +10,15 @@ from plumbob.reference.backend import compiled
 from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
 from plumbob.reference.implicit_euler.line_search import line_search
 from plumbob.reference.implicit_euler.local_global import PLAIN
-from plumbob.reference.implicit_euler.objective import Objective, global_matrix
+from plumbob.reference.implicit_euler.objective import global_matrix
 from plumbob.reference.mass_spring import (
     MassSpring,
     State,
-    derivation,
-    forces,
     lengths,
 )
 from plumbob.reference.outcome import Outcome
 
 h = 0.05
-# A central difference is off by DX² times the third derivative and by precision / DX.
-DX = 6e-6
-DIFFERENCE = 1e-8
-
 CONVERGING = ["local_global", "chebyshev", "lbfgs", "newton", "newton_cg"]
 
 
@@ -46,15 +40,6 @@ def stepped(system, state, solver="newton", external_forces=None, **settings):
     return ImplicitEuler(system, **{"h": h, "solver": solver} | settings).step(
         state, external_forces
     )
-
-
-def converged(system, state, solver, **settings):
-    """Return the state after a step solved as far as rounding allows."""
-    limits = {"local_global": 3000, "chebyshev": 500, "lbfgs": 500, "gauss_newton": 1}
-    limit = limits.get(solver, 50)
-    result = stepped(system, state, solver, tolerance=1e-15, max_iterations=limit, **settings)
-    assert result.at_floor or solver == "gauss_newton"
-    return result.state
 
 
 def beside(system, x_n):
@@ -94,82 +79,19 @@ class TestObjective:
         energy = np.sum(k / 2 * stretch**2) - np.sum(objective.external * x)
         assert objective.value(x) == pytest.approx(inertia + h * h * energy, rel=1e-14, abs=0)
 
-    def test_gradient_is_the_slope_of_the_value(self, problem, backend):
-        objective, x = problem
-        expected = np.zeros((7, 3))
-        for where in itertools.product(np.flatnonzero(objective.system.free), range(3)):
-            step = np.zeros((7, 3))
-            step[where] = DX
-            rise = objective.value(x + step) - objective.value(x - step)
-            expected[where] = rise / (2 * DX)
-        scale = np.abs(expected).max()
-        np.testing.assert_allclose(objective.gradient(x), expected, atol=DIFFERENCE * scale)
-
-    def test_hessian_is_the_slope_of_the_gradient_and_the_identity_at_pins(self, problem, backend):
-        objective, x = problem
-        expected = np.zeros((21, 21))
-        for i in range(21):
-            step = np.zeros(21)
-            step[i] = DX
-            step = step.reshape(7, 3)
-            rise = objective.gradient(x + step) - objective.gradient(x - step)
-            expected[i] = rise.ravel() / (2 * DX)
-        expected[6:9] = expected[:, 6:9] = 0
-        expected[6:9, 6:9] = np.eye(3)
-        scale = np.abs(expected).max()
-        np.testing.assert_allclose(
-            objective.hessian(x).toarray(), expected, atol=DIFFERENCE * scale
-        )
-
     def test_quadratic_form_is_g_where_d_is_optimal(self, problem, backend):
         objective, x = problem
         form = objective.quadratic_form(x, objective.rest_vectors(x))
         assert form == pytest.approx(objective.value(x), rel=1e-13, abs=0)
 
-    def test_a_wrong_step_is_named(self, network):
-        for wrong in (0.0, -1.0, np.nan, "fast"):
-            with pytest.raises(ValueError, match=r"^h: expected a"):
-                Objective(*network, wrong)
-        with pytest.raises(ValueError, match=r"^system: expected a MassSpring"):
-            Objective(None, network[1], h)
-        with pytest.raises(ValueError, match=r"^start: expected one of y, x_n, got 'z'"):
-            Objective(*network, h, start="z")
-
 
 class TestStep:
-    @pytest.mark.parametrize("name", CONVERGING)
-    def test_momentum_balances_the_forces_at_the_end_of_the_step(self, network, rng, backend, name):
-        """M (v' - v) = h f(x'), the dampers pulling with c (l' - l_n) / h."""
-        system, state = network
-        given = outer(rng)
-        after = converged(system, state, name, external_forces=given)
-        x_n, x = state.positions, after.positions
-        resting = State(x, np.zeros((7, 3)))
-        p = derivation(system).A.T @ x
-        u = p / np.linalg.norm(p, axis=1)[:, None]
-        rates = (lengths(system, x) - lengths(system, x_n)) / h
-        dampers = -(derivation(system).A @ ((system.dampings * rates)[:, None] * u))
-        gained = system.masses[:, None] * (after.velocities - state.velocities)
-        expected = h * (forces(system, resting, given) + dampers)
-        free = system.free
-        scale = np.abs(expected).max()
-        np.testing.assert_allclose(gained[free], expected[free], rtol=0, atol=1e-12 * scale)
-
     def test_velocities_are_displacements_over_h(self, network, solver, backend):
         after = stepped(*network, solver, max_iterations=2).state
         displacement = after.positions - network[1].positions
         np.testing.assert_array_equal(after.velocities, displacement / h)
         assert (displacement[2] == 0).all()  # the pin's
         assert np.abs(displacement).max() > 0.01
-
-    @pytest.mark.parametrize("name", ["local_global", "chebyshev", "lbfgs", "newton_cg"])
-    def test_every_solver_meets_newton(self, network, cloth, name):
-        for system, state in (network, cloth):
-            one, other = (converged(system, state, solver) for solver in (name, "newton"))
-            assert np.abs(one.positions - state.positions).max() > 0.01
-            # Both gradients are at their floor, 1e-13 of the masses here, and the Hessian is above
-            # M/2.
-            np.testing.assert_allclose(one.positions, other.positions, rtol=0, atol=1e-12)
 
     @pytest.mark.parametrize(("name", "iterations"), [("lbfgs", 1), ("chebyshev", PLAIN)])
     def test_without_a_past_they_step_as_local_global(self, cloth, backend, name, iterations):
@@ -190,7 +112,7 @@ class TestStep:
     @pytest.mark.parametrize("name", ["local_global", "chebyshev", "lbfgs", "newton_cg"])
     def test_g_never_grows_in_an_iteration(self, cloth, backend, name):
         integrator = ImplicitEuler(*cloth[:1], h=h, solver=name)
-        iterates = list(itertools.islice(integrator.iterates(cloth[1]), 60))
+        iterates = list(itertools.islice(integrator.iterates(cloth[1]), 30))
         for before, after in itertools.pairwise(iterates):
             assert after.value <= before.value + after.value_floor
         assert iterates[-1].value < iterates[0].value - 1e-4
@@ -385,13 +307,6 @@ class TestResidual:
         for x in (objective.y, objective.x_n + 5.0, 1e-3 * objective.y, np.ones((7, 3))):
             iterate = objective.evaluate(x)
             assert iterate.floor <= iterate.floor_bound <= 3 * iterate.floor
-
-    def test_at_the_floor_the_gradient_is_rounding(self, network, rng):
-        given = outer(rng)
-        result = stepped(*network, "newton", given, tolerance=1e-75)
-        norm, _, floor = self.residual(*network, result.state.positions, given)
-        assert result.at_floor
-        assert norm <= 2 * floor
 
     @pytest.mark.parametrize("name", ["value", "quadratic_form"])
     def test_an_objective_that_overflows_is_an_error(self, name, backend):
@@ -651,14 +566,6 @@ class TestUnusualSystems:
         after = stepped(system, state, solver).state
         expected = [[1.0, -0.5, 0], [0, -0.5, 0]]
         np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-15)
-
-    def test_a_system_that_is_all_pins_stays(self, solver, backend):
-        system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
-        state = State(np.eye(3)[:2], np.ones((2, 3)))
-        result = stepped(system, state, solver)
-        assert (result.outcome, result.residual) == (Outcome.CONVERGED, 0)
-        np.testing.assert_array_equal(result.state.positions, state.positions)
-        np.testing.assert_array_equal(result.state.velocities, np.zeros((2, 3)))
 
     @pytest.mark.parametrize("name", CONVERGING)
     def test_coincident_particles_are_driven_apart(self, name, backend):

@@ -114,27 +114,6 @@ def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, backend):
             jacobians(arm, q, wrong)
 
 
-def test_joints_off_the_path_have_columns_of_zero(arm, q, backend):
-    for effector in range(arm.joint_count):
-        moved_by = {5: 2, 6: 1}
-        leaders = {moved_by.get(int(j), int(j)) for j in arm.skeleton.path(effector)}
-        J = jacobian(arm, q, effector)
-        for j in (1, 2, 3, 4):
-            assert J[:, arm.freedoms_of(j)].any() == (j in leaders)
-
-
-def test_a_mimic_adds_to_its_leaders_column_by_the_chain_rule(arm, q, backend):
-    """The joints released: every column of a mimic joint times its multiplier."""
-    released = Articulation(arm.skeleton, arm.kinds, arm.axes, frames=arm.frames)
-    single = np.array([-0.5 * q[1] + 0.3, 2.0 * q[0] + 0.1])
-    J = jacobians(released, np.concatenate([q, single]))
-    joined = J[..., :-2].copy()
-    joined[..., 1] += -0.5 * J[..., -2]
-    joined[..., 0] += 2.0 * J[..., -1]
-    np.testing.assert_allclose(jacobians(arm, q), joined, rtol=0, atol=ROUNDING)
-    assert J[..., -2:].any(axis=(0, 1)).all()
-
-
 def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, rng, backend):
     balls, v = Articulation(skeleton), rng.standard_normal(18)
     assert (jacobians(skeleton, local) == jacobians(balls, local.ravel())).all()

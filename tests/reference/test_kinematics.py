@@ -6,7 +6,6 @@ from plumbob.reference import (
     kinematics,
     local_from_global,
     rotation,
-    scenes,
     set_num_threads,
 )
 from plumbob.reference.backend import compiled
@@ -14,25 +13,6 @@ from plumbob.reference.backend.simd.vectors import LANES
 
 # Six joints: a dozen products and sums of numbers of order one.
 ROUNDING = 1e-14
-
-
-def by_matrices(skeleton, local):
-    """Return positions and rotation matrices by 4 x 4 transforms, an independent formulation."""
-    world = np.empty((skeleton.joint_count, 4, 4))
-    for j, parent in enumerate(skeleton.parents):
-        T = np.eye(4)
-        T[:3, :3] = rotation.to_matrix(local[j])
-        T[:3, 3] = skeleton.offsets[j]
-        world[j] = world[parent] @ T if parent >= 0 else T
-    return world[:, :3, 3], world[:, :3, :3]
-
-
-def test_forward_kinematics_equals_a_product_of_transforms(skeleton, local, backend):
-    pose = forward_kinematics(skeleton, local)
-    positions, matrices = by_matrices(skeleton, local)
-    np.testing.assert_allclose(pose.positions, positions, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(rotation.to_matrix(pose.rotations), matrices, rtol=0, atol=ROUNDING)
-    assert np.ptp(pose.positions, axis=0).min() > 0.01
 
 
 # Fewer poses than lanes, as many, one more; a last tile that overlaps; several tiles.
@@ -85,39 +65,6 @@ def test_one_bad_quaternion_in_a_batch_is_found(
         convert(skeleton, rotations)
 
 
-def test_the_lab_arm_hangs_at_its_heights(backend):
-    arm, rest = scenes.lab_arm()
-    heights = forward_kinematics(arm, rest).positions[:, 1]
-    np.testing.assert_allclose(heights, [1.7, 0.9, 0.5, 0.3, -0.9], rtol=0, atol=1e-15)
-
-
-def test_a_joint_moves_only_what_hangs_below_it(skeleton, local, rng, backend):
-    before = forward_kinematics(skeleton, local)
-    for j in range(skeleton.joint_count):
-        turned = local.copy()
-        turned[j] = rotation.random(rng)
-        after = forward_kinematics(skeleton, turned)
-        below = np.array([j in skeleton.path(k)[:-1] for k in range(skeleton.joint_count)])
-        assert (after.positions[~below] == before.positions[~below]).all()
-        assert (after.positions[below] != before.positions[below]).any(axis=-1).all()
-
-
-def test_local_rotations_come_back_from_global_ones(skeleton, local, backend):
-    rotations = forward_kinematics(skeleton, local).rotations
-    np.testing.assert_allclose(local_from_global(skeleton, rotations), local, rtol=0, atol=ROUNDING)
-
-
-def test_a_batch_is_its_poses(skeleton, rng, backend):
-    local = rotation.random(rng, 2, 3, skeleton.joint_count)
-    batch = forward_kinematics(skeleton, local)
-    assert batch.positions.shape == (2, 3, 6, 3)
-    one = forward_kinematics(skeleton, local[1, 2])
-    assert (batch.positions[1, 2] == one.positions).all()
-    assert (batch.rotations[1, 2] == one.rotations).all()
-    assert (local_from_global(skeleton, batch.rotations)[1, 2]
-            == local_from_global(skeleton, one.rotations)).all()  # fmt: skip
-
-
 def test_an_empty_batch_gives_an_empty_pose(skeleton, backend):
     assert forward_kinematics(skeleton, np.empty((0, 6, 4))).positions.shape == (0, 6, 3)
 
@@ -139,23 +86,3 @@ def test_lengths_on_the_edge_of_the_tolerance_are_normalised_too(skeleton, local
     np.testing.assert_allclose(edge.positions, exact.positions, rtol=0, atol=ROUNDING)
     back = local_from_global(skeleton, exact.rotations * (1.0 + excess))
     np.testing.assert_allclose(back, local, rtol=0, atol=ROUNDING)
-
-
-@pytest.mark.parametrize("convert", [forward_kinematics, local_from_global])
-def test_a_scene_not_unpacked_is_named(convert):
-    with pytest.raises(ValueError, match=r"skeleton: expected a Skeleton.*, got tuple"):
-        convert(scenes.lab_arm(), rotation.identity(5))
-
-
-@pytest.mark.parametrize("convert", [forward_kinematics, local_from_global])
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda q: 0.0 * q, "expected unit quaternions .* length 0 at index"),
-        (lambda q: 1.00001 * q, "expected unit quaternions"),
-        (lambda q: 0.99999 * q, "expected unit quaternions"),
-    ],
-)
-def test_bad_rotations_are_named(convert, change, message, skeleton, local, backend):
-    with pytest.raises(ValueError, match=f"rotations: {message}"):
-        convert(skeleton, change(local))

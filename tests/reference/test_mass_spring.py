@@ -17,28 +17,12 @@ from plumbob.reference.mass_spring import (
     lengths,
     potential_energy,
     rest_vectors,
-    spring_energy,
     spring_forces,
     stiffness_matrix,
 )
 
 # Sums of a few dozen terms round by a few units in the last place of the largest.
 ROUNDING = 1e-14
-# A central difference with the step DX, the cube root of the machine's precision, is off by
-# DX² times the third derivative and by precision/DX times the value: 1e-10 of either.
-DX = 6e-6
-DIFFERENCE = 1e-8
-
-
-def slope(function, x):
-    """Return the derivatives of a function of positions by central differences, last axis x."""
-    columns = []
-    for i in range(x.size):
-        step = np.zeros(x.size)
-        step[i] = DX
-        step = step.reshape(x.shape)
-        columns.append((function(x + step) - function(x - step)) / (2 * DX))
-    return np.stack(columns, axis=-1)
 
 
 def assert_close(actual, expected, tolerance=ROUNDING):
@@ -57,33 +41,7 @@ def pair(**changes):
 PAIR = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, 0.0]])
 
 
-class TestByHand:
-    def test_energy_is_half_the_stiffness_times_the_stretch_squared(self, backend):
-        assert spring_energy(pair(), PAIR) == 0.5
-
-    def test_potential_energy_grows_upwards(self, backend):
-        assert potential_energy(pair(), PAIR) == 0.5 + 1.0 * 10 * 2.0
-        lifted = PAIR + np.array([0, 1, 0])
-        assert potential_energy(pair(), lifted) == 0.5 + 10 * 3.0 + 3 * 10 * 1.0
-
-    def test_kinetic_energy_weighs_with_the_masses(self):
-        state = State(PAIR, [[2.0, 0, 0], [0, 0, 1.0]])
-        assert kinetic_energy(pair(), state) == 0.5 * 1 * 4 + 0.5 * 3 * 1
-
-    def test_all_forces_together(self, backend):
-        state = State(PAIR, [[0.0, 3.0, 0.0], [0.0, 1.0, 0.0]])
-        external = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
-        expected = [[1.0, -2.0 - 1.0 - 10.0, 0.0], [0.0, 2.0 + 1.0 - 30.0, 2.0]]
-        np.testing.assert_array_equal(forces(pair(dampings=0.5), state, external), expected)
-
-
 class TestDerivatives:
-    def test_forces_are_the_negative_gradient_of_energy(self, network, backend):
-        system, state = network
-        resting = State(state.positions, np.zeros((7, 3)))
-        gradient = slope(lambda x: potential_energy(system, x), state.positions)
-        assert_close(-gradient.reshape(-1, 3), forces(system, resting), DIFFERENCE)
-
     def test_stiffness_matrix_is_symmetric_to_the_last_bit(self, network, backend):
         matrix = stiffness_matrix(network[0], network[1].positions)
         assert abs(matrix - matrix.T).max() == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plumbob.reference import scenes
-from plumbob.reference.mass_spring import forces, lengths, stretches
+from plumbob.reference.mass_spring import lengths, stretches
 
 SCENES = [scenes.lab_cloth, scenes.hanging_rope, scenes.grid_cloth, scenes.net, scenes.lattice]
 
@@ -178,14 +178,7 @@ class TestClothFromMesh:
             ({"triangles": [[0, 1, 2], [1, 0, 3], [2, 0, 1]]}, "^triangles: .*indices 0, 2"),
             ({"density": 1.0}, "^density, mass: .*got both"),
             ({"mass": None}, "^density, mass: .*neither"),
-            ({"mass": 0.0}, "^mass: "),
-            ({"mass": None, "density": 0.0}, "^density: "),
             ({"mass": None, "density": 1.0}, "^masses: .*free particles.*index 4"),
-            ({"stiffness": -1.0}, "^stiffness: "),
-            ({"bending_stiffness": np.nan}, "^bending_stiffness: "),
-            ({"damping": -1.0}, "^damping: "),
-            ({"pinned": [7]}, "^pinned: "),
-            ({"gravity": np.inf}, "^gravity: "),
         ],
     )
     def test_wrong_meshes_are_named(self, change, message):
@@ -231,17 +224,6 @@ class TestHangingRope:
         assert (state.positions[:, [0, 2]] == 0).all()
         assert system.pinned.tolist() == [0]
         assert system.springs.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]
-
-    def test_the_promised_equilibrium_is_one(self):
-        """Spring i is longer by the weight below it over its stiffness."""
-        system, state = scenes.hanging_rope(particles=6, mass=0.2, stiffness=50.0)
-        x = state.positions.copy()
-        below = 6 - 1 - np.arange(5)
-        x[1:, 1] = -np.cumsum(system.rest_lengths + below * 0.2 * 9.81 / 50.0)
-        pulls = forces(system, type(state)(x, np.zeros_like(x)))
-        # The springs' forces, of about 10 N, cancel the weights to rounding.
-        np.testing.assert_allclose(pulls[1:], 0, atol=1e-13)
-        assert pulls[0, 1] == pytest.approx(-6 * 0.2 * 9.81, rel=1e-13)
 
 
 @pytest.mark.parametrize("scene", SCENES)

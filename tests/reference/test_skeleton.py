@@ -62,12 +62,6 @@ def test_the_reach_is_the_links_total_length():
     assert skeleton.link_lengths.tolist() == [0.0, 5.0, 1.0]
 
 
-@pytest.mark.parametrize("joint", [5, -6, "arm", 1.0, True, None])
-def test_an_unknown_joint_is_refused(joint):
-    with pytest.raises(ValueError, match="joint: expected"):
-        Skeleton(**FORK).index(joint)
-
-
 @pytest.mark.parametrize("length", [1e-76, 1e-155, 1e-160])
 def test_a_link_whose_length_cannot_be_divided_by_is_refused(length):
     with pytest.raises(

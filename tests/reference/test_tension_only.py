@@ -110,18 +110,6 @@ class TestStep:
         np.testing.assert_allclose(state.positions[0], expected, rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        ("yes", "expected booleans"),
-        (None, "expected booleans"),
-    ],
-)
-def test_wrong_flags_are_named(value, message):
-    with pytest.raises(ValueError, match=f"^tension_only: .*{message}"):
-        rope(1.0, tension_only=value)
-
-
 def test_flags_are_copied_and_broadcast():
     given = np.array([True, False])
     system = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.0, 1.0, tension_only=given)

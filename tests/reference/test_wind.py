@@ -29,26 +29,16 @@ def plate():
 
 
 class TestByHand:
-    def test_a_plate_square_to_the_wind_feels_its_whole_dynamic_pressure(self, backend):
-        forces = wind_forces(*plate(), [0, 3.0, 0], density=1.2, drag=1.5, lift=0.7)
-        expected = 0.5 * 1.2 * 1.5 * 3.0**2 * 2.0 / 3
-        np.testing.assert_allclose(forces, [[0, expected, 0]] * 3, rtol=1e-15, atol=1e-15)
-
-    def test_there_is_no_force_on_a_plate_along_the_wind(self, backend):
-        np.testing.assert_array_equal(
-            wind_forces(*plate(), [3.0, 0, 4.0], **BOTH), np.zeros((3, 3))
-        )
-
-    @pytest.mark.parametrize("degrees", [20, 45, 70])
+    @pytest.mark.parametrize("degrees", [0, 20, 45, 70, 90])
     def test_drag_and_lift_go_with_the_angle_of_attack(self, backend, degrees):
         """Drag like its sine, lift like its sine times its cosine."""
         angle = np.radians(degrees)
         e, across = np.array([np.cos(angle), np.sin(angle), 0]), [-np.sin(angle), np.cos(angle), 0]
         total = wind_forces(*plate(), 5.0 * e, density=1.2, **BOTH).sum(axis=0)
         pressure = 0.5 * 1.2 * 25.0 * 2.0
-        assert total @ e == pytest.approx(1.1 * pressure * np.sin(angle), rel=1e-14)
+        assert total @ e == pytest.approx(1.1 * pressure * np.sin(angle), rel=1e-14, abs=1e-13)
         lift = 0.4 * pressure * np.sin(angle) * np.cos(angle)
-        assert total @ across == pytest.approx(lift, rel=1e-14)
+        assert total @ across == pytest.approx(lift, rel=1e-14, abs=1e-13)
         assert total[2] == 0
 
 
@@ -123,25 +113,3 @@ def test_there_is_no_force_on_a_triangle_without_area(backend):
     state = State([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [0, 0, 0]], np.zeros((4, 3)))
     forces = wind_forces(state, [[0, 1, 2], [0, 3, 1]], WIND, **BOTH)
     np.testing.assert_array_equal(forces, np.zeros((4, 3)))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"triangles": [[0, 1, 3]]}, "^triangles: .* from 0 to 2, got 3"),
-        ({"density": -1.0}, "^density: .*at least 0"),
-        ({"lift": "much"}, "^lift: .*number"),
-    ],
-)
-def test_wrong_arguments_are_named(change, message):
-    state, triangles = plate()
-    arguments = {"state": state, "triangles": triangles, "wind": WIND} | change
-    with pytest.raises(ValueError, match=message):
-        wind_forces(**arguments)
-
-
-def test_a_force_that_overflows_is_an_error(backend):
-    state, triangles = plate()
-    vast = State(1e74 * state.positions, state.velocities)
-    with np.errstate(over="ignore"), pytest.raises(FloatingPointError, match=r"^wind_forces: "):
-        wind_forces(vast, triangles, [0, 1e75, 0], density=1e75)

@@ -14,7 +14,7 @@ from plumbob.reference.arguments import FloatArray
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Outcome, raised
+from ...harness.isolation import JobOutcome, raised
 from ...harness.job import Job, worker_process
 from ...harness.measure import not_asked
 from ...harness.stopwatch import time_call
@@ -170,7 +170,7 @@ def solve_one_by_one(
 
 def _performed(
     requests: ChainRequests, peer: ChainPeer, tolerance: float, budget: float
-) -> Outcome:
+) -> JobOutcome:
     settings, skeleton = {"method": peer.method, **peer.spec}, requests.problem.skeleton
     limits = (tolerance, settings, 0, budget)
     return worker_process().perform(
@@ -178,7 +178,7 @@ def _performed(
     )
 
 
-def _answers(requests: ChainRequests, outcome: Outcome) -> tuple[FloatArray, FloatArray]:
+def _answers(requests: ChainRequests, outcome: JobOutcome) -> tuple[FloatArray, FloatArray]:
     """Return the joints' positions and the iterations of every target; NaN where there are none."""
     answers = np.full(requests.shape, np.nan)
     answers[: len(outcome.solved)] = [solve.q for solve in outcome.solved]

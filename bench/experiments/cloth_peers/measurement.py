@@ -17,7 +17,7 @@ from plumbob.reference import ImplicitEuler, MassSpring, State
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Outcome, WorkerProcess
+from ...harness.isolation import JobOutcome, WorkerProcess
 from ...harness.measure import not_installed
 from ...harness.values import Values
 from ...peers import registry
@@ -209,11 +209,11 @@ class RungResults:
         self._peer = peer
         self._remarks: list[tuple[int, str, bool]] = []  # particles, sentence, whether it failed
 
-    def run(self, cloth: FallingCloth, rung: Rung, shape: Shape) -> Outcome:
+    def run(self, cloth: FallingCloth, rung: Rung, shape: Shape) -> JobOutcome:
         """Return the outcome of a rung; a set-up that ran out of time is not repeated."""
         task = self._peer.module, self._peer.entrant_name, len(cloth.start.positions)
         if task in _given_up:
-            outcome = Outcome(0.0, [], _given_up[task])
+            outcome = JobOutcome(0.0, [], _given_up[task])
         else:
             outcome = worker_process().perform(job(self._peer, cloth, rung.settings, shape))
         if outcome.is_silent and not outcome.is_lost:
@@ -275,7 +275,7 @@ def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
     return results.measured(MotionWork, **certainty)
 
 
-def _distances(outcome: Outcome, truth: ClothTruth, extent: float) -> dict[str, Any]:
+def _distances(outcome: JobOutcome, truth: ClothTruth, extent: float) -> dict[str, Any]:
     """Return times, and distances from the references after the last frame that was reached."""
     frames = len(outcome.solved)
     seconds = np.array([frame.seconds for frame in outcome.solved])

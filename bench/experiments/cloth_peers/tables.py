@@ -267,7 +267,7 @@ def _liu_row(record: Record) -> Row:
     return {
         "record": record,
         "solver": label(record.solver),
-        "setting for a frame": frame.done,
+        "setting for a frame": frame.work,
         "published time": frame.seconds,
         "our time": metrics.spread(record.values.seconds).median,
         "our error": record.values.error,

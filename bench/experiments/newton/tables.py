@@ -44,9 +44,12 @@ def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
     solved = sum(r.values.at_floor or r.values.residual <= r.details.tolerance for r in newton)
     distances = [record.values.newton_distance for record in rivals if record.values.same]
     nearby = f", at most {words(max(distances))} m from Newton’s" if distances else ""
-    return Summary(
+    first = (
         f"Newton reached the tolerance or the rounding floor in {words(solved)} of "
-        f"{counted(len(newton), 'cloth')}. Of the other solvers’ "
+        f"{counted(len(newton), 'cloth')}. "
+    )
+    return Summary(
+        f"{first if newton else ''}Of the other solvers’ "
         f"{counted(len(rivals), 'solution')}, {words(len(distances))} are proven to belong to the "
         f"same minimiser{nearby}."
     )

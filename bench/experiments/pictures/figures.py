@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...figures.sketch import Sketch
-from ...figures.view import ARM_VIEW, CLOTH_VIEW, seen
+from ...figures.view import ARM_VIEW, CLOTH_VIEW, project
 from ...harness.record import Record
 from ...motion.motion import Moving, Scene
 from ...tables.captions import Captions
@@ -103,7 +103,7 @@ def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "ScalarMappable"
     from matplotlib.colors import LogNorm
 
     scale = ScalarMappable(LogNorm(1e-4, 1), mpl.colormaps["viridis"].resampled(SHADES))
-    points, shades = np.stack(seen(curve[:-1], ARM_VIEW)[:2], axis=-1), scale.to_rgba(spacing)
+    points, shades = np.stack(project(curve[:-1], ARM_VIEW)[:2], axis=-1), scale.to_rgba(spacing)
     for shade in np.unique(shades, axis=0):
         ends = points[(shades == shade).all(axis=-1)][:, None] + [[0, 0], [1e-3, 0], [np.nan, 0]]
         ax.plot(*ends.reshape(-1, 2).T, color=shade, lw=2, solid_capstyle="round", zorder=5)

@@ -31,7 +31,7 @@ class PublishedFrame(NamedTuple):
     """A time for one frame of a cloth [s], the work done in it, and our settings for the same."""
 
     seconds: float
-    done: str
+    work: str
     settings: dict[str, float]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...figures.chart import Panel, Series, declared_chart, series
 from ...figures.sketch import Sketch
-from ...figures.style import COLOURS, written
+from ...figures.style import COLOURS, plain_label
 from ...harness import metrics
 from ...harness.metrics import Floats
 from ...problems.robots import LIMIT_TOLERANCE
@@ -147,7 +147,7 @@ def draw_map(maps: RobotMaps) -> "Canvas":
     figure, axes = canvas(height, len(maps.panels) // rows, rows, sharey=True)
     for ax, (title, cells) in zip(axes, maps.panels.items(), strict=True):
         _draw_panel(ax, title, cells, maps.robots)
-    axes[0].set_yticks(range(len(maps.solvers)), [written(solver) for solver in maps.solvers])
+    axes[0].set_yticks(range(len(maps.solvers)), [plain_label(solver) for solver in maps.solvers])
     axes[0].invert_yaxis()
     return figure
 
@@ -161,7 +161,7 @@ def _draw_panel(
         ax.barh(i, 0.96, 0.92, j - 0.48, color=COLOURS["blue"], alpha=alpha, linewidth=0)
         ax.text(j, i, text, ha="center", va="center", fontsize=8)
     ax.set(title=title, xlim=(-0.5, len(robots) - 0.5), ylim=(-0.5, len(rows) - 0.5))
-    names = [written(robot) for robot in robots]
+    names = [plain_label(robot) for robot in robots]
     ax.set_xticks(range(len(robots)), names, rotation=25, ha="right", rotation_mode="anchor")
     ax.tick_params(length=0)
     ax.grid(visible=False)

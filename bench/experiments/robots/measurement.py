@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Outcome, raised
+from ...harness.isolation import JobOutcome, raised
 from ...harness.job import Job, worker_process
 from ...harness.measure import not_asked, not_installed
 from ...harness.stopwatch import Budget
@@ -81,9 +81,10 @@ def blocks(scale: Scale) -> Iterator[Block]:
             yield Block(SUITE, f"robots/{name}", "all solvers", absent, _ANY, 0, facts)
     peers = registry.robot_peers(scale.entrants)
     robots = [*installed, *own]
+    groups = ("robots", "unreachable")
+    owners = {f"{group}/{name}": problem for name, problem in own.items() for group in groups}
     for block in _drawn(block for peer in peers for block in _blocks_of(peer, robots, scale)):
-        name = block.problem.partition("/")[2]
-        yield block.on(own[name]) if name in own else block
+        yield block.on(owners[block.problem]) if block.problem in owners else block
     for entrant in scale.entrants:
         if entrant.offers(SUITE) and ROBOT_TASK not in entrant.tasks:
             measure, facts = partial(not_asked, NO_ROBOTS), _facts(REACHABLE, "every robot")
@@ -164,7 +165,7 @@ def solve(job: RobotJob, targets: Targets) -> Measured:
     )
 
 
-def _performed(job: RobotJob, targets: Targets, budget: Budget) -> Outcome:
+def _performed(job: RobotJob, targets: Targets, budget: Budget) -> JobOutcome:
     """Return the solves of targets; continue in a new process behind a target that crashes it."""
     peer, entry, robot = job.peer, job.entry, evaluator_of(job.robot).robot
     request = (peer.module, robot, targets, job.tolerance, {**entry.settings, **peer.spec})

@@ -12,7 +12,7 @@ from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import Peer, PeerEntry
 from ...tables.columns import words_in
-from ...tables.entered import entered
+from ...tables.entered import entrant_table
 from ...tables.layout import Layout, Row
 from ...tables.results import Results, counted, grouped, leaders, listed, steadiness
 from ...tables.table import INTERVAL, Column, Summary, in_unit, listing, words
@@ -293,4 +293,4 @@ unreachable = _layout(
     "robots_unreachable", readings.out_of_reach, _unreachable_row, summary=_unreachable_summary
 )
 
-LAYOUTS = (participants, over_all, robot_by_robot, outcomes, unreachable, entered)
+LAYOUTS = (participants, over_all, robot_by_robot, outcomes, unreachable, entrant_table)

@@ -32,7 +32,7 @@ class TimedWork(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Case:
+class TimedCase:
     """Work to be timed with an implementation."""
 
     work: TimedWork
@@ -49,13 +49,13 @@ class Case:
         return f"{self.work.problem}, {self.solver}"
 
 
-def copying(work: TimedWork, size: int, *, passes: int = 1, operations: int = 1) -> Case:
+def copying(work: TimedWork, size: int, *, passes: int = 1, operations: int = 1) -> TimedCase:
     """Return a yardstick of memory: copies that read and write as many bytes, half and half.
 
     Each pass moves `size` bytes, so that they come from as near a cache as the work's.
     """
     prepare = partial(_copies, size // 16, passes)
-    return Case(work, LIMIT, prepare, operations, moved=size * passes)
+    return TimedCase(work, LIMIT, prepare, operations, moved=size * passes)
 
 
 def _copies(numbers: int, passes: int) -> Callable[[], None]:
@@ -71,14 +71,14 @@ def _copies(numbers: int, passes: int) -> Callable[[], None]:
 def streaming(
     work: TimedWork, read: int, write: int, *, operations: int = 1,
     cores: int | None = 1, minimum: int = 0,
-) -> Case:  # fmt: skip
+) -> TimedCase:  # fmt: skip
     """Return a yardstick of memory: a compiled loop that reads and writes so many bytes.
 
     A processor reads the memory that it is about to write (write-allocate), which counts as moved.
     On several cores the loop is cut into slices that read at least `minimum` bytes each.
     """
     prepare = partial(_streams, read // 8, write // 8, minimum // 8)
-    return Case(work, LIMIT, prepare, operations, read + 2 * write, cores=cores)
+    return TimedCase(work, LIMIT, prepare, operations, read + 2 * write, cores=cores)
 
 
 def stream(source: FloatArray, sink: FloatArray) -> None:

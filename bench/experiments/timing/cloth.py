@@ -13,7 +13,7 @@ from plumbob.reference.implicit_euler.factor_cache import global_factor
 from plumbob.reference.sparse import CholeskyFactor
 
 from ..cloth.measurement import MIDDLE, ClothSwing, cloth_swing, converged_motion, motion
-from .case import COMPILED, PLAIN, Case, TimedWork, copying
+from .case import COMPILED, PLAIN, TimedCase, TimedWork, copying
 
 FACTORS = (1, 100)
 SUBSTEPS = ITERATIONS = 10
@@ -27,20 +27,20 @@ MUJOCO = "MuJoCo"
 Starter = Callable[[ClothSwing], Callable[[], Any]]
 
 
-def cases() -> Iterator[Case]:
+def cases() -> Iterator[TimedCase]:
     """Yield a frame of 1/60 s by four methods, at two stiffnesses, and of a larger cloth."""
     for factor in FACTORS:
         problem = cloth_swing(factor)
         for title, (reference, engine) in WORKS.items():
             work = _work(f"x{factor:g}", f"stiffness × {factor:g}", title)
-            yield Case(work, COMPILED, partial(reference, problem))
-            yield Case(work, PLAIN, partial(reference, problem), backend="python")
+            yield TimedCase(work, COMPILED, partial(reference, problem))
+            yield TimedCase(work, PLAIN, partial(reference, problem), backend="python")
             if engine:
-                yield Case(work, MUJOCO, partial(engine, problem))
+                yield TimedCase(work, MUJOCO, partial(engine, problem))
         yield solving(_work(f"x{factor:g}", f"stiffness × {factor:g}", LOCAL_GLOBAL), problem)
     large, group = cloth_swing(1, LARGE), f"{LARGE} × {LARGE} particles"
     work = _work(group, group, LOCAL_GLOBAL)
-    yield Case(work, COMPILED, partial(local_global, large))
+    yield TimedCase(work, COMPILED, partial(local_global, large))
     yield solving(work, large)
 
 
@@ -94,7 +94,7 @@ def moving(problem: ClothSwing) -> State:
     return motion(problem.start, MIDDLE, integrator)[-1]
 
 
-def solving(work: TimedWork, problem: ClothSwing) -> Case:
+def solving(work: TimedWork, problem: ClothSwing) -> TimedCase:
     """Return a copy of the bytes that the triangular solves read: L twice an iteration.
 
     A nonzero has eight bytes; a block of them shares its indices.

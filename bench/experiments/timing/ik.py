@@ -12,7 +12,7 @@ from ...peers import registry
 from ...peers.ik.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
 from ...problems.chains import chain_targets
 from ..chain.measurement import MAX_ITERATIONS, TOLERANCE
-from .case import COMPILED, PLAIN, Case, TimedWork
+from .case import COMPILED, PLAIN, TimedCase, TimedWork
 
 STRATA = ("near", "far")
 # Plain Python takes milliseconds a solve; the first targets of the same set are enough.
@@ -26,19 +26,23 @@ KINEMATICS: dict[str, type[SkeletonEngine] | type[ReferenceKinematics]] = {
 }
 
 
-def cases() -> Iterator[Case]:
+def cases() -> Iterator[TimedCase]:
     """Yield our solvers compiled, plain and in batches, and a Python loop on three kinematics."""
     for stratum in STRATA:
         for solver in IK_SOLVERS:
             work = _work(stratum, solver)
             single = partial(single_solves, stratum, solver)
-            yield Case(work, COMPILED, partial(single, TARGETS), TARGETS)
-            yield Case(work, PLAIN, partial(single, FEW_TARGETS), FEW_TARGETS, backend="python")
+            yield TimedCase(work, COMPILED, partial(single, TARGETS), TARGETS)
+            yield TimedCase(
+                work, PLAIN, partial(single, FEW_TARGETS), FEW_TARGETS, backend="python"
+            )
             calls = f"{TARGETS} targets a call"
             batch = work._replace(problem=f"{work.problem}/{calls}", title=f"{work.title}, {calls}")
-            yield Case(batch, COMPILED, partial(batch_solve, stratum, solver), TARGETS)
+            yield TimedCase(batch, COMPILED, partial(batch_solve, stratum, solver), TARGETS)
         for name in KINEMATICS:
-            yield Case(_work(stratum, LOOP), name, partial(loop_solves, stratum, name), TARGETS)
+            yield TimedCase(
+                _work(stratum, LOOP), name, partial(loop_solves, stratum, name), TARGETS
+            )
 
 
 def _work(stratum: str, solver: str) -> TimedWork:

@@ -11,7 +11,7 @@ from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes
 from plumbob.reference.kinematics import THREAD_JOINTS
 
-from .case import COMPILED, PLAIN, Case, TimedWork, streaming
+from .case import COMPILED, PLAIN, TimedCase, TimedWork, streaming
 
 # Bytes of each joint: its local rotation is read, its position and global rotation are written.
 READ, WRITE = 8 * 4, 8 * (3 + 4)
@@ -21,15 +21,15 @@ LONGER = 5
 LIMBS = ((0, 5), (0, 5), (0, 5), (4, 7), (4, 7))
 
 
-def cases() -> Iterator[Case]:
+def cases() -> Iterator[TimedCase]:
     """Yield single poses by everyone, and our batches, each with a plain copy of its bytes."""
     for name, (skeleton, batch) in models().items():
         size = skeleton.joint_count * np.array([READ, WRITE])
         pose = _work(name, "one pose a call")
-        yield Case(pose, COMPILED, partial(compiled_poses, skeleton))
-        yield Case(pose, PLAIN, partial(compiled_poses, skeleton), backend="python")
+        yield TimedCase(pose, COMPILED, partial(compiled_poses, skeleton))
+        yield TimedCase(pose, PLAIN, partial(compiled_poses, skeleton), backend="python")
         for engine in SKELETON_ENGINES:
-            yield Case(pose, engine, partial(engine_pose, engine, skeleton))
+            yield TimedCase(pose, engine, partial(engine_pose, engine, skeleton))
         yield streaming(pose, *size)
         for count, cores, suffix, minimum in (
             (batch, 1, "", 0),
@@ -37,7 +37,7 @@ def cases() -> Iterator[Case]:
         ):
             poses = _work(name, f"{count:,} poses a call{suffix}")
             prepare = partial(compiled_poses, skeleton, count)
-            yield Case(poses, COMPILED, prepare, count, cores=cores)
+            yield TimedCase(poses, COMPILED, prepare, count, cores=cores)
             yield streaming(poses, *(count * size), operations=count, cores=cores, minimum=minimum)
 
 

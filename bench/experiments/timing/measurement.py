@@ -19,7 +19,7 @@ from ...harness.machine import pace
 from ...harness.progress import announce
 from ...peers.protocol import describe
 from . import cloth, ik, kinematics
-from .case import Case
+from .case import TimedCase
 from .values import RoundTimes
 
 # Time limit of a case [s].
@@ -35,12 +35,12 @@ QUICK = 1e-3
 
 
 @functools.cache
-def cases() -> tuple[Case, ...]:
+def cases() -> tuple[TimedCase, ...]:
     """Return the cases of all subjects."""
     return tuple(case for subject in (kinematics, ik, cloth) for case in subject.cases())
 
 
-def compared(subject: str, group: str) -> list[Case]:
+def compared(subject: str, group: str) -> list[TimedCase]:
     """Return the cases of a group, which are compared."""
     return [c for c in cases() if (c.work.subject, c.work.group) == (subject, group)]
 
@@ -55,7 +55,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
                     facts=case.work.facts, budget=seconds)  # fmt: skip
 
 
-def measure_case(run: str, case: Case, seconds: float) -> Measured:
+def measure_case(run: str, case: TimedCase, seconds: float) -> Measured:
     """Return the rounds of a case, measured together with its group.
 
     Its facts are the variation of a fixed loop meanwhile, and a word that the group has in common.
@@ -103,7 +103,7 @@ def sweep(subject: str, group: str, seconds: float) -> dict[str, Any]:
     return {"rounds": rounds, "troubles": troubles, "paces": paces}
 
 
-def _rounds(case: Case, seconds: float) -> Iterator[list[float]]:
+def _rounds(case: TimedCase, seconds: float) -> Iterator[list[float]]:
     """Yield the times of a call in the rounds of each sweep [s].
 
     The call is prepared, compiled and counted before the first.

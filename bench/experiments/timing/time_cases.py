@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from plumbob.bench.experiments.timing.case import Case
+from plumbob.bench.experiments.timing.case import TimedCase
 from plumbob.bench.experiments.timing.measurement import cases
 from plumbob.reference import set_backend, set_num_threads
 
 
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
-def test_speed(benchmark: Any, case: Case) -> None:
+def test_speed(benchmark: Any, case: TimedCase) -> None:
     """Time a case as pytest-benchmark does; its first call, which may compile, is not counted."""
     with set_backend(case.backend), set_num_threads(case.cores):
         call = case.prepare()

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio
 
-from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, Tolerance
 
 STEP = 0.1
 DAMPING = 1e-12
 
 
-def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 1000) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 1000) -> Ask:
     """Return the loop, set up for a robot."""
     model = pinocchio_model(robot)
     data = model.createData()
@@ -65,7 +65,7 @@ def _error(
     return np.concatenate(errors), np.vstack(slopes)
 
 
-def pinocchio_model(robot: Robot) -> pinocchio.Model:
+def pinocchio_model(robot: BenchRobot) -> pinocchio.Model:
     """Return the robot in Pinocchio.
 
     Raises:
@@ -80,17 +80,17 @@ def pinocchio_model(robot: Robot) -> pinocchio.Model:
     return model
 
 
-def to_pinocchio(robot: Robot, q: FloatArray) -> FloatArray:
+def to_pinocchio(robot: BenchRobot, q: FloatArray) -> FloatArray:
     """Return coordinates with w at the end of quaternions."""
     return _permuted(robot, q, [1, 2, 3, 0])
 
 
-def from_pinocchio(robot: Robot, q: FloatArray) -> FloatArray:
+def from_pinocchio(robot: BenchRobot, q: FloatArray) -> FloatArray:
     """Return coordinates with w at the start of quaternions."""
     return _permuted(robot, q, [3, 0, 1, 2])
 
 
-def _permuted(robot: Robot, q: FloatArray, order: list[int]) -> FloatArray:
+def _permuted(robot: BenchRobot, q: FloatArray, order: list[int]) -> FloatArray:
     permuted = q.copy()
     for i in robot.balls:
         permuted[i : i + 4] = q[i : i + 4][order]

@@ -7,10 +7,19 @@ the joints' limits. DART's own restarts draw from a generator without a seed, so
 import dartpy
 import numpy as np
 
-from .protocol import Ask, FloatArray, Forward, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import (
+    Ask,
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    SolverOutput,
+    Tolerance,
+)
 
 
-def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 200) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 200) -> Ask:
     """Return the solver, set up for a robot."""
     skeleton = dart_skeleton(robot)
     ik = skeleton.getBodyNode(robot.effectors[0]).getIK(True)
@@ -36,7 +45,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 200) -> Ask:
     return ask
 
 
-def kinematics(robot: Robot) -> Forward:
+def kinematics(robot: BenchRobot) -> Forward:
     """Return DART's forward kinematics of the effector."""
     skeleton = dart_skeleton(robot)
     effector = skeleton.getBodyNode(robot.effectors[0])
@@ -49,7 +58,7 @@ def kinematics(robot: Robot) -> Forward:
     return forward
 
 
-def dart_skeleton(robot: Robot) -> dartpy.dynamics.Skeleton:
+def dart_skeleton(robot: BenchRobot) -> dartpy.dynamics.Skeleton:
     """Return a chain in DART, its root fixed in the world.
 
     Raises:

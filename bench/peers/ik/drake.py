@@ -19,7 +19,16 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.solvers import IpoptSolver, SnoptSolver, SolverOptions
 
-from .protocol import Ask, FloatArray, Forward, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import (
+    Ask,
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    SolverOutput,
+    Tolerance,
+)
 
 # The part of the tolerance that is asked for.
 INSIDE = 0.5
@@ -32,7 +41,7 @@ SOLVERS: dict[str, tuple[Any, str, str]] = {
 
 
 def prepare(
-    robot: Robot, tolerance: Tolerance, solver: str = "SNOPT", iterations: int = 200
+    robot: BenchRobot, tolerance: Tolerance, solver: str = "SNOPT", iterations: int = 200
 ) -> Ask:
     """Return the program, set up for a robot."""
     logging.getLogger("drake").setLevel(logging.ERROR)  # IPOPT gives advice at each failure
@@ -60,7 +69,7 @@ def prepare(
     return ask
 
 
-def kinematics(robot: Robot) -> Forward:
+def kinematics(robot: BenchRobot) -> Forward:
     """Return Drake's forward kinematics of the effectors."""
     plant = drake_plant(robot)[0]
     context, coordinates = plant.CreateDefaultContext(), _Coordinates(robot, plant)
@@ -75,7 +84,7 @@ def kinematics(robot: Robot) -> Forward:
     return forward
 
 
-def drake_plant(robot: Robot) -> tuple[Any, list[Any]]:
+def drake_plant(robot: BenchRobot) -> tuple[Any, list[Any]]:
     """Return the robot in Drake, its root fixed in the world, and a frame for each target."""
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModelsFromString(robot.text, "urdf" if robot.is_chain else "xml")
@@ -90,7 +99,7 @@ def drake_plant(robot: Robot) -> tuple[Any, list[Any]]:
     return plant, frames
 
 
-def _program(robot: Robot, plant: Any, targets: list[Any], tolerance: Tolerance) -> Any:
+def _program(robot: BenchRobot, plant: Any, targets: list[Any], tolerance: Tolerance) -> Any:
     """Return the program, with positions bounded in a cube within the ball of tolerance."""
     ik, identity = InverseKinematics(plant, True), RotationMatrix()
     side = np.full(3, INSIDE * tolerance.position / np.sqrt(3.0))
@@ -105,7 +114,7 @@ def _program(robot: Robot, plant: Any, targets: list[Any], tolerance: Tolerance)
 class _Coordinates:
     """The conversion to Drake's coordinates, which are roll, pitch and yaw for a ball."""
 
-    def __init__(self, robot: Robot, plant: Any) -> None:
+    def __init__(self, robot: BenchRobot, plant: Any) -> None:
         """Find the first coordinate of each joint in the robot and in Drake."""
         self._size, self._drake_size = len(robot.lower), plant.num_positions()
         self._hinges, self._balls = list[tuple[int, int]](), list[tuple[int, int]]()

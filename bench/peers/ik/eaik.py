@@ -12,13 +12,13 @@ from eaik.pybindings import EAIK
 
 from ...problems.robots import LIMIT_TOLERANCE, UnableError, links
 from ..protocol import OwnTime
-from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, Tolerance
 
 REVOLUTION = 2.0 * np.pi
 MAXIMUM_HINGES = 6
 
 
-def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
     """Return the solver, set up for a robot; it takes no tolerance.
 
     Raises:
@@ -50,7 +50,7 @@ def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
     return ask
 
 
-def within(robot: Robot, q: FloatArray) -> FloatArray:
+def within(robot: BenchRobot, q: FloatArray) -> FloatArray:
     """Return angles brought within the limits by whole revolutions where that can be done."""
     q = q + REVOLUTION * np.ceil((robot.lower - LIMIT_TOLERANCE - q) / REVOLUTION).clip(0.0)
     q = q - REVOLUTION * np.ceil((q - robot.upper - LIMIT_TOLERANCE) / REVOLUTION).clip(0.0)
@@ -58,7 +58,7 @@ def within(robot: Robot, q: FloatArray) -> FloatArray:
     return np.where(np.abs(q - nearest) <= LIMIT_TOLERANCE, nearest, q)
 
 
-def axes_at_zero(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray]:
+def axes_at_zero(robot: BenchRobot) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return axes (joint, 3), offsets between them (joint + 1, 3), and the effector's rotation.
 
     All are in the frame of the root, with every joint at zero.

@@ -11,14 +11,14 @@ from ...problems.robots import links
 from ..contestant import opened, remark
 from ..entrant import ROBOT_TASK, Spec
 from ..protocol import NoAnswerError
-from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance, UnableError
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance, UnableError
 
 __all__ = ["prepare", "remark", "robot_inputs"]
 
 ITERATIONS = 200
 
 
-def prepare(robot: Robot, tolerance: Tolerance, spec: Spec = "") -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance, spec: Spec = "") -> Ask:
     """Return a user's solver, set up for a robot.
 
     Raises:
@@ -44,7 +44,7 @@ def prepare(robot: Robot, tolerance: Tolerance, spec: Spec = "") -> Ask:
     return ask
 
 
-def robot_inputs(robot: Robot) -> dict[str, Any]:
+def robot_inputs(robot: BenchRobot) -> dict[str, Any]:
     """Return a chain of hinges in the terms of the protocol; its frames hold the fixed joints."""
     transform, frames, axes = np.eye(4), [], []
     for link in links(robot):

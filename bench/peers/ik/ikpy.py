@@ -8,10 +8,10 @@ import warnings
 import ikpy.chain
 import numpy as np
 
-from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
 
 
-def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
     """Return the solver, set up for a robot; it takes no tolerance."""
     robot.require_chain()
     with robot.file() as file, warnings.catch_warnings():

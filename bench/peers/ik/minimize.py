@@ -9,12 +9,12 @@ import numpy as np
 from mujoco import minimize
 
 from ...problems.evaluate import mujoco_model
-from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, Tolerance
 
 SILENT = minimize.Verbosity.SILENT
 
 
-def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     """Return the solver, set up for a robot."""
     robot.require_chain()
     bounds = [robot.lower[:, None], robot.upper[:, None]]
@@ -36,7 +36,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 class _Reach:
     """The displacement and rotation vector of the effector from its current target."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: BenchRobot) -> None:
         self._model = mujoco_model(robot)
         self._data = mujoco.MjData(self._model)
         self._effector = self._model.body(robot.effectors[0]).id

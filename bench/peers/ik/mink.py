@@ -7,11 +7,11 @@ of the task must not be zero: full steps then jump about.
 import mink
 
 from ...problems.evaluate import mujoco_model
-from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance, arrived, iterate
 
 
 def prepare(
-    robot: Robot, tolerance: Tolerance, iterations: int = 200, lm_damping: float = 0.01
+    robot: BenchRobot, tolerance: Tolerance, iterations: int = 200, lm_damping: float = 0.01
 ) -> Ask:
     """Return the solver, set up for a robot."""
     configuration = mink.Configuration(mujoco_model(robot))

@@ -9,11 +9,11 @@ With pink's own damping of 1e-12 the quadratic program is infeasible, and pink r
 import pink
 
 from .closed_loop import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance, arrived, iterate
 
 
 def prepare(
-    robot: Robot, tolerance: Tolerance, iterations: int = 200, damping: float = 1e-6
+    robot: BenchRobot, tolerance: Tolerance, iterations: int = 200, damping: float = 1e-6
 ) -> Ask:
     """Return the solver, set up for a robot."""
     model, cost = pinocchio_model(robot), float(robot.oriented)

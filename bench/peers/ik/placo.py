@@ -15,12 +15,12 @@ from plumbob.crosscheck.child_process import ChildProcess, LostError
 from ...problems.robots import UnableError
 from ..protocol import OwnTime
 from ..registry import environment_python
-from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
 
 PROGRAM = Path(__file__).with_name("placo_program.py")
 
 
-def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     """Return the solver, set up for a robot.
 
     Raises:

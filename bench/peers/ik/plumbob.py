@@ -5,11 +5,11 @@ from typing import Any
 from plumbob.reference import Outcome, Target, rotation, solve_ik
 from plumbob.reference.formats import mjcf, urdf
 
-from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
 
 
 def prepare(
-    robot: Robot,
+    robot: BenchRobot,
     tolerance: Tolerance,
     solver: str = "levenberg_marquardt",
     restarts: int = 0,

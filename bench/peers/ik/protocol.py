@@ -17,10 +17,10 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from ...problems.evaluate import PoseRequest, Tolerance
-from ...problems.robots import Robot, UnableError
+from ...problems.robots import BenchRobot, UnableError
 from ..protocol import OwnTime, describe
 
-__all__ = ["FloatArray", "PoseRequest", "Robot", "Tolerance", "UnableError"]
+__all__ = ["BenchRobot", "FloatArray", "PoseRequest", "Tolerance", "UnableError"]
 
 
 class SolverOutput(NamedTuple):
@@ -47,7 +47,7 @@ def attempt(solve: Solve) -> SolverOutput:
         return SolverOutput(None, False, error=describe(error))
 
 
-def arrived(errors: Sequence[FloatArray], robot: Robot, tolerance: Tolerance) -> bool:
+def arrived(errors: Sequence[FloatArray], robot: BenchRobot, tolerance: Tolerance) -> bool:
     """Return whether the effectors' errors, (6,) each, position first, are within the tolerance."""
     sizes = np.linalg.norm(np.reshape(errors, (-1, 2, 3)), axis=-1)
     limits = (tolerance.position, tolerance.rotation if robot.oriented else np.inf)

@@ -13,14 +13,23 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from .protocol import Ask, FloatArray, Forward, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import (
+    Ask,
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    SolverOutput,
+    Tolerance,
+)
 
 # It stops within this part of the tolerance, which bounds a distance; angles come along.
 INSIDE = 0.1
 
 
 def prepare(
-    robot: Robot,
+    robot: BenchRobot,
     tolerance: Tolerance,
     iterations: int = 200,
     damping: float = 1e-3,
@@ -55,7 +64,7 @@ def prepare(
     return ask
 
 
-def kinematics(robot: Robot) -> Forward:
+def kinematics(robot: BenchRobot) -> Forward:
     """Return PyBullet's forward kinematics of the effector."""
     return BulletBody(robot).forward
 
@@ -69,7 +78,7 @@ class BulletBody:
         effector: the index of its link.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: BenchRobot) -> None:
         """Load the robot; fixed joints have links of their own."""
         robot.require_chain()
         self.client = _client()

@@ -9,11 +9,22 @@ import numpy as np
 import pytorch_kinematics
 import torch
 
-from .protocol import Ask, FloatArray, Forward, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import (
+    Ask,
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    SolverOutput,
+    Tolerance,
+)
 from .restarts import generator_of
 
 
-def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 50, attempts: int = 1) -> Ask:
+def prepare(
+    robot: BenchRobot, tolerance: Tolerance, iterations: int = 50, attempts: int = 1
+) -> Ask:
     """Return the solver, set up for a robot; attempts beyond the first start anywhere."""
     chain = torch_chain(robot)
     torch.set_num_threads(1)
@@ -43,7 +54,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 50, attempts: 
     return ask
 
 
-def kinematics(robot: Robot) -> Forward:
+def kinematics(robot: BenchRobot) -> Forward:
     """Return the forward kinematics of the effector."""
     chain = torch_chain(robot)
 
@@ -54,7 +65,7 @@ def kinematics(robot: Robot) -> Forward:
     return forward
 
 
-def torch_chain(robot: Robot) -> pytorch_kinematics.SerialChain:
+def torch_chain(robot: BenchRobot) -> pytorch_kinematics.SerialChain:
     """Return a chain in double precision.
 
     Raises:

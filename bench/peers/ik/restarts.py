@@ -5,12 +5,12 @@ import zlib
 import numpy as np
 
 from ..protocol import total
-from .protocol import Ask, FloatArray, PoseRequest, Robot, Solve, SolverOutput, attempt
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, attempt
 
 _SEED = 1986
 
 
-def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
+def restarted(ask: Ask, robot: BenchRobot, restarts: int) -> Ask:
     """Return a solver that makes up to `restarts` further attempts from seeded random poses.
 
     An attempt succeeds if it claims an answer within the limits, which not all solvers look at; an

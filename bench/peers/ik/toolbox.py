@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...problems.robots import links
-from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -19,7 +19,7 @@ with warnings.catch_warnings():
 
 
 def prepare(
-    robot: Robot,
+    robot: BenchRobot,
     tolerance: Tolerance,
     method: str = "LM",
     damping: str = "chan",
@@ -53,7 +53,7 @@ def prepare(
     return ask
 
 
-def chain_of_transforms(robot: Robot) -> ETS:
+def chain_of_transforms(robot: BenchRobot) -> ETS:
     """Return the robot as elementary transforms: each hinge in a frame with its axis for z."""
     steps, pending, joint = [], np.eye(4), 0
     for transform, axis in links(robot):

@@ -9,10 +9,10 @@ import math
 
 import pytracik
 
-from .protocol import Ask, PoseRequest, Robot, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
 
 
-def prepare(robot: Robot, tolerance: Tolerance, seconds: float = 0.005) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance, seconds: float = 0.005) -> Ask:
     """Return the solver, set up for a robot, with so much time for each target [s]."""
     robot.require_chain()
     eps, speed = min(tolerance) / math.sqrt(3.0), pytracik.SolveType.Speed

@@ -12,7 +12,7 @@ from ..explain import largest_gap
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Verdict
 from ..sentence import Sentence, sentence
-from ..timing import timed
+from ..timing import time_call
 
 HOLDS = sentence("It holds.")
 
@@ -27,7 +27,7 @@ def judge_case(
 ) -> CaseJudgement:
     """Return the judgement of an answer by the laws of its task and of all tasks."""
     case, answer = exchange.case, exchange.answer
-    seconds = timed(reference)[1] if reference else None
+    seconds = time_call(reference)[1] if reference else None
     findings: tuple[Finding, ...] = ()
     if isinstance(answer, Answer):
         repeats = _equal_answers(answer, exchange.repeat, case.facts["size"], greeting)

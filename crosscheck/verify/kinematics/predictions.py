@@ -12,7 +12,7 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 from ..case import Case
 from ..explain import Variant
 from .faults import combinations, switches
-from .textbook import SOLVERS, Chain, Ending, Pose, Switches, place_all
+from .textbook import SOLVERS, Ending, Switches, TextbookChain, TextbookPose, place_all
 
 RIGHT = Switches()
 
@@ -28,7 +28,7 @@ def path_to(parents: IndexArray, effector: int) -> IndexArray:
 def forward(inputs: Mapping[str, Any], switched: Switches = RIGHT) -> tuple[FloatArray, FloatArray]:
     """Return positions and global rotations of all joints."""
     pose = _read(inputs, switched)
-    chain = Chain(inputs["parents"], inputs["offsets"], np.zeros(0, dtype=np.int64))
+    chain = TextbookChain(inputs["parents"], inputs["offsets"], np.zeros(0, dtype=np.int64))
     place_all(chain, switched, pose)
     return pose.positions, pose.rotations
 
@@ -40,19 +40,19 @@ def solve(
     parents = inputs["parents"]
     pose = _read(inputs, switched)
     effector = len(parents) - 1 if switched.effector == 1 else inputs["effector"]
-    chain = Chain(parents, inputs["offsets"], path_to(parents, effector))
+    chain = TextbookChain(parents, inputs["offsets"], path_to(parents, effector))
     target = tuple(inputs["target"].tolist())
     ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]))
     sweeps = SOLVERS[method](chain, target, ending, switched, pose)
     return _reordered(pose.local, switched), pose.positions, sweeps
 
 
-def _read(inputs: Mapping[str, Any], switched: Switches) -> Pose:
+def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
     """Return the start, its quaternions in the order that the solver expects."""
     local = np.array(inputs["local_rotations"])
     if switched.numbers in (1, 2):
         local = np.roll(local, 1, axis=-1)
-    return Pose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
+    return TextbookPose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
 
 
 def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:

@@ -43,7 +43,7 @@ def _solve(request: Mapping[str, Any], restarts: int) -> tuple[FloatArray, bool]
 def solve_by_reference(**inputs: Any) -> Mapping[str, Any]:
     """Return the result of the reference's Levenberg-Marquardt on the request's URDF."""
     robot = urdf.parse(inputs["urdf"]).articulation
-    links = [robot.names.index(f"link_{j}") for j in range(len(inputs["start"]))]
+    links = [robot.names.index(f"link_{joint}") for joint in range(len(inputs["start"]))]
     coordinates = [robot.coordinates_of(link).start for link in links]
     start = np.empty(robot.coordinate_count)
     start[coordinates] = inputs["start"]

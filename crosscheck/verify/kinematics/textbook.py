@@ -69,7 +69,7 @@ class Switches(NamedTuple):
     cap: float = UNCAPPED
 
 
-class Chain(NamedTuple):
+class TextbookChain(NamedTuple):
     """A skeleton, and the joints from its root to the effector, both included."""
 
     parents: IndexArray
@@ -77,7 +77,7 @@ class Chain(NamedTuple):
     path: IndexArray
 
 
-class Pose(NamedTuple):
+class TextbookPose(NamedTuple):
     """Local rotations, and the global positions and rotations of all joints."""
 
     local: FloatArray
@@ -92,7 +92,7 @@ class Ending(NamedTuple):
     sweeps: int
 
 
-def place(chain: Chain, faults: Switches, pose: Pose) -> None:
+def place(chain: TextbookChain, faults: Switches, pose: TextbookPose) -> None:
     """Fill positions and global rotations of all joints."""
     for j in range(len(chain.parents)):
         p = j - 1 if faults.parent == 1 else chain.parents[j]
@@ -104,7 +104,7 @@ def place(chain: Chain, faults: Switches, pose: Pose) -> None:
         store_quaternion(pose.rotations, j, R)
 
 
-def root_pose(chain: Chain, faults: Switches, pose: Pose, j: int) -> Any:
+def root_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: int) -> Any:
     """Return the position and the global rotation of the root."""
     Q, offset = load_quaternion(pose.local, j), load_vector(chain.offsets, j)
     if faults.product == 2:
@@ -115,7 +115,7 @@ def root_pose(chain: Chain, faults: Switches, pose: Pose, j: int) -> Any:
     return places[faults.root], R
 
 
-def joint_pose(chain: Chain, faults: Switches, pose: Pose, j: int, p: int) -> Any:
+def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: int, p: int) -> Any:
     """Return the position and the global rotation of joint j, the parent p placed before it."""
     Q, R_parent = load_quaternion(pose.local, j), load_quaternion(pose.rotations, p)
     products = (
@@ -132,7 +132,7 @@ def joint_pose(chain: Chain, faults: Switches, pose: Pose, j: int, p: int) -> An
     return add(base_of(chain, pose, p, faults.base), offset), R
 
 
-def base_of(chain: Chain, pose: Pose, p: int, fault: int) -> Any:
+def base_of(chain: TextbookChain, pose: TextbookPose, p: int, fault: int) -> Any:
     """Return what a rotated offset is added to: the parent's position, at rest (1), the root's."""
     if fault == 1:
         x = load_vector(chain.offsets, p)
@@ -143,7 +143,9 @@ def base_of(chain: Chain, pose: Pose, p: int, fault: int) -> Any:
     return load_vector(pose.positions, 0 if fault == 2 else p)
 
 
-def solve(chain: Chain, target: Any, ending: Ending, faults: Switches, pose: Pose) -> int:
+def solve(
+    chain: TextbookChain, target: Any, ending: Ending, faults: Switches, pose: TextbookPose
+) -> int:
     """Solve in place, `pose` from the start to the result, and return the number of sweeps."""
     if faults.start == 1:
         for j in range(len(chain.parents)):
@@ -175,7 +177,9 @@ def is_reached(distance: float, before: float, tolerance: float, sweeps: int, fa
     return error <= bound
 
 
-def sweep_ccd(chain: Chain, target: Any, i: int, faults: Switches, pose: Pose) -> None:
+def sweep_ccd(
+    chain: TextbookChain, target: Any, i: int, faults: Switches, pose: TextbookPose
+) -> None:
     """Rotate each joint from the effector's parent to the root; or only one of them, the i-th."""
     links = len(chain.path) - 1
     if faults.budget == 3:
@@ -189,7 +193,9 @@ def sweep_ccd(chain: Chain, target: Any, i: int, faults: Switches, pose: Pose) -
     place(chain, faults, pose)
 
 
-def rotate_joint(chain: Chain, k: int, target: Any, faults: Switches, pose: Pose) -> None:
+def rotate_joint(
+    chain: TextbookChain, k: int, target: Any, faults: Switches, pose: TextbookPose
+) -> None:
     """Rotate joint k of the path so that the effector comes nearest to the target."""
     joint = load_vector(pose.positions, chain.path[k])
     effector = load_vector(pose.positions, chain.path[-1])
@@ -223,7 +229,7 @@ def damped(d: Any, faults: Switches) -> Any:
     return rotation_about(scale(1.0 / angle, v), min(factor * angle, faults.cap))
 
 
-def apply_rotation(chain: Chain, k: int, d: Any, fault: int, pose: Pose) -> None:
+def apply_rotation(chain: TextbookChain, k: int, d: Any, fault: int, pose: TextbookPose) -> None:
     """Give joint k of the path, or its child, the world rotation d."""
     j = chain.path[k]
     p = chain.parents[j]
@@ -252,11 +258,13 @@ def apply_rotation(chain: Chain, k: int, d: Any, fault: int, pose: Pose) -> None
     store_quaternion(pose.local, j, renormalised(multiply(multiply(multiply(a, b), c), e)))
 
 
-def keep(chain: Chain, sweeps: int, faults: Switches, pose: Pose) -> None:
+def keep(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
     """Leave a pose of CCD as it is: its sweeps keep rotations and positions together."""
 
 
-def sweep_fabrik(chain: Chain, target: Any, i: int, faults: Switches, pose: Pose) -> None:
+def sweep_fabrik(
+    chain: TextbookChain, target: Any, i: int, faults: Switches, pose: TextbookPose
+) -> None:
     """Pull the joints to the target, then back to the root."""
     last, positions = len(chain.path) - 1, pose.positions
     if faults.passes == 0:
@@ -272,7 +280,7 @@ def sweep_fabrik(chain: Chain, target: Any, i: int, faults: Switches, pose: Pose
         pull(positions, chain.path[k], chain.path[k + 1], length)
 
 
-def link_length(chain: Chain, k: int, fault: int, positions: FloatArray) -> float:
+def link_length(chain: TextbookChain, k: int, fault: int, positions: FloatArray) -> float:
     """Return the length of link k, from joint k of the path to the next; or (3) as it is now."""
     last = len(chain.path) - 2
     links = (k, min(k + 1, last), max(k - 1, 0), k)
@@ -291,7 +299,7 @@ def pull(positions: FloatArray, fixed: int, moved: int, length: float) -> None:
         store_vector(positions, moved, add(start, scale(length / distance, direction)))
 
 
-def follow(chain: Chain, sweeps: int, faults: Switches, pose: Pose) -> None:
+def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
     """Rotate each joint of the path to its link's new direction; the path keeps its positions."""
     moved, start = pose.positions.copy(), pose.rotations.copy()
     for k in range(len(chain.path) - 1 if sweeps > 0 else 0):
@@ -304,7 +312,12 @@ def follow(chain: Chain, sweeps: int, faults: Switches, pose: Pose) -> None:
 
 
 def point_link(
-    chain: Chain, k: int, moved: FloatArray, fault: int, rotations: FloatArray, pose: Pose
+    chain: TextbookChain,
+    k: int,
+    moved: FloatArray,
+    fault: int,
+    rotations: FloatArray,
+    pose: TextbookPose,
 ) -> None:
     """Rotate joint k of the path, or its child (3), by global rotations as they are thought."""
     j, child = chain.path[k], chain.path[k + 1]

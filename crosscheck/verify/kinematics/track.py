@@ -170,7 +170,7 @@ def _judge(exchange: Exchange, method: str, greeting: Greeting) -> CaseJudgement
         frames = frames_of(exchange)
         if not frames:
             return [laws.missing(pose_laws.NEITHER)]
-        findings = [*_frame_laws(frames, greeting), *_continuity([f.pose for f in frames])]
+        findings = [*_frame_laws(frames, greeting), *_continuity([frame.pose for frame in frames])]
         return (
             [*findings, _continues(exchange, method, greeting)] if method in METHODS else findings
         )

@@ -19,7 +19,7 @@ from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import sentence
-from ..timing import timed
+from ..timing import time_call
 from . import laws
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, combined
@@ -104,7 +104,7 @@ def _judge_case(
     case, answer = exchange.case, exchange.answer
     p = problem_of(case.inputs)
     system, state = system_of(p), state_of(p)
-    _, seconds = timed(
+    _, seconds = time_call(
         lambda: potential_energy(system, state.positions) + kinetic_energy(system, state)
     )
     expected, allowed = predict((), p), tolerance(p, greeting.epsilon)

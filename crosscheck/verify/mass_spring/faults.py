@@ -58,6 +58,11 @@ def _first_for_all(p: SpringProblem, name: str) -> dict[str, Any]:
     return {name: np.resize(getattr(p, name)[:1], len(p.springs))}
 
 
+# What an entry of faults.toml may hold.
+FIELDS = {
+    *("key", "sentence", "tasks", "parts", "rare", "each"),
+    *("scale", "set", "model", "integrator", "matrix", "value"),
+}
 # Faults that are no fixed factors or fields.
 CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
     "mass inverse missing": lambda p: {"masses": np.ones(p.count)},
@@ -116,6 +121,8 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
 
 
 def _change(entry: Mapping[str, Any], values: Mapping[str, Any]) -> Change | None:
+    if unknown := entry.keys() - FIELDS:
+        raise ValueError(f"faults.toml: expected {sorted(FIELDS)}, got {sorted(unknown)}")
     if "scale" in entry:
         return lambda p: {name: f * getattr(p, name) for name, f in entry["scale"].items()}
     if "set" in entry:
@@ -129,13 +136,18 @@ _FAULTS = read_table("faults.toml")
 
 def faults_of(task: str, aspects: Sequence[str]) -> tuple[Option, ...]:
     """Return the faults of these aspects that show in a task: step, forces or energy."""
-    return tuple(
+    options = tuple(
         option
         for aspect in aspects
         for entry in _FAULTS.get(aspect, ())
         if task in entry.get("tasks", (task,))
         for option in options_of(aspect, entry)
     )
+    if idle := [
+        option.key for option in options if not (option.change or option.fields or option.parts)
+    ]:
+        raise ValueError(f"faults.toml: expected a change of each fault, got none of {idle}")
+    return options
 
 
 FORCE_FAULTS = faults_of("forces", ("gravity", "springs", "damping"))

@@ -15,7 +15,7 @@ from ..explain import Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
-from ..timing import timed
+from ..timing import time_call
 from . import laws
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
@@ -65,7 +65,7 @@ def _judge_case(
     case, answer = exchange.case, exchange.answer
     p = problem_of(case.inputs)
     system, state = system_of(p), state_of(p)
-    forces, seconds = timed(lambda: reference_forces(system, state))
+    forces, seconds = time_call(lambda: reference_forces(system, state))
     if not isinstance(answer, Answer):
         return CaseJudgement(case, answer, (), {"forces": forces}, None, seconds)
     output, allowed, digits = answer.values["forces"], tolerance(p, greeting.epsilon), None

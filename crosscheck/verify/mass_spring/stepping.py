@@ -16,7 +16,7 @@ from ..explain import either, first_broken, hints_of
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
-from ..timing import timed
+from ..timing import time_call
 from . import laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
@@ -161,9 +161,9 @@ def _reference_seconds(p: SpringProblem, model: StepModel) -> float:
     """Return the compiled reference's time for as many steps of the same kind [s]."""
     system, state = system_of(p), state_of(p)
     if model.integrator.explicit:
-        _, seconds = timed(lambda: symplectic_euler(system, state, p.h))
+        _, seconds = time_call(lambda: symplectic_euler(system, state, p.h))
         return seconds * model.substeps * (p.steps or 1)
-    _, seconds = timed(lambda: ImplicitEuler(system, h=p.h).step(state))
+    _, seconds = time_call(lambda: ImplicitEuler(system, h=p.h).step(state))
     return seconds * (p.steps or 1)
 
 

@@ -28,19 +28,19 @@ class NumberRow(NamedTuple):
     expected: list[float]
 
 
-class Shape(NamedTuple):
+class Wireframe(NamedTuple):
     """Points (point, 3) and the pairs of them (line, 2) that a line joins."""
 
     points: FloatArray
     lines: FloatArray
 
 
-class Drawing(NamedTuple):
-    """The shapes of a failing case; None where there is no shape."""
+class CaseDrawing(NamedTuple):
+    """The wireframes of a failing case; None where there is none."""
 
-    request: Shape | None  # a curve, or the system that forces act on
-    answer: Shape | None
-    expected: Shape | None
+    request: Wireframe | None  # a curve, or the system that forces act on
+    answer: Wireframe | None
+    expected: Wireframe | None
     marks: FloatArray  # a target, or pins (point, 3)
 
 
@@ -140,8 +140,8 @@ def texts(row: NumberRow) -> tuple[str, str]:
     return answer, expected
 
 
-def drawing_of(judgement: CaseJudgement) -> Drawing | None:
-    """Return the shapes of a case, or None if there is nothing to draw."""
+def drawing_of(judgement: CaseJudgement) -> CaseDrawing | None:
+    """Return the wireframes of a case, or None if there are none."""
     inputs, task = judgement.case.inputs, judgement.case.task
     answer, expected = (_shape(task, inputs, outputs) for outputs in _outputs(judgement))
     if answer is None and expected is None:
@@ -150,34 +150,36 @@ def drawing_of(judgement: CaseJudgement) -> Drawing | None:
     if "curve" in inputs:
         request = _path(inputs["curve"])
     elif task == "mass_spring_forces":
-        request = Shape(inputs["positions"], np.asarray(inputs["springs"]))
+        request = Wireframe(inputs["positions"], np.asarray(inputs["springs"]))
     if "target" in inputs:
         marks = np.asarray(inputs["target"], dtype=float)[None]
     elif "pinned" in inputs and "positions" in inputs:
         marks = np.asarray(inputs["positions"])[np.asarray(inputs["pinned"], dtype=int)]
-    return Drawing(request, answer, expected, marks)
+    return CaseDrawing(request, answer, expected, marks)
 
 
-def _shape(task: str, inputs: Outputs, outputs: Outputs) -> Shape | None:
+def _shape(task: str, inputs: Outputs, outputs: Outputs) -> Wireframe | None:
     """Return an answer as points and lines, None if it has no shape."""
     if not outputs:
         return None
     if task in ("forward_kinematics", "inverse_kinematics", "track"):
         points, parents = _positions(inputs, outputs), np.asarray(inputs["parents"])
         joints = np.flatnonzero(parents >= 0)
-        return points if points is None else Shape(points, np.stack([parents[joints], joints], 1))
+        return (
+            points if points is None else Wireframe(points, np.stack([parents[joints], joints], 1))
+        )
     if task in ("mass_spring_step", "mass_spring_motion") and "positions" in outputs:
-        return Shape(_last(outputs["positions"]), np.asarray(inputs["springs"]))
+        return Wireframe(_last(outputs["positions"]), np.asarray(inputs["springs"]))
     if task == "mass_spring_forces":
         start, forces = inputs["positions"], np.asarray(outputs["forces"])
         longest = np.nanmax(np.abs(forces), initial=0.0) or 1.0
         ends = start + forces * (_ARROW * max(np.ptp(start, axis=0).max(), 1e-9) / longest)
         first = np.arange(len(start))
-        return Shape(np.concatenate([start, ends]), np.stack([first, first + len(start)], 1))
+        return Wireframe(np.concatenate([start, ends]), np.stack([first, first + len(start)], 1))
     return _path(outputs["points"]) if task == "resample" else None
 
 
-def _path(curve: Any) -> Shape:
+def _path(curve: Any) -> Wireframe:
     points = np.asarray(curve)
     first = np.arange(max(len(points) - 1, 0))
-    return Shape(points, np.stack([first, first + 1], 1))
+    return Wireframe(points, np.stack([first, first + 1], 1))

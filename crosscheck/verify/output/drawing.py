@@ -14,7 +14,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from plumbob.reference.arguments import FloatArray
 
-from .comparison import Drawing, Shape
+from .comparison import CaseDrawing, Wireframe
 
 # Differences below the first share of the extent are magnified to about the second.
 _VISIBLE, _MAGNIFIED = 0.02, 0.2
@@ -32,7 +32,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 }
 
 
-def svg(drawing: Drawing, title: str) -> Markup:
+def svg(drawing: CaseDrawing, title: str) -> Markup:
     """Return a drawing in the colours of the page."""
     points = _visible_points(drawing)
     figure = Figure(figsize=(6.4, 4.8))
@@ -59,7 +59,7 @@ def svg(drawing: Drawing, title: str) -> Markup:
     return Markup(_to_text(figure, title))
 
 
-def _visible_points(drawing: Drawing) -> dict[str, FloatArray]:
+def _visible_points(drawing: CaseDrawing) -> dict[str, FloatArray]:
     """Return the points of each shape, NaN where they are far from the right answer."""
     shapes = {name: getattr(drawing, name) for name in _STYLES}
     points = {name: np.zeros((0, 3)) if s is None else s.points for name, s in shapes.items()}
@@ -112,7 +112,7 @@ def _to_text(figure: Figure, title: str) -> str:
     return head + inside
 
 
-def distance(drawing: Drawing) -> float | None:
+def distance(drawing: CaseDrawing) -> float | None:
     """Return the largest distance of an answered point from the expected one [m], if known."""
     if drawing.answer is None or drawing.expected is None:
         return None
@@ -122,7 +122,7 @@ def distance(drawing: Drawing) -> float | None:
     return float(np.linalg.norm(a - b, axis=-1).max(initial=0.0))
 
 
-def magnified(drawing: Drawing) -> tuple[Drawing, float]:
+def magnified(drawing: CaseDrawing) -> tuple[CaseDrawing, float]:
     """Return a drawing in which small differences are larger, and the factor."""
     gap = distance(drawing)
     if not gap or drawing.answer is None or drawing.expected is None:
@@ -133,4 +133,4 @@ def magnified(drawing: Drawing) -> tuple[Drawing, float]:
         return drawing, 1.0
     factor = float(f"{_MAGNIFIED * extent / gap:.0e}")
     points = expected + factor * (drawing.answer.points - expected)
-    return drawing._replace(answer=Shape(points, drawing.answer.lines)), factor
+    return drawing._replace(answer=Wireframe(points, drawing.answer.lines)), factor

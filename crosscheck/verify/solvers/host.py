@@ -243,8 +243,9 @@ class _Watch(threading.Thread):
                 self._note_line()
 
     def _note_line(self) -> None:
-        beside, frame = Path(self._folder) / "solver.py", sys._current_frames().get(self._solver)
-        while frame is not None and not is_beside(Path(frame.f_code.co_filename), beside):
+        solver_file = Path(self._folder) / "solver.py"
+        frame = sys._current_frames().get(self._solver)
+        while frame is not None and not is_beside(Path(frame.f_code.co_filename), solver_file):
             frame = frame.f_back
         if frame is not None:
             file = Path(frame.f_code.co_filename).name

@@ -50,7 +50,9 @@ def read_table(field: Field, counts: Mapping[str, int], data: bytes) -> Any:
     Raises:
         ValueError: if it is not understood.
     """
-    lines = [(i, line.strip()) for i, line in enumerate(_text(field, data).splitlines(), 1)]
+    lines = [
+        (number, line.strip()) for number, line in enumerate(_text(field, data).splitlines(), 1)
+    ]
     lines = [(i, line) for i, line in lines if line.strip(";,\t ") and not line.startswith("#")]
     if not lines:
         return checked(field, counts, [])
@@ -76,22 +78,24 @@ def _text(field: Field, data: bytes) -> str:
 def _rows(
     field: Field, lines: list[tuple[int, str]], separator: str | None, decimal: str
 ) -> Iterator[list[float]]:
-    cells = [(i, [cell.strip(' "') for cell in line.split(separator)]) for i, line in lines]
+    cells = [
+        (number, [cell.strip(' "') for cell in line.split(separator)]) for number, line in lines
+    ]
     if all(row[-1] == "" for _, row in cells):
-        cells = [(i, row[:-1]) for i, row in cells]
+        cells = [(number, row[:-1]) for number, row in cells]
     if len(cells) > 1 and all(_number(cell, decimal) is None for cell in cells[0][1]):
         cells = cells[1:]
     width = len(cells[0][1])
-    for i, row in cells:
+    for line, row in cells:
         numbers = [_number(cell, decimal) for cell in row]
         if len(row) != width:
             raise ValueError(
-                f"{field.name}: expected {width} numbers in line {i} as before, got {len(row)}"
+                f"{field.name}: expected {width} numbers in line {line} as before, got {len(row)}"
             )
         if None in numbers:
             wrong = row[numbers.index(None)]
             raise ValueError(
-                f"{field.name}: expected a number in line {i}, got {shown(repr(wrong), 40)}"
+                f"{field.name}: expected a number in line {line}, got {shown(repr(wrong), 40)}"
             )
         yield [number for number in numbers if number is not None]
 
@@ -112,8 +116,10 @@ def _number(cell: str, decimal: str) -> float | None:
 
 def _shaped(field: Field, counts: Mapping[str, int], rows: list[list[float]]) -> Any:
     """Return rows in the shape that is expected, or as they are if they cannot have it."""
-    shape = [counts.get(n, -1) if isinstance(n, str) else n for n in field.shape]
-    widths = sorted({1, *(abs(n) for n in accumulate(reversed(shape), mul))})
+    shape = [
+        counts.get(length, -1) if isinstance(length, str) else length for length in field.shape
+    ]
+    widths = sorted({1, *(abs(length) for length in accumulate(reversed(shape), mul))})
     array = np.array(rows)
     if array.shape[1] not in widths:
         raise ValueError(

@@ -91,7 +91,7 @@ def _motion(text: str, origin: str) -> Motion:
     rest = np.array([joint.offset for joint in joints])
     if len(offsets):
         rest[0] = offsets[0, 0]
-    skeleton = Skeleton([j.parent for j in joints], rest, [j.name for j in joints])
+    skeleton = Skeleton([joint.parent for joint in joints], rest, [joint.name for joint in joints])
     return Motion(skeleton, frozen(rotations), frame_time, frozen(offsets))
 
 
@@ -129,7 +129,7 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
     for line in lines:
         if line.upper() == "MOTION":
             if tree.path or not tree.joints:
-                path = [tree.joints[j].name for j in tree.path]
+                path = [tree.joints[joint].name for joint in tree.path]
                 got = f"{path[-1]!r:.40} still open" if path else "none"
                 raise ValueError(f"expected complete joints before MOTION, got {got}")
             return tree.joints
@@ -240,8 +240,8 @@ def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, Floa
     if count and (width == 0 or 2 * count * width > size):  # two characters a number
         raise ValueError(f"expected {count:,} frames of {width:,} numbers, got a shorter file")
     values = np.empty((count, width))
-    for i in range(count):
-        values[i] = _numbers(lines.next(f"{count:,} frames"), width)
+    for frame in range(count):
+        values[frame] = _numbers(lines.next(f"{count:,} frames"), width)
     return frame_time, values
 
 

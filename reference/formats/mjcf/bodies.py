@@ -41,7 +41,7 @@ def robot(root: Element, origin: str) -> Robot:
     if root.tag != "mujoco":
         raise root.error("expected a <mujoco>")
     tree = _Tree(settings(root))
-    for world in root.named("worldbody"):
+    for world in root.children_named("worldbody"):
         tree.add_world(world)
     robot = assemble(origin, tree.links, tree.joints)
     home = np.array(robot.home)

@@ -106,7 +106,7 @@ class CompilerSettings(NamedTuple):
 def settings(root: Element) -> CompilerSettings:
     """Return the settings of a file."""
     merged = Element("compiler", {}, [], root.location)
-    for compiler in root.named("compiler"):
+    for compiler in root.children_named("compiler"):
         merged = compiler._replace(attributes=merged.attributes | compiler.attributes)
     one_of(merged, "coordinate", ("local",), "local")
     sequence = merged.word("eulerseq", "xyz")
@@ -150,7 +150,7 @@ def _from_axes(element: Element, axes: Sequence[float]) -> Quaternion:
 def _classes(root: Element) -> dict[str, dict[str, str]]:
     """Return the joint attributes of each default class, with those of outer classes."""
     classes: dict[str, dict[str, str]] = {"main": {}}
-    waiting = [(element, "") for element in reversed(root.named("default"))]
+    waiting = [(element, "") for element in reversed(root.children_named("default"))]
     while waiting:
         element, outer = waiting.pop()
         name = element.word("class", None if outer else "main")
@@ -163,5 +163,5 @@ def _classes(root: Element) -> dict[str, dict[str, str]]:
         joint = element.single("joint")
         own = joint.attributes if joint else {}
         classes[name] = classes[name] | {key: own[key] for key in OF_JOINTS if key in own}
-        waiting += [(inner, name) for inner in reversed(element.named("default"))]
+        waiting += [(inner, name) for inner in reversed(element.children_named("default"))]
     return classes

@@ -288,7 +288,7 @@ def test_the_demonstration_below_the_main_guard_does_not_run(inside):
 
 @pytest.mark.parametrize(
     "names",
-    [("rotation", "skeleton"), ("crosscheck", "message"), ("reference", "task"), ("host", "case")],
+    [("crosscheck", "message"), ("reference", "host", "task")],
 )
 def test_modules_beside_the_file_are_its_own(solver, names):
     imports = "".join(f"import {name}\n" for name in names if name != "crosscheck")
@@ -313,7 +313,7 @@ def test_a_file_runs_in_its_own_folder_wherever_it_is_called_from(solver, tmp_pa
     other.close()
 
 
-@pytest.mark.parametrize("name", ["my ik-2", "json", "numpy", "2", "message"])
+@pytest.mark.parametrize("name", ["my ik-2", "numpy", "message"])
 def test_a_file_may_have_any_name(solver, name):
     text = f"import math\n{FORWARD}return offsets + math.pi\n"
     contestant = solver(text, f"{name}.py", **{name: text})

@@ -19,7 +19,7 @@ def test_the_call_of_the_reference_that_compiles_is_not_its_time(monkeypatch):
         calls.append("call")
         return "answer"
 
-    assert timing.timed(reference) == ("answer", 1.5)
+    assert timing.time_call(reference) == ("answer", 1.5)
     assert calls == timing.CALLS * ["pause", "call"]  # as a solver waits for each request
 
 

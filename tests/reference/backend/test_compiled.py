@@ -249,7 +249,7 @@ def test_division_by_zero_is_infinite_as_in_numpy(backend):
         assert compiled.Kernel(quotient)(np.array([1.0, 0.0])) == np.inf
 
 
-SOURCES = {
+EDITS = {
     "constant of a callee": ("SCALE = 2.0", "SCALE = 5.0"),
     "code of a callee": ("return x * SCALE", "return x * SCALE + 1.0"),
     "callee of a callee": ("return 1.0", "return 2.0"),
@@ -271,7 +271,7 @@ CALLEE = textwrap.dedent("""
 """)
 CALLER = textwrap.dedent("""
     import numpy as np
-    from callee import callee
+    from callee{number} import callee
     from plumbob.reference.backend.compiled import Kernel
     from plumbob.reference.backend.simd.vectors import LANES, store_vectors, load_vectors
 
@@ -287,26 +287,30 @@ CALLER = textwrap.dedent("""
 
 
 def run_in_fresh_process(folder):
-    command = [sys.executable, "-B", "caller.py"]
+    """Run every caller; return their values and cache hits."""
+    imports = "; ".join(f"import caller{i}" for i in range(len(EDITS)))
+    command = [sys.executable, "-B", "-c", imports]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
-    compiled_value, plain_value, hits = done.stdout.split()
-    assert compiled_value == plain_value
-    return float(compiled_value), int(hits)
+    lines = [line.split() for line in done.stdout.splitlines()]
+    assert all(compiled_value == plain_value for compiled_value, plain_value, _ in lines)
+    return [float(value) for value, *_ in lines], [int(hits) for *_, hits in lines]
 
 
 def test_the_cache_on_disk_is_used_but_never_stale(tmp_path):
-    """Every edit below changes a file that numba's own key for the caller does not see."""
-    (tmp_path / "caller.py").write_text(CALLER)
-    (tmp_path / "callee.py").write_text(CALLEE)
+    """Every edit changes a file that numba's own key for its caller does not see."""
+    count = len(EDITS)
+    for i in range(count):
+        (tmp_path / f"caller{i}.py").write_text(CALLER.replace("{number}", str(i)))
+        (tmp_path / f"callee{i}.py").write_text(CALLEE)
     first, _ = run_in_fresh_process(tmp_path)
-    assert run_in_fresh_process(tmp_path) == (first, 1)
-    for old, new in SOURCES.values():
-        (tmp_path / "callee.py").write_text(CALLEE.replace(old, new))
-        value, hits = run_in_fresh_process(tmp_path)
-        assert value != first
-        assert hits == 0
-    (tmp_path / "callee.py").write_text(CALLEE)
-    assert run_in_fresh_process(tmp_path) == (first, 1)
+    for i, edit in enumerate(EDITS.values()):
+        (tmp_path / f"callee{i}.py").write_text(CALLEE.replace(*edit))
+    values, hits = run_in_fresh_process(tmp_path)
+    assert all(value != before for value, before in zip(values, first, strict=True))
+    assert hits == [0] * count
+    for i in range(count):
+        (tmp_path / f"callee{i}.py").write_text(CALLEE)
+    assert run_in_fresh_process(tmp_path) == (first, [1] * count)
 
 
 def test_with_numbas_compiler_off_the_interpreter_runs_every_kernel(monkeypatch):

@@ -6,8 +6,6 @@ import subprocess
 import sys
 import textwrap
 
-import pytest
-
 CALLER = textwrap.dedent("""
     import numpy as np
     from shapes import Disc
@@ -16,8 +14,8 @@ CALLER = textwrap.dedent("""
     def area(disc):
         return 3.0 * disc.radius[0] * disc.radius[0]
 
-    run = Kernel(area)
-    print(run(Disc(np.array([2.0]))), sum(run.compiled.stats.cache_hits.values()))
+    kernel = Kernel(area)
+    print(kernel(Disc(np.array([2.0]))), sum(kernel.compiled.stats.cache_hits.values()))
 """)
 SHAPES = textwrap.dedent("""
     from typing import NamedTuple
@@ -29,75 +27,63 @@ SHAPES = textwrap.dedent("""
 CACHED, COMPILED = ["12.0", "1"], ["12.0", "0"]
 
 
-def run(folder, **environment):
-    """What a fresh process prints: the kernel's value, and how often it came from the cache."""
-    command = [sys.executable, "-B", "caller.py"]
-    settings = {**os.environ, **environment}
+def run(folder, count=1, **environment):
+    """Run callers in a fresh process; return the value and the cache hits that each prints."""
+    imports = "; ".join(f"import caller{i}" for i in range(count))
+    command, settings = [sys.executable, "-B", "-c", imports], {**os.environ, **environment}
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=settings)
     assert done.returncode == 0, done.stderr[-500:]
-    return done.stdout.split()
+    return [line.split() for line in done.stdout.splitlines()]
 
 
-@pytest.fixture(scope="module")
-def original(tmp_path_factory):
-    """A folder of a kernel in whose cache one compiled version lies."""
-    folder = tmp_path_factory.mktemp("original")
-    (folder / "caller.py").write_text(CALLER)
+def callers(folder, count):
+    """Write modules with a kernel each, in whose cache one compiled version lies."""
     (folder / "shapes.py").write_text(SHAPES)
-    assert run(folder) == COMPILED
+    for i in range(count):
+        (folder / f"caller{i}.py").write_text(CALLER)
+    assert run(folder, count) == [COMPILED] * count
     return folder
 
 
-@pytest.fixture
-def folder(original, tmp_path):
-    """A copy of that folder."""
-    return shutil.copytree(original, tmp_path / "copy")
+FAULTS = {
+    "cut": lambda content: content[: len(content) // 2],
+    "emptied": lambda content: b"",
+    "a byte of machine code inverted": lambda content: (
+        content[: len(content) // 2]
+        + bytes([content[len(content) // 2] ^ 0xFF])
+        + content[len(content) // 2 + 1 :]
+    ),
+    "of another kind": lambda content: b"no pickle",
+}
+DAMAGES = [(fault, kind) for fault in FAULTS for kind in ("nbi", "nbc")]
 
 
-def test_a_cache_that_is_whole_is_used(folder):
-    assert run(folder) == CACHED
+def test_damaged_files_are_compiled_anew_and_whole_ones_used(tmp_path):
+    """One caller for each damage, and one left whole."""
+    count = len(DAMAGES) + 1
+    folder = callers(tmp_path, count)
+    for i, (fault, kind) in enumerate(DAMAGES):
+        (file,) = folder.rglob(f"caller{i}.*.{kind}")
+        file.write_bytes(FAULTS[fault](file.read_bytes()))
+    assert run(folder, count) == [COMPILED] * len(DAMAGES) + [CACHED]
+    assert run(folder, count) == [CACHED] * count
 
 
-def cut(content):
-    return content[: len(content) // 2]
-
-
-def emptied(content):
-    return b""
-
-
-def overwritten(content):
-    """Flip the bits of a byte in the middle: of machine code, in a data file."""
-    middle = len(content) // 2
-    return content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :]
-
-
-def of_another_kind(content):
-    return b"no pickle"
-
-
-@pytest.mark.parametrize("fault", [cut, emptied, overwritten, of_another_kind])
-@pytest.mark.parametrize("kind", ["nbi", "nbc"])
-def test_a_damaged_cache_is_renewed(folder, kind, fault):
-    (file,) = folder.rglob(f"*.{kind}")
-    file.write_bytes(fault(file.read_bytes()))
-    assert run(folder) == COMPILED
-    assert run(folder) == CACHED
-
-
-def test_a_cache_that_names_a_class_that_has_moved_is_renewed(folder):
-    """As numba pickles the types of arguments into its index."""
-    (folder / "figures.py").write_text(SHAPES)
+def test_a_cache_that_names_a_class_that_has_moved_is_renewed(tmp_path):
+    """Numba pickles the types of arguments into its index."""
+    folder = callers(tmp_path, 1)
+    (folder / "shapes.py").rename(folder / "figures.py")
     (folder / "shapes.py").write_text("")
-    (folder / "caller.py").write_text(CALLER.replace("from shapes", "from figures"))
-    assert run(folder) == COMPILED
-    assert run(folder) == CACHED
+    (folder / "caller0.py").write_text(CALLER.replace("from shapes", "from figures"))
+    assert run(folder) == [COMPILED]
+    assert run(folder) == [CACHED]
 
 
-def test_a_kernel_runs_where_nothing_can_be_saved(folder):
+def test_a_kernel_runs_where_nothing_can_be_saved(tmp_path):
     """Files stand where numba would make a folder."""
+    folder = callers(tmp_path, 1)
     shutil.rmtree(folder / "__pycache__")
     for name in ("__pycache__", "home"):
         (folder / name).write_text("")
     home = str(folder / "home")
-    assert run(folder, HOME=home, XDG_CACHE_HOME=home) == COMPILED
+    assert run(folder, HOME=home, XDG_CACHE_HOME=home) == [COMPILED]

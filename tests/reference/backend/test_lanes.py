@@ -5,8 +5,6 @@ from plumbob.reference.backend import compiled
 from plumbob.reference.backend.simd import vectors
 from plumbob.reference.backend.simd.vectors import (
     LANES,
-    all_within,
-    load_lanes,
     load_quaternions,
     load_vectors,
     store_lanes,
@@ -29,30 +27,9 @@ from plumbob.reference.quaternion import (
 JOINTS = 3
 
 
-def copy_vectors(tile, result):
-    store_vectors(result, 1, load_vectors(tile, 2))
-
-
-def copy_quaternions(tile, result):
-    store_quaternions(result, 1, load_quaternions(tile, 2))
-
-
-def spread_out(tile, scratch):
-    store_lanes(scratch, 1, load_quaternions(tile, 2))
-
-
-def gather(scratch, tile):
-    store_quaternions(tile, 1, load_lanes(scratch, 2))
-
-
 def put_the_same(tile, scratch):
     store_quaternions(tile, 1, (1.0, 2.0, 3.0, 4.0))
     store_lanes(scratch, 1, (1.0, 2.0, 3.0, 4.0))
-
-
-def bounded(scratch, bound):
-    w, x, y, z = load_lanes(scratch, 0)
-    return all_within(w, bound)
 
 
 def algebra(a, b, v, vectors, quaternions):
@@ -83,29 +60,6 @@ def numbers(rng):
     return lambda *shape: rng.standard_normal(shape)
 
 
-@pytest.mark.parametrize(("copy", "count"), [(copy_vectors, 3), (copy_quaternions, 4)])
-def test_a_row_of_a_tile_is_read_and_written_whole_and_no_other(copy, count, numbers, backend):
-    tile, result = numbers(LANES, JOINTS, count), numbers(LANES, JOINTS, count)
-    expected = result.copy()
-    expected[:, 1] = tile[:, 2]
-    before = tile.copy()
-    run(copy, tile, result)
-    assert (result == expected).all()
-    assert (tile == before).all()
-
-
-def test_scratch_holds_a_component_of_all_poses_side_by_side(numbers, backend):
-    tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
-    expected = scratch.copy()
-    expected[1] = tile[:, 2].T
-    run(spread_out, tile, scratch)
-    assert (scratch == expected).all()
-    back = tile.copy()
-    back[:, 1] = scratch[2].T
-    run(gather, scratch, tile)
-    assert (tile == back).all()
-
-
 def test_a_float_stands_for_itself_in_every_lane(numbers, backend):
     tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
     run(put_the_same, tile, scratch)
@@ -124,18 +78,6 @@ def test_lanes_compute_the_bits_of_floats(numbers, backend):
         assert (x[:2] != 0.0).all()
         assert (vectors[i] == x).all()
         assert (quaternions[i] == q).all()
-
-
-@pytest.mark.parametrize("lane", range(LANES))
-@pytest.mark.parametrize("value", [0.5, -0.5, np.nan, np.inf, -np.inf])
-def test_one_lane_out_of_bounds_is_out_of_bounds(lane, value, numbers, backend):
-    scratch = numbers(JOINTS, 4, LANES).clip(-0.25, 0.25)
-    assert run(bounded, scratch, 0.25)
-    scratch[0, 0, lane] = value
-    assert not run(bounded, scratch, 0.25)
-    scratch[0, 1] = value
-    scratch[0, 0, lane] = 0.0
-    assert run(bounded, scratch, 0.25)
 
 
 def test_every_function_of_lanes_has_its_instructions():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from plumbob.reference import ImplicitEuler, State, scenes
-from plumbob.reference.backend.partition import cut
+from plumbob.reference.backend.partition import partition_springs
 from plumbob.reference.backend.threads import set_num_threads
 from plumbob.reference.implicit_euler.objective import Objective
 
@@ -45,7 +45,7 @@ def in_regions(moving, monkeypatch):
 @pytest.mark.parametrize("count", [1, 2, 7, 200])
 def test_every_spring_is_in_its_region_once(moving, count):
     system, _ = moving
-    regions = cut(system.springs, system.particle_count, count)
+    regions = partition_springs(system.springs, system.particle_count, count)
     assert sorted(regions.order) == list(range(len(system.springs)))
     np.testing.assert_array_equal(regions.springs, system.springs[regions.order])
     assert (regions.particles[0], regions.particles[-1]) == (0, system.particle_count)

@@ -12,8 +12,8 @@ from plumbob.reference.backend.threads import SLICES_PER_CORE, in_slices
 CORES = [1, 2, 3]
 
 
-def slices_of(count, least):
-    return in_slices(lambda part: part, count, lambda part: (part,), minimum=least)
+def slices_of(count, minimum):
+    return in_slices(lambda part: part, count, lambda part: (part,), minimum=minimum)
 
 
 def total(values):

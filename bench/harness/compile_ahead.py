@@ -1,0 +1,60 @@
+"""Compile the kernels of the reference in a process of its own, while other work goes on.
+
+Compiled kernels are stored on disk, where a later call only reads them. Run as a module it compiles
+and exits.
+"""
+
+import contextlib
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+
+
+@contextlib.contextmanager
+def compiling_ahead() -> Iterator[Callable[[], object]]:
+    """Compile in a process while the block runs; yield a function that waits for its end.
+
+    The process reports no failure, because the first caller of the kernel will meet it again.
+    """
+    command = [sys.executable, "-m", __name__]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield process.wait
+    finally:
+        process.kill()
+        process.wait()
+
+
+def compile_kernels() -> None:
+    """Solve one small problem with each solver, the slowest to compile and last needed first."""
+    import numpy as np
+
+    from plumbob.reference import (
+        IK_SOLVERS,
+        STEP_SOLVERS,
+        Articulation,
+        ImplicitEuler,
+        Skeleton,
+        Target,
+        curves,
+        scenes,
+        solve_ik,
+        track,
+    )
+
+    cloth, state = scenes.lab_cloth(damping=0.2)
+    for name in STEP_SOLVERS:
+        ImplicitEuler(cloth, h=1 / 60, solver=name, max_iterations=2).step(state)
+    links = Skeleton([-1, 0, 1, 2], [[0, 0, 0.3], [0, 0, 0.4], [0.4, 0, 0], [0.3, 0, 0]])
+    axes = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0]]
+    robot = Articulation(links, "hinge", axes=axes, lower=-2.5, upper=2.5)
+    arm, rest = scenes.lab_arm()
+    target = np.array([0.4, 0.2, 0.5])
+    for name in IK_SOLVERS:
+        solve_ik(robot, robot.neutral(), Target(target), solver=name, max_iterations=2)
+        solve_ik(arm, rest, target, solver=name, max_iterations=2)
+    track(arm, curves["heart"](), coherent=True, closed=True)
+
+
+if __name__ == "__main__":
+    compile_kernels()
