@@ -46,6 +46,11 @@ def test_a_sample_holds_the_page_and_the_headlines(sample, written):
     assert {path.name for path in sample.SAMPLE.iterdir()} == {"index.html", "headlines.md"}
 
 
+def test_the_committed_sample_is_small():
+    files = [path for path in (ROOT / "docs" / "sample").rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in files) <= 2e6  # every clone downloads it
+
+
 def test_a_readme_without_marks_is_refused(sample):
     with pytest.raises(ValueError, match="README: expected the marks"):
         sample.with_headlines("# Title\n", "line")
