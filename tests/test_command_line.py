@@ -370,7 +370,7 @@ def test_from_measuring_to_the_page(capsys, empty_folder, monkeypatch):
     assert count > 0
     assert f"{count} measured, 0 already on record" in out
     code, out, _ = plumbob(capsys, "bench", "arm", "--quick", "-o", "out")
-    assert f"0 measured, {count} kept" in out
+    assert f"0 measured, {count} already on record" in out
     code, out, _ = plumbob(capsys, "bench", "arm", "--quick", "--fresh", "-o", "out")
     assert f"{count} measured, 0 already on record" in out
     code, out, err = plumbob(capsys, "report", "-o", "out")
