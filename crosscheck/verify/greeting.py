@@ -32,24 +32,31 @@ Method = Literal["explicit", "symplectic", "linearised", "local_global", "newton
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The time step that a solver declares to make."""
+    """The time step that a solver declares to make.
 
-    # explicit or symplectic Euler, one linearised implicit step, local/global or Newton iterations,
-    # or implicit Euler converged
+    Attributes:
+        method: explicit or symplectic Euler, one linearised implicit step, local/global or Newton
+            iterations, or implicit Euler converged.
+        start: where iterations begin: x_n, or y = x_n + h v_n.
+        iterations: how many of them a step has.
+        substeps: how many equal steps make up h.
+        damper: none; explicit; length_rate: (c/h) (l - l_n) along the spring; end_velocity:
+            the force of the velocities at the end; global_factor: every velocity is scaled.
+        damping_factor: what global_factor multiplies velocities by after each substep.
+        pins: eliminated from the unknowns, overwritten after the solve, held by a penalty, or
+            heavy.
+        velocity: displacement: (x' - x_n) / h; separate: integrated beside the positions.
+    """
+
     method: Method | None = None
-    start: Literal["x_n", "y"] | None = None  # where iterations begin: x_n, or y = x_n + h v_n
-    iterations: Iterations | None = None  # how many of them a step has
-    substeps: Substeps | None = None  # how many equal steps make up h
-    # none; explicit; length_rate: (c/h) (l - l_n) along the spring; end_velocity: the force of the
-    # velocities at the end; global_factor: every velocity is scaled
+    start: Literal["x_n", "y"] | None = None
+    iterations: Iterations | None = None
+    substeps: Substeps | None = None
     damper: Literal["none", "explicit", "length_rate", "end_velocity", "global_factor"] | None = (
         None
     )
-    # what global_factor multiplies velocities by after each substep
     damping_factor: float | None = None
-    # eliminated from the unknowns, overwritten after the solve, held by a penalty, or heavy
     pins: Literal["eliminated", "overwritten", "penalty", "heavy"] | None = None
-    # displacement: (x' - x_n) / h; separate: integrated beside the positions
     velocity: Literal["displacement", "separate"] | None = None
 
 

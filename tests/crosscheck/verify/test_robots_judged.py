@@ -29,7 +29,7 @@ FEW = [
 def misled(case, key):
     """The case with a target that a solver with this fault believes to have reached."""
     q, inputs, fault = 0.7 * case.inputs["upper"] + 0.2, dict(case.inputs), FAULTS[key]
-    pose = tool_pose(fault.read(inputs), fault.meant(inputs, q))
+    pose = tool_pose(fault.read(inputs), fault.coordinates(inputs, q))
     target = np.roll(pose.rotations, -1) if key == "scalar last" else pose.rotations
     if key == "position only":
         target = rotation.multiply(target, rotation.random(np.random.default_rng(3)))
@@ -65,8 +65,8 @@ def test_an_answer_means_what_it_was_given_for(key):
     inputs = CASES[8].inputs
     assert inputs["slides"].any()
     q = inputs["start"] + 0.1
-    answer = FAULTS[key].answered(inputs, q)
-    np.testing.assert_allclose(FAULTS[key].meant(inputs, answer), q, atol=1e-14)
+    answer = FAULTS[key].answer(inputs, q)
+    np.testing.assert_allclose(FAULTS[key].coordinates(inputs, answer), q, atol=1e-14)
 
 
 def test_limits_that_are_left_aside_are_seen():
