@@ -129,7 +129,7 @@ def headline(comparison: RunComparison, failed: Sequence[RowChange]) -> str:
         return f"STOP: {counted(len(failed), 'row')} beyond the limits of --fail"
     bad = (ChangeVerdict.LESS_RIGHT, ChangeVerdict.SLOWER)
     worse = sum(row.verdict in bad for row in comparison.rows)
-    return f"{counted(worse, 'row')} worse" if worse else "Nothing is less right or slower"
+    return f"{counted(worse, 'row')} worse" if worse else "No row is less accurate or slower"
 
 
 def verdict_counts(comparison: RunComparison) -> str:

@@ -112,7 +112,7 @@ def table(runs: Sequence[RecordedRun], rows: Sequence[Course], quantity: str) ->
         Column("first", read=lambda course: course.finite[0]),
         Column("last", read=lambda course: course.finite[-1]),
         Column("ratio", read=lambda course: math.exp(course.change)),
-        text("course", lambda course: sparkline(course.medians)),
+        text("trend", lambda course: sparkline(course.medians)),
     )
     hidden = len(rows) - MAX_ROWS
     more = f"; {counted(hidden, 'more row')} changed less" if hidden > 0 else ""

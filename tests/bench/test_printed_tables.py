@@ -200,7 +200,7 @@ def test_history_prints_the_first_and_the_last_value_of_each_row(
         ]  # fmt: skip
         RecordFile(tmp_path / f"run{day}").append(records)
     code, out = plumbob(capsys, "history", "run1", "run2", "run3")
-    headings = ["problem", "solver", "settings", "first", "last", "ratio", "course"]
+    headings = ["problem", "solver", "settings", "first", "last", "ratio", "trend"]
     rows = [
         ["arm/circle", "my_ik, 20 restarts", "warm false", "1.0e-5", "4.0e-5", "4.00"],
         ["arm/circle", "my_ik, 20 restarts", "warm true", "1.0e-4", "4.0e-4", "4.00"],
