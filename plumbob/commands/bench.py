@@ -85,8 +85,9 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     ] = None,
     robot: Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")] = None,
     targets: Annotated[
-        int | None, option("N", "Random targets per problem; for robots a tenth.")
+        int | None, option("N", "Random targets per problem; for robots 1/20 a stratum.")
     ] = None,
+    seed: Annotated[int | None, option("N", "Seed of other random targets in suite ik.")] = None,
     effector: Annotated[
         Text, option("NAME", "Link of your models that must reach the target.")
     ] = None,
@@ -113,7 +114,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
     request = MeasurementRequest(
-        entrants or (), program_of(context), *parts, targets, effector, pins
+        entrants or (), program_of(context), *parts, targets, seed, effector, pins
     )
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:

@@ -46,7 +46,12 @@ def restarted(ask: Ask, robot: BenchRobot, restarts: int) -> Ask:
 
 def generator_of(*target: FloatArray) -> np.random.Generator:
     """Return a target's own generator, always with the same seed."""
+    return np.random.default_rng([_SEED, digest_of(*target)])
+
+
+def digest_of(*target: FloatArray | int) -> int:
+    """Return a number of 32 bits that depends on a target only, not on the order of targets."""
     digest = 0
     for part in target:
         digest = zlib.crc32(np.ascontiguousarray(part).tobytes(), digest)
-    return np.random.default_rng([_SEED, digest])
+    return digest
