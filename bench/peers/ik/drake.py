@@ -19,16 +19,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.solvers import IpoptSolver, SnoptSolver, SolverOptions
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    SolverOutput,
-    Tolerance,
-)
+from .overhead import library
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 # The part of the tolerance that is asked for.
 INSIDE = 0.5
@@ -52,19 +44,22 @@ def prepare(
     options.SetOption(engine.solver_id(), feasibility_name, FEASIBILITY)
     options.SetOption(engine.solver_id(), iterations_name, iterations)
     context, program, unknowns = ik.get_mutable_context(), ik.prog(), ik.q()
+    run = library(engine.Solve)
+    setters = [library(frame.SetPoseInParentFrame) for frame in frames]
+
+    def read(solution: Any) -> tuple[FloatArray, bool]:
+        return coordinates.from_drake(solution.GetSolution(unknowns)), solution.is_success()
 
     def ask(request: PoseRequest) -> Solve:
         targets = [RigidTransform(RotationMatrix(R), x) for x, R in request.poses]
         q0 = coordinates.to_drake(request.start)
 
-        def solve() -> SolverOutput:
-            for frame, target in zip(frames, targets, strict=True):
-                frame.SetPoseInParentFrame(context, target)
-            solution = engine.Solve(program, q0, options)
-            q = coordinates.from_drake(solution.GetSolution(unknowns))
-            return SolverOutput(q, bool(solution.is_success()))
+        def solve() -> Any:
+            for set_target, target in zip(setters, targets, strict=True):
+                set_target(context, target)
+            return run(program, q0, options)
 
-        return solve
+        return Solve(solve, read)
 
     return ask
 

@@ -4,11 +4,12 @@ It solves for the last link of a chain, which is the effector here, and does not
 """
 
 import warnings
+from functools import partial
 
 import ikpy.chain
 import numpy as np
 
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 
 def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
@@ -24,10 +25,7 @@ def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
         target, q0 = (request.positions[0], request.rotations[0], "all"), np.zeros(len(moving))
         q0[moving] = request.start
 
-        def solve() -> SolverOutput:
-            q = chain.inverse_kinematics(*target, initial_position=q0)
-            return SolverOutput(q[moving], None)
-
-        return solve
+        solve = partial(chain.inverse_kinematics, *target, initial_position=q0)
+        return Solve(solve, lambda q: (q[moving], None))
 
     return ask

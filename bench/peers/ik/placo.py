@@ -5,6 +5,7 @@ Its wheels pin a Pinocchio older than ours, so it works in a process of an envir
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from plumbob.crosscheck.child_process import ChildProcess, LostError
 from ...problems.robots import UnableError
 from ..protocol import OwnTime
 from ..registry import environment_python
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
+from .overhead import is_metered, report_library
+from .protocol import Ask, BenchRobot, PoseRequest, SolverOutput, Tolerance
 
 PROGRAM = Path(__file__).with_name("placo_program.py")
 
@@ -28,18 +30,26 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> A
     """
     robot.require_chain()
     program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
-    task = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
+    task = {
+        "text": robot.text,
+        "effector": robot.effectors[0],
+        "joints": robot.joints,
+        "iterations": iterations,
+        "limits": tolerance,
+        "is_metered": is_metered(),
+    }
     try:
-        _answer(program, {**task, "iterations": iterations, "limits": tolerance})
+        _answer(program, task)
     except ConnectionError:
         why = "PlaCo does not read the robot, or orders its joints otherwise"
         raise UnableError(why) from None
 
-    def ask(request: PoseRequest) -> Solve:
+    def ask(request: PoseRequest) -> Callable[[], SolverOutput]:
         question = {"target": request.matrix.tolist(), "start": request.start.tolist()}
 
         def solve() -> SolverOutput:
-            claim, seconds, q = _answer(program, question)
+            claim, seconds, q, library_seconds = _answer(program, question)
+            report_library(library_seconds)
             return SolverOutput(np.array(q), claim, OwnTime(float(seconds)))
 
         return solve
