@@ -151,7 +151,8 @@ class Chart:
         ranked = sorted(names, key=lambda name: costs[name])
         firsts = [name for name in ranked if name in self.entrants]
         for side in (True, False):
-            firsts += [n for n in ranked if registry.is_ours(n) == side and n not in self.entrants][:1]
+            peers = [name for name in ranked if name not in self.entrants]
+            firsts += [name for name in peers if registry.is_ours(name) == side][:1]
         labelled = list(dict.fromkeys([*firsts, *ranked]))[:MAX_LABELLED]
         return [name for name in names if name in labelled]
 

@@ -25,6 +25,7 @@ from ..experiments.timing.tables import median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import registry
+from ..problems.robots import CHARACTER, group_of
 from ..tables.results import Results, by_problem, counted, grouped, listed
 from ..tables.table import words
 from .standings import MISSES, Headline, best_rival, factor, named, percent, speed, standings
@@ -34,7 +35,8 @@ MAX_NAMED = 3
 _FROM = dict(zip(STARTS, ("from one start", "with restarts"), strict=True))
 # What is timed of other engines' own code; loops of ours on engines are no rivals.
 _SUBJECTS = {"kinematics": "forward kinematics", "cloth": "a step of a cloth"}
-HELD_OUT = "held out"
+# The groups of robots: those that no setting has seen come first.
+_GROUPS = ["held out", "tuning", CHARACTER, "yours"]
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
 # What the scales of a run mean.
 _SCALES = {"quick": "Quick run: few targets and rounds", "full": "Full run: all targets and rounds"}
@@ -85,6 +87,7 @@ def headlines(results: Results) -> list[Headline]:
     robots = [
         headline
         for group, start, fields in _robot_groups(results)
+        if group != CHARACTER
         for headline in _robot_headlines(group, start, fields)
     ]
     return [*robots, *filter(None, map(_race_headline, _races(results)))]
@@ -138,14 +141,14 @@ def _robot_groups(results: Results) -> Iterator[tuple[str, str, dict[str, list[S
     """Yield group, start and solvers on each robot; robots held out from tuning come first."""
     by_start = {start: fields_of(results, start) for start in STARTS}
     groups = {robot: _group_of(f[robot][0].records[0]) for f in by_start.values() for robot in f}
-    for group in sorted(set(groups.values()), key=lambda group: (group != HELD_OUT, group)):
+    for group in sorted(set(groups.values()), key=_GROUPS.index):
         for start, fields in by_start.items():
             yield group, start, {robot: fields[robot] for robot in fields if groups[robot] == group}
 
 
 def _group_of(record: Record) -> str:
-    """Return the group of a record's robot."""
-    return str(record.facts.get("group", ""))
+    """Return the group of a record's robot: for tuning, held out, the character, or the user's."""
+    return group_of(record.problem.rpartition("/")[2])
 
 
 def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> Iterator[Headline]:
@@ -169,9 +172,13 @@ def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> 
     order = [solver for solver in row.time.order if rows[solver].share.hits]
     first = _first(order)
     if first and (rival := best_rival(first, order)):
-        ratio = speed(ratio_of_times(rows[rival], rows[first]), rival)
-        sentence = f"On {place}, {named(first)} is the fastest, {MISSES}: it is {ratio}"
-        yield _headline("Fastest", group, start, f"{sentence}, the best other solver.")
+        ratio = ratio_of_times(rows[rival], rows[first])
+        sentence = f"On {place}, {named(first)} is the fastest, {MISSES}: it is "
+        sentence += f"{speed(ratio, rival)}, the best other solver."
+        if ratio.low < 1.0 < ratio.high:
+            names = f"{named(first)} and {named(rival)}"
+            sentence = f"On {place}, {names} are the fastest and tie within chance, {MISSES}."
+        yield _headline("Fastest", group, start, sentence)
 
 
 def _headline(question: str, group: str, start: str, sentence: str) -> Headline:
@@ -197,7 +204,9 @@ def _place(group: str, row: Score, total: int) -> str:
 
 def _robots(group: str, count: int) -> str:
     """Return a number of robots of a group as words: "10 held-out robots"."""
-    return counted(count, " ".join(filter(None, (group.replace(" ", "-"), "robot"))))
+    if group == _GROUPS[-1]:
+        return f"{counted(count, 'robot')} of yours"
+    return counted(count, f"{group.replace(' ', '-')} robot")
 
 
 def _first(order: Sequence[str]) -> str:
@@ -295,7 +304,7 @@ def wins_of_others(results: Results) -> list[Headline]:
 
 def _win_headline(wins: Sequence[Win]) -> Headline:
     win, names = wins[0], [win.case for win in wins]
-    unit = "{} points" if "solves" in win.result else "a factor of {}"
+    unit = "{} percentage points" if "solves" in win.result else "a factor of {}"
     size = unit.format(_span([win.size for win in wins]))
     cases = f" ({listed(names)})" if len(names) <= MAX_NAMED else ""
     sentence = f"{named(win.solver)} {win.result} on {len(names)} of {win.cases}{cases}, by {size}."

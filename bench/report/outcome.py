@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from ..tables.aligned import filled
 from ..tables.entered import remarks_of_entrants
-from ..tables.results import Results, counted
+from ..tables.results import Results, counted, grouped
 from ..tables.table import is_blank, words
 from ..text import visible
 from .headlines import ClaimCount, Overview, overview
@@ -86,8 +86,9 @@ def _verdict(verdict: ClaimCount | None) -> str:
 
 def leading(answers: Overview) -> list[str]:
     """Return who is best in a few tasks, most solved first, and where others beat ours."""
-    tasks = {_task(headline): headline for headline in reversed(answers.headlines)}
-    headlines = sorted(reversed(tasks.values()), key=lambda h: not h.question.startswith("Most"))
+    tasks = grouped(answers.headlines, _task)
+    firsts = [headlines[0] for headlines in tasks.values()]
+    headlines = sorted(firsts, key=lambda headline: not headline.question.startswith("Most"))
     best = [f"Best: {headline.sentence}" for headline in headlines[:HEADLINES]]
     wins = [f"Others win: {win.sentence}" for win in answers.wins[:WINS]]
     if more := len(answers.wins) - len(wins):
