@@ -46,30 +46,25 @@ class Job(NamedTuple):
         """Yield the messages of the job, each as soon as it is there."""
         try:
             adapter = importlib.import_module(self.module)
-            ask, setup = time_call(lambda: self._prepared(adapter))
+            prepare = partial(adapter.prepare, self.model, self.tolerance, **self.settings)
+            ask, setup = time_call(prepare)
+            if self.restarts:
+                ask = restarted(ask, self.model, self.restarts)
             first = self._solved(ask(self.targets.request(0))) if self.warms_up else None
             if self.restarts and first is not None and first.claim < 0:
                 raise UnableError("not started again, for it claims nothing of its answers")
         except Exception as error:  # an exception of an engine is its result
             yield from unfit(error, self.entrant)
         else:
-            yield Ready(setup, remark_of(adapter), self._overhead(adapter))
+            yield Ready(setup, remark_of(adapter), self._overhead(adapter, prepare))
             yield from announced(self._answers(ask), self.entrant)
             yield Finished()
 
-    def _prepared(self, adapter: Any) -> Any:
-        ask = adapter.prepare(self.model, self.tolerance, **self.settings)
-        return restarted(ask, self.model, self.restarts) if self.restarts else ask
-
-    def _overhead(self, adapter: Any) -> float:
-        """Return the time of a solve that the solver does not use [s], NaN if it is not known."""
-        if not self.warms_up:
+    def _overhead(self, adapter: Any, prepare: Callable[[], Any]) -> float:
+        """Return the time of a solve that the solver does not use [s], NaN of users' solvers."""
+        if self.entrant or not self.warms_up:
             return math.nan
-        try:
-            prepare = partial(adapter.prepare, self.model, self.tolerance, **self.settings)
-            return overhead(prepare, self.targets.request(0))
-        except Exception:  # its first solve raised as well
-            return math.nan
+        return overhead(adapter, prepare, self.targets.request(0))
 
     def _answers(self, ask: Any) -> Iterator[Solved]:
         """Solve the targets in order within the budget."""

@@ -22,6 +22,7 @@ from pydrake.solvers import IpoptSolver, SnoptSolver, SolverOptions
 from .overhead import library
 from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
+METERED = True
 # The part of the tolerance that is asked for.
 INSIDE = 0.5
 FEASIBILITY = 1e-8

@@ -10,6 +10,8 @@ from ...problems.evaluate import mujoco_model
 from .overhead import library
 from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance, arrived, iterate
 
+METERED = True
+
 
 def prepare(
     robot: BenchRobot, tolerance: Tolerance, iterations: int = 200, lm_damping: float = 0.01

@@ -1,11 +1,17 @@
-"""The time inside the clock that a solver's library does not use: what the harness adds."""
+"""The time inside the clock that a solver's library does not use: what the harness adds.
 
+Most adapters time a single call of their library, so that the harness adds the reading of the clock
+and one call. An adapter that calls its library in a loop passes the functions through `library` and
+says `METERED = True`.
+"""
+
+import math
 from collections.abc import Callable
 from statistics import median
 from time import perf_counter
 from typing import Any, TypeVar
 
-from .protocol import Ask, PoseRequest, Solve
+from .protocol import Ask, PoseRequest, Solve, SolverOutput
 
 REPEATS = 5
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -53,38 +59,34 @@ def report_library(seconds: float) -> None:
         _meters[-1].seconds += seconds
 
 
-def overhead(prepare: Callable[[], Ask], request: PoseRequest) -> float:
+def overhead(adapter: Any, prepare: Callable[[], Ask], request: PoseRequest) -> float:
     """Return the median time of a solve that its solver's library does not use [s].
 
-    It is an upper bound, for reading the clock costs time too. NaN of solvers in other processes
-    that do not tell.
+    It is an upper bound, for reading the clock costs time too; NaN if the solver raises.
 
     Args:
-        prepare: sets the solver up, as an adapter does.
-        request: a target, which is solved several times.
+        adapter: its module.
+        prepare: sets the solver up by the adapter.
+        request: a target, which is solved several times if the adapter is metered.
     """
+    if not getattr(adapter, "METERED", False):
+        stored = Solve(lambda: None, lambda answer: (answer, None))
+        return median(_seconds(stored()) for _ in range(REPEATS))
     meter = Meter()
     _meters.append(meter)
     try:
         solve = prepare()(request)
-        seconds = [_remaining(solve, meter) for _ in range(REPEATS)]
+        return median(_remaining(solve, meter) for _ in range(REPEATS))
+    except Exception:  # which is a failed attempt where its answers count
+        return math.nan
     finally:
         _meters.remove(meter)
-    return median(seconds)
 
 
-def _remaining(solve: Any, meter: Meter) -> float:
-    """Return the time of a solve without that of its library's functions [s].
-
-    Where none is known the whole call is the library's: a function that returns its stored answer
-    takes its place.
-    """
+def _remaining(solve: Callable[[], SolverOutput], meter: Meter) -> float:
     meter.seconds = 0.0
-    output = solve()
-    if meter.seconds:
-        return output.time.seconds - meter.seconds
-    if not isinstance(solve, Solve):
-        return float("nan")
-    answer = output
-    stored = Solve(lambda: answer, lambda answer: (answer.q, answer.claim))
-    return stored().time.seconds  # type: ignore[union-attr]
+    return _seconds(solve()) - meter.seconds
+
+
+def _seconds(output: SolverOutput) -> float:
+    return output.time.seconds if output.time else math.nan

@@ -12,6 +12,8 @@ from .closed_loop import from_pinocchio, pinocchio_model, to_pinocchio
 from .overhead import library
 from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance, arrived, iterate
 
+METERED = True
+
 
 def prepare(
     robot: BenchRobot, tolerance: Tolerance, iterations: int = 200, damping: float = 1e-6

@@ -19,6 +19,7 @@ from ..registry import environment_python
 from .overhead import is_metered, report_library
 from .protocol import Ask, BenchRobot, PoseRequest, SolverOutput, Tolerance
 
+METERED = True
 PROGRAM = Path(__file__).with_name("placo_program.py")
 
 
