@@ -1,10 +1,11 @@
 """Drake: inverse kinematics as a nonlinear program, solved by a solver of its wheel.
 
-There is no objective unless one is asked for: effectors are constrained to a box and a cone about their targets,
-coordinates to their limits. The program is built once for a robot; frames in the world are moved to
-the targets. Solvers stop at the edge of the constraints, so a part of the tolerance is set. Drake
-bounds an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's usual tolerance on
-constraints of 1e-6: a smaller tolerance is given, or half of its claims are false.
+There is no objective unless one is asked for: effectors are constrained to a box and a cone about
+their targets, coordinates to their limits. The program is built once for a robot; frames in the
+world are moved to the targets. Solvers stop at the edge of the constraints, so a part of the
+tolerance is set. Drake bounds an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's
+usual tolerance on constraints of 1e-6: a smaller tolerance is given, or half of its claims are
+false.
 """
 
 import logging

@@ -16,12 +16,12 @@ def prepare(
     robot: BenchRobot,
     tolerance: Tolerance,
     optimizer: str = "least_squares",
-    precision: float | None = None,
+    precision: float = 0.0,
     method: str = "",
 ) -> Ask:
     """Return the solver, set up for a robot; it takes no tolerance on poses.
 
-    `precision` is that of its optimizer, `method` one of that in SciPy.
+    `precision` is that of its optimizer, if any, `method` one of that in SciPy.
     """
     robot.require_chain()
     with robot.file() as file, warnings.catch_warnings():
@@ -29,7 +29,7 @@ def prepare(
         chain = ikpy.chain.Chain.from_urdf_file(file, base_elements=[robot.root])
         moving = np.array([link.name in robot.joints for link in chain.links])
         chain.active_links_mask = moving
-    options: dict[str, Any] = {"optimizer": optimizer, "tol": precision}
+    options: dict[str, Any] = {"optimizer": optimizer, "tol": precision or None}
     options |= {"optimizer_kwargs": {"method": method}} if method else {}
 
     def ask(request: PoseRequest) -> Solve:

@@ -22,13 +22,16 @@ def prepare(
     iterations: int = 100,
     minimum: float = 1e-6,
     factor: float = 10.0**0.1,
-    scale: str | None = None,
+    scale: str = "",
 ) -> Ask:
-    """Return the solver, set up for a robot: its least damping, the factor by which that changes."""
+    """Return the solver, set up for a robot.
+
+    `minimum` is the least damping, `factor` what changes it, `scale` its rule for coordinates.
+    """
     robot.require_chain()
     bounds = [robot.lower[:, None], robot.upper[:, None]]
     options: dict[str, Any] = {"max_iter": iterations, "verbose": SILENT}
-    options |= {"mu_min": minimum, "mu_factor": factor, "x_scale": scale}
+    options |= {"mu_min": minimum, "mu_factor": factor, "x_scale": scale or None}
     reach = _Reach(robot)
 
     def ask(request: PoseRequest) -> Solve:

@@ -6,6 +6,8 @@ With pink's own damping of 1e-12 the quadratic program is infeasible, and pink r
 `NoSolutionFound`, once a step leaves a joint 1e-7 beyond its limit; with 1e-6 it never is here.
 """
 
+import logging
+
 import pink
 
 from .closed_loop import from_pinocchio, pinocchio_model, to_pinocchio
@@ -21,6 +23,7 @@ def prepare(
     gain: float = 1.0,
 ) -> Ask:
     """Return the solver, set up for a robot."""
+    logging.getLogger().setLevel(logging.ERROR)  # it warns of each step beyond a limit
     model, cost = pinocchio_model(robot), float(robot.oriented)
     data, limits = model.createData(), [pink.limits.ConfigurationLimit(model)]
     tasks = [pink.FrameTask(effector, 1.0, cost, lm_damping, gain) for effector in robot.effectors]

@@ -34,7 +34,11 @@ def prepare(
     """
     robot.require_chain()
     program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
-    task = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
+    task: dict[str, Any] = {
+        "text": robot.text,
+        "effector": robot.effectors[0],
+        "joints": robot.joints,
+    }
     task |= {"regularization": regularization, "weight": weight}
     try:
         _answer(program, {**task, "iterations": iterations, "limits": tolerance})

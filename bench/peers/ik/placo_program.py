@@ -1,8 +1,9 @@
 """PlaCo as a program that answers targets, run by the Python of PlaCo's own environment.
 
 Its input and output are lines of JSON. The first is {"text": a URDF, "effector", "joints",
-"iterations", "limits": [m] and [rad], "regularization", "weight"} and is answered by true. A question is {"target": a
-transform, "start"}; the answer is whether it has arrived, the time [s], and the coordinates.
+"iterations", "limits": [m] and [rad], "regularization", "weight"} and is answered by true. A
+question is {"target": a transform, "start"}; the answer is whether it has arrived, the time [s],
+and the coordinates.
 """
 
 import json
