@@ -362,8 +362,8 @@ def test_a_solver_is_closed_after_its_greeting(folder, monkeypatch):
         (["--problem", "chain/naer"], "did you mean 'chain/near'?"),
         (["--robot", "ur6"], "did you mean 'ur5'?"),
         (["--solver", "qqq"], "expected one of 'DART', 'DART, 20 restarts', 'Drake', 'Drake, I"),
-        (["--problem", "qqq"], "'PR2, right arm', 'UR5', 'chain', 'chain, beyond', 'chain, ed"),
-        (["--robot", "qqq"], "expected one of character, iiwa14, panda"),
+        (["--problem", "qqq"], "'Fetch', 'Franka Panda', 'KUKA iiwa14'"),
+        (["--robot", "qqq"], "expected one of baxter, character, fetch"),
         (["--targets", "0"], "targets: expected 1 or more, got 0"),
         (
             ["--solver", "ccd", "--robot", "ur5"],
