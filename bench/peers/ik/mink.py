@@ -1,7 +1,8 @@
 """mink: differential inverse kinematics on MuJoCo by quadratic programs, iterated to a target.
 
-Each step asks for a part of the error (`gain`, over 1 s) within the joint limits. With full steps,
-the damping of the task must not be zero: they then jump about.
+Each step asks for a part of the error (`gain`, over 1 s) within the joint limits, and takes at most
+the part `limit_gain` of the way to a limit. With full steps, the damping of the task must not be
+zero: they then jump about.
 """
 
 import mink
@@ -17,10 +18,11 @@ def prepare(
     damping: float = 1e-12,
     lm_damping: float = 0.01,
     gain: float = 1.0,
+    limit_gain: float = 0.95,
 ) -> Ask:
     """Return the solver, set up for a robot."""
     configuration = mink.Configuration(mujoco_model(robot))
-    limits, cost = [mink.ConfigurationLimit(configuration.model)], float(robot.oriented)
+    limits, cost = [mink.ConfigurationLimit(configuration.model, limit_gain)], float(robot.oriented)
     tasks = [
         mink.FrameTask(effector, "body", 1.0, cost, gain, lm_damping)
         for effector in robot.effectors
