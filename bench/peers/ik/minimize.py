@@ -4,6 +4,8 @@ The residual is the effector's displacement and rotation vector from the target,
 of both. It works on coordinates, not on rotations, so it takes hinges only.
 """
 
+from typing import Any
+
 import mujoco
 import numpy as np
 from mujoco import minimize
@@ -14,10 +16,22 @@ from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 SILENT = minimize.Verbosity.SILENT
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> Ask:
-    """Return the solver, set up for a robot."""
+def prepare(
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 100,
+    minimum: float = 1e-6,
+    factor: float = 10.0**0.1,
+    scale: str = "",
+) -> Ask:
+    """Return the solver, set up for a robot.
+
+    `minimum` is the least damping, `factor` what changes it, `scale` its rule for coordinates.
+    """
     robot.require_chain()
     bounds = [robot.lower[:, None], robot.upper[:, None]]
+    options: dict[str, Any] = {"max_iter": iterations, "verbose": SILENT}
+    options |= {"mu_min": minimum, "mu_factor": factor, "x_scale": scale or None}
     reach = _Reach(robot)
 
     def ask(request: PoseRequest) -> Solve:
@@ -25,7 +39,7 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> A
 
         def solve() -> FloatArray:
             reach.aim(request.positions[0], request.rotations[0])
-            return minimize.least_squares(*problem, max_iter=iterations, verbose=SILENT)[0].ravel()
+            return minimize.least_squares(*problem, **options)[0].ravel()
 
         def read(q: FloatArray) -> tuple[FloatArray, bool]:
             errors = np.linalg.norm(reach.residual(q).reshape(2, 3), axis=-1)

@@ -23,7 +23,13 @@ METERED = True
 PROGRAM = Path(__file__).with_name("placo_program.py")
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> Ask:
+def prepare(
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 100,
+    regularization: float = 1e-6,
+    weight: float = 1.0,
+) -> Ask:
     """Return the solver, set up for a robot.
 
     Raises:
@@ -35,9 +41,11 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> A
         "text": robot.text,
         "effector": robot.effectors[0],
         "joints": robot.joints,
+        "regularization": regularization,
+        "weight": weight,
+        "is_metered": is_metered(),
         "iterations": iterations,
         "limits": tolerance,
-        "is_metered": is_metered(),
     }
     try:
         _answer(program, task)

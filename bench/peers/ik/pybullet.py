@@ -17,23 +17,24 @@ import pybullet
 
 from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
-# It stops within this part of the tolerance, which bounds a distance; angles come along.
-INSIDE = 0.1
-
 
 def prepare(
     robot: BenchRobot,
     tolerance: Tolerance,
     iterations: int = 200,
     damping: float = 1e-3,
+    inside: float = 0.1,
     limits: bool = False,
     check: bool = False,
 ) -> Ask:
-    """Return the solver, set up for a robot, with a damping or with limits."""
+    """Return the solver, set up for a robot, with a damping or with limits.
+
+    It stops within the part `inside` of the tolerance, which bounds a distance; angles come along.
+    """
     body = BulletBody(robot)
     options: dict[str, Any] = {
         "maxNumIterations": iterations,
-        "residualThreshold": INSIDE * tolerance.position,
+        "residualThreshold": inside * tolerance.position,
         "physicsClientId": body.client,
     }
     if limits:
@@ -46,7 +47,6 @@ def prepare(
         pose = request.positions[0].tolist(), request.quaternion.tolist()
         start = request.start.tolist()
         poses = {"currentPositions": start} | ({"restPoses": start} if limits else {})
-
         target = body.number, body.effector, *pose
         solve = partial(pybullet.calculateInverseKinematics, *target, **poses, **options)
 
