@@ -1,6 +1,7 @@
 """Run jobs in a process of their own; end it when it stays silent, keep its earlier messages."""
 
 import contextlib
+import math
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -35,6 +36,7 @@ class JobOutcome(NamedTuple):
     is_silent: bool = False  # whether the worker was ended for its silence
     remark: str = ""  # the remark of the solver's adapter, else ""
     laps: Sequence[Lap] = ()  # the times of solvers in turns
+    overhead: float = math.nan  # of a solve's time, what the solver does not use [s]
 
     @property
     def note(self) -> str:

@@ -4,13 +4,16 @@ import contextlib
 import ctypes
 import functools
 import importlib
+import math
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..peers.ik.protocol import Solve, attempt
+from ..peers.ik.overhead import overhead
+from ..peers.ik.protocol import SolverOutput, attempt
 from ..peers.ik.restarts import digest_of, restarted
 from ..peers.protocol import NoAnswerError, OwnTime, describe, remark_of
 from ..problems.robots import UnableError
@@ -51,25 +54,34 @@ class Job(NamedTuple):
         except Exception as error:  # an exception of an engine is its result
             yield from unfit(error, self.entrant)
         else:
-            yield Ready(setup, remark_of(adapter))
+            yield Ready(setup, remark_of(adapter), self._overhead(adapter))
             yield from announced(self._answers(ask), self.entrant)
             yield Finished()
 
     def prepared(self) -> Any:
         """Return the function of the adapter that takes requests."""
-        adapter = importlib.import_module(self.module)
-        ask = adapter.prepare(self.model, self.tolerance, **self.settings)
+        ask = self._prepare()
         return restarted(ask, self.model, self.restarts) if self.restarts else ask
+
+    def _prepare(self) -> Any:
+        adapter = importlib.import_module(self.module)
+        return adapter.prepare(self.model, self.tolerance, **self.settings)
+
+    def _overhead(self, adapter: Any) -> float:
+        """Return the time of a solve that the solver does not use [s], NaN of users' solvers."""
+        if self.entrant or not self.warms_up:
+            return math.nan
+        return overhead(adapter, self._prepare, self.targets.request(0))
 
     def _answers(self, ask: Any) -> Iterator[Solved]:
         """Solve the targets in order."""
         for i in range(self.targets.shape[0]):
             request = self.targets.request(i)
             solve = ask(request)
-            _seed_shared_generators(digest_of(*request))
+            seed_shared_generators(digest_of(*request))
             yield self._solved(solve)
 
-    def _solved(self, solve: Solve) -> Solved:
+    def _solved(self, solve: Callable[[], SolverOutput]) -> Solved:
         output, seconds = time_call(lambda: attempt(solve))
         q, trouble = np.full(self.targets.shape[1], np.nan), output.error
         if output.q is not None:
@@ -89,8 +101,8 @@ class Job(NamedTuple):
         requests = [self.targets.request(i) for i in range(count)]
         solves = [(digest_of(*request), ask(request)) for request in requests]
         for number, (digest, solve) in enumerate([solves[0], *solves]):
-            _seed_shared_generators(digest)
-            output, seconds = time_call(functools.partial(attempt, solve))
+            seed_shared_generators(digest)
+            output, seconds = time_call(partial(attempt, solve))
             if number:
                 yield output.time or OwnTime(seconds)
 
@@ -195,7 +207,7 @@ def announced(targets: Iterator[Solved], entrant: str) -> Iterator[Message]:
         yield target
 
 
-def _seed_shared_generators(seed: int) -> None:
+def seed_shared_generators(seed: int) -> None:
     """Seed the generators of the process, from which an engine may draw.
 
     Without it, an answer would depend on the solves before it.

@@ -206,7 +206,8 @@ def _measured(job: RobotJob, outcome: JobOutcome, times: Times | None) -> Measur
         "group": group_of(job.robot),
         "time_limited": job.entry.has_time_limit,
     }
-    return Measured(RobotSolves(**arrays, setup=outcome.setup), {"remark": outcome.note}, facts)
+    solves = RobotSolves(**arrays, setup=outcome.setup, overhead=outcome.overhead)
+    return Measured(solves, {"remark": outcome.note}, facts)
 
 
 def _evaluated(job: RobotJob, solved: list[Solved], engine: str) -> dict[str, np.ndarray]:

@@ -21,6 +21,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
         exception: whether the solver raised, or its process was lost.
         stratum: the number of each target's stratum.
         setup: how long the solver took before the first [s].
+        overhead: of the time of a solve, what the harness adds [s]; NaN if that is not known.
         bound: how near any pose may come to a target out of reach [m].
         disputed: the numbers of the targets whose answers the engines place differently.
     """
@@ -35,6 +36,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
     exception: Booleans1 | None = None
     stratum: Integers1 | None = None
     setup: float
+    overhead: float | None = None
     bound: Floats1 | None = None
     disputed: Integers1 | None = None
 

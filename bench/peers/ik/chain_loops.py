@@ -1,7 +1,7 @@
 """Plumbob's solvers, and one loop on each engine, for chains of balls one target at a time."""
 
 from collections.abc import Callable
-from time import perf_counter
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,8 @@ from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import Skeleton, forward_kinematics, solve_ik
 
 from ...problems.chains import ChainRequest
-from ..protocol import OwnTime
-from .levenberg_marquardt import levenberg_marquardt, within_reach
-from .protocol import Solve, SolverOutput
+from .levenberg_marquardt import LoopOutput, levenberg_marquardt, within_reach
+from .protocol import FloatArray, Solve
 
 
 def prepare(
@@ -30,11 +29,8 @@ def prepare(
         target, start, iterations = request
         options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": iterations}
 
-        def solve() -> SolverOutput:
-            solution = solve_ik(skeleton, start, target, solver, **options)
-            return SolverOutput(np.append(solution.iterations, solution.positions), None)
-
-        return solve
+        call = partial(solve_ik, skeleton, start, target, solver, **options)
+        return Solve(call, lambda s: (np.append(s.iterations, s.positions), None))
 
     return ask
 
@@ -48,13 +44,11 @@ def _loop(skeleton: Skeleton, tolerance: float, name: str) -> Callable[[ChainReq
         q = coordinates(engine, request.start)
         limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": request.iterations}
 
-        def solve() -> SolverOutput:
-            begin = perf_counter()
-            answer = levenberg_marquardt(engine, q, target, effector, **limits)
-            time = OwnTime(perf_counter() - begin)
+        def read(answer: LoopOutput) -> tuple[FloatArray, None]:
             positions = forward_kinematics(skeleton, answer.q[engine.columns]).positions
-            return SolverOutput(np.append(answer.iterations, positions), None, time)
+            return np.append(answer.iterations, positions), None
 
-        return solve
+        call = partial(levenberg_marquardt, engine, q, target, effector, **limits)
+        return Solve(call, read)
 
     return ask
