@@ -28,7 +28,7 @@ from ...harness.job import seed_shared_generators
 from ...harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
 from ...harness.stopwatch import processor_time_of
 from ...peers.ik.protocol import attempt
-from ...peers.ik.restarts import restarted
+from ...peers.ik.restarts import digest_of, restarted
 from ...peers.registry import PEERS, Peer
 from ...problems.evaluate import Targets, evaluator_of
 from ...problems.robot_targets import STRATA, stratum_poses
@@ -131,8 +131,9 @@ def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, 
     attempt(ask(targets.request(0)))  # which compiles
     q = np.full(targets.starts.shape, math.nan)
     for i in range(count):
-        solve = ask(targets.request(i))
-        seed_shared_generators(i)
+        request = targets.request(i)
+        solve = ask(request)
+        seed_shared_generators(digest_of(*request))
         output, duration = processor_time_of(functools.partial(attempt, solve))
         q[i] = math.nan if output.q is None else output.q
         # A solver that works in yet another process has a clock of its own.
