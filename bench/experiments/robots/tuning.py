@@ -25,7 +25,7 @@ import numpy as np
 
 from ...harness.isolation import WorkerProcess
 from ...harness.job import seed_shared_generators
-from ...harness.metrics import ranking, shifted_geometric_mean
+from ...harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
 from ...harness.stopwatch import processor_time_of
 from ...peers.ik.protocol import attempt
 from ...peers.ik.restarts import restarted
@@ -185,12 +185,17 @@ def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
 def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
     """Return the best of the trials on all targets.
 
-    Trials tie whose shares the bench's paired test cannot tell from the best. Of these, the trials
-    tie whose times are equal to the fastest; of these it is the default, if there, or the share.
+    Trials tie with the greatest share that McNemar's paired test cannot tell from it. Of these,
+    those tie whose times are equal to the fastest; of these it is the default, if there, or the one
+    with the greatest share.
     """
     candidates = [trial for trial in trials if trial.settings in search.candidates]
-    order = ranking({str(i): trial.solved.ravel() for i, trial in enumerate(candidates)}).first
-    tied = [candidates[int(i)] for i in order]
+    best = max(candidates, key=lambda trial: trial.share).solved.ravel()
+    tied = [
+        trial
+        for trial in candidates
+        if chance_of_pairs(best, trial.solved.ravel()) > 1.0 - CONFIDENCE
+    ]
     limit = EQUAL_TIMES * min(trial.microseconds for trial in tied)
     fast = [trial for trial in tied if trial.microseconds <= limit]
     return max(fast, key=lambda trial: (trial.settings == search.default, trial.share))
