@@ -15,8 +15,9 @@ from ..contestant import Answer, Exchange
 from ..explain import either
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..laws import finding, judge_case, not_finite
 from ..sentence import Sentence, sentence
-from . import laws, robot_models, rounding
+from . import robot_models, rounding
 from .report import report
 from .robot_models import ANYWHERE, BEYOND, IDENTITY, judgement_of
 
@@ -98,18 +99,21 @@ FAULTS: Mapping[str, Misreading] = {
 def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Judge coordinates by the laws of poses; name the faults."""
     judgements = [
-        laws.judge_case(exchange, greeting, partial(_findings, exchange.case, greeting))
+        judge_case(
+            exchange, partial(_findings, exchange.case, greeting),
+            rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
+        )
         for exchange in exchanges
-    ]
+    ]  # fmt: skip
     return report(TASK, method, judgements, _diagnosis(judgements))
 
 
 def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> list[Finding]:
     q = outputs.get("q")
     if q is None:
-        return [laws.missing(sentence("The answer has no coordinates q."))]
+        return [finding("numbers, no coordinates")]
     if not np.isfinite(q).all():
-        return [laws.no_numbers("numbers", q, 0.0)]
+        return [not_finite("numbers, of a joint", q)]
     judgement = judgement_of(case.inputs, q)
     limits = _limits(judgement, q, case, greeting)
     return [limits, *_target_laws(judgement, outputs, case, greeting)]
@@ -120,10 +124,7 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
     joint = int(np.argmax(excess))
     largest = float(np.abs([case.inputs["lower"], case.inputs["upper"]]).max())
     bound = rounding.ROUNDINGS_A_JOINT * greeting.epsilon * largest
-    message = sentence(
-        "Joint {joint} is at {value:.6g}, {error:.2g} beyond its limit.", value=float(q[joint])
-    )
-    return laws.bounded("limits kept", excess[joint], bound, "rad", message, index=joint)
+    return finding("limits kept", excess[joint], bound, index=joint, value=float(q[joint]))
 
 
 def _target_laws(
@@ -135,35 +136,14 @@ def _target_laws(
     bound = judgement.tolerance + rounding.positions(greeting.epsilon, joints, size)
     angle_bound = judgement.tolerance_rotation + rounding.rotations(greeting.epsilon, joints)
     if case.family != BEYOND:
-        verdict = Verdict.RIGHT_BUT if case.family == ANYWHERE else Verdict.WRONG
-        too_far = sentence("It ends {error:.2g} m from a target that it can reach.")
-        rotated = sentence(
-            "The tool's rotation differs by {error:.2g} rad from a target that it can reach."
-        )
-        yield laws.bounded("target reached", distance, bound, "m", too_far, verdict=verdict)
-        yield laws.bounded("rotation reached", angle, angle_bound, "rad", rotated, verdict=verdict)
-    yield from _claims(distance, angle, bound, angle_bound, outputs)
-
-
-def _claims(
-    distance: float, angle: float, bound: float, angle_bound: float, outputs: Mapping[str, Any]
-) -> Iterator[Finding]:
-    """Yield a finding if `converged` is false."""
-    reached = distance <= bound and angle <= angle_bound
-    if outputs.get("converged") and not reached:
-        message = sentence(
-            "It reports success, but the tool is {distance:.2g} m and {angle:.2g} rad from the "
-            "target.",
-            distance=distance, angle=angle,
-        )  # fmt: skip
-        yield Finding("claims", Verdict.WRONG, distance, bound, "m", message)
-    if reached and not outputs.get("converged", True):
-        message = sentence(
-            "The effector is {error:.2g} m from the target, within the tolerance, but it "
-            "reports failure.",
-            error=distance,
-        )
-        yield Finding("claims", Verdict.RIGHT_BUT, distance, bound, "m", message)
+        verdict = Verdict.RIGHT_BUT if case.family == ANYWHERE else None
+        yield finding("target reached", distance, bound, verdict=verdict)
+        yield finding("rotation reached", angle, angle_bound, verdict=verdict)
+    # The larger of both errors, in multiples of its bound.
+    error = max(distance / bound, angle / angle_bound)
+    if "converged" in outputs and outputs["converged"] != (error <= 1.0):
+        key = "claims, success of a tool" if outputs["converged"] else "claims, failure of a tool"
+        yield finding(key, abs(error - 1.0), distance=distance, angle=angle)
 
 
 def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:

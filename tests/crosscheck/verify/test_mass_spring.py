@@ -281,7 +281,7 @@ def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told(monkeypat
     median, worst = (float(x) for x in re.search(r"by (\S+) in .* by (\S+) in", nearest).groups())
     assert 0.0 < median <= worst < 0.1
     laws_that_hold = set(holds.removesuffix(".").partition(": ")[2].split(", "))
-    assert laws_that_hold == {"pins", "momentum", "equal requests", "symmetry", "consistency"}
+    assert laws_that_hold == {"pins", "momentum", "equal answers", "symmetry", "consistency"}
     screen = " ".join(" ".join(terminal.lines(
         Report(Greeting(1, ("mass_spring_step",)), [judged], 0),
         Presentation(speaker("en"), "en", ["x.py"]), terminal.ENDLESS,
@@ -327,7 +327,7 @@ def test_noise_is_named():
         lambda positions, **inputs: 7e-4 * rng.standard_normal(positions.shape),
     )
     judged = report(noise, step=DECLARED["linearised"][1])
-    assert "equal requests" in broken_laws(judged)
+    assert "equal answers" in broken_laws(judged)
     assert any("-fsanitize" in str(hint) for hint in judged.diagnosis.hints)
 
 

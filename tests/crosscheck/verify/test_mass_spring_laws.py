@@ -10,6 +10,7 @@ import pytest
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.judgement import Verdict
+from plumbob.crosscheck.verify.laws import equal_answers
 from plumbob.crosscheck.verify.mass_spring import laws
 from plumbob.crosscheck.verify.mass_spring.laws import (
     IMPRECISE,
@@ -231,7 +232,7 @@ def test_equal_requests_have_equal_answers_to_what_is_allowed(name, share, verdi
     allowed = {"positions": 1e-12, "velocities": 1e-9}
     first = {key: np.ones((3, 3)) for key in allowed}
     second = first | {name: first[name] + one_moved(1, share * allowed[name])}
-    found = laws.equal_requests(asked(first, second), allowed)
+    found = equal_answers(asked(first, second), allowed)
     assert found.verdict is verdict
     assert found.tolerance == allowed[name]
 
