@@ -73,10 +73,16 @@ def explain(
 
 
 def _telling(matches: Sequence[Match]) -> list[Match]:
-    """Return the perfect matches, or else those better than the faultless variant's."""
-    right = max((match.share for match in matches if not match.variant.faults), default=0.0)
-    best = max((match.share for match in matches), default=0.0)
-    return [match for match in matches if match.share == 1.0 or right < match.share <= best < 1.0]
+    """Return the perfect matches, or else all, that explain more than any part of their faults."""
+
+    def is_needless(match: Match) -> bool:
+        faults = set(match.variant.faults)
+        return any(
+            set(part.variant.faults) < faults and part.share >= match.share for part in matches
+        )
+
+    perfect = [match for match in matches if match.share == 1.0]
+    return [match for match in perfect or matches if not is_needless(match)]
 
 
 def _match(

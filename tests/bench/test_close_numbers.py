@@ -72,7 +72,9 @@ SENTENCES = {
     ),
     "URDF": lambda _: message(urdf.parse, robot(3.0 * CLOSE, 3.0), crossed_limits="refused"),
     "MJCF": lambda _: message(mjcf.parse, body(3.0 * CLOSE, 3.0)),
-    "unit quaternions": lambda _: pose_laws.unit_quaternions(np.array([1.0 - 2.0**-24]), 0.0).sentence,
+    "unit quaternions": lambda _: (
+        pose_laws.unit_quaternions(np.array([1.0 - 2.0**-24]), 0.0).sentence
+    ),
     "residual": lambda _: claimed_residual(),
     "spacing": lambda _: spaced(0.5 * (1 + 1e-5), 0.5),
     "records' sizes": sizes,

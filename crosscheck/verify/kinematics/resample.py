@@ -17,6 +17,7 @@ from ..judgement import Diagnosis, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case
 from ..sentence import Sentence, sentence
 from . import rounding
+from .faults import AS_THE_TEXTBOOK, TABLE
 from .polylines import Polyline
 from .report import report
 from .skeletons import generator
@@ -210,10 +211,8 @@ def _closing(points: FloatArray, arc: FloatArray, line: Polyline, bound: float) 
 
 def _expected_count(case: Case) -> int:
     """Return the number of points that a case requests."""
-    inputs = case.inputs
-    if "count" in inputs:
-        return int(inputs["count"])
-    return int(case.facts["line"].count(inputs["spacing"], inputs["closed"]))
+    spacing, closed = case.inputs.get("spacing"), case.inputs["closed"]
+    return int(case.inputs.get("count") or case.facts["line"].count(spacing, closed))
 
 
 def _even(case: Case, extra: int = 0) -> FloatArray:
@@ -250,33 +249,24 @@ def _samples_before(case: Case) -> FloatArray:
     return points
 
 
-# The points that a faulty program answers, and the sentence about its fault.
-FAULTS: dict[str, tuple[Callable[[Case], FloatArray], Sentence]] = {
-    "by index": (_by_index, sentence(
-        "Points are spaced by the number of samples, not by the length along the curve: they are "
-        "as uneven as the samples. Add up the lengths of the segments and divide those.")),
-    "end left out": (_without_end, sentence(
-        "The last point is left out on open curves: divide the length by count - 1, so that the "
-        "end is kept.")),
-    "one point less": (partial(_even, extra=-1), sentence(
-        "There is one point less than asked for: the loop ends too early.")),
-    "one point more": (partial(_even, extra=1), sentence(
-        "There is one point more than asked for: count points, not gaps.")),
-    "left open": (_left_open, sentence(
-        "The segment from the end of a closed curve back to its start is missing.")),
-    "reversed": (lambda case: _even(case)[::-1], sentence(
-        "The points come in the reverse order of the curve.")),
-    "samples only": (_samples_before, sentence(
-        "Points are taken from the samples. Interpolate between two samples where the even length "
-        "falls between them.")),
-}  # fmt: skip
+# The points that a program with each fault answers.
+FAULTS: dict[str, Callable[[Case], FloatArray]] = {
+    "by index": _by_index,
+    "end left out": _without_end,
+    "one point less": partial(_even, extra=-1),
+    "one point more": partial(_even, extra=1),
+    "left open": _left_open,
+    "reversed": lambda case: _even(case)[::-1],
+    "samples only": _samples_before,
+}
 
 
 def _diagnosis(
     wrong_first: Sequence[Exchange], greeting: Greeting, behaviour: Sentence | None
 ) -> Diagnosis:
     """Return the faults that reproduce the answers."""
-    right = {"": (_even, sentence("It does what the textbook does."))}
+    sentences = {key: Sentence(entry["sentence"], {}) for key, entry in TABLE[TASK].items()}
+    sentences[""] = AS_THE_TEXTBOOK
 
     def variant(key: str, points: Callable[[Case], FloatArray]) -> Variant:
         return Variant((key,) if key else (), lambda case: {"points": points(case)})
@@ -284,8 +274,7 @@ def _diagnosis(
     def tolerance(case: Case) -> float:
         return max(1e-9, 64.0 * greeting.epsilon * len(case.inputs["curve"]))
 
-    faults = {**right, **FAULTS}
-    variants = [variant(key, points) for key, (points, _) in faults.items()]
-    explanations, count = explain(variants, wrong_first, tolerance, lambda keys: faults[keys[0]][1])
+    variants = [variant(key, points) for key, points in ({"": _even} | FAULTS).items()]
+    explanations, count = explain(variants, wrong_first, tolerance, lambda keys: sentences[keys[0]])
     faulty = tuple(explanation for explanation in explanations if explanation.faults != ("",))
     return Diagnosis(faulty, behaviour, variant_count=count)

@@ -16,8 +16,9 @@ from ..explain import either
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from ..sentence import Sentence, sentence
+from ..sentence import Sentence
 from . import robot_models, rounding
+from .faults import TABLE
 from .report import report
 from .robot_models import ANYWHERE, BEYOND, IDENTITY, judgement_of
 
@@ -36,7 +37,7 @@ class Misreading(NamedTuple):
     """A wrong interpretation of a request."""
 
     sentence: Sentence  # the mistake, and its correction
-    misread: Callable[[Inputs], Inputs] = lambda inputs: {}  # the inputs with another meaning
+    misread: Callable[[Inputs], Inputs] = dict  # returns the inputs with another meaning
     scale: float = 1.0  # of the coordinates of hinges, in radians
     relative: bool = False  # whether coordinates count from the start
 
@@ -55,44 +56,24 @@ class Misreading(NamedTuple):
         return scaled - inputs["start"] if self.relative else scaled
 
 
-FAULTS: Mapping[str, Misreading] = {
-    "degrees": Misreading(
-        sentence("Your coordinates are in degrees. Answer in radians: multiply by pi / 180."),
-        scale=np.pi / 180.0,
-    ),
-    "rotation sense": Misreading(
-        sentence("Your hinges rotate in the wrong sense. A hinge rotates by q about its axis, "
-                 "counterclockwise as seen from the axis' tip."),
-        scale=-1.0,
-    ),
-    "relative": Misreading(
-        sentence("Your coordinates count from the start. Answer start + change."), relative=True
-    ),
-    "tool ignored": Misreading(
-        sentence("Your target is reached by the last joint, not by the tool, which is at "
-                 "tool_position and tool_rotation in that joint's frame."),
-        lambda inputs: {"tool_position": np.zeros(3), "tool_rotation": IDENTITY},
-    ),
-    "orientations ignored": Misreading(
-        sentence("You ignore the orientations of the joints' frames. A joint's frame is rotated "
-                 "in its parent's by orientations[j], before it moves."),
-        lambda inputs: {"orientations": rotation.identity(len(inputs["parents"]))},
-    ),
-    "axes of the parent": Misreading(
-        sentence("You take axes to be in the parent's frame. They are in the joint's own, which "
-                 "orientations[j] has rotated."),
-        lambda inputs: {
-            "axes": rotation.rotate(rotation.conjugate(inputs["orientations"]), inputs["axes"])
-        },
-    ),
-    "scalar last": Misreading(
-        sentence("You read the target's quaternion as x, y, z, w. It is w, x, y, z."),
-        lambda inputs: {"target_rotation": np.roll(inputs["target_rotation"], 1)},
-    ),
-    POSITION_ONLY: Misreading(
-        sentence("You bring the tool to its position and ignore its rotation."),
-        lambda inputs: {"target_rotation": None},
-    ),
+# The inputs that a fault reads otherwise.
+MISREAD: Mapping[str, Callable[[Inputs], Inputs]] = {
+    "tool ignored": lambda inputs: {"tool_position": np.zeros(3), "tool_rotation": IDENTITY},
+    "orientations ignored": lambda inputs: {
+        "orientations": rotation.identity(len(inputs["parents"]))
+    },
+    "axes of the parent": lambda inputs: {
+        "axes": rotation.rotate(rotation.conjugate(inputs["orientations"]), inputs["axes"])
+    },
+    "scalar last": lambda inputs: {"target_rotation": np.roll(inputs["target_rotation"], 1)},
+    POSITION_ONLY: lambda inputs: {"target_rotation": None},
+}
+FAULTS = {
+    key: Misreading(
+        Sentence(entry["sentence"], {}), MISREAD.get(key, dict), entry.get("scale", 1.0),
+        entry.get("relative", False),
+    )
+    for key, entry in TABLE["robots"].items()
 }  # fmt: skip
 
 

@@ -481,7 +481,7 @@ def resampler(make):
 
 @pytest.mark.parametrize("key", RESAMPLE_FAULTS)
 def test_fault_of_resampling_is_caught_and_named(key):
-    report = judged(RESAMPLE, resampler(RESAMPLE_FAULTS[key][0]))
+    report = judged(RESAMPLE, resampler(RESAMPLE_FAULTS[key]))
     assert report.verdict is WRONG
     assert named(report)[0] == {key}
 

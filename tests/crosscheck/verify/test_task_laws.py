@@ -297,5 +297,6 @@ def test_fault_is_named_only_if_it_explains_more_than_no_fault():
     right, as_good, better, whole = match(0.6), match(0.6, "a"), match(0.7, "b"), match(1.0, "c")
     assert _telling([right, as_good, better]) == [better]
     assert _telling([right, as_good, better, whole]) == [whole]
-    perfect = right._replace(share=1.0)
-    assert _telling([perfect, whole]) == [perfect, whole]
+    perfect, pair = right._replace(share=1.0), match(0.7, "b", "d")
+    assert _telling([perfect, whole]) == [perfect]
+    assert _telling([better, pair, match(0.8, "b", "e")]) == [better, match(0.8, "b", "e")]
