@@ -40,14 +40,14 @@ def damper_steps(integrator: str, case: int) -> Comparison:
     return _compare_with(integrator, case, semi_implicit(system, state, h, external, D))
 
 
-def gauss_newton_steps(case: int, *, damped: bool) -> Comparison:
+def gauss_newton_steps(damped: bool, case: int) -> Comparison:
     """Compare the state after a Gauss-Newton step with MuJoCo's discrete."""
     system, state, external, h = samples.network(case, damped=damped)
     end = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
     return _compare_with("discrete", case, end, damped=damped)
 
 
-def implicit_balances(case: int, *, damped: bool) -> Comparison:
+def implicit_balances(damped: bool, case: int) -> Comparison:
     """Compare M (x - y) of our converged step with h² f(x), with MuJoCo's forces at our x.
 
     The scale is |M (x - y)| + h² sum |spring force|.

@@ -5,7 +5,7 @@ of it suffices.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import chain, groupby
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -206,23 +206,3 @@ def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -
                     why=finding.sentence,
                 )
     return None
-
-
-def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
-    """Return hints at mistakes that no variant has."""
-    findings = chain.from_iterable(judgement.findings for judgement in judgements)
-    broken = {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
-    hints = []
-    if "equal answers" in broken:
-        hints.append(sentence(
-            "Equal requests get different answers. Look for state that is left over from the "
-            "request before, and for memory that is read before it is written or dangles (in "
-            "Eigen, a product kept with auto); a sanitizer (-fsanitize=address,undefined, or "
-            "valgrind) finds the latter."
-        ))  # fmt: skip
-    if "untouched inputs" in broken:
-        hints.append(sentence(
-            "The solver modifies the skeleton that it receives, so every later answer is for a "
-            "different skeleton. Copy what you change."
-        ))  # fmt: skip
-    return tuple(hints)

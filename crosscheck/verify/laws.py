@@ -1,7 +1,8 @@
 """Findings by the laws in `laws.toml`, and the judgement of a case from them."""
 
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +116,14 @@ def equal_answers(exchange: Exchange, allowed: float | Mapping[str, float]) -> F
     ]  # fmt: skip
     ratios = [found.error / max(found.tolerance, 1e-300) for found in findings]
     return findings[int(np.argmax(ratios))] if findings else finding("equal answers", 0.0)
+
+
+def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
+    """Return hints at mistakes that no variant has, from the laws that are broken."""
+    findings = chain.from_iterable(judgement.findings for judgement in judgements)
+    broken = {found.law for found in findings if found.verdict >= Verdict.WRONG}
+    hints = (entry for law, entry in LAWS["hints"].items() if law in broken)
+    return tuple(Sentence(entry["sentence"], {}) for entry in hints)
 
 
 def _remark(remark: Sentence) -> Finding:

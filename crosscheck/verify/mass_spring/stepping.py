@@ -14,15 +14,15 @@ from plumbob.reference.mass_spring import State
 
 from ..case import Case
 from ..contestant import Answer, Exchange
-from ..explain import either, first_broken, hints_of
+from ..explain import either, first_broken
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
-from ..laws import digits, finding, judge_case
+from ..laws import digits, finding, hints_of, judge_case
 from ..sentence import Sentence, sentence
 from . import laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
-from .honest import HONEST, compatible, domains, honest
+from .honest import compatible, domains, honest
 from .laws import SOLVED, StepContext, relative_gap, rounding
 from .model import StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
@@ -202,8 +202,9 @@ def _nearest(search: ModelSearch) -> Sentence:
     """Return which of the known steps comes nearest to the answers to the probes."""
     usual = {option.aspect: option for option in honest_options((), search.step)}
     steps = []
-    for integrator, damper in product(honest(search.step)["integrator"], HONEST["damper"]):
-        velocity = HONEST["velocity"][integrator.fields["integrator"].explicit]
+    choices = honest(search.step)
+    for integrator, damper in product(choices["integrator"], choices["damper"]):
+        velocity = choices["velocity"][integrator.fields["integrator"].explicit]
         step = usual | {"integrator": integrator, "damper": damper, "velocity": velocity}
         if compatible(step):
             gaps = _gaps(tuple(step.values()), search.probes, search.epsilon)

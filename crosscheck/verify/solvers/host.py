@@ -13,8 +13,6 @@ import inspect
 import io
 import os
 import sys
-import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -23,7 +21,7 @@ import msgspec
 
 from ...child_process import take_streams
 from ..contestant import Answer, Failure, FailureKind
-from ..functions import call, describe_exception, is_beside, takes
+from ..functions import call, describe_exception, takes
 from ..greeting import PROTOCOL
 from ..message import (
     GREETING,
@@ -217,39 +215,12 @@ def _protocol_streams() -> Iterator[tuple[BinaryIO, BinaryIO, _Prints]]:
         yield requests, answers, prints
 
 
-class _Watch(threading.Thread):
-    """Says on standard error in which line the solver is, each time that it took so long."""
-
-    def __init__(self, folder: str, patience: float) -> None:
-        super().__init__(daemon=True)
-        self._folder, self._patience = folder, patience
-        self._solver = threading.get_ident()
-        self._since: float | None = None
-
-    @contextlib.contextmanager
-    def working(self) -> Iterator[None]:
-        """Watch the solver while the block lasts."""
-        self._since = time.monotonic()
-        yield
-        self._since = None
-
-    def run(self) -> None:
-        """Look at the solver ten times in its patience."""
-        while True:
-            time.sleep(self._patience / 10)
-            since, now = self._since, time.monotonic()
-            if since is not None and now - since > self._patience:
-                self._since = now
-                self._note_line()
-
-    def _note_line(self) -> None:
-        solver_file = Path(self._folder) / "solver.py"
-        frame = sys._current_frames().get(self._solver)
-        while frame is not None and not is_beside(Path(frame.f_code.co_filename), solver_file):
-            frame = frame.f_back
-        if frame is not None:
-            file = Path(frame.f_code.co_filename).name
-            os.write(2, f"It was in line {frame.f_lineno} of {file}.\n".encode())
+@contextlib.contextmanager
+def _watched(patience: float) -> Iterator[None]:
+    """Note on standard error where the solver is, each time that the block lasts so long [s]."""
+    faulthandler.dump_traceback_later(patience, repeat=True, file=2)
+    yield
+    faulthandler.cancel_dump_traceback_later()
 
 
 def serve(spec: str, folder: str, patience: float) -> None:
@@ -258,19 +229,17 @@ def serve(spec: str, folder: str, patience: float) -> None:
     Args:
         spec: as of `load`.
         folder: that of the solver and its other modules.
-        patience: after which its line is noted on standard error [s].
+        patience: after which its lines are noted on standard error [s].
     """
     faulthandler.enable(all_threads=False)
     with _protocol_streams() as (requests, answers, prints):
         sys.argv = [spec]
         if folder not in sys.path:
             sys.path.insert(0, folder)
-        watch = _Watch(folder, patience)
-        watch.start()
-        with watch.working():
+        with _watched(patience):
             solver, failure = load_safely(spec, folder)
         for line in requests:
-            with watch.working():
+            with _watched(patience):
                 request = decode_request(line)
                 fields = solver.answer(request) if solver else failure
             answers.write(encode_answer(request.id, **{**fields, **prints.take()}))

@@ -56,7 +56,7 @@ def build(language, folder, edit=str):
     """Write a starter, compile it, and return what runs it; skip without its compiler."""
     for name, text in template(language).items():
         (folder / name).write_text(edit(text), encoding="utf-8")
-    make, run = (shlex.split(one) for one in LANGUAGES[language][1:])
+    make, run = map(shlex.split, (LANGUAGES[language].build, LANGUAGES[language].run))
     for tool in (one[0] for one in (make, run) if one and not one[0].startswith("./")):
         if shutil.which(tool) is None:
             pytest.skip(f"{tool} is not on this machine: the {language} starter was not built")
