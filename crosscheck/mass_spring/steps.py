@@ -136,15 +136,12 @@ def _balance(
 def _forces_at_end(
     system: MassSpring, state: State, x: FloatArray, h: float
 ) -> tuple[FloatArray, float]:
-    """Return MuJoCo's forces at the end x of an implicit step, and the springs' total tension.
+    """Return MuJoCo's forces at the end x of an implicit step [N], (free, 3), and all tension [N].
 
     Springs and gravity are MuJoCo's at x. The damper of the step is -c (l(x) - l_n)/h, a tendon of
     stiffness c/h and rest length l_n in MuJoCo, with l_n its own length of the spring at x_n.
-    MuJoCo's damper at the velocity (x - x_n)/h differs: it takes the component of the
-    velocity along the spring at x, which is not zero for a spring that only rotates.
-
-    Returns:
-        Forces on the free particles [N], shape (free, 3); sum of |force| over all springs [N].
+    MuJoCo's damper at the velocity (x - x_n)/h differs: it takes the component of the velocity
+    along the spring at x, which is not zero for a spring that only rotates.
     """
     dampers = MassSpring(
         system.masses,

@@ -47,11 +47,9 @@ def explain(
 ) -> tuple[tuple[Explanation, ...], int]:
     """Return the variants that reproduce most answers, nearest first, and the number compared.
 
-    Args:
-        variants: in ascending order of the number of faults.
-        exchanges: the answers to compare, the most telling first: small, and wrong.
-        tolerance: the relative difference from a prediction that rounding explains.
-        describe: puts faults into words, given the keys of a class that no answer tells apart.
+    The variants come in ascending order of the number of faults, the most telling answers first:
+    small, and wrong. `tolerance` is the relative difference that rounding explains; `describe` puts
+    the faults into words, given the keys of a class that no answer tells apart.
     """
     answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
     count, matches = 0, list[Match]()

@@ -32,14 +32,9 @@ def finding(
 ) -> Finding:
     """Return RIGHT if an error is within its tolerance, else what an entry of `laws.toml` says.
 
-    Args:
-        key: of the entry: a law, or a law and a reason after a comma.
-        error: of the answer; NaN is within no tolerance.
-        tolerance: the largest error that is right.
-        verdict: in place of the entry's.
-        index: of the worst joint, particle or point, if there is one.
-        law: in place of the one that the key begins with.
-        values: of the fields of the sentence, besides {error} and {index}.
+    The key is a law, or a law and a reason after a comma; the sentence has the fields {error},
+    {index} of the worst joint, particle or point, and `values`. `verdict` and `law` replace those
+    of the entry.
     """
     entry, error = LAWS[key], float(error)
     if verdict is None:
@@ -84,13 +79,8 @@ def judge_case(
 ) -> CaseJudgement:
     """Return the judgement of an answer by the laws of its task and of all tasks.
 
-    Args:
-        exchange: the case with its answers.
-        laws: returns the findings about the outputs of an answer.
-        allowed: the difference of two answers to a request, of any output or by its name.
-        reference: the call to time.
-        expected: the right outputs.
-        correct_digits: of the answer.
+    `laws` returns the findings about its outputs, `reference` is the call to time, and two answers
+    to a request may differ by `allowed`, in any output or by its name.
     """
     answer, findings = exchange.answer, list[Finding]()
     seconds = time_call(reference)[1] if reference else None

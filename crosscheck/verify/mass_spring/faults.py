@@ -113,7 +113,7 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
             fields["integrator"] = Integrator(**entry["integrator"], **values)
         elif aspect == "time" and values:
             fields["time"] = float(Fraction(values["time"]))
-        elif aspect in values:
+        elif aspect in values and aspect in StepModel._fields:
             fields[aspect] = values[aspect]
         name = " ".join(map(str, fields.get("integrator", ()))) or f"{aspect} {entry.get('value')}"
         key = entry.get("key", name).format(**values)

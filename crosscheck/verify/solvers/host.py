@@ -48,14 +48,9 @@ class OfferError(ValueError):
 
 
 class PythonSolver:
-    """The tasks that a Python file or object offers.
+    """The functions of a Python file or object by task or method, and the fields of its greeting.
 
-    Attributes:
-        functions: by the name of a task, or of a method of inverse kinematics.
-        greeting: fields of the greeting.
-
-    Raises:
-        OfferError: if it offers no task, or its declaration is not understood.
+    Raise OfferError if it offers no task, or its declaration is not understood.
     """
 
     def __init__(self, source: object, name: str, declared: object) -> None:
@@ -152,9 +147,7 @@ def _failed(failure: Failure) -> dict[str, Any]:
 def load(spec: str) -> PythonSolver:
     """Return the solver in a Python file, file:object or module:object.
 
-    Raises:
-        OfferError: if it offers no task.
-        Exception: any exception of the solver while it is loaded.
+    Raise OfferError if it offers no task, and any exception of the solver while it is loaded.
     """
     place, _, attribute = spec.partition(":")
     path = Path(place)
@@ -226,10 +219,8 @@ def _watched(patience: float) -> Iterator[None]:
 def serve(spec: str, folder: str, patience: float) -> None:
     """Answer requests about a solver until they end.
 
-    Args:
-        spec: as of `load`.
-        folder: that of the solver and its other modules.
-        patience: after which its lines are noted on standard error [s].
+    The folder is that of the solver and its other modules; after so much patience [s] its lines are
+    noted on standard error.
     """
     faulthandler.enable(all_threads=False)
     with _protocol_streams() as (requests, answers, prints):

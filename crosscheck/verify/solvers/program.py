@@ -18,11 +18,7 @@ from .losses import LIMITS, FailureError, ProcessLimits, departure, failure_of, 
 
 
 class ProgramContestant:
-    """A program, started for its first request, and anew after a loss.
-
-    Attributes:
-        remarks: on the program apart from its answers, as on processes that it left running.
-    """
+    """A program, started for its first request, and anew after a loss."""
 
     def __init__(
         self, command: Sequence[str], folder: Path | None = None, limits: ProcessLimits = LIMITS
@@ -43,11 +39,7 @@ class ProgramContestant:
 
     @property
     def greeting(self) -> Greeting:
-        """Its description of itself.
-
-        Raises:
-            NoGreetingError: if it cannot be started, or its greeting is not understood.
-        """
+        """Its description of itself; raise NoGreetingError if it does not start or greet."""
         if self._greeting is None:
             try:
                 self._ready()
