@@ -7,13 +7,7 @@ import sys
 
 import pytest
 
-from plumbob.crosscheck.child_process import (
-    ChildProcess,
-    Loss,
-    LostError,
-    pickled,
-    python_process,
-)
+from plumbob.crosscheck.child_process import ChildProcess, Loss, LostError, pickled, python_process
 
 ECHO = (
     "import plumbob.crosscheck.child_process as c\nrequests, answers = c.connect()\n"

@@ -285,12 +285,7 @@ def test_refused_mimics_move_independently_for_both_with_a_reason(engine, small)
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
 @pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("cut.urdf", URDF[:500]),
-        ("cut.xml", MJCF[:500]),
-        ("other.xml", "<html/>"),
-    ],
+    ("name", "text"), [("cut.urdf", URDF[:500]), ("cut.xml", MJCF[:500]), ("other.xml", "<html/>")]
 )
 def test_the_reason_of_a_refusal_is_one_line(engine, name, text, tmp_path):
     (tmp_path / name).write_text(text)

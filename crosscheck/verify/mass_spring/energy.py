@@ -23,14 +23,7 @@ from ..sentence import sentence
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, combined
 from .model import StepModel
-from .problem import (
-    SpringProblem,
-    all_forces,
-    elastic_energy,
-    problem_of,
-    state_of,
-    system_of,
-)
+from .problem import SpringProblem, all_forces, elastic_energy, problem_of, state_of, system_of
 
 TASK = "energy"
 Energies = Mapping[str, Any]

@@ -23,14 +23,7 @@ from ...child_process import take_streams
 from ..contestant import Answer, Failure, FailureKind
 from ..functions import call, describe_exception, takes
 from ..greeting import PROTOCOL
-from ..message import (
-    GREETING,
-    Request,
-    decode_greeting,
-    decode_request,
-    encode_answer,
-    excerpt,
-)
+from ..message import GREETING, Request, decode_greeting, decode_request, encode_answer, excerpt
 from ..sentence import did_you_mean
 from ..task import TASKS
 

@@ -286,10 +286,7 @@ def test_the_demonstration_below_the_main_guard_does_not_run(inside):
     assert inside(text).greeting.tasks == ("forward_kinematics",)
 
 
-@pytest.mark.parametrize(
-    "names",
-    [("crosscheck", "message"), ("reference", "host", "task")],
-)
+@pytest.mark.parametrize("names", [("crosscheck", "message"), ("reference", "host", "task")])
 def test_modules_beside_the_file_are_its_own(solver, names):
     imports = "".join(f"import {name}\n" for name in names if name != "crosscheck")
     last = names[-1]

@@ -323,8 +323,7 @@ def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family)
 def test_noise_is_named():
     rng = np.random.default_rng(3)
     noise = wrapped(
-        Stepper(LINEARISED),
-        lambda positions, **inputs: 7e-4 * rng.standard_normal(positions.shape),
+        Stepper(LINEARISED), lambda positions, **inputs: 7e-4 * rng.standard_normal(positions.shape)
     )
     judged = report(noise, step=DECLARED["linearised"][1])
     assert "equal answers" in broken_laws(judged)

@@ -73,8 +73,7 @@ RIGHT = {
 
 
 @pytest.mark.parametrize(
-    "language",
-    ["cpp", "javascript", "python", pytest.param("single", marks=pytest.mark.slow)],
+    "language", ["cpp", "javascript", "python", pytest.param("single", marks=pytest.mark.slow)]
 )
 def test_right_program_is_not_accused(language, program):
     contestant = open_contestant(program(language))
