@@ -1,4 +1,8 @@
-"""Test the judge: laws catch every known fault, the search names it, honest solvers are right."""
+"""Test the judge: laws catch every known fault, the search names it, honest solvers are right.
+
+A fault counts as caught also by a reservation (RIGHT BUT): where a fault is small, as a sign that
+matters in few cases, the user is told of it even if no answer is wrong.
+"""
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -221,23 +221,11 @@ def _even(case: Case, extra: int = 0) -> FloatArray:
     return line.even_points(_expected_count(case) + extra, case.inputs["closed"])
 
 
-def _without_end(case: Case) -> FloatArray:
-    """Leave out the last point of an open curve."""
-    line: Polyline = case.facts["line"]
-    return line.even_points(_expected_count(case), True)
-
-
 def _by_index(case: Case) -> FloatArray:
     """Space points by the number of samples instead of the length along the curve."""
     points, closed = case.facts["line"].points, bool(case.inputs["closed"])
     place = np.linspace(0.0, len(points) - 1.0, _expected_count(case), endpoint=not closed)
     return np.stack([np.interp(place, np.arange(len(points)), x) for x in points.T], axis=-1)
-
-
-def _left_open(case: Case) -> FloatArray:
-    """Leave out the segment from the end of a closed curve to its start."""
-    line = Polyline(case.inputs["curve"], case.facts["line"].strokes, False)
-    return line.even_points(_expected_count(case), False)
 
 
 def _samples_before(case: Case) -> FloatArray:
@@ -252,10 +240,12 @@ def _samples_before(case: Case) -> FloatArray:
 # The points that a program with each fault answers.
 FAULTS: dict[str, Callable[[Case], FloatArray]] = {
     "by index": _by_index,
-    "end left out": _without_end,
+    "end left out": lambda case: case.facts["line"].even_points(_expected_count(case), True),
     "one point less": partial(_even, extra=-1),
     "one point more": partial(_even, extra=1),
-    "left open": _left_open,
+    "left open": lambda case: Polyline(
+        case.inputs["curve"], case.facts["line"].strokes, False
+    ).even_points(_expected_count(case), False),
     "reversed": lambda case: _even(case)[::-1],
     "samples only": _samples_before,
 }

@@ -173,38 +173,20 @@ class ModelSearch:
         """Return whether choices reproduce an answer; None where neither is a number of use."""
         probe = self.probes[index]
         relevant = choices if probe.coupled else _relevant_in_flight(choices)
-        by_centre = not probe.coupled and choices["matrix"].key.startswith("matrix without k")
-        key = ((index, by_centre), *sorted((name, id(o)) for name, o in relevant.items()))
-        position_key = key
+        if not probe.coupled and choices["matrix"].key.startswith("matrix without k"):
+            return None  # it joins particles by springs without stiffness, each integrator its way
+        parts = sorted((name, id(option)) for name, option in relevant.items())
+        key = position_key = (index, *parts)
         if relevant["substeps"].fields["substeps"] == 1:  # velocities do not enter positions
-            position_key = tuple(part for part in key if part[:1] != ("velocity",))
+            position_key = (index, *(part for part in parts if part[0] != "velocity"))
         if position_key in self._misplaced:
             return False
         if key not in self._explained:
-            options = tuple(relevant.values())
-            if by_centre:
-                self._explained[key] = self._has_right_centre(options, probe)
-            else:
-                self.prediction_count += 1
-                self._explained[key], is_placed = self._compare(options, probe)
-                if not is_placed:
-                    self._misplaced.add(position_key)
+            self.prediction_count += 1
+            self._explained[key], is_placed = self._compare(tuple(relevant.values()), probe)
+            if not is_placed:
+                self._misplaced.add(position_key)
         return self._explained[key]
-
-    def _has_right_centre(self, options: tuple[Option, ...], probe: Probe) -> bool | None:
-        """Return False where the centre of mass is elsewhere, else None.
-
-        A matrix without stiffness joins particles even where their spring has none, differently
-        for each integrator, but leaves their centre where it is.
-        """
-        problem, model = apply(options, probe.problem, StepModel(damper="none"))
-        share = problem.masses / problem.masses.sum()
-        x = predicted(problem, model)["positions"]
-        centre = {"positions": share @ x, "velocities": np.zeros(0)}
-        answers = {"positions": share @ probe.answers["positions"]}
-        whole = probe.problem.changed(positions=share @ probe.problem.positions)
-        error = relative_gap(whole, centre, answers, self._rounding(probe, model))
-        return None if error <= SOLVED else False
 
     def _rounding(self, probe: Probe, model: StepModel) -> Rounding:
         key = probe.name, model.substeps, model.integrator.explicit

@@ -126,13 +126,6 @@ def test_fault_of_tracking_is_caught_and_named(method, fault):
     assert named(report)[0] == {fault.key}
 
 
-@pytest.mark.parametrize("key", ["world rotation on the left", "offset not rotated"])
-def test_fault_of_the_solver_is_named_in_tracking(key):
-    report = judged(TRACK, textbook(TRACK, [by_key("ccd")[key]]), "ccd")
-    if report.verdict is not RIGHT:
-        assert named(report)[0] == {key}
-
-
 @pytest.mark.parametrize(
     ("key", "law"),
     [
