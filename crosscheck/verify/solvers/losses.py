@@ -72,6 +72,11 @@ def failure_of(
     return FailureError(FailureKind(entry["kind"]), message)
 
 
+def garbage(key: str, **values: object) -> FailureError:
+    """Return why the output of a program is no answer."""
+    return FailureError(FailureKind.GARBAGE, Sentence(_TABLE["garbage"][key]["sentence"], values))
+
+
 def ending(code: int) -> Sentence:
     """Return how a program ended, from its exit code or minus the number of a signal."""
     if code >= 0:
