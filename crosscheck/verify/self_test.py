@@ -4,7 +4,6 @@ A fault counts as caught also by a reservation (RIGHT BUT): where a fault is sma
 matters in few cases, the user is told of it even if no answer is wrong.
 """
 
-import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -179,8 +178,6 @@ class Stepper:
     ) -> None:
         self.model, self.faults, self.precision = model, tuple(faults), precision
         self.first_h: dict[tuple[bytes, bytes], float] = {}
-        every = inspect.Parameter("inputs", inspect.Parameter.VAR_KEYWORD)
-        self.__signature__ = inspect.Signature([every])
 
     def __call__(self, **inputs: Any) -> dict[str, Any]:
         """Return positions and velocities, rounded to the precision."""

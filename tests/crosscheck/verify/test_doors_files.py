@@ -135,15 +135,15 @@ def test_answers_in_json_are_read_each_time_the_same(folder, name):
     assert "whether equal requests have equal answers is not known" in str(contestant.remarks[0])
 
 
-TABLE = tomllib.loads(Path(__file__).with_name("answer_files.toml").read_text("utf-8"))
+DATA = tomllib.loads(Path(__file__).with_name("answer_files.toml").read_text("utf-8"))
 ENCODINGS = ["utf-8", "utf-8-sig", "utf-16"]
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-@pytest.mark.parametrize("name", TABLE["csv"])
+@pytest.mark.parametrize("name", DATA["csv"])
 def test_answers_in_csv_are_understood(folder, name, encoding):
     place = folder / place_of(CASES[0])
-    (place / "answer_positions.csv").write_bytes(TABLE["csv"][name].encode(encoding))
+    (place / "answer_positions.csv").write_bytes(DATA["csv"][name].encode(encoding))
     answer = FileContestant(folder).answer(CASES[0])
     assert isinstance(answer, Answer), answer.sentence
     np.testing.assert_array_equal(answer.values["positions"], POSITIONS)
@@ -151,7 +151,7 @@ def test_answers_in_csv_are_understood(folder, name, encoding):
 
 
 WRONG_TABLES = [
-    *TABLE["wrong_table"],
+    *DATA["wrong_table"],
     {"data": "\udcff\0", "words": "expected a text file in UTF-8"},
 ]
 
@@ -165,7 +165,7 @@ def test_tables_that_are_not_understood_say_where(folder, row):
     assert f"positions: {row['words']}" in str(failure.sentence)
 
 
-@pytest.mark.parametrize("row", TABLE["wrong_json"], ids=lambda row: row["words"])
+@pytest.mark.parametrize("row", DATA["wrong_json"], ids=lambda row: row["words"])
 def test_json_that_is_not_understood_says_why(folder, row):
     (folder / place_of(CASES[0]) / "answer.json").write_text(row["data"])
     failure = FileContestant(folder).answer(CASES[0])

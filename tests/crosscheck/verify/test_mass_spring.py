@@ -81,7 +81,6 @@ def wrapped(stepper, change):
         state = stepper(**inputs)
         return state | {"positions": state["positions"] + change(**inputs)}
 
-    step.__signature__ = stepper.__signature__
     return step
 
 
