@@ -24,7 +24,7 @@ from .kinematics.faults import FAULTS, switches
 from .kinematics.predictions import predict_forward, predict_track, solve
 from .kinematics.robot_inverse_kinematics import FAULTS as ROBOT_FAULTS
 from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
-from .kinematics.robot_solver import solve_by_reference, solve_wrongly
+from .kinematics.robot_inverse_kinematics import solve_by_reference, solve_wrongly
 from .kinematics.textbook import Switches
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
 from .mass_spring.model import Integrator, StepModel, simulate
