@@ -307,7 +307,8 @@ def _sum_over_springs(
     count: int, springs: IndexArray, at_first: FloatArray, at_second: FloatArray
 ) -> FloatArray:
     """Return the sum over each particle's springs of the value at its end, shape (particle,)."""
-    return np.bincount(springs.ravel(), np.column_stack([at_first, at_second]).ravel(), count)
+    ends = np.column_stack([at_first, at_second]).ravel()
+    return np.asarray(np.bincount(springs.ravel(), ends, count), dtype=np.float64)
 
 
 def _norms(vectors: FloatArray) -> FloatArray:
