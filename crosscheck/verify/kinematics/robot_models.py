@@ -100,11 +100,20 @@ def _urdf_joint(inputs: Mapping[str, Any], j: int) -> str:
 
 
 def _urdf_origin(position: FloatArray, quaternion: FloatArray) -> str:
-    """Return an origin; roll, pitch and yaw rotate about the fixed axes x, y and z in turn."""
-    R = rotation.to_matrix(quaternion)
-    pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
-    angles = (math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0]))
+    angles = roll_pitch_yaw(rotation.to_matrix(quaternion))
     return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(angles)}"/>'
+
+
+def roll_pitch_yaw(R: FloatArray) -> tuple[float, float, float]:
+    """Return the angles about the fixed axes x, y and z whose rotations in turn make R [rad].
+
+    Roll is read off after yaw is undone, so that it is exact also where pitch is a right angle.
+    """
+    yaw = math.atan2(R[1, 0], R[0, 0])
+    sine, cosine = math.sin(yaw), math.cos(yaw)
+    pitch = math.atan2(-R[2, 0], cosine * R[0, 0] + sine * R[1, 0])
+    roll = math.atan2(sine * R[0, 2] - cosine * R[1, 2], cosine * R[1, 1] - sine * R[0, 1])
+    return roll, pitch, yaw
 
 
 def _numbers(vector: Iterable[float]) -> str:
