@@ -18,7 +18,7 @@ from plumbob.bench.report.page import page
 from plumbob.bench.tables.results import Results, label
 
 ENTRANT = "my very own solver, a name of some length"
-CHARTS = 15
+CHARTS = 14
 
 
 def with_solvers(records, count):
