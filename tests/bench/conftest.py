@@ -268,7 +268,7 @@ def worked(
 
 
 def fell(solver, stiffness=1e3, **changed):
-    """A motion of a cloth by three settings: diverged, whole, cut short."""
+    """A motion of a cloth by three settings: diverged, and ever nearer to the truth."""
     which = {"problem": f"peers/motion/k{stiffness:g}", "solver": solver}
     return sample("fell", **which, settings={"stiffness": stiffness}, arrays=changed)
 

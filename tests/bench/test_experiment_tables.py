@@ -92,7 +92,7 @@ def test_every_declared_column_has_a_cell(records, make):
     """A title in `tables.toml` that no row has would make an empty column."""
     solved = make.worked("MuJoCo Euler", error=(0.5, 1e-7))
     swing = make.swung("RK4", left=np.ones(11))
-    near = make.fell("MuJoCo Euler", true=[np.nan, 1e-3, 1e-3])
+    near = make.fell("MuJoCo Euler", error=[np.inf, 1e-3, 1e-3])
     results = Results([*records, solved, near, swing])
     for layout in (layout for section in SECTIONS for layout in section.layouts):
         rows = [row for row in layout.subjects(results) if isinstance(row, dict)]
