@@ -183,6 +183,8 @@ class Peer(Adapter):
     precision: str = field(default="", kw_only=True)
     # whether it is a Python loop of ours on the package's kinematics
     loop: bool = field(default=False, kw_only=True)
+    # what one would choose it for
+    use: str = field(default="", kw_only=True)
 
     def label_of(self, entry: PeerEntry) -> str:
         """Return how an entry is written."""

@@ -8,7 +8,10 @@ zero: they then jump about.
 import mink
 
 from ...problems.evaluate import mujoco_model
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance, arrived, iterate
+from .overhead import library
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance, arrived, iterate
+
+METERED = True
 
 
 def prepare(
@@ -29,13 +32,15 @@ def prepare(
     ]
 
     options = {"solver": "daqp", "damping": damping, "limits": limits}
+    solve_ik, integrate = library(mink.solve_ik), library(configuration.integrate_inplace)
+    compute_errors = [library(task.compute_error) for task in tasks]
+    setters, update = [library(task.set_target) for task in tasks], library(configuration.update)
 
     def step() -> None:
-        velocity = mink.solve_ik(configuration, tasks, 1.0, **options)
-        configuration.integrate_inplace(velocity, 1.0)
+        integrate(solve_ik(configuration, tasks, 1.0, **options), 1.0)
 
     def is_done() -> bool:
-        return arrived([task.compute_error(configuration) for task in tasks], robot, tolerance)
+        return arrived([compute(configuration) for compute in compute_errors], robot, tolerance)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [
@@ -43,13 +48,12 @@ def prepare(
             for x, R in request.poses
         ]
 
-        def solve() -> SolverOutput:
-            for task, target in zip(tasks, targets, strict=True):
-                task.set_target(target)
-            configuration.update(request.start)
-            claim = iterate(step, is_done, iterations)
-            return SolverOutput(configuration.q.copy(), claim)
+        def solve() -> bool:
+            for set_target, target in zip(setters, targets, strict=True):
+                set_target(target)
+            update(request.start)
+            return iterate(step, is_done, iterations)
 
-        return solve
+        return Solve(solve, lambda claim: (configuration.q.copy(), claim))
 
     return ask
