@@ -1,6 +1,8 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
 import importlib
+import subprocess
+import sys
 from functools import partial
 
 import numpy as np
@@ -475,6 +477,33 @@ def test_explicit_solvers_take_no_implicit_step_and_all_move():
     cloths = len(orders[0]) // len(set(orders[0]))
     solvers = orders[0][: len(orders[0]) // cloths]
     assert orders == [(solvers if i % 2 == 0 else solvers[::-1]) * cloths for i in range(3)]
+
+
+def errors_of_all(peers):
+    """The errors of every peer in a step and a motion of a tiny cloth, to the bit."""
+    return {
+        (task, peer.title): peers_cloth.work(task, peer, [FALL]).arrays["error"].tobytes()
+        for task in (ONE_STEP, MOTION)
+        for peer in peers
+        if task == MOTION or peer.kind != EXPLICIT
+    }
+
+
+@pytest.mark.slow
+def test_a_busy_machine_changes_no_error(monkeypatch):
+    """Every installed peer computes the same bits beside two busy processes."""
+    worker = WorkerProcess(600.0, 120.0)
+    monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
+    peers = [peer for peer in registry.cloth_peers() if peer.is_installed]
+    quiet = errors_of_all(peers)
+    loop = [sys.executable, "-c", "while True: pass"]
+    busy = [subprocess.Popen(loop) for _ in range(2)]
+    try:
+        assert errors_of_all(peers) == quiet
+    finally:
+        for process in busy:
+            process.kill()
+        worker.close()
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
