@@ -1,5 +1,6 @@
 """The command `show`: the arm drawing a curve or the cloth, by Plumbob's solvers and the user's."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -19,17 +20,19 @@ EXAMPLES = block(
     "plumbob show heart --coherent --output heart.bvh",
     "plumbob show heart --with my_ik.py -o heart.html",
     "plumbob show cloth -o cloth.gif -- ./my_solver --flag",
+    "plumbob show gallery -o pictures",
 )
 
 
 def show(
     context: typer.Context,
     scene: Annotated[
-        Text, argument("SCENE", "arm, cloth, or the curve that the arm draws.")
+        Text, argument("SCENE", "arm, cloth, a curve that the arm draws, or gallery.")
     ] = None,
     *,
     file: Annotated[
-        File, option("FILE", "File ending in .gif, .svg, .html or .bvh.", "--output", "-o")
+        File,
+        option("FILE", "File in .gif, .svg, .html or .bvh, or a folder.", "--output", "-o"),
     ] = None,
     solver: Annotated[
         Text, option("NAME", "Plumbob's solver: fabrik, ccd ...; for the cloth: newton ...")
@@ -44,21 +47,24 @@ def show(
     """Write an animation, a picture or a page of the arm or the cloth.
 
     Your solver moves beside Plumbob's, with errors in colour. The motion of the arm can also be
-    written as BVH, which animation programs open.
+    written as BVH, which animation programs open. The gallery is a folder of pictures of good and
+    faulty solvers.
     """
     from plumbob.bench.harness.record import check_regular
-    from plumbob.bench.show.scenes import SCENES, write
+    from plumbob.bench.show.scenes import GALLERY, SCENES, write
     from plumbob.bench.show.your_solver import YourSolver
 
     program = program_of(context)
     if yours is not None and program:
         raise ValueError("with: expected one solver, got --with and a program behind --")
     words = program if yours is None else [yours]
+    if scene == GALLERY and not (words or solver or coherent):
+        return _show_gallery(file or REPORT / GALLERY)
     if scene is None and not words:
         raise ValueError(f"SCENE: expected one of {', '.join(SCENES)}, got none")
     if scene is not None:
         valid_name("scene", scene, SCENES)
-    entrant = YourSolver(words) if words else None
+    entrant = YourSolver.open(words) if words else None
     try:
         name = scene or (entrant.scene if entrant else "")
         path = file or REPORT / f"{name}.gif"
@@ -75,4 +81,16 @@ def show(
         if entrant:
             entrant.close()
     print(visible(str(path)))
+    return SUCCESS
+
+
+def _show_gallery(folder: Path) -> int:
+    """Write the gallery, and print the paths of its pictures."""
+    from plumbob.bench.show.gallery import write_gallery
+
+    writable(folder)
+    with progress() as bar:
+        task = bar.add_task("gallery", total=None)
+        paths = write_gallery(folder, lambda i, count: bar.update(task, completed=i, total=count))
+    print("\n".join(visible(str(path)) for path in paths))
     return SUCCESS

@@ -70,8 +70,9 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     json: Annotated[File, option("FILE", "Write the verdict as JSON.")] = None,
     junit: Annotated[File, option("FILE", "Write the verdict as JUnit XML.")] = None,
     html: Annotated[File, option("FILE", "Write the verdict as a page.")] = None,
+    card: Annotated[File, option("FILE", "Write the verdict as an SVG for a README.")] = None,
     output: Annotated[
-        File, option("DIR", "Write all three formats and failing cases.", "--output", "-o")
+        File, option("DIR", "Write all four formats and failing cases.", "--output", "-o")
     ] = None,
     lang: Annotated[Text, option("LANG", "Language: en or zh; default: the locale.")] = None,
     self_test: Annotated[
@@ -108,7 +109,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     folder = [ANSWERS, str(answers)] if answers else []
     words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
     question = Question(tuple(task or ()), rerun, thorough, seed)
-    files = Files(json, junit, html, output)
+    files = Files(json, junit, html, card, output)
     return _judge(words, limits(time_limit, memory_limit), question, files, language)
 
 
