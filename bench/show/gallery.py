@@ -10,7 +10,7 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel
 from plumbob.crosscheck.verify.self_test import STEP, Stepper, Subject, subjects
-from plumbob.reference import forward_kinematics, solve_ik
+from plumbob.reference import forward_kinematics, scenes, solve_ik
 from plumbob.reference.arguments import FloatArray
 
 from ..figures.view import ARM_VIEW
@@ -30,8 +30,8 @@ from .scenes import (
 from .your_solver import YourSolver
 
 EXPLODING, REACH = "explicit Euler", "reach"
-# The reach: from a random pose to a point within so many sweeps, one a frame.
-SEED, POINT, SWEEPS = 34, 160, 40
+# The reach: from a random pose to a point [m] within so many sweeps, one a frame.
+SEED, POINT, SWEEPS = 34, (-0.238, 0.0, -0.956), 40
 # Of the frames of a scene, the animations of the gallery show every third, in a small picture.
 EVERY, DPI = 3, 56
 
@@ -107,20 +107,20 @@ def _beside_truth(fault: FamousFault) -> Scene:
 
 def _reach(fault: FamousFault) -> Scene:
     """Return the scene of an arm that reaches for a point, sweep by sweep."""
-    arm = arm_motion("heart", fault.solver, coherent=False)
-    target, n = arm.curve[POINT], len(arm.rest)
+    skeleton, rest = scenes.lab_arm()
+    target, n = np.array(POINT), len(rest)
     q = np.random.default_rng(SEED).standard_normal((n, 4))
     q /= np.linalg.norm(q, axis=-1, keepdims=True)
-    inputs = {"parents": arm.skeleton.parents, "offsets": arm.skeleton.offsets, "effector": n - 1,
+    inputs = {"parents": skeleton.parents, "offsets": skeleton.offsets, "effector": n - 1,
               "local_rotations": q, "target": target, "tolerance": 1e-4}  # fmt: skip
     faulty = [
         forward_kinematics(
-            arm.skeleton, _subject(fault).function(**inputs, max_iterations=k)["local_rotations"]
+            skeleton, _subject(fault).function(**inputs, max_iterations=k)["local_rotations"]
         ).positions
         for k in range(SWEEPS + 1)
     ]
     right = [
-        solve_ik(arm.skeleton, q, target, fault.solver, max_iterations=k).positions
+        solve_ik(skeleton, q, target, fault.solver, max_iterations=k).positions
         for k in range(SWEEPS + 1)
     ]
     motions = [
