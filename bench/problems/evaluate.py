@@ -100,6 +100,8 @@ class Evaluator:
         self.model = mujoco_model(robot)
         self._data = mujoco.MjData(self.model)
         self._effectors = [self.model.body(effector).id for effector in robot.effectors]
+        mujoco.mj_kinematics(self.model, self._data)
+        self.first_joint = self._data.xanchor[0].copy()  # its position, which is fixed [m], (3,)
 
     def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the effectors' positions [m], (..., effector, 3), and rotations, (..., 3, 3)."""

@@ -15,7 +15,7 @@ from plumbob.reference.formats.source import read_bytes, read_text
 from . import models
 from .chains import TargetsForSkeleton
 from .own import OwnProblem, clean
-from .robots import ALL
+from .robots import ROBOTS
 
 SUFFIXES = (".py", ".urdf", ".xml", ".mjcf", ".bvh", ".obj")
 LIST = "PROBLEMS"
@@ -67,7 +67,7 @@ def _read(path: Path, effector: str | None, pins: str | None) -> list[OwnProblem
         return [OwnProblem(name, _digest(digest.encode(), cloth[0].pinned), "cloth", cloth=cloth)]
     if suffix == ".xml" and "<mujoco" not in read_text(path):
         raise ValueError(f"{path}: expected MJCF, URDF, BVH, OBJ or Python, got other XML")
-    name = f"{name} of yours" if name in ALL else name
+    name = f"{name} of yours" if name in ROBOTS else name
     robot = models.robot(path, name, effector)
     return [OwnProblem(name, _digest(robot.text.encode()), "ik", robot=robot)]
 

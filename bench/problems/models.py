@@ -1,11 +1,12 @@
 """Problems from model files: a robot of URDF or MJCF, a skeleton of BVH, a cloth of OBJ."""
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
+from plumbob.crosscheck.verify.kinematics.robot_models import roll_pitch_yaw
 from plumbob.reference import (
     Articulation,
     MassSpring,
@@ -65,10 +66,8 @@ def _joints(model: Articulation, steps: list[int]) -> Iterator[ElementTree.Eleme
     for i, j in enumerate(steps):
         child, kind = f"{i}_{model.names[j]}", "revolute" if model.kinds[j] == "hinge" else "fixed"
         R = rotation.to_matrix(model.frames[j])
-        pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-        rpy = np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
         joint = ElementTree.Element("joint", name=f"joint_{child}", type=kind)
-        origin = {"xyz": _numbers(model.skeleton.offsets[j]), "rpy": _numbers(rpy)}
+        origin = {"xyz": _numbers(model.skeleton.offsets[j]), "rpy": _numbers(roll_pitch_yaw(R))}
         ElementTree.SubElement(joint, "origin", origin)
         ElementTree.SubElement(joint, "parent", link=parent)
         ElementTree.SubElement(joint, "child", link=child)
@@ -80,7 +79,7 @@ def _joints(model: Articulation, steps: list[int]) -> Iterator[ElementTree.Eleme
         parent = child
 
 
-def _numbers(vector: FloatArray) -> str:
+def _numbers(vector: Iterable[float]) -> str:
     return " ".join(repr(float(x)) for x in vector)
 
 

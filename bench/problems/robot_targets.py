@@ -13,7 +13,7 @@ from plumbob.reference.arguments import FloatArray
 
 from .chains import random_rotations, unit
 from .evaluate import Evaluator, Targets, evaluator_of
-from .robots import links, seed_of
+from .robots import seed_of
 
 STRATA = {
     "joint space": "uniform in joint space",
@@ -48,7 +48,7 @@ def stratum_poses(
     """Return the poses that define the targets, (count, coordinate) for each stratum."""
     pool = evaluator.robot.draw(rng, _POOL * count)
     effectors, _ = evaluator.forward(pool)
-    distance = np.linalg.norm(effectors - root(evaluator), axis=-1).max(axis=-1)
+    distance = np.linalg.norm(effectors - evaluator.first_joint, axis=-1).max(axis=-1)
     poses = [
         pool[:count],
         pool[spread(rng, effectors, count)],
@@ -66,7 +66,7 @@ def unreachable_targets(name: str, count: int) -> Targets:
     evaluator, rng = evaluator_of(name), np.random.default_rng([_SEED, seed_of(name), 1])
     shape = (count, len(evaluator.robot.effectors))
     distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (*shape, 1))
-    positions = root(evaluator) + distance * unit(rng.standard_normal((*shape, 3)))
+    positions = evaluator.first_joint + distance * unit(rng.standard_normal((*shape, 3)))
     w, x, y, z = np.moveaxis(random_rotations(rng, *shape), -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -84,7 +84,7 @@ def least_distances(name: str, targets: Targets) -> FloatArray:
     The target's distance from the first joint exceeds the sum of all link lengths by that much.
     """
     evaluator = evaluator_of(name)
-    distance = np.linalg.norm(targets.positions - root(evaluator), axis=-1)
+    distance = np.linalg.norm(targets.positions - evaluator.first_joint, axis=-1)
     return np.maximum(distance - farthest(evaluator), 0.0).max(axis=-1)
 
 
@@ -135,13 +135,6 @@ def _at_a_limit(rng: np.random.Generator, evaluator: Evaluator, count: int) -> F
     is_low = rng.random(count) < 0.5
     q[np.arange(count), joint] = np.where(is_low, robot.lower[joint], robot.upper[joint])
     return q
-
-
-def root(evaluator: Evaluator) -> FloatArray:
-    """Return the position of the first joint, which is fixed [m], (3,)."""
-    if evaluator.robot.is_chain:
-        return links(evaluator.robot)[0].transform[:3, 3]
-    return np.array(evaluator.model.body(evaluator.model.jnt_bodyid[0]).pos)
 
 
 def farthest(evaluator: Evaluator) -> float:

@@ -1,4 +1,4 @@
-"""Robots: arms cut out of the URDFs of example-robot-data, an iiwa, a character (`robots.toml`).
+"""Robots: arms for tuning solvers, arms held out from tuning, and a character (`robots.toml`).
 
 An arm is the chain of links from a root to an effector. Everything that is not kinematics is
 dropped from the file, and so are soft limits, which some readers take for the limits. Continuous
@@ -109,11 +109,11 @@ class Link(NamedTuple):
 _DATA: dict[str, Any] = tomllib.loads(
     Path(__file__).with_name("robots.toml").read_text(encoding="utf-8")
 )
-_ARMS = _DATA["arms"]
-IIWA, CHARACTER = "iiwa14", "character"
-# The robots of the tables; the iiwa stands beside a published table only.
-ROBOTS = (*_ARMS, CHARACTER)
-ALL = (*_ARMS, IIWA, CHARACTER)
+# Arms on which settings of solvers are chosen, and arms that no setting has seen.
+TUNING, HELD_OUT = tuple(_DATA["tuning"]), tuple(_DATA["held_out"])
+CHARACTER = "character"
+ROBOTS = (*TUNING, *HELD_OUT, CHARACTER)
+_ARMS: dict[str, dict[str, Any]] = {**_DATA["tuning"], **_DATA["held_out"]}
 # Robots of users, by name.
 OWN: dict[str, BenchRobot] = {}
 
@@ -127,7 +127,13 @@ def enter(own: BenchRobot) -> None:
 
 def seed_of(name: str) -> int:
     """Return the seed of a robot's targets."""
-    return ALL.index(name) if name in ALL else zlib.crc32(name.encode(errors="replace"))
+    return zlib.crc32(name.encode(errors="replace"))
+
+
+def group_of(name: str) -> str:
+    """Return the group of a robot, which is never averaged with another group."""
+    lists = {"tuning": TUNING, "held out": HELD_OUT, CHARACTER: (CHARACTER,)}
+    return next((group for group, names in lists.items() if name in names), "yours")
 
 
 @functools.cache
@@ -140,12 +146,13 @@ def robot(name: str) -> BenchRobot:
     """
     if name in OWN:
         return OWN[name]
-    choice("robot", name, ALL)
+    choice("robot", name, ROBOTS)
     if name == CHARACTER:
         return _character()
-    if name == IIWA:
-        return chain_from(name, title(name), _iiwa(), "link_0", "link_8")
     arm = _ARMS[name]
+    if "joints" in arm:
+        text = _from_dimensions(arm["joints"])
+        return chain_from(name, arm["title"], text, "link_0", f"link_{len(arm['joints'])}")
     text = _folder().joinpath(arm["file"]).read_text(encoding="utf-8")
     return chain_from(name, arm["title"], text, arm["root"], arm["effector"])
 
@@ -153,7 +160,8 @@ def robot(name: str) -> BenchRobot:
 def is_installed(name: str) -> bool:
     """Return whether a robot's file is there."""
     try:
-        return name not in _ARMS or _folder().joinpath(_ARMS[name]["file"]).exists()
+        file = _ARMS.get(name, {}).get("file")
+        return file is None or _folder().joinpath(file).exists()
     except AbsentError:
         return False
 
@@ -240,15 +248,18 @@ def _urdf(name: str, root: str, joints: Sequence[ElementTree.Element]) -> str:
     return ElementTree.tostring(tree, encoding="unicode")
 
 
-def _iiwa() -> str:
+def _from_dimensions(joints: list[list[Any]]) -> str:
+    """Return the URDF of joints of `robots.toml`."""
     parts = []
-    for i, (height, axis, degrees) in enumerate(_DATA[IIWA]["joints"]):
-        limit = math.radians(degrees)
-        hinge = f'<axis xyz="{axis}"/><limit lower="{-limit!r}" upper="{limit!r}"/>' if axis else ""
+    for i, (offset, *hinge) in enumerate(joints):
+        limits = ""
+        if hinge:
+            axis, lower, upper = hinge[0], *map(math.radians, hinge[1:])
+            limits = f'<axis xyz="{axis}"/><limit lower="{lower!r}" upper="{upper!r}"/>'
         parts.append(
-            f'<joint name="joint_{i + 1}" type="{"revolute" if axis else "fixed"}">'
-            f'<origin xyz="0 0 {height}"/><parent link="link_{i}"/><child link="link_{i + 1}"/>'
-            f"{hinge}</joint>"
+            f'<joint name="joint_{i + 1}" type="{"revolute" if hinge else "fixed"}">'
+            f'<origin xyz="{offset}"/><parent link="link_{i}"/><child link="link_{i + 1}"/>'
+            f"{limits}</joint>"
         )
     return f"<robot>{''.join(parts)}</robot>"
 

@@ -1,7 +1,7 @@
 """The command `show`: the arm drawing a curve or the cloth, by Plumbob's solvers and the user's."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,9 @@ from ..help_text import block
 from ..terminal import progress
 from .options import REPORT, SUCCESS, File, Text, argument, flag, option, valid_name, writable
 from .verify import program_of
+
+if TYPE_CHECKING:
+    from plumbob.bench.show.your_solver import YourSolver
 
 EXAMPLES = block(
     "Examples",
@@ -24,25 +27,25 @@ EXAMPLES = block(
 )
 
 
+Scene = Annotated[Text, argument("SCENE", "arm, cloth, a curve that the arm draws, or gallery.")]
+Picture = Annotated[
+    File, option("FILE", "File in .gif, .svg, .html or .bvh, or a folder.", "--output", "-o")
+]
+Yours = Annotated[Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")]
+Solver = Annotated[
+    Text, option("NAME", "Plumbob's solver: fabrik, ccd ...; for the cloth: newton ...")
+]
+Coherent = Annotated[bool, flag("Move the arm as smoothly as possible, in a loop.", "--coherent")]
+
+
 def show(
     context: typer.Context,
-    scene: Annotated[
-        Text, argument("SCENE", "arm, cloth, a curve that the arm draws, or gallery.")
-    ] = None,
+    scene: Scene = None,
     *,
-    file: Annotated[
-        File,
-        option("FILE", "File in .gif, .svg, .html or .bvh, or a folder.", "--output", "-o"),
-    ] = None,
-    solver: Annotated[
-        Text, option("NAME", "Plumbob's solver: fabrik, ccd ...; for the cloth: newton ...")
-    ] = None,
-    coherent: Annotated[
-        bool, flag("Move the arm as smoothly as possible, in a loop.", "--coherent")
-    ] = False,
-    yours: Annotated[
-        Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")
-    ] = None,
+    file: Picture = None,
+    solver: Solver = None,
+    coherent: Coherent = False,
+    yours: Yours = None,
 ) -> int:
     """Write an animation, a picture or a page of the arm or the cloth.
 
@@ -50,8 +53,7 @@ def show(
     written as BVH, which animation programs open. The gallery is a folder of pictures of good and
     faulty solvers.
     """
-    from plumbob.bench.harness.record import check_regular
-    from plumbob.bench.show.scenes import GALLERY, SCENES, write
+    from plumbob.bench.show.scenes import GALLERY, SCENES
     from plumbob.bench.show.your_solver import YourSolver
 
     program = program_of(context)
@@ -68,20 +70,30 @@ def show(
     try:
         name = scene or (entrant.scene if entrant else "")
         path = file or REPORT / f"{name}.gif"
-        check_regular(path)
-        writable(path.parent)
-        with progress() as bar:
-            task = bar.add_task(name, total=None)
-
-            def update(frame: int, total: int) -> None:
-                bar.update(task, completed=frame, total=total)
-
-            write(name, path, solver, update, coherent, entrant)
+        _draw(name, path, solver, coherent, entrant)
     finally:
         if entrant:
             entrant.close()
     print(visible(str(path)))
     return SUCCESS
+
+
+def _draw(
+    name: str, path: Path, solver: str | None, coherent: bool, entrant: "YourSolver | None"
+) -> None:
+    """Write a scene to a file with a progress bar."""
+    from plumbob.bench.harness.record import check_regular
+    from plumbob.bench.show.scenes import write
+
+    check_regular(path)
+    writable(path.parent)
+    with progress() as bar:
+        task = bar.add_task(name, total=None)
+
+        def update(frame: int, total: int) -> None:
+            bar.update(task, completed=frame, total=total)
+
+        write(name, path, solver, update, coherent, entrant)
 
 
 def _show_gallery(folder: Path) -> int:
@@ -90,7 +102,7 @@ def _show_gallery(folder: Path) -> int:
 
     writable(folder)
     with progress() as bar:
-        task = bar.add_task("gallery", total=None)
+        task = bar.add_task(folder.name, total=None)
         paths = write_gallery(folder, lambda i, count: bar.update(task, completed=i, total=count))
     print("\n".join(visible(str(path)) for path in paths))
     return SUCCESS

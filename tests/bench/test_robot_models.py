@@ -10,7 +10,7 @@ from plumbob.bench.experiments.robot_models.measurement import (
 )
 from plumbob.bench.experiments.robot_models.tables import readers
 from plumbob.bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
-from plumbob.bench.problems.robots import ALL, CHARACTER, is_installed
+from plumbob.bench.problems.robots import CHARACTER, ROBOTS, is_installed
 from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import ROBOT_ENGINES
 from plumbob.crosscheck.robots.models import RobotFile
@@ -81,7 +81,7 @@ def test_an_engine_with_a_known_cause_is_left_out_of_the_numbers(compared):
     assert table.summary.points[0].endswith("1 of them differently from MuJoCo's documentation")
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("peer", KINEMATICS, ids=lambda peer: peer.title)
 def test_the_engine_of_a_peer_puts_effectors_where_we_do(peer, name):
     """Ten rotations in a row round to 1e-15; single precision rounds a metre to 6e-8 each."""

@@ -14,17 +14,17 @@ from plumbob.bench.problems.robot_targets import (
     least_distances,
     least_singular_values,
     robot_targets,
-    root,
     spread,
     stratum_poses,
     uniform_targets,
     unreachable_targets,
 )
 from plumbob.bench.problems.robots import (
-    ALL,
     CHARACTER,
     LIMIT_TOLERANCE,
+    ROBOTS,
     AbsentError,
+    group_of,
     is_installed,
     links,
     robot,
@@ -35,7 +35,7 @@ COUNT = 8
 TOLERANCE = Tolerance(1e-3, 1e-3)
 
 
-@pytest.fixture(params=ALL)
+@pytest.fixture(params=ROBOTS)
 def name(request):
     """Every robot that is installed."""
     if not is_installed(request.param):
@@ -126,7 +126,7 @@ def test_extreme_strata_are_extreme(poses):
 
     def distance(stratum):
         effectors, _ = evaluator.forward(q[stratum])
-        return np.linalg.norm(effectors - root(evaluator), axis=-1).max(axis=-1)
+        return np.linalg.norm(effectors - evaluator.first_joint, axis=-1).max(axis=-1)
 
     near, far = np.quantile(distance("joint space"), [0.2, 0.8])
     assert np.median(distance("outer shell")) > far
@@ -158,10 +158,12 @@ def test_a_crowd_of_effectors_is_thinned_out(rng):
 def test_the_sum_of_link_lengths_bounds_the_reach(name, rng):
     evaluator = evaluator_of(name)
     effectors, _ = evaluator.forward(evaluator.robot.draw(rng, 300))
-    assert np.linalg.norm(effectors - root(evaluator), axis=-1).max() <= farthest(evaluator) * (
-        1 + 1e-12
+    assert np.linalg.norm(effectors - evaluator.first_joint, axis=-1).max() <= farthest(
+        evaluator
+    ) * (1 + 1e-12)
+    distance = np.linalg.norm(
+        unreachable_targets(name, COUNT).positions - evaluator.first_joint, axis=-1
     )
-    distance = np.linalg.norm(unreachable_targets(name, COUNT).positions - root(evaluator), axis=-1)
     assert (distance >= 1.05 * farthest(evaluator) * (1 - 1e-12)).all()
 
 
@@ -178,6 +180,19 @@ def asked(rng):
     q = 0.9 * evaluator.robot.draw(rng, 5)
     starts = evaluator.robot.draw(rng, 5)
     return evaluator, q, Targets(*evaluator.forward(q), starts, np.zeros(5, dtype=int))
+
+
+def test_every_robot_is_in_one_list():
+    """No setting has seen a robot held out; a user's robot is in a list of its own."""
+    groups = {name: group_of(name) for name in ROBOTS}
+    assert [groups[name] for name in ("fetch", "z1", CHARACTER)] == [
+        "tuning",
+        "held out",
+        CHARACTER,
+    ]
+    assert list(groups.values()).count("tuning") == 6
+    assert list(groups.values()).count("held out") == 10
+    assert group_of("a robot of mine") == "yours"
 
 
 def test_an_evaluation_needs_position_rotation_and_limits(asked):

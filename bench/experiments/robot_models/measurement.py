@@ -18,7 +18,7 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.job import worker_process
 from ...harness.worker import Calculation
 from ...peers.registry import KINEMATICS, Peer
-from ...problems.robots import ALL, is_installed, robot, title
+from ...problems.robots import ROBOTS, is_installed, robot, title
 from . import PEERS
 from .values import EffectorDifferences, FileValues
 
@@ -35,7 +35,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
                 measure = partial(compare, engine, model)
                 facts = {"title": model.name}
                 yield Block(SUITE, f"{family}/{model.name}", engine, measure, settings, facts=facts)
-    for name in filter(is_installed, ALL):
+    for name in filter(is_installed, ROBOTS):
         for peer in (peer for peer in KINEMATICS if peer.version):
             settings = {"configurations": ROBOT_CONFIGURATIONS, "version": peer.version}
             facts = {"task": PEERS, "title": title(name)}

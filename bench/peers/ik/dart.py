@@ -7,26 +7,31 @@ the joints' limits. DART's own restarts draw from a generator without a seed, so
 import dartpy
 import numpy as np
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    SolverOutput,
-    Tolerance,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 200) -> Ask:
-    """Return the solver, set up for a robot."""
+def prepare(
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 200,
+    clamp: float = 0.2,
+    length: float = 1.0,
+    weight: float = 0.4,
+) -> Ask:
+    """Return the solver, set up for a robot.
+
+    A step is clamped to `clamp` for each joint [rad] and the error to `length`; `weight` is that of
+    angles.
+    """
     skeleton = dart_skeleton(robot)
     ik = skeleton.getBodyNode(robot.effectors[0]).getIK(True)
     target_frame = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "target")
     ik.setTarget(target_frame)
     side = np.repeat([tolerance.rotation, tolerance.position], 3) / np.sqrt(3.0)
     ik.getErrorMethod().setBounds(-side, side)
+    ik.getErrorMethod().setAngularErrorWeights(np.full(3, weight))
+    ik.getErrorMethod().setErrorLengthClamp(length)
+    ik.getGradientMethod().setComponentWiseClamp(clamp)
     ik.getSolver().setNumMaxIterations(iterations)
 
     def ask(request: PoseRequest) -> Solve:
@@ -34,13 +39,12 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 200) -> A
         target.set_rotation(request.rotations[0])
         target.set_translation(request.positions[0])
 
-        def solve() -> SolverOutput:
+        def solve() -> bool:
             target_frame.setTransform(target)
             skeleton.setPositions(request.start)
-            claim = bool(ik.solveAndApply(True))
-            return SolverOutput(skeleton.getPositions(), claim)
+            return bool(ik.solveAndApply(True))
 
-        return solve
+        return Solve(solve, lambda claim: (skeleton.getPositions(), claim))
 
     return ask
 

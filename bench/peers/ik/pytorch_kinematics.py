@@ -5,27 +5,29 @@ It starts from as many configurations at once as it is given. In single precisio
 targets end in a singular matrix; here it works in double precision.
 """
 
+from typing import Any
+
 import numpy as np
 import pytorch_kinematics
 import torch
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    SolverOutput,
-    Tolerance,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 from .restarts import generator_of
 
 
 def prepare(
-    robot: BenchRobot, tolerance: Tolerance, iterations: int = 50, attempts: int = 1
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 50,
+    attempts: int = 1,
+    damping: float = 0.1,
+    patience: int = 2,
+    clamp: bool = False,
 ) -> Ask:
-    """Return the solver, set up for a robot; attempts beyond the first start anywhere."""
+    """Return the solver, set up for a robot; attempts beyond the first start anywhere.
+
+    It ends after `patience` iterations without progress, and may clamp each step to the limits.
+    """
     chain = torch_chain(robot)
     torch.set_num_threads(1)
     solver = pytorch_kinematics.PseudoInverseIK(
@@ -35,6 +37,9 @@ def prepare(
         retry_configs=torch.zeros(attempts, len(robot.lower), dtype=torch.float64),
         max_iterations=iterations,
         early_stopping_any_converged=True,
+        early_stopping_no_improvement_patience=patience,
+        lm_damping=damping,
+        clamp_to_limits=clamp,
     )
 
     def ask(request: PoseRequest) -> Solve:
@@ -43,15 +48,18 @@ def prepare(
         poses = robot.draw(generator_of(*request), attempts - 1)
         starts = torch.tensor(np.vstack([request.start, poses]))
 
-        def solve() -> SolverOutput:
+        def solve() -> Any:
             solver.initial_config = starts
-            output = solver.solve(target)
-            best = int(output.converged[0].int().argmax())
-            return SolverOutput(output.solutions[0, best].numpy(), bool(output.converged_any[0]))
+            return solver.solve(target)
 
-        return solve
+        return Solve(solve, _read)
 
     return ask
+
+
+def _read(output: Any) -> tuple[FloatArray, bool]:
+    best = int(output.converged[0].int().argmax())
+    return output.solutions[0, best].numpy(), bool(output.converged_any[0])
 
 
 def kinematics(robot: BenchRobot) -> Forward:

@@ -6,26 +6,30 @@ tolerance is on two norms of three components each, so eps is that over the squa
 """
 
 import math
+from collections.abc import Sequence
+from functools import partial
 
 import pytracik
 
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, seconds: float = 0.005) -> Ask:
+def prepare(
+    robot: BenchRobot, tolerance: Tolerance, seconds: float = 0.005, kind: str = "Speed"
+) -> Ask:
     """Return the solver, set up for a robot, with so much time for each target [s]."""
     robot.require_chain()
-    eps, speed = min(tolerance) / math.sqrt(3.0), pytracik.SolveType.Speed
+    eps, solve_type = min(tolerance) / math.sqrt(3.0), getattr(pytracik.SolveType, kind)
     chain = (robot.root, robot.effectors[0], robot.text)
-    engine = pytracik.TRAC_IK(*chain, seconds, eps, speed)
+    engine = pytracik.TRAC_IK(*chain, seconds, eps, solve_type)
 
     def ask(request: PoseRequest) -> Solve:
         target = (*request.positions[0], *request.quaternion)
-
-        def solve() -> SolverOutput:
-            code, *q = pytracik.ik(engine, request.start, *target)
-            return SolverOutput(q, True) if code >= 0 else SolverOutput(None, False)
-
-        return solve
+        return Solve(partial(pytracik.ik, engine, request.start, *target), _read)
 
     return ask
+
+
+def _read(answer: Sequence[float]) -> tuple[Sequence[float] | None, bool]:
+    code, *q = answer
+    return (q, True) if code >= 0 else (None, False)
