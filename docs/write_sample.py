@@ -42,15 +42,15 @@ def write_sample(folder: Path) -> None:
 
 def headlines(report: BenchReport, folder: Path) -> str:
     """Return the headlines as a Markdown table, with the machine and the versions below it."""
-    rows = ["| question | best | by how much |", "|---|---|---|"]
+    rows = ["| question | answer |", "|---|---|"]
     if verdict := report.answers.verdict:
         rows.append(
-            f"| Is the reference right? | {verdict.holding} of {verdict.total} claims hold "
-            f"| the largest difference uses {words(100 * verdict.used)} % of its tolerance |"
+            f"| Is the reference right? | {verdict.holding} of {verdict.total} claims hold; "
+            f"the largest difference uses {words(100 * verdict.used)} % of its tolerance. |"
         )
     rows += [
-        f"| {line.chapter.capitalize()}, {line.question.lower()} | {line.answer} | {line.detail} |"
-        for line in report.answers.headlines
+        f"| {line.question} | {line.sentence} |"
+        for line in (*report.answers.headlines, *report.answers.wins)
     ]
     timing = [record for record in RecordFile(folder).read().records if record.suite == "timing"]
     absent = f"Absent: {listed(report.answers.absent)}. " if report.answers.absent else ""

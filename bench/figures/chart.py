@@ -151,7 +151,8 @@ class Chart:
         ranked = sorted(names, key=lambda name: costs[name])
         firsts = [name for name in ranked if name in self.entrants]
         for side in (True, False):
-            firsts += [n for n in ranked if is_ours(n) == side and n not in self.entrants][:1]
+            peers = [name for name in ranked if name not in self.entrants]
+            firsts += [name for name in peers if registry.is_ours(name) == side][:1]
         labelled = list(dict.fromkeys([*firsts, *ranked]))[:MAX_LABELLED]
         return [name for name in names if name in labelled]
 
@@ -225,11 +226,6 @@ def _area(points: Floats) -> float:
     lowest = np.minimum.accumulate(y[order])
     reached = np.searchsorted(x[order], np.linspace(0.0, 1.0, _PLACES), side="right") - 1
     return float(np.where(reached < 0, 1.0, lowest[np.maximum(reached, 0)]).mean())
-
-
-def is_ours(solver: str) -> bool:
-    """Return whether a solver is Plumbob's."""
-    return registry.find(solver).engine.casefold() == registry.PLUMBOB.casefold()
 
 
 def looks(names: Sequence[str]) -> Mapping[str, Look]:

@@ -71,7 +71,7 @@ class Job(NamedTuple):
                     break
                 repeated = attempt(previous)
                 budget.excuse(repeated.time.overhead if repeated.time else 0.0)
-            _seed_shared_generators(i)
+            seed_shared_generators(i)
             solved = self._solved(solve)
             budget.excuse(solved.overhead)
             previous = solve if solved.seconds < QUICK else None
@@ -112,7 +112,7 @@ def announced(targets: Iterator[Solved], entrant: str) -> Iterator[Message]:
         yield target
 
 
-def _seed_shared_generators(seed: int) -> None:
+def seed_shared_generators(seed: int) -> None:
     """Seed the generators of the process, from which an engine may draw.
 
     Without it, an answer would depend on how often earlier solves were repeated.

@@ -55,6 +55,7 @@ class Solver:
     label: str  # how it is written
     engine: str = PLUMBOB  # its engine; "" if that is not known
     style: Style = OTHER  # how it is drawn where each solver has a style of its own
+    loop: bool = False  # whether it is a Python loop of ours on another engine's kinematics
 
 
 @dataclass(frozen=True)
@@ -180,6 +181,8 @@ class Peer(Adapter):
     kinematics: bool = field(default=False, kw_only=True)
     # how exact that is, where it is not in double precision
     precision: str = field(default="", kw_only=True)
+    # whether it is a Python loop of ours on the package's kinematics
+    loop: bool = field(default=False, kw_only=True)
 
     def label_of(self, entry: PeerEntry) -> str:
         """Return how an entry is written."""
@@ -305,6 +308,21 @@ def find(name: str) -> Solver:
     return Solver(name, name, "", Style(colour, line, "P"))
 
 
+def is_ours(name: str) -> bool:
+    """Return whether a solver is Plumbob's, by its name in records, or Plumbob as an engine."""
+    return PLUMBOB.casefold() in (name.casefold(), find(name).engine.casefold())
+
+
+def is_loop(name: str) -> bool:
+    """Return whether a solver is a Python loop of ours on another engine's kinematics."""
+    return find(name).loop
+
+
+def engine_of(name: str) -> str:
+    """Return the engine or package of a solver, else its name."""
+    return (PLUMBOB if is_ours(name) else find(name).engine or name).casefold()
+
+
 @functools.cache
 def _by_name(*reference_names: tuple[str, ...]) -> Mapping[str, Solver]:
     """Return the solvers by their names in records, the first of a name."""
@@ -322,4 +340,4 @@ def _solvers() -> Iterator[Solver]:
     yield from (Solver(peer.title, peer.title, peer.engine) for peer in cloth_peers())
     for peer in PEERS:
         labels = [peer.label_of(entry) for entry in peer.entries]
-        yield from (Solver(label, label, peer.package) for label in labels)
+        yield from (Solver(label, label, peer.package, loop=peer.loop) for label in labels)

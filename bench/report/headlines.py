@@ -1,11 +1,12 @@
-"""The headlines of the page: correctness, the most accurate, the fastest, and the absent solvers.
+"""The first screen: who is best and who is the best other solver, where others win, who is absent.
 
-Solvers that `metrics.ranking` does not distinguish from the first tie with it, as in the tables.
-Solvers that did not finish are not ranked, and a headline gives the number of those that did.
+Plumbob takes part like everyone else. Solvers that `metrics.ranking` does not distinguish from the
+first tie with it, as in the tables. Our own Python loops on engines are nobody's rivals.
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -13,23 +14,32 @@ import numpy as np
 from ..experiments.cloth_peers import MISSING, ONE_STEP, SOLVED
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
-from ..experiments.robots.readings import STARTS, Score, fields_of, over_sets, ratio_of_times
+from ..experiments.robots.readings import (
+    STARTS,
+    Score,
+    fields_of,
+    ratio_of_times,
+    together,
+)
 from ..experiments.timing.tables import median_time, ranked_by_time
 from ..harness import metrics
-from ..harness.record import FINISHED
+from ..harness.record import FINISHED, Record
 from ..peers import registry
-from ..tables.results import Results, by_problem, counted, listed
+from ..problems.robots import CHARACTER, group_of
+from ..tables.results import Results, by_problem, counted, grouped, listed
 from ..tables.table import words
-from .standings import Headline, of_finishers, solved, speed, standings
+from .standings import MISSES, Headline, best_rival, factor, named, percent, speed, standings
 
-# Ties of more solvers are counted, not listed.
-MAX_NAMED = 2
-SUBJECTS = {"kinematics": "Forward kinematics", "ik": "Inverse kinematics", "cloth": "Cloth step"}
+# The most robots or cases that a sentence names.
+MAX_NAMED = 3
+_FROM = dict(zip(STARTS, ("from one start", "with restarts"), strict=True))
+# What is timed of other engines' own code; loops of ours on engines are no rivals.
+_SUBJECTS = {"kinematics": "forward kinematics", "cloth": "a step of a cloth"}
+# The groups of robots: those that no setting has seen come first.
+_GROUPS = ["held out", "tuning", CHARACTER, "yours"]
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
 # What the scales of a run mean.
 _SCALES = {"quick": "Quick run: few targets and rounds", "full": "Full run: all targets and rounds"}
-# Median times by problem and solver [s].
-Times = Mapping[str, Mapping[str, float]]
 
 
 class ClaimCount(NamedTuple):
@@ -49,12 +59,13 @@ class Overview(NamedTuple):
     scale: str
     absent: list[str]
     standings: Sequence[Headline] = ()
+    wins: Sequence[Headline] = ()  # of other solvers over ours
 
 
 def overview(results: Results) -> Overview:
     """Return the contents of the first screen."""
     parts = verdict(results), headlines(results), scale(results), absent(results)
-    return Overview(*parts, standings(results))
+    return Overview(*parts, standings(results), wins_of_others(results))
 
 
 def verdict(results: Results) -> ClaimCount | None:
@@ -69,10 +80,17 @@ def verdict(results: Results) -> ClaimCount | None:
 
 
 def headlines(results: Results) -> list[Headline]:
-    """Return the most accurate and fastest solvers, chapter by chapter, as far as measured."""
-    robots = [headline for start in STARTS for headline in _robot_headlines(results, start)]
-    times = [headline for subject in SUBJECTS for headline in _timing_headlines(results, subject)]
-    return [*robots, *_cloth_headlines(results), *times]
+    """Return the best solver and the best other one of each task, as far as measured.
+
+    Robots that no setting has seen come first.
+    """
+    robots = [
+        headline
+        for group, start, fields in _robot_groups(results)
+        if group != CHARACTER
+        for headline in _robot_headlines(group, start, fields)
+    ]
+    return [*robots, *filter(None, map(_race_headline, _races(results)))]
 
 
 def scale(results: Results) -> str:
@@ -119,115 +137,207 @@ def _recorded_names() -> dict[str, set[str]]:
     return {peer.title: set(map(peer.label_of, peer.entries)) for peer in registry.PEERS}
 
 
-def _robot_headlines(results: Results, start: str) -> Iterator[Headline]:
-    """Yield the solver that solves the most, and the fastest, on the robots most can solve."""
-    fields = fields_of(results, start)
-    sets: dict[str, dict[str, Score]] = {}
-    for score in over_sets(fields):
-        if score.is_ranked:
-            sets.setdefault(score.robots, {})[score.solver] = score
-    scores = max(sets.values(), key=len, default={})
-    if len(scores) < 2:
+def _robot_groups(results: Results) -> Iterator[tuple[str, str, dict[str, list[Score]]]]:
+    """Yield group, start and solvers on each robot; robots held out from tuning come first."""
+    by_start = {start: fields_of(results, start) for start in STARTS}
+    groups = {robot: _group_of(f[robot][0].records[0]) for f in by_start.values() for robot in f}
+    for group in sorted(set(groups.values()), key=_GROUPS.index):
+        for start, fields in by_start.items():
+            yield group, start, {robot: fields[robot] for robot in fields if groups[robot] == group}
+
+
+def _group_of(record: Record) -> str:
+    """Return the group of a record's robot: for tuning, held out, the character, or the user's."""
+    return group_of(record.problem.rpartition("/")[2])
+
+
+def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> Iterator[Headline]:
+    """Yield who solves the most, and who is the fastest, on robots that most solvers take."""
+    rows = {row.solver: row for row in _most_compared(fields)}
+    if len(rows) < 2:
         return
-    row = next(iter(scores.values()))
-    count = len({score.solver for field in fields.values() for score in field})
-    place = f" on {row.robots}" if len(row.records) == 1 else ""
-    finishers = of_finishers(len(scores), count)
-    most_solved, fastest = (
-        [solver for solver in ranking.first if scores[solver].share.hits]
-        for ranking in (row.success, row.time)
-    )
-    share = solved(scores[row.success.order[0]].share, "poses")
-    detail = f"{share}{place}, {finishers}"
-    question = f"Most accurate, {start}"
-    yield Headline("kinematics", question, _leaders(most_solved), detail, "robots_overall")
-    first, second = row.time.order[:2]
-    detail = f"too near to tell{place}"
-    if len(fastest) == 1:
-        lead = speed(ratio_of_times(scores[second], scores[first]), second)
-        detail = f"{lead}{place}, failures penalised"
-    detail += f", {finishers}" if len(scores) < count else ""
-    question = f"Fastest, {start}"
-    yield Headline("kinematics", question, _leaders(fastest), detail, "robots_overall")
+    row = next(iter(rows.values()))
+    place = f"{_place(group, row, len(fields))} {_FROM[start]}"
+    order = [solver for solver in row.success.order if rows[solver].share.hits]
+    if first := _first(order):
+        sentence = f"On {place}, {named(first)} solves the most poses: {percent(rows[first].share)}"
+        sentence += f" of {words(rows[first].share.total)}"
+        if rival := best_rival(first, order):
+            sentence += f"; the best other solver is {named(rival)} with "
+            sentence += percent(rows[rival].share)
+            ties = len({*row.success.first} & {*order})
+            sentence += f", and {ties} solvers tie within chance" * (ties > 2)
+            sentence += ", a tie within chance" * (ties == 2)
+        yield _headline("Most poses solved", group, start, f"{sentence}.")
+    order = [solver for solver in row.time.order if rows[solver].share.hits]
+    first = _first(order)
+    if first and (rival := best_rival(first, order)):
+        ratio = ratio_of_times(rows[rival], rows[first])
+        sentence = f"On {place}, {named(first)} is the fastest, {MISSES}: it is "
+        sentence += f"{speed(ratio, rival)}, the best other solver."
+        if ratio.low < 1.0 < ratio.high:
+            names = f"{named(first)} and {named(rival)}"
+            sentence = f"On {place}, {names} are the fastest and tie within chance, {MISSES}."
+        yield _headline("Fastest", group, start, sentence)
 
 
-def _leaders(names: Sequence[str]) -> str:
-    """Return the leader, or the solvers that tie."""
-    if len(names) <= 1:
-        return "".join(names)
-    return f"Tie: {listed(names) if len(names) <= MAX_NAMED else f'{len(names)} solvers'}"
+def _headline(question: str, group: str, start: str, sentence: str) -> Headline:
+    question = ", ".join(filter(None, (question, group, start)))
+    return Headline("kinematics", question, sentence, "robots_overall")
 
 
-def _cloth_headlines(results: Results) -> Iterator[Headline]:
-    """Yield the solver of the steps of most cloths, and the engine with the fastest step."""
-    steps = points(results, ONE_STEP)
-    engines = {step.solver: registry.find(step.solver).engine or step.solver for step in steps}
-    count = len(set(engines.values()))
-    times: dict[str, dict[str, float]] = {step.cloth: {} for step in steps}
-    fastest: dict[str, dict[str, float]] = {step.cloth: {} for step in steps}
-    for step in sorted(steps, key=lambda step: -step.values["seconds"]):
-        if step.values["error"] <= float(SOLVED):
-            times[step.cloth][step.solver] = step.values["seconds"]
-            fastest[step.cloth][engines[step.solver]] = step.values["seconds"]
-    arrivals = Counter(solver for solvers in times.values() for solver in solvers)
-    if arrivals and len(engines) > 1:
-        maximum = max(arrivals.values())
-        leaders = [solver for solver in engines if arrivals[solver] == maximum]
-        detail = f"to {SOLVED} on {maximum} of {counted(len(times), 'cloth')} in time"
-        yield Headline("cloth", "Most steps solved", _leaders(leaders), detail, "cloth_peers_step")
-    if count > 1 and (answer := _most_often_first("cloth", fastest, engines=count)):
-        yield Headline("cloth", f"Fastest to {SOLVED}", *answer, "cloth_peers_step")
+def _most_compared(fields: dict[str, list[Score]]) -> list[Score]:
+    """Return the ranked solvers over the robots with the most pairs of a robot and a solver."""
+    takers = grouped((s for field in fields.values() for s in field), lambda score: score.solver)
+    sets = dict.fromkeys(frozenset(s.robots for s in group) for group in takers.values())
+    ranked = [[row for row in together(robots, fields) if row.is_ranked] for robots in sets]
+    return max(ranked, key=lambda rows: sum(len(row.records) for row in rows), default=[])
 
 
-def _timing_headlines(results: Results, subject: str) -> Iterator[Headline]:
-    """Yield the fastest solver in the cases of a subject that several can solve."""
-    times: dict[str, dict[str, float]] = {}
-    ties: set[str] = set()
-    for problem, records in by_problem(results.all("timing", subject=subject)).items():
-        rivals = [record for record in records if record.solver not in _NOT_RIVALS]
-        if len(rivals) > 1:
-            times[problem] = {_short_name(r.solver): median_time(r) for r in rivals}
-            ranking = ranked_by_time(rivals)
-            fastest = min(times[problem], key=times[problem].__getitem__)
-            if ranking is None or ranking.first != (fastest,):
-                ties.add(problem)
-    if answer := _most_often_first("case", times, ties):
-        yield Headline("speed", SUBJECTS[subject], *answer, f"timing_{subject}")
+def _place(group: str, row: Score, total: int) -> str:
+    """Return the robots of a row as words: "the 10 held-out robots", "UR5"."""
+    count = len(row.records)
+    if count == 1:
+        return row.robots
+    return f"{'the' if count == total else f'{count} of'} {_robots(group, total)}"
 
 
-def _most_often_first(
-    noun: str, times: Times, ties: Collection[str] = (), engines: int = 0
-) -> tuple[str, str] | None:
-    """Return the solver that is fastest on most problems and by which factors, None without any.
+def _robots(group: str, count: int) -> str:
+    """Return a number of robots of a group as words: "10 held-out robots"."""
+    if group == _GROUPS[-1]:
+        return f"{counted(count, 'robot')} of yours"
+    return counted(count, f"{group.replace(' ', '-')} robot")
 
-    A problem with a tie has no first. With a number of engines, the detail counts the problems
-    that no other engine solved in time.
-    """
-    ranked = {name: sorted(times[name].items(), key=lambda pair: pair[1]) for name in times}
-    ranked = {name: order for name, order in ranked.items() if order}
-    if not ranked:
+
+def _first(order: Sequence[str]) -> str:
+    """Return the first solver that is no loop of ours on another engine, "" without any."""
+    return next((solver for solver in order if not registry.is_loop(solver)), "")
+
+
+class Race(NamedTuple):
+    """The times of engines in several cases [s], and the cases that chance may decide."""
+
+    chapter: str
+    task: str  # in a sentence
+    noun: str  # of a case
+    table: str
+    times: dict[str, dict[str, float]]  # by case and engine, the fastest first
+    ties: set[str]
+
+
+def _races(results: Results) -> Iterator[Race]:
+    """Yield the times of each task in which engines run code of their own."""
+    cloths: dict[str, dict[str, float]] = {}
+    for point in points(results, ONE_STEP):
+        best = cloths.setdefault(point.cloth, {})
+        if point.values["error"] <= float(SOLVED):
+            engine = point.engine or point.solver
+            best[engine] = min(point.seconds, best.get(engine, np.inf))
+    yield Race("cloth", f"a step solved to {SOLVED}", "cloth", "cloth_peers_step", cloths, set())
+    for subject, task in _SUBJECTS.items():
+        records = [r for r in results.all("timing", subject=subject) if r.solver not in _NOT_RIVALS]
+        cases = {g[0].title: g for g in by_problem(records).values() if len(g) > 1}
+        times = {case: {_engine(r): median_time(r) for r in cases[case]} for case in cases}
+        rankings = {case: ranked_by_time(cases[case]) for case in cases}
+        ties = {case for case, order in rankings.items() if not order or len(order.first) > 1}
+        yield Race("speed", task, "case", f"timing_{subject}", times, ties)
+
+
+def _engine(record: Record) -> str:
+    is_compiled = record.solver == registry.COMPILED.name
+    return registry.PLUMBOB if is_compiled else record.solver
+
+
+def _race_headline(race: Race) -> Headline | None:
+    """Return the engine that is the fastest in most cases, None without rivals."""
+    if len({engine for times in race.times.values() for engine in times}) < 2:
         return None
-    wins = [order for name, order in ranked.items() if name not in ties]
-    if not wins:
-        leaders = [solver for solver, _ in next(iter(ranked.values()))]
-        return _leaders(leaders), f"too near to tell on {counted(len(ranked), noun)}"
-    firsts = Counter(order[0][0] for order in wins)
-    maximum = max(firsts.values())
-    leaders = [solver for solver, count in firsts.items() if count == maximum]
-    total = counted(len(times), noun)
-    if len(leaders) > 1:
-        return _leaders(leaders), f"each on {maximum} of {total}"
-    wins = [order for order in wins if order[0][0] == leaders[0]]
-    factors = [order[1][1] / order[0][1] for order in wins if len(order) > 1]
-    sentences = []
-    if factors:
-        span = "–".join(dict.fromkeys(map(words, metrics.extent(np.array(factors)))))
-        sentences.append(f"{span} times faster than the next on {len(factors)} of {total}")
-    if unopposed := len(wins) - len(factors):
-        only = f"the only one of {engines} engines that reached it in time"
-        sentences.append(f"{only} on {unopposed} of {total}")
-    return leaders[0], listed(sentences)
+    orders = {case: sorted(race.times[case].items(), key=itemgetter(1)) for case in race.times}
+    decided = [order for case, order in orders.items() if order and case not in race.ties]
+    total = counted(len(orders), race.noun)
+    question = f"Fastest in {race.task}"
+    if not decided:
+        sentence = f"No engine is the fastest beyond chance in {race.task} ({total})."
+        return Headline(race.chapter, question, sentence, race.table)
+    first = Counter(order[0][0] for order in decided).most_common(1)[0][0]
+    orders_won = [dict(order) for order in decided if order[0][0] == first]
+    rivals = [best_rival(first, list(times)) for times in orders_won]
+    sentence = f"In {race.task}, {named(first)} is the fastest on {len(orders_won)} of {total}"
+    opposed = [
+        (times[r] / times[first], r) for times, r in zip(orders_won, rivals, strict=True) if r
+    ]
+    if opposed:
+        ratios, names = zip(*opposed, strict=True)
+        best = listed(list(map(named, dict.fromkeys(names))), "or")
+        sentence += f", {_span(ratios)} times faster than the best other engine, {best}"
+    if alone := len(orders_won) - len(opposed):
+        sentence += f"; no other engine solves {alone} of them"
+    return Headline(race.chapter, question, f"{sentence}.", race.table)
 
 
-def _short_name(solver: str) -> str:
-    return registry.PLUMBOB if solver == registry.COMPILED.name else solver
+def _span(numbers: Sequence[float]) -> str:
+    """Return the least and the greatest number: "1.3 to 1.9"."""
+    return " to ".join(dict.fromkeys(map(factor, metrics.extent(np.array(numbers)))))
+
+
+class Win(NamedTuple):
+    """A case in which another solver beats ours beyond chance, and by how much."""
+
+    chapter: str
+    solver: str
+    result: str  # "is faster than ours"
+    case: str
+    size: float  # a factor, or points of a share
+    cases: str  # how many there are: "5 robots"
+    table: str
+
+
+def wins_of_others(results: Results) -> list[Headline]:
+    """Return where other solvers beat ours beyond chance, among all rows that are compared."""
+    wins = [win for group in _robot_groups(results) for win in _robot_wins(*group)]
+    wins += [win for race in _races(results) for win in _race_wins(race)]
+    return [
+        _win_headline(group)
+        for group in grouped(wins, lambda win: (win.solver, win.result, win.cases)).values()
+    ]
+
+
+def _win_headline(wins: Sequence[Win]) -> Headline:
+    win, names = wins[0], [win.case for win in wins]
+    unit = "{} percentage points" if "solves" in win.result else "a factor of {}"
+    size = unit.format(_span([win.size for win in wins]))
+    cases = f" ({listed(names)})" if len(names) <= MAX_NAMED else ""
+    sentence = f"{named(win.solver)} {win.result} on {len(names)} of {win.cases}{cases}, by {size}."
+    return Headline(win.chapter, "Where others win", sentence, win.table)
+
+
+def _robot_wins(group: str, start: str, fields: dict[str, list[Score]]) -> Iterator[Win]:
+    """Yield the robots on which another solver solves more, or is faster."""
+    for robot, field in fields.items():
+        rows = {row.solver: row for row in field if row.is_ranked}
+        for verb, ranking in (
+            ("solves more poses", field[0].success),
+            ("is faster", field[0].time),
+        ):
+            ours = next(filter(registry.is_ours, ranking.order), "")
+            first = _first(ranking.order)
+            if not ours or ours in ranking.first or first not in ranking.first:
+                continue
+            shares = [rows[solver].share for solver in (first, ours)]
+            points = 100 * (shares[0].hits - shares[1].hits) / shares[0].total
+            ratio = ratio_of_times(rows[ours], rows[first]).mean
+            size = points if ranking is field[0].success else ratio
+            result = f"{verb} than {named(ours)} {_FROM[start]}"
+            cases = _robots(group, len(fields))
+            yield Win("kinematics", first, result, robot, size, cases, "robots_by_robot")
+
+
+def _race_wins(race: Race) -> Iterator[Win]:
+    """Yield the cases in which another engine is faster."""
+    for case, times in race.times.items():
+        first = min(times, key=times.__getitem__, default="")
+        if registry.PLUMBOB in times and first != registry.PLUMBOB and case not in race.ties:
+            ratio = times[registry.PLUMBOB] / times[first]
+            result = f"is faster than {named(registry.PLUMBOB)} in {race.task}"
+            cases = counted(len(race.times), race.noun)
+            yield Win(race.chapter, first, result, case, ratio, cases, race.table)

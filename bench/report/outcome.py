@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from ..tables.aligned import filled
 from ..tables.entered import remarks_of_entrants
-from ..tables.results import Results, counted
+from ..tables.results import Results, counted, grouped
 from ..tables.table import is_blank, words
 from ..text import visible
 from .headlines import ClaimCount, Overview, overview
@@ -13,30 +13,30 @@ from .report import BenchReport
 from .sections import tables
 from .standings import Headline
 
-# The headlines that are printed first, and the number that is printed.
-_FIRST, HEADLINES = ("Most accurate", "Fastest to"), 3
+# The most headlines and wins of other solvers that are printed.
+HEADLINES, WINS = 3, 1
 # Lines on a report without those on the user's solvers; tables that a bench summarises.
-LINES, TABLES = 10, 4
+LINES, TABLES = 14, 4
 
 
 def outcome(report: BenchReport, width: int) -> list[str]:
-    """Return a summary of a report: the user's solvers, then at most ten lines of 80 letters."""
+    """Return a summary of a report: the user's solvers, then a few lines of 80 letters."""
     answers = report.answers
-    sentences = [_verdict(answers.verdict), *map(_sentence, printed(answers.headlines))]
+    sentences = [_verdict(answers.verdict), *leading(answers)]
     sentences += _scale_and_absent(answers, width)
-    page = f"{report.page}: the page, {len(report.tables)} tables (plumbob report --list)"
+    page = f"Read on: {report.page}, the page; `plumbob report --list` names the tables."
     lines, last = _lines(sentences, width), _lines([page], width)
     missing = [text for text in report.missing if not text.startswith("Absent peers")]
     lines += _missing(missing, width, LINES - len(lines) - len(last))
-    return [*_lines(map(_sentence, answers.standings), width), *lines, *last]
+    return [*_lines(map(_yours, answers.standings), width), *lines, *last]
 
 
 def ending(results: Results, suites: Sequence[str], width: int) -> list[str]:
     """Return a summary of a bench of some suites."""
     answers = overview(results)
-    sentences = [*map(_sentence, answers.standings)]
+    sentences = [*map(_yours, answers.standings)]
     sentences += [_verdict(answers.verdict)] if "check" in suites else []
-    sentences += map(_sentence, printed(answers.headlines))
+    sentences += leading(answers)
     sentences += remarks_of_entrants(results, suites)
     if not sentences:
         full = [table for table in tables(results, suites) if not is_blank(table)]
@@ -84,14 +84,22 @@ def _verdict(verdict: ClaimCount | None) -> str:
     return f"Right: {verdict.holding} of {verdict.total} claims hold, {margin}."
 
 
-def printed(headlines: Sequence[Headline]) -> list[Headline]:
-    """Return the printed headlines: first the most accurate in kinematics, the fastest cloths."""
-    return sorted(headlines, key=lambda h: not h.question.startswith(_FIRST))[:HEADLINES]
+def leading(answers: Overview) -> list[str]:
+    """Return who is best in a few tasks, most solved first, and where others beat ours."""
+    tasks = grouped(answers.headlines, _task)
+    firsts = [headlines[0] for headlines in tasks.values()]
+    headlines = sorted(firsts, key=lambda headline: not headline.question.startswith("Most"))
+    best = [f"Best: {headline.sentence}" for headline in headlines[:HEADLINES]]
+    wins = [f"Others win: {win.sentence}" for win in answers.wins[:WINS]]
+    if more := len(answers.wins) - len(wins):
+        wins[-1] += f" {counted(more, 'more win')} of others: see the page."
+    return [*best, *wins]
 
 
-def _sentence(headline: Headline) -> str:
-    question = headline.question
-    if not headline.chapter:
-        return f"{question}: {headline.answer}; {headline.detail.rstrip('.')}."
-    question = f"{headline.chapter.capitalize()}, {question[:1].lower()}{question[1:]}"
-    return f"{question}: {headline.answer}, {headline.detail}."
+def _task(headline: Headline) -> tuple[str, str]:
+    """Return the task of a headline without its group of robots."""
+    return headline.question.partition(",")[0], headline.question.rpartition(", ")[2]
+
+
+def _yours(headline: Headline) -> str:
+    return f"Yours: {headline.sentence}"

@@ -8,6 +8,7 @@ import numpy as np
 from ..experiments import chain, cloth_peers
 from ..experiments.cloth_peers.readings import Point, points
 from ..experiments.robots.readings import (
+    PENALTY,
     STARTS,
     Score,
     by_robot,
@@ -15,7 +16,6 @@ from ..experiments.robots.readings import (
     ratio_of_times,
     together,
 )
-from ..figures.chart import is_ours
 from ..harness import metrics
 from ..harness.record import Record
 from ..peers import registry
@@ -25,19 +25,19 @@ from ..tables.table import words
 
 # The most cloths with a sentence of their own.
 MAX_CLOTHS = 3
+MISSES = f"a miss counted as {PENALTY:g} s"
 
 
 class Headline(NamedTuple):
-    """An answer in a line, with a detail and the name of its table.
+    """A question, its answer in one complete sentence, and the name of the table that shows it.
 
-    For a solver of the user's the chapter is empty, the question its name and task, the answer its
-    rank.
+    The chapter is one of the page's, "" for a solver of the user's. A sentence is understood
+    without the question, which is a heading of a few words.
     """
 
     chapter: str
     question: str
-    answer: str
-    detail: str
+    sentence: str
     table: str
 
 
@@ -51,8 +51,10 @@ def standings(results: Results) -> list[Headline]:
     motions = [point for point in points(results, cloth_peers.MOTION) if point.is_whole]
     ranks += _cloth_ranks("step", "error", "error {}", steps)
     ranks += _cloth_ranks("motion", "true", "{} m from the truth", motions)
-    headlines = [*_failures(results, "ik"), *_failures(results, "cloth"), *ranks]
-    return sorted(headlines, key=lambda headline: not headline.answer.startswith("rank"))
+    is_ranked = [" ranks " in headline.sentence for headline in ranks]
+    first = [rank for rank, flag in zip(ranks, is_ranked, strict=True) if flag]
+    others = [rank for rank, flag in zip(ranks, is_ranked, strict=True) if not flag]
+    return [*first, *_failures(results, "ik"), *_failures(results, "cloth"), *others]
 
 
 def _failures(results: Results, suite: str) -> Iterator[Headline]:
@@ -62,9 +64,10 @@ def _failures(results: Results, suite: str) -> Iterator[Headline]:
         doors.setdefault(str(record.facts.get("door")), []).append(record)
     for records in doors.values():
         if sentences := [f"{r.problem}: {why}" for r in records if (why := r.failed or r.trouble)]:
-            question = f"{min((record.solver for record in records), key=len)}, suite {suite}"
-            answer = f"trouble on {len(sentences)} of {counted(len(records), 'problem')}"
-            yield Headline("", question, answer, sentences[0], "entered")
+            name = min((record.solver for record in records), key=len)
+            problems = f"{len(sentences)} of {counted(len(records), 'problem')}"
+            sentence = f"{name} had trouble on {problems}; the first is {sentences[0].rstrip('.')}."
+            yield Headline("", f"{name}, suite {suite}", sentence, "entered")
 
 
 def _target_ranks(task: str, table: str, fields: dict[str, list[Score]]) -> Iterator[Headline]:
@@ -73,63 +76,69 @@ def _target_ranks(task: str, table: str, fields: dict[str, list[Score]]) -> Iter
     for solver in dict.fromkeys(s.solver for s in scores if s.records[0].facts.get("entrant")):
         problems = {score.robots for score in scores if score.solver == solver}
         rows = {row.solver: row for row in together(problems, fields)}
-        yield Headline("", f"{solver}, {task}", *_rank(rows[solver], rows), table)
+        yield Headline("", f"{solver}, {task}", _rank(rows[solver], rows), table)
 
 
-def _rank(row: Score, rows: Mapping[str, Score]) -> tuple[str, str]:
-    """Return the rank of a solver, and details: share solved, best share, relative times."""
+def _rank(row: Score, rows: Mapping[str, Score]) -> str:
+    """Return a sentence on a solver: its rank, share solved, the best share, relative times."""
     order, first = row.success
-    details = [solved(row.share, "targets")]
+    share = f"it solves {percent(row.share)} of {counted(row.share.total, 'target')}"
     if not row.is_ranked or not row.share.hits:
-        return f"not ranked, {row.limits or 'solves nothing'}", details[0]
+        why = f"it was {row.limits}, and {share}" if row.limits else "it solves no target"
+        return f"{row.solver} is not ranked: {why}."
     if row.solver not in first:
-        best = rows[order[0]].share
-        details.append(f"{_full_name(order[0])}: {100 * best.hits / best.total:.3g} %")
+        share += f", the best solver, {named(order[0])}, {percent(rows[order[0]].share)}"
     if len(order) > 1:
         rivals = _fastest([solver for solver in row.time.order if solver != row.solver])
         speeds = [speed(ratio_of_times(rows[rival], row), rival) for rival in rivals]
-        details.append(f"{listed(speeds)}, failures penalised")
+        share += f"; it is {listed(speeds)}, {MISSES}" if speeds else ""
     place = 1 if row.solver in first else order.index(row.solver) + 1
-    tie = " (tie)" if row.solver in first and len(first) > 1 else ""
-    return f"rank {place} {of_finishers(len(order), len(rows))}{tie}", "; ".join(details)
+    tie = f", in a tie of {len(first)}" if row.solver in first and len(first) > 1 else ""
+    cut = len(rows) - len(order)
+    unranked = f" ({counted(cut, 'solver')} did not finish)" if cut else ""
+    return f"{row.solver} ranks {place} of {len(order)}{tie}{unranked}: {share}."
 
 
-def of_finishers(finished: int, count: int) -> str:
-    """Return "of 5 solvers" or, if fewer finished, "among the 4 of 5 solvers that finished"."""
-    solvers = counted(count, "solver")
-    among_finished = f"among the {finished} of {solvers} that finished"
-    return f"of {solvers}" if finished == count else among_finished
+def percent(share: metrics.Share) -> str:
+    """Return a share in three digits, or in as many as tell it from 100 %."""
+    rate = 100 * share.hits / share.total
+    digits = next(n for n in range(3, 12) if rate == 100 or float(f"{rate:.{n}g}") < 100)
+    return f"{rate:.{digits}g} %"
 
 
-def solved(share: metrics.Share, noun: str) -> str:
-    """Return the share of solved targets or poses, with its interval."""
-    low, high = (f"{round(100 * x, 1):g}" for x in (share.low, share.high))
-    rate = f"{100 * share.hits / share.total:.3g} %"
-    return f"{rate} of {words(share.total)} {noun} solved ({low}–{high})"
+def named(solver: str) -> str:
+    """Return how a solver is written, with "(ours)" behind each of Plumbob's."""
+    return f"{label(solver)} (ours)" if registry.is_ours(solver) else label(solver)
 
 
-def _fastest(rivals: Sequence[str]) -> list[str]:
-    """Return the first rival, and the first of Plumbob's solvers if that is another."""
-    own = [solver for solver in rivals if is_ours(solver)]
-    return list(dict.fromkeys((*rivals[:1], *own[:1])))
+def best_rival(solver: str, order: Sequence[str]) -> str:
+    """Return the first solver of other authors than a solver's, "" if there is none.
+
+    A loop of ours on another engine's kinematics is no solver of other authors.
+    """
+    authors = registry.engine_of(solver)
+    rivals = (s for s in order if registry.engine_of(s) != authors and not registry.is_loop(s))
+    return next(rivals, "")
+
+
+def _fastest(order: Sequence[str]) -> list[str]:
+    """Return the first solver, and the first of Plumbob's solvers if that is another."""
+    rivals = [solver for solver in order if not registry.is_loop(solver)]
+    return list(dict.fromkeys((*rivals[:1], *list(filter(registry.is_ours, rivals))[:1])))
+
+
+def factor(ratio: float) -> str:
+    """Return a factor in two digits or more: "4.0", "15" or "1.04"."""
+    return f"{ratio:.{0 if ratio >= 10 else 1 if ratio >= 1.1 else 2}f}"
 
 
 def speed(ratio: metrics.PairedRatio, rival: str) -> str:
     """Return how much faster a solver is than a rival, by the ratio of the rival's time to its."""
     mean, low, high, _ = ratio
     if low < 1.0 < high:
-        return f"as fast as {_full_name(rival)} ({words(low)}–{words(high)})"
+        return f"as fast as {named(rival)} within chance"
     adverb = "faster" if mean >= 1.0 else "slower"
-    if mean < 1.0:
-        mean, low, high = 1.0 / mean, 1.0 / high, 1.0 / low
-    interval = f" ({words(low)}–{words(high)})" if low < high else ""
-    return f"{words(mean)} times {adverb} than {_full_name(rival)}{interval}"
-
-
-def _full_name(solver: str) -> str:
-    """Return a solver's label, with "Plumbob" before the labels of ours that lack it."""
-    is_clear = not is_ours(solver) or label(solver).startswith(registry.PLUMBOB)
-    return label(solver) if is_clear else f"{registry.PLUMBOB} {label(solver)}"
+    return f"{factor(max(mean, 1.0 / mean))} times {adverb} than {named(rival)}"
 
 
 def _cloth_ranks(task: str, error: str, phrase: str, field: Sequence[Point]) -> Iterator[Headline]:
@@ -143,8 +152,8 @@ def _cloth_ranks(task: str, error: str, phrase: str, field: Sequence[Point]) -> 
         span = "–".join(dict.fromkeys((str(min(ranks)), str(max(ranks)))))
         count = max(len({point.solver for point in points}) for points in by_cloth)
         question = f"{solver}, {task} of {counted(len(cloths), 'cloth')}"
-        detail = "; ".join(details[:MAX_CLOTHS])
-        yield Headline("", question, f"rank {span} of {count}", detail, f"cloth_peers_{task}")
+        sentence = f"{solver} ranks {span} of {count}: {'; '.join(details[:MAX_CLOTHS])}."
+        yield Headline("", question, sentence, f"cloth_peers_{task}")
 
 
 def _cloth_rank(field: Sequence[Point], solver: str, error: str, phrase: str) -> tuple[int, str]:
@@ -162,5 +171,5 @@ def _cloth_rank(field: Sequence[Point], solver: str, error: str, phrase: str) ->
         speed(metrics.PairedRatio(r, r, r, 1), s) for r, s in zip(ratios, rivals, strict=True)
     ]
     result = f"{phrase.format(words(own_error))} in {words_in(own_time, 'ms')}"
-    detail = f"{field[0].cloth}: {result}, {listed(speeds) or 'nobody else as near'}"
+    detail = f"on {field[0].cloth} {result}, {listed(speeds) or 'no other solver as near'}"
     return 1 + len(set(solvers[errors < own_error])), detail

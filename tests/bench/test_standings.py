@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from plumbob import terminal
-from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening
 from plumbob.bench.report import outcome, report
@@ -27,7 +26,7 @@ def only(records):
 
 
 def test_rank_share_and_times_are_those_of_the_records(make):
-    """Beside the best and beside ours, with 95 % intervals."""
+    """Beside the best and beside ours."""
     mine = make.solving("Mine", 150, seconds=4e-3, mine=True)
     others = [
         make.solving("pink", 190, seconds=1e-3),
@@ -35,13 +34,12 @@ def test_rank_share_and_times_are_those_of_the_records(make):
     ]
     standing = only([*others, mine])
     assert standing.question == "Mine, robots, one start"
-    assert standing.answer == "rank 3 of 3 solvers"
-    share = metrics.share(np.arange(N) < 150)
-    low, high = (round(100 * x, 1) for x in (share.low, share.high))
-    assert standing.detail.startswith(
-        f"75 % of 200 targets solved ({low}–{high}); Plumbob LM: 97.5 %; ")  # fmt: skip
+    assert standing.sentence.startswith(
+        "Mine ranks 3 of 3: it solves 75 % of 200 targets, the best solver, Plumbob LM (ours), "
+        "97.5 %; it is "
+    )
     # Of targets that both solve, the times are 4 to 1 and 4 to 2; penalties make it more.
-    factors = re.findall(r"([\d.]+) times slower than (pink|Plumbob LM)", standing.detail)
+    factors = re.findall(r"([\d.]+) times slower than (pink|Plumbob LM)", standing.sentence)
     assert [name for _, name in factors] == ["pink", "Plumbob LM"]
     assert float(factors[0][0]) > 4.0
     assert float(factors[1][0]) > 2.0
@@ -52,24 +50,24 @@ def test_the_best_is_told_by_how_much_it_is_faster(make):
     mine = make.solving("Mine", N, seconds=1e-3, mine=True)
     others = [make.solving("pink", 100, seconds=4e-3), make.solving("Plumbob LM", N, seconds=8e-3)]
     standing = only([*others, mine])
-    assert standing.answer == "rank 1 of 3 solvers (tie)"
-    assert "7.93 times faster than Plumbob LM" in standing.detail
+    assert standing.sentence.startswith("Mine ranks 1 of 3, in a tie of 2: it solves 100 % of ")
+    assert "7.9 times faster than Plumbob LM (ours)" in standing.sentence
     assert standings(Results(others)) == []
 
 
 def test_a_solver_that_is_cut_off_has_no_rank_and_one_that_solves_nothing_neither(make):
     rivals = [make.solving("pink", 100), make.solving("mink", 50)]
     cut = only([*rivals, make.solving("Mine", 3, begun=18, mine=True)])
-    assert cut.answer == "not ranked, cut at 18 of 200"
-    assert cut.detail == "1.5 % of 200 targets solved (0.5–4.3)"
+    why = "it was cut at 18 of 200, and it solves 1.5 % of 200 targets"
+    assert cut.sentence == f"Mine is not ranked: {why}."
     none = only([*rivals, make.solving("Mine", 0, mine=True)])
-    assert none.answer == "not ranked, solves nothing"
+    assert none.sentence == "Mine is not ranked: it solves no target."
 
 
 def test_a_rank_is_among_those_that_finished(make):
     rivals = [make.solving("pink", 100), make.solving("mink", 18, begun=18)]
     standing = only([*rivals, make.solving("Mine", 20, mine=True)])
-    assert standing.answer == "rank 2 among the 2 of 3 solvers that finished"
+    assert standing.sentence.startswith("Mine ranks 2 of 2 (1 solver did not finish): it solves ")
 
 
 def chained(make, solver, residuals, seconds, stratum="near", mine=False):
@@ -92,9 +90,9 @@ def test_on_chains_ours_are_called_so_and_what_is_beyond_reach_does_not_count(ma
     ]
     standing = only(records)
     assert standing.question == "Mine, chain of balls"
-    assert standing.answer == "rank 3 of 3 solvers"
-    assert standing.detail.startswith("25 % of 20 targets solved")
-    assert "times slower than Plumbob FABRIK (" in standing.detail
+    assert standing.sentence.startswith("Mine ranks 3 of 3: it solves 25 % of 20 targets, the best")
+    assert "times slower than FABRIK (ours)" in standing.sentence
+    assert "LM, MuJoCo" not in standing.sentence  # a loop of ours
     assert standing.table == "accuracy"
 
 
@@ -105,22 +103,23 @@ def test_on_cloths_a_rank_is_by_the_error_and_a_time_beside_who_comes_as_near(ma
         make.entered(make.worked("Mine", error=(0.5, 0.2), seconds=(1e-3, 4e-3))),
     ]
     standing = only(records)
-    assert (standing.question, standing.answer) == ("Mine, step of 1 cloth", "rank 2 of 3")
-    assert standing.detail == (
-        "20 × 20, 1,000 N/m: error 0.200 in 4.00 ms, 2.00 times slower than MuJoCo Euler and "
-        "1.25 times faster than Plumbob Newton"
+    assert standing.question == "Mine, step of 1 cloth"
+    assert standing.sentence == (
+        "Mine ranks 2 of 3: on 20 × 20, 1,000 N/m error 0.200 in 4.00 ms, 2.0 times slower than "
+        "MuJoCo Euler and 1.2 times faster than Plumbob Newton (ours)."
     )
     alone = only([records[1], make.entered(make.worked("Mine", error=(0.5, 0.1)))])
-    assert alone.answer == "rank 1 of 2"
-    assert alone.detail.endswith("nobody else as near")
+    assert alone.sentence.startswith("Mine ranks 1 of 2: ")
+    assert alone.sentence.endswith("no other solver as near.")
 
 
 def test_motions_are_ranked_by_the_distance_from_the_truth(make):
     """Of settings that got to the end: others are nearer, but diverged or were cut short."""
     records = [make.fell("Plumbob Newton"), make.entered(make.fell("Mine", true=[0.0, 1e-2, 0.0]))]
     standing = only(records)
-    assert (standing.question, standing.answer) == ("Mine, motion of 1 cloth", "rank 1 of 2")
-    assert "0.0100 m from the truth in 1.00 ms" in standing.detail
+    assert standing.question == "Mine, motion of 1 cloth"
+    assert standing.sentence.startswith("Mine ranks 1 of 2: ")
+    assert "0.0100 m from the truth in 1.00 ms" in standing.sentence
 
 
 def test_many_cloths_have_few_sentences_and_the_rank_on_all(make):
@@ -129,8 +128,8 @@ def test_many_cloths_have_few_sentences_and_the_rank_on_all(make):
     records += [make.entered(make.worked("Mine", k, error=(0.1, 0.02))) for k in stiffnesses]
     standing = only(records)
     assert standing.question == "Mine, step of 5 cloths"
-    assert standing.answer == "rank 2 of 2"
-    assert standing.detail.count("N/m: ") == MAX_CLOTHS
+    assert standing.sentence.startswith("Mine ranks 2 of 2: ")
+    assert standing.sentence.count("N/m error ") == MAX_CLOTHS
 
 
 RAISED = "It raised ValueError in line 3 of mine.py: no, on 4 of 200 targets"
@@ -142,10 +141,11 @@ def test_what_a_solver_raised_stands_below_its_ranks_with_how_often(make):
         "Mine, 20 restarts", 0, mine=True, kind="restarts", facts={"trouble": RAISED}
     )
     rank, trouble, unranked = standings(Results([bad, good]))
-    assert rank.answer == "rank 1 of 1 solver"
-    assert (trouble.question, trouble.answer) == ("Mine, suite ik", "trouble on 1 of 2 problems")
-    assert trouble.detail == f"robots/arm: {RAISED}"
-    assert unranked.answer == "not ranked, solves nothing"
+    assert rank.sentence.startswith("Mine ranks 1 of 1: ")
+    assert trouble.question == "Mine, suite ik"
+    first = f"the first is robots/arm: {RAISED}."
+    assert trouble.sentence == f"Mine had trouble on 1 of 2 problems; {first}"
+    assert unranked.sentence == "Mine, 20 restarts is not ranked: it solves no target."
 
 
 def test_a_problem_that_could_not_be_measured_is_not_forgotten(make):
@@ -153,8 +153,8 @@ def test_a_problem_that_could_not_be_measured_is_not_forgotten(make):
     failed = make.entered(make.reached("near", "Mine"))
     failed = replace(failed, arrays={}, notes={"failed": "It raised ValueError: no"})
     standing = only([failed])
-    assert standing.answer == "trouble on 1 of 1 problem"
-    assert standing.detail == "chain/near: It raised ValueError: no"
+    first = "chain/near: It raised ValueError: no"
+    assert standing.sentence == f"Mine had trouble on 1 of 1 problem; the first is {first}."
 
 
 def run_folder(make, tmp_path):
@@ -171,14 +171,15 @@ def run_folder(make, tmp_path):
 def test_the_first_screen_of_the_page_begins_with_the_solver_of_the_user(make, tmp_path):
     made = report.write(run_folder(make, tmp_path))
     lines = outcome.outcome(made, 200)
-    assert lines[0].startswith("Mine, robots, one start: ")
+    assert lines[0].startswith("Yours: Mine ranks 3 of 3: ")
     assert any(line.startswith("Right? ") for line in lines)
     page = made.page.read_text("utf-8")
     screen = page[page.index('<section id="answers"') : page.index("</section>")]
     (heading,) = re.findall("<h1[^>]*>(.*?)</h1>", screen)
-    assert heading == "Mine, robots, one start: rank 3 of 3 solvers"
+    assert heading.startswith("Mine ranks 3 of 3: ")
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
-        assert f'<a href="#{standing.table}">{standing.answer}</a>' in screen
+        assert f'href="#{standing.table}"' in screen
+        assert standing.sentence in screen
         assert standing.question in screen
     assert screen.index("Your solver") < screen.index("Not checked yet")
     assert RAISED in screen
@@ -191,13 +192,13 @@ def test_a_bench_ends_with_the_solver_of_the_user_and_who_leads(
     monkeypatch.setenv("COLUMNS", str(width))
     terminal.print_ending(["ik"], run_folder(make, tmp_path))
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) <= {80: 16, 120: 12}[width]  # eight sentences, of which most take two lines
+    assert len(lines) <= {80: 20, 120: 14}[width]  # nine sentences, of which most take two lines
     assert max(map(len, lines)) <= width
     said = " ".join(lines)
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
-        assert f"{standing.question}: {standing.answer}; {standing.detail}." in said
-    assert lines[0].startswith("Mine, robots, one start: rank 3 of 3 solvers; ")
-    assert said.index("trouble on 1 of 2 problems") < said.index("Kinematics, most accurate")
+        assert f"Yours: {standing.sentence}" in said
+    assert lines[0].startswith("Yours: Mine ranks 3 of 3: ")
+    assert said.index("trouble on 1 of 2 problems") < said.index("Best: On the arm from one start")
 
 
 def test_a_bench_without_leaders_ends_with_what_its_tables_say(tmp_path, records, capsys):
@@ -253,8 +254,8 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
     assert printed_before[0] == line
     assert err.count(why) == 1
     said = " ".join(out.split())
-    rank = "My raiser, suite ik: trouble on 2 of 2 problems"
-    assert f"{rank}; robots/ur5: {why}, on 12 of 12 targets." in said
+    rank = "My raiser had trouble on 2 of 2 problems"
+    assert f"{rank}; the first is robots/ur5: {why}, on 12 of 12 targets." in said
     results = Results(RecordFile("out").read().records)
     made = {table.name: table for table in tables(results, ["ik"])}
     for name, title in (

@@ -1,4 +1,4 @@
-"""The terminal: no digit is cut and no name shortened, at any width; the run ends in ten lines."""
+"""The terminal: no digit is cut and no name shortened, at any width; a run ends with an answer."""
 
 import functools
 import io
@@ -172,11 +172,13 @@ def test_bar_count_and_time_left_are_there_at_any_width(monkeypatch, width, what
 
 def an_outcome(folder, tables=(), **more):
     verdict = ClaimCount(52, 52, "spring forces", 0.462)
-    headline = Headline("kinematics", "Fastest", "A", "2.00 × B (1.90–2.10), 400 poses", "robots")
-    cloth = headline._replace(chapter="cloth")
-    answers = Overview(
-        verdict, [headline, headline, cloth, headline], "Quick run", ["pink", "mink"]
-    )
+    parts = [(task, start) for task in ("Fastest", "Most poses") for start in "ab"]
+    headlines = [
+        Headline("kinematics", f"{task}, {group}, {start}", f"{group}, {task}, {start}.", "robots")
+        for group in ("held out", "tuning") for task, start in parts
+    ]  # fmt: skip
+    wins = [Headline("cloth", "Others", f"{n} wins.", "cloths") for n in ("A", "B")]
+    answers = Overview(verdict, headlines, "Quick run", ["pink", "mink"], [], wins)
     answers = answers._replace(**more)
     missing = ["a"] + ["A sentence on what is missing, which is rather long. " * 3] * 20
     return report.BenchReport(folder / "index.html", list(tables), missing, answers)
@@ -184,17 +186,20 @@ def an_outcome(folder, tables=(), **more):
 
 @pytest.mark.parametrize("width", [80, 120, 240])
 @pytest.mark.parametrize("absent", [[], ["pink"], [f"solver {i}" for i in range(40)]])
-def test_a_run_ends_in_ten_lines(capsys, tmp_path, monkeypatch, width, absent):
+def test_a_run_ends_with_an_answer(capsys, tmp_path, monkeypatch, width, absent):
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.chdir(tmp_path)
     written = an_outcome(tmp_path.relative_to(tmp_path), absent=absent)
     terminal.print_outcome(written)
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) <= 10
+    assert len(lines) <= outcome.LINES
     assert max(map(len, lines)) <= width
     assert "52 of 52 claims hold" in lines[0]
     text = "\n".join(lines)
-    assert text.count("astest") == outcome.HEADLINES
+    best = [line.removeprefix("Best: held out, ") for line in lines if line.startswith("Best")]
+    assert best == ["Most poses, a.", "Most poses, b.", "Fastest, a."]
+    assert "Others win: A wins. 1 more win of others: see the page." in text
+    assert lines[-1].startswith("Read on: index.html")
     assert "Missing: a" in text
     assert "index.html" in text
     assert ("Absent" in text) == bool(absent)

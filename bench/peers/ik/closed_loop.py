@@ -1,7 +1,8 @@
 """Pinocchio's closed-loop inverse kinematics, as its documentation gives it.
 
 The error of the effector is the logarithm of the transform from it to its target, the velocity
-v = -J' (J J' + damping I)^-1 e, the step 0.1 s, at most 1,000 of them. It looks at no limits.
+v = -J' (J J' + damping I)^-1 e; there, the step is 0.1 s and there are at most 1,000 of them. It
+looks at no limits.
 """
 
 from collections.abc import Sequence
@@ -11,12 +12,15 @@ import pinocchio
 
 from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, Tolerance
 
-STEP = 0.1
-DAMPING = 1e-12
 
-
-def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 1000) -> Ask:
-    """Return the loop, set up for a robot."""
+def prepare(
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 1000,
+    damping: float = 1e-12,
+    step: float = 0.1,
+) -> Ask:
+    """Return the loop, set up for a robot, with steps so long [s]."""
     model = pinocchio_model(robot)
     data = model.createData()
     frames = [model.getFrameId(effector) for effector in robot.effectors]
@@ -32,8 +36,8 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 1000) -> 
                 is_done = bool(np.linalg.norm(e) < tolerance.position)
                 if is_done or iteration == iterations:
                     break
-                damped = J @ J.T + DAMPING * np.eye(len(e))
-                q = pinocchio.integrate(model, q, -STEP * (J.T @ np.linalg.solve(damped, e)))
+                damped = J @ J.T + damping * np.eye(len(e))
+                q = pinocchio.integrate(model, q, -step * (J.T @ np.linalg.solve(damped, e)))
             return SolverOutput(from_pinocchio(robot, q), is_done)
 
         return solve

@@ -19,14 +19,28 @@ from .protocol import (
 )
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 200) -> Ask:
-    """Return the solver, set up for a robot."""
+def prepare(
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 200,
+    clamp: float = 0.2,
+    length: float = 1.0,
+    weight: float = 0.4,
+) -> Ask:
+    """Return the solver, set up for a robot.
+
+    A step is clamped to `clamp` for each joint [rad] and the error to `length`; `weight` is that of
+    angles.
+    """
     skeleton = dart_skeleton(robot)
     ik = skeleton.getBodyNode(robot.effectors[0]).getIK(True)
     target_frame = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "target")
     ik.setTarget(target_frame)
     side = np.repeat([tolerance.rotation, tolerance.position], 3) / np.sqrt(3.0)
     ik.getErrorMethod().setBounds(-side, side)
+    ik.getErrorMethod().setAngularErrorWeights(np.full(3, weight))
+    ik.getErrorMethod().setErrorLengthClamp(length)
+    ik.getGradientMethod().setComponentWiseClamp(clamp)
     ik.getSolver().setNumMaxIterations(iterations)
 
     def ask(request: PoseRequest) -> Solve:

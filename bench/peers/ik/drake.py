@@ -1,10 +1,11 @@
 """Drake: inverse kinematics as a nonlinear program, solved by a solver of its wheel.
 
-There is no objective: effectors are constrained to a box and a cone about their targets,
-coordinates to their limits. The program is built once for a robot; frames in the world are moved to
-the targets. Solvers stop at the edge of the constraints, so half of the tolerance is set. Drake
-bounds an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's usual tolerance on
-constraints of 1e-6: a smaller tolerance is given, or half of its claims are false.
+There is no objective unless one is asked for: effectors are constrained to a box and a cone about
+their targets, coordinates to their limits. The program is built once for a robot; frames in the
+world are moved to the targets. Solvers stop at the edge of the constraints, so a part of the
+tolerance is set. Drake bounds an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's
+usual tolerance on constraints of 1e-6: a smaller tolerance is given, or half of its claims are
+false.
 """
 
 import logging
@@ -17,7 +18,7 @@ from pydrake.multibody.inverse_kinematics import InverseKinematics
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
-from pydrake.solvers import IpoptSolver, SnoptSolver, SolverOptions
+from pydrake.solvers import IpoptSolver, NloptSolver, SnoptSolver, SolverOptions
 
 from .protocol import (
     Ask,
@@ -30,28 +31,42 @@ from .protocol import (
     Tolerance,
 )
 
-# The part of the tolerance that is asked for.
-INSIDE = 0.5
-FEASIBILITY = 1e-8
 # A solver, and its names for the tolerance on constraints and the maximum of iterations.
 SOLVERS: dict[str, tuple[Any, str, str]] = {
     "SNOPT": (SnoptSolver, "Major feasibility tolerance", "Major iterations limit"),
     "IPOPT": (IpoptSolver, "constr_viol_tol", "max_iter"),
+    "NLopt": (NloptSolver, "constraint_tol", "max_eval"),
 }
 
 
 def prepare(
-    robot: BenchRobot, tolerance: Tolerance, solver: str = "SNOPT", iterations: int = 200
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    solver: str = "SNOPT",
+    iterations: int = 200,
+    feasibility: float = 1e-8,
+    inside: float = 0.5,
+    centring: float = 0.0,
 ) -> Ask:
-    """Return the program, set up for a robot."""
+    """Return the program, set up for a robot.
+
+    `feasibility` is the solver's tolerance on constraints, `inside` the part of the bench's
+    tolerance that is asked for, `centring` the weight of the squared distance from the middle of
+    the limits, which is then the objective.
+    """
     logging.getLogger("drake").setLevel(logging.ERROR)  # IPOPT gives advice at each failure
     plant, frames = drake_plant(robot)
-    ik, coordinates = _program(robot, plant, frames, tolerance), _Coordinates(robot, plant)
+    part = Tolerance(inside * tolerance.position, inside * tolerance.rotation)
+    ik, coordinates = _program(robot, plant, frames, part), _Coordinates(robot, plant)
     kind, feasibility_name, iterations_name = SOLVERS[solver]
     engine, options = kind(), SolverOptions()
-    options.SetOption(engine.solver_id(), feasibility_name, FEASIBILITY)
+    options.SetOption(engine.solver_id(), feasibility_name, feasibility)
     options.SetOption(engine.solver_id(), iterations_name, iterations)
     context, program, unknowns = ik.get_mutable_context(), ik.prog(), ik.q()
+    if centring:
+        bounds = plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()
+        middle = np.nan_to_num(np.mean(bounds, axis=0))  # balls have none
+        program.AddQuadraticErrorCost(centring * np.eye(len(middle)), middle, unknowns)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [RigidTransform(RotationMatrix(R), x) for x, R in request.poses]
@@ -102,12 +117,11 @@ def drake_plant(robot: BenchRobot) -> tuple[Any, list[Any]]:
 def _program(robot: BenchRobot, plant: Any, targets: list[Any], tolerance: Tolerance) -> Any:
     """Return the program, with positions bounded in a cube within the ball of tolerance."""
     ik, identity = InverseKinematics(plant, True), RotationMatrix()
-    side = np.full(3, INSIDE * tolerance.position / np.sqrt(3.0))
+    side = np.full(3, tolerance.position / np.sqrt(3.0))
     for effector, target in zip(map(plant.GetFrameByName, robot.effectors), targets, strict=True):
         ik.AddPositionConstraint(effector, np.zeros(3), target, -side, side)
         if robot.oriented:
-            angle = INSIDE * tolerance.rotation
-            ik.AddOrientationConstraint(target, identity, effector, identity, angle)
+            ik.AddOrientationConstraint(target, identity, effector, identity, tolerance.rotation)
     return ik
 
 

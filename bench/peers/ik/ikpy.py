@@ -4,6 +4,7 @@ It solves for the last link of a chain, which is the effector here, and does not
 """
 
 import warnings
+from typing import Any
 
 import ikpy.chain
 import numpy as np
@@ -11,21 +12,32 @@ import numpy as np
 from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
-    """Return the solver, set up for a robot; it takes no tolerance."""
+def prepare(
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    optimizer: str = "least_squares",
+    precision: float = 0.0,
+    method: str = "",
+) -> Ask:
+    """Return the solver, set up for a robot; it takes no tolerance on poses.
+
+    `precision` is that of its optimizer, if any, `method` one of that in SciPy.
+    """
     robot.require_chain()
     with robot.file() as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         chain = ikpy.chain.Chain.from_urdf_file(file, base_elements=[robot.root])
         moving = np.array([link.name in robot.joints for link in chain.links])
         chain.active_links_mask = moving
+    options: dict[str, Any] = {"optimizer": optimizer, "tol": precision or None}
+    options |= {"optimizer_kwargs": {"method": method}} if method else {}
 
     def ask(request: PoseRequest) -> Solve:
         target, q0 = (request.positions[0], request.rotations[0], "all"), np.zeros(len(moving))
         q0[moving] = request.start
 
         def solve() -> SolverOutput:
-            q = chain.inverse_kinematics(*target, initial_position=q0)
+            q = chain.inverse_kinematics(*target, initial_position=q0, **options)
             return SolverOutput(q[moving], None)
 
         return solve

@@ -4,6 +4,8 @@ The residual is the effector's displacement and rotation vector from the target,
 of both. It works on coordinates, not on rotations, so it takes hinges only.
 """
 
+from typing import Any
+
 import mujoco
 import numpy as np
 from mujoco import minimize
@@ -14,17 +16,29 @@ from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOut
 SILENT = minimize.Verbosity.SILENT
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> Ask:
-    """Return the solver, set up for a robot."""
+def prepare(
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 100,
+    minimum: float = 1e-6,
+    factor: float = 10.0**0.1,
+    scale: str = "",
+) -> Ask:
+    """Return the solver, set up for a robot.
+
+    `minimum` is the least damping, `factor` what changes it, `scale` its rule for coordinates.
+    """
     robot.require_chain()
     bounds = [robot.lower[:, None], robot.upper[:, None]]
+    options: dict[str, Any] = {"max_iter": iterations, "verbose": SILENT}
+    options |= {"mu_min": minimum, "mu_factor": factor, "x_scale": scale or None}
     reach = _Reach(robot)
 
     def ask(request: PoseRequest) -> Solve:
         def solve() -> SolverOutput:
             reach.aim(request.positions[0], request.rotations[0])
             problem = (request.start[:, None], reach.residuals, bounds, reach.jacobian)
-            q, _ = minimize.least_squares(*problem, max_iter=iterations, verbose=SILENT)
+            q, _ = minimize.least_squares(*problem, **options)
             errors = np.linalg.norm(reach.residual(q.ravel()).reshape(2, 3), axis=-1)
             return SolverOutput(q.ravel(), bool((errors <= tolerance).all()))
 

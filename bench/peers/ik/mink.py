@@ -1,7 +1,7 @@
 """mink: differential inverse kinematics on MuJoCo by quadratic programs, iterated to a target.
 
-Each step asks for all of the error at once (gain 1 over 1 s) within the joint limits. Its damping
-of the task must not be zero: full steps then jump about.
+Each step asks for a part of the error (`gain`, over 1 s) within the joint limits. With full steps,
+the damping of the task must not be zero: they then jump about.
 """
 
 import mink
@@ -11,18 +11,25 @@ from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Toleran
 
 
 def prepare(
-    robot: BenchRobot, tolerance: Tolerance, iterations: int = 200, lm_damping: float = 0.01
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 200,
+    damping: float = 1e-12,
+    lm_damping: float = 0.01,
+    gain: float = 1.0,
 ) -> Ask:
     """Return the solver, set up for a robot."""
     configuration = mink.Configuration(mujoco_model(robot))
     limits, cost = [mink.ConfigurationLimit(configuration.model)], float(robot.oriented)
     tasks = [
-        mink.FrameTask(effector, "body", 1.0, cost, lm_damping=lm_damping)
+        mink.FrameTask(effector, "body", 1.0, cost, gain, lm_damping)
         for effector in robot.effectors
     ]
 
+    options = {"solver": "daqp", "damping": damping, "limits": limits}
+
     def step() -> None:
-        velocity = mink.solve_ik(configuration, tasks, 1.0, solver="daqp", limits=limits)
+        velocity = mink.solve_ik(configuration, tasks, 1.0, **options)
         configuration.integrate_inplace(velocity, 1.0)
 
     def is_done() -> bool:

@@ -1,10 +1,12 @@
 """pink: differential inverse kinematics by quadratic programs, iterated to a target.
 
-Each step asks for all of the error at once (gain 1 over 1 s) within the joint limits. An effector
+Each step asks for a part of the error (`gain`, over 1 s) within the joint limits. An effector
 without a target rotation has no cost for it. Velocity limits are left out: there is no motion here.
 With pink's own damping of 1e-12 the quadratic program is infeasible, and pink raises
 `NoSolutionFound`, once a step leaves a joint 1e-7 beyond its limit; with 1e-6 it never is here.
 """
+
+import logging
 
 import pink
 
@@ -13,12 +15,18 @@ from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Toleran
 
 
 def prepare(
-    robot: BenchRobot, tolerance: Tolerance, iterations: int = 200, damping: float = 1e-6
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 200,
+    damping: float = 1e-6,
+    lm_damping: float = 0.0,
+    gain: float = 1.0,
 ) -> Ask:
     """Return the solver, set up for a robot."""
+    logging.getLogger().setLevel(logging.ERROR)  # it warns of each step beyond a limit
     model, cost = pinocchio_model(robot), float(robot.oriented)
     data, limits = model.createData(), [pink.limits.ConfigurationLimit(model)]
-    tasks = [pink.FrameTask(effector, 1.0, cost) for effector in robot.effectors]
+    tasks = [pink.FrameTask(effector, 1.0, cost, lm_damping, gain) for effector in robot.effectors]
     options = {"solver": "daqp", "damping": damping, "limits": limits, "safety_break": False}
 
     def ask(request: PoseRequest) -> Solve:

@@ -20,7 +20,13 @@ from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Toleran
 PROGRAM = Path(__file__).with_name("placo_program.py")
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> Ask:
+def prepare(
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 100,
+    regularization: float = 1e-6,
+    weight: float = 1.0,
+) -> Ask:
     """Return the solver, set up for a robot.
 
     Raises:
@@ -28,7 +34,12 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, iterations: int = 100) -> A
     """
     robot.require_chain()
     program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
-    task = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
+    task: dict[str, Any] = {
+        "text": robot.text,
+        "effector": robot.effectors[0],
+        "joints": robot.joints,
+    }
+    task |= {"regularization": regularization, "weight": weight}
     try:
         _answer(program, {**task, "iterations": iterations, "limits": tolerance})
     except ConnectionError:

@@ -1,8 +1,9 @@
 """PlaCo as a program that answers targets, run by the Python of PlaCo's own environment.
 
 Its input and output are lines of JSON. The first is {"text": a URDF, "effector", "joints",
-"iterations", "limits": [m] and [rad]} and is answered by true. A question is {"target": a
-transform, "start"}; the answer is whether it has arrived, the time [s], and the coordinates.
+"iterations", "limits": [m] and [rad], "regularization", "weight"} and is answered by true. A
+question is {"target": a transform, "start"}; the answer is whether it has arrived, the time [s],
+and the coordinates.
 """
 
 import json
@@ -14,15 +15,22 @@ from time import perf_counter
 import numpy as np
 import placo
 
-# Without it, the tasks of a redundant arm do not determine a step.
-REGULARIZATION = 1e-6
-
 
 class Reacher:
     """A robot and a task, which takes its effector to a frame within the joints' limits."""
 
-    def __init__(self, text: str, effector: str, joints: Sequence[str]) -> None:
+    def __init__(
+        self,
+        text: str,
+        effector: str,
+        joints: Sequence[str],
+        regularization: float,
+        weight: float,
+    ) -> None:
         """Read the robot; its base stands still.
+
+        Without `regularization`, the tasks of a redundant arm do not determine a step; `weight` is
+        that of the effector's rotation.
 
         Raises:
             ValueError: if PlaCo orders the joints otherwise.
@@ -34,8 +42,8 @@ class Reacher:
         self._solver.mask_fbase(True)
         self._solver.enable_joint_limits(True)
         self._task = self._solver.add_frame_task(effector, np.eye(4))
-        self._task.configure("effector", "soft", 1.0, 1.0)
-        self._solver.add_regularization_task(REGULARIZATION)
+        self._task.configure("effector", "soft", 1.0, weight)
+        self._solver.add_regularization_task(regularization)
         self._parts = self._task.position(), self._task.orientation()
         self._first = self._robot.get_joint_offset(joints[0])
 
@@ -70,7 +78,8 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     task = json.loads(sys.stdin.readline())
-    reacher = Reacher(task["text"], task["effector"], task["joints"])
+    names = ("text", "effector", "joints", "regularization", "weight")
+    reacher = Reacher(*(task[name] for name in names))
     print("true", file=answers, flush=True)
     for line in sys.stdin:
         question = json.loads(line)

@@ -24,23 +24,24 @@ from .protocol import (
     Tolerance,
 )
 
-# It stops within this part of the tolerance, which bounds a distance; angles come along.
-INSIDE = 0.1
-
 
 def prepare(
     robot: BenchRobot,
     tolerance: Tolerance,
     iterations: int = 200,
     damping: float = 1e-3,
+    inside: float = 0.1,
     limits: bool = False,
     check: bool = False,
 ) -> Ask:
-    """Return the solver, set up for a robot, with a damping or with limits."""
+    """Return the solver, set up for a robot, with a damping or with limits.
+
+    It stops within the part `inside` of the tolerance, which bounds a distance; angles come along.
+    """
     body = BulletBody(robot)
     options: dict[str, Any] = {
         "maxNumIterations": iterations,
-        "residualThreshold": INSIDE * tolerance.position,
+        "residualThreshold": inside * tolerance.position,
         "physicsClientId": body.client,
     }
     if limits:

@@ -23,9 +23,18 @@ from .restarts import generator_of
 
 
 def prepare(
-    robot: BenchRobot, tolerance: Tolerance, iterations: int = 50, attempts: int = 1
+    robot: BenchRobot,
+    tolerance: Tolerance,
+    iterations: int = 50,
+    attempts: int = 1,
+    damping: float = 0.1,
+    patience: int = 2,
+    clamp: bool = False,
 ) -> Ask:
-    """Return the solver, set up for a robot; attempts beyond the first start anywhere."""
+    """Return the solver, set up for a robot; attempts beyond the first start anywhere.
+
+    It ends after `patience` iterations without progress, and may clamp each step to the limits.
+    """
     chain = torch_chain(robot)
     torch.set_num_threads(1)
     solver = pytorch_kinematics.PseudoInverseIK(
@@ -35,6 +44,9 @@ def prepare(
         retry_configs=torch.zeros(attempts, len(robot.lower), dtype=torch.float64),
         max_iterations=iterations,
         early_stopping_any_converged=True,
+        early_stopping_no_improvement_patience=patience,
+        lm_damping=damping,
+        clamp_to_limits=clamp,
     )
 
     def ask(request: PoseRequest) -> Solve:

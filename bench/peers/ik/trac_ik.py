@@ -12,12 +12,14 @@ import pytracik
 from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, seconds: float = 0.005) -> Ask:
+def prepare(
+    robot: BenchRobot, tolerance: Tolerance, seconds: float = 0.005, kind: str = "Speed"
+) -> Ask:
     """Return the solver, set up for a robot, with so much time for each target [s]."""
     robot.require_chain()
-    eps, speed = min(tolerance) / math.sqrt(3.0), pytracik.SolveType.Speed
+    eps, solve_type = min(tolerance) / math.sqrt(3.0), getattr(pytracik.SolveType, kind)
     chain = (robot.root, robot.effectors[0], robot.text)
-    engine = pytracik.TRAC_IK(*chain, seconds, eps, speed)
+    engine = pytracik.TRAC_IK(*chain, seconds, eps, solve_type)
 
     def ask(request: PoseRequest) -> Solve:
         target = (*request.positions[0], *request.quaternion)

@@ -1,0 +1,257 @@
+"""Search the settings of all solvers for robots, ours included, on the tuning robots.
+
+    python -m plumbob.bench.experiments.robots.tuning [--solver NAME ...] [--results FILE]
+
+Every solver gets the same care: at most 64 settings, listed in `tuning.toml`, on the same 200
+targets of each tuning robot, which no table of the bench contains. All settings are tried on the
+first targets; the best quarter, the authors' defaults and the bench's earlier settings on all. The
+file of results continues an interrupted search.
+"""
+
+import argparse
+import contextlib
+import csv
+import functools
+import importlib
+import itertools
+import json
+import math
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...harness.isolation import WorkerProcess
+from ...harness.job import seed_shared_generators
+from ...harness.metrics import ranking, shifted_geometric_mean
+from ...harness.stopwatch import processor_time_of
+from ...peers.ik.protocol import attempt
+from ...peers.ik.restarts import restarted
+from ...peers.registry import PEERS, Peer
+from ...problems.evaluate import Targets, evaluator_of
+from ...problems.robot_targets import STRATA, stratum_poses
+from ...problems.robots import TUNING, seed_of
+from .measurement import TOLERANCE
+
+RESULTS = Path("docs/peers/tuning.csv")
+# Settings of a solver at the most, targets of each robot, and those on which all are tried.
+MAXIMUM, COUNT, SCREENED = 64, 200, 40
+SEED = 2011
+# Processor times within this factor of each other are taken for equal.
+EQUAL_TIMES = 1.25
+# Added to times before their geometric mean, and subtracted from it [s].
+_SHIFT = 1e-5
+# A worker is ended that has not finished a robot after so long [s].
+_PATIENCE = 3600.0
+Settings = Mapping[str, Any]
+
+
+class Search(NamedTuple):
+    """The settings of a solver, from one start or with restarts."""
+
+    solver: str
+    start: str  # `registry.ONE_START` or `registry.RESTARTS`
+    default: Settings  # of its authors
+    before: Settings  # of the bench before the search
+    candidates: tuple[Settings, ...]  # the settings among which is chosen, the default first
+
+    @property
+    def peer(self) -> Peer:
+        """The solver."""
+        return next(peer for peer in PEERS if peer.title == self.solver)
+
+    @property
+    def settings(self) -> list[Settings]:
+        """All settings that are tried."""
+        return [*self.candidates, *([] if self.before in self.candidates else [self.before])]
+
+
+class Trial(NamedTuple):
+    """A solver with settings on the first targets of each tuning robot."""
+
+    solver: str
+    start: str
+    settings: Settings
+    version: str  # of the solver's package
+    microseconds: float  # of processors for a target, the geometric mean
+    solved: np.ndarray  # (robot, target)
+    trouble: str = ""  # why its process was lost, else ""
+
+    @property
+    def share(self) -> float:
+        """The share of targets that it solves."""
+        return float(np.mean(self.solved))
+
+    @classmethod
+    def from_row(cls, row: Mapping[str, str]) -> "Trial":
+        """Return a trial from a row of the file of results."""
+        bits = np.unpackbits(np.frombuffer(bytes.fromhex(row["solved"]), dtype=np.uint8))
+        solved = bits[: len(TUNING) * int(row["targets"])].reshape(len(TUNING), -1).astype(bool)
+        settings = json.loads(row["settings"])
+        names = (row["solver"], row["start"], settings, row["version"])
+        return cls(*names, float(row["us"]), solved, row["trouble"])
+
+    @property
+    def row(self) -> dict[str, str]:
+        """Return it as a row of the file: a digit in base 16 holds four targets."""
+        return {
+            "solver": self.solver,
+            "start": self.start,
+            "settings": json.dumps(self.settings),
+            "version": self.version,
+            "targets": str(self.solved.shape[1]),
+            "us": f"{self.microseconds:.4g}",
+            "solved": np.packbits(self.solved).tobytes().hex(),
+            "trouble": self.trouble,
+        }
+
+
+def searches() -> list[Search]:
+    """Return the searches of `tuning.toml`."""
+    text = Path(__file__).with_name("tuning.toml").read_text(encoding="utf-8")
+    return [_search(**row) for row in tomllib.loads(text)["searches"]]
+
+
+def _search(
+    solver: str, start: str, default: Settings, before: Settings, axes: list[dict[str, list[Any]]]
+) -> Search:
+    points = [
+        [dict(zip(axis, values, strict=True)) for values in zip(*axis.values(), strict=True)]
+        for axis in axes
+    ]
+    products = [functools.reduce(dict.__or__, parts) for parts in itertools.product(*points)]
+    candidates = [default, *(settings for settings in products if settings != default)]
+    return Search(solver, start, default, before, tuple(candidates))
+
+
+def tuning_targets(name: str, count: int) -> Targets:
+    """Return the first targets of a tuning robot, the strata alternating, and random starts."""
+    evaluator, rng = evaluator_of(name), np.random.default_rng([SEED, seed_of(name)])
+    poses = np.stack([*stratum_poses(evaluator, rng, -(-COUNT // len(STRATA))).values()], axis=1)
+    poses = poses.reshape(-1, poses.shape[-1])[:COUNT]
+    starts, strata = evaluator.robot.draw(rng, COUNT), np.arange(COUNT) % len(STRATA)
+    positions, rotations = evaluator.forward(poses)
+    return Targets(positions[:count], rotations[:count], starts[:count], strata[:count])
+
+
+def answers(
+    module: str, name: str, count: int, settings: Settings
+) -> dict[str, list[float] | np.ndarray]:
+    """Return a solver's answers to targets of a robot, and their processor times [s]."""
+    options, robot = dict(settings), evaluator_of(name).robot
+    restarts = options.pop("bench_restarts", 0)
+    ask = importlib.import_module(module).prepare(robot, TOLERANCE, **options)
+    ask = restarted(ask, robot, restarts) if restarts else ask
+    targets, seconds = tuning_targets(name, count), []
+    attempt(ask(targets.request(0)))  # which compiles
+    q = np.full(targets.starts.shape, math.nan)
+    for i in range(count):
+        solve = ask(targets.request(i))
+        seed_shared_generators(i)
+        output, duration = processor_time_of(functools.partial(attempt, solve))
+        q[i] = math.nan if output.q is None else output.q
+        seconds.append(output.time.seconds if output.time else duration)
+    return {"q": q, "seconds": seconds}
+
+
+def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int) -> Trial:
+    """Try settings in a worker's process; a robot over which that is lost is not solved."""
+    solved, seconds = np.zeros((len(TUNING), count), dtype=bool), list[float]()
+    trouble = ""
+    for robot, name in enumerate(TUNING):
+        try:
+            values = worker.calculate(answers, search.peer.module, name, count, settings)
+            targets = tuning_targets(name, count)
+            evaluation = evaluator_of(name).evaluate(targets, values["q"], TOLERANCE)
+            solved[robot], seconds = evaluation.solved, [*seconds, *values["seconds"]]
+        except RuntimeError as error:
+            trouble = f"{name}: {error}"
+    time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else math.inf
+    names = (search.solver, search.start, settings, search.peer.version)
+    return Trial(*names, time, solved, trouble)
+
+
+def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
+    """Return the settings to try on all targets, from their trials on the first."""
+    share = {json.dumps(trial.settings): trial.share for trial in trials}
+    order = sorted(search.candidates, key=lambda settings: -share[json.dumps(settings)])
+    best = order[: math.ceil(len(order) / 4)]
+    extra = [settings for settings in (search.default, search.before) if settings not in best]
+    return [*best, *extra] if search.default != search.before else [*best, *extra[:1]]
+
+
+def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
+    """Return the best of the trials on all targets.
+
+    Trials tie whose shares the bench's paired test cannot tell from the best. Of these, the trials
+    tie whose times are equal to the fastest; of these it is the default, if there, or the share.
+    """
+    candidates = [trial for trial in trials if trial.settings in search.candidates]
+    order = ranking({str(i): trial.solved.ravel() for i, trial in enumerate(candidates)}).first
+    tied = [candidates[int(i)] for i in order]
+    limit = EQUAL_TIMES * min(trial.microseconds for trial in tied)
+    fast = [trial for trial in tied if trial.microseconds <= limit]
+    return max(fast, key=lambda trial: (trial.settings == search.default, trial.share))
+
+
+def read(path: Path) -> list[Trial]:
+    """Return the trials of a file of results, none if it does not exist."""
+    if not path.exists():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        return [Trial.from_row(row) for row in csv.DictReader(file)]
+
+
+def trials_of(search: Search, trials: Sequence[Trial], count: int) -> list[Trial]:
+    """Return the trials of a search on so many targets of each robot."""
+    return [
+        trial
+        for trial in trials
+        if (trial.solver, trial.start, trial.solved.shape[1]) == (*search[:2], count)
+        and trial.settings in search.settings
+    ]
+
+
+def perform(search: Search, path: Path) -> Iterator[Trial]:
+    """Perform the missing trials of a search; append each to the file and yield it."""
+    with contextlib.closing(WorkerProcess(_PATIENCE)) as worker:
+        for count in (SCREENED, COUNT):
+            first = trials_of(search, read(path), SCREENED)
+            settings = finalists(search, first) if count == COUNT else search.settings
+            done = [trial.settings for trial in trials_of(search, read(path), count)]
+            for missing in (part for part in settings if part not in done):
+                result = trial(worker, search, missing, count)
+                _append(path, result)
+                yield result
+
+
+def _append(path: Path, trial: Trial) -> None:
+    is_new = not path.exists()
+    with path.open("a", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(trial.row), lineterminator="\n")
+        if is_new:
+            writer.writeheader()
+        writer.writerow(trial.row)
+
+
+def main() -> None:
+    """Perform the searches of the installed solvers, and print what they choose."""
+    parser = argparse.ArgumentParser(description="Search the settings of solvers for robots.")
+    names = list(dict.fromkeys(search.solver for search in searches()))
+    parser.add_argument("--solver", action="append", choices=names, help="by default all")
+    parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE")
+    arguments = parser.parse_args()
+    for search in searches():
+        if search.solver not in (arguments.solver or names) or not search.peer.is_installed:
+            continue
+        for result in perform(search, arguments.results):
+            figures = f"{100 * result.share:5.1f} %  {result.microseconds:8.0f} µs"
+            print(figures, result.row["settings"], result.trouble, flush=True)
+        best = chosen(search, trials_of(search, read(arguments.results), COUNT))
+        print(f"{search.solver}, {search.start}: {best.row['settings']}", flush=True)
+
+
+if __name__ == "__main__":  # the worker imports this file by its name
+    importlib.import_module("plumbob.bench.experiments.robots.tuning").main()
