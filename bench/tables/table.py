@@ -181,7 +181,9 @@ def ranked_rows(table: Table) -> list[int]:
 
     The first column that has best cells decides, then the next; unranked rows come last.
     """
-    signs = {j: -1.0 if c.best == "greatest" else 1.0 for j, c in enumerate(table.columns) if c.best}
+    signs = {
+        j: -1.0 if c.best == "greatest" else 1.0 for j, c in enumerate(table.columns) if c.best
+    }
     groups: dict[tuple[Cell, ...], int] = {}
 
     def rank(i: int) -> tuple[int, bool, list[float]]:

@@ -41,7 +41,7 @@ class RobotMap(NamedTuple):
 
 
 class ClaimDot(NamedTuple):
-    """A claim on the strip: its name, difference over tolerance, place [%], and how high it lies."""
+    """A claim on the strip: its difference over its tolerance, its place [%], and its level."""
 
     name: str
     used: float
@@ -60,9 +60,7 @@ def robot_maps(results: Results) -> list[RobotMap]:
     ]
 
 
-def _map(
-    start: str, quantity: str, fields: dict[str, list[Score]], results: Results
-) -> RobotMap:
+def _map(start: str, quantity: str, fields: dict[str, list[Score]], results: Results) -> RobotMap:
     by_group = grouped(fields, lambda robot: _group(fields[robot][0]))
     robots = [robot for members in by_group.values() for robot in members]
     scores = {(s.solver, robot): s for robot in robots for s in fields[robot]}
@@ -114,6 +112,6 @@ def claim_dots(check: PageTable) -> list[ClaimDot]:
     for used, name, address in sorted(claims):
         place = 100 * (1 + math.log10(min(max(used, 10.0**-DECADES), 2.0)) / DECADES)
         level = next((i for i, end in enumerate(ends) if end <= place), len(ends))
-        ends[level:level + 1] = [place + DOT]
+        ends[level : level + 1] = [place + DOT]
         dots.append(ClaimDot(name, used, place, level, address))
     return dots

@@ -14,7 +14,6 @@ from ...harness.metrics import Share
 from ...tables.results import label
 from ...tables.table import (
     Cell,
-    Column,
     Source,
     Summary,
     Table,
@@ -140,7 +139,7 @@ def _rows(table: Table, heads: Sequence[PageHead]) -> list[PageRow]:
     best = best_cells(table)
     ties = Counter((table.rows[i][: table.compared], j) for i, j in best)
     columns = range(len(table.columns))
-    texts, bars = ([make(table, j) for j in columns] for make in (_texts, _bars))
+    texts, bars = [_texts(table, j) for j in columns], [_bars(table, j) for j in columns]
     rows: list[PageRow] = []
     addresses = Counter[str]()
     for i, row in enumerate(table.rows):
