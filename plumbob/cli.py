@@ -14,7 +14,7 @@ import typer
 from plumbob.bench.text import visible
 
 from . import compile_notice, entry_point
-from .commands import bench, check, records, report, show
+from .commands import bench, check, records, report, show, which
 from .commands import compare as comparison
 from .commands import verify as verify
 from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh, flag, option
@@ -95,6 +95,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         "Examples",
         ("plumbob", "check, measure quickly and write a report"),
         ("plumbob verify my_solver.py", "judge your solver"),
+        ("plumbob which robot.urdf", "find the best solver for your robot"),
         ("plumbob check", "check the reference"),
         ("plumbob bench ik cloth", "measure two suites at full length"),
         ("plumbob report", "write the report again from the records"),
@@ -129,6 +130,7 @@ def plumbob(
 app.command(cls=verify.SolverCommand, epilog=block("Examples", *verify.EXAMPLES))(verify.verify)
 app.command(cls=Command, epilog=check.EXAMPLES)(check.check)
 app.command(cls=verify.SolverCommand, epilog=bench.EXAMPLES)(bench.bench)
+app.command(cls=Command, epilog=which.EXAMPLES)(which.which)
 app.command(cls=Command, epilog=report.EXAMPLES)(report.report)
 app.command(cls=verify.SolverCommand, epilog=show.EXAMPLES)(show.show)
 app.command(cls=Command, epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)

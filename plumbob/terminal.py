@@ -50,27 +50,26 @@ def _results(suites: Sequence[str], output: Path) -> "Results":
     return Results(record for record in records if record.suite in (*suites, FINISHED))
 
 
-def print_summary(table: "Table") -> None:
-    """Print title and summary of a table."""
+def print_filled(text: str, indent: str = "") -> None:
+    """Print a text in lines that fit, indented; nothing if it is empty."""
     from plumbob.bench.tables.aligned import filled
 
-    print()
-    for text in (table.title, table.summary.sentence):
-        print("\n".join(filled(text, width())) if text else "", end="\n" if text else "")
-    for point in table.summary.points:
-        print("\n".join(f"  {line}" for line in filled(point, width() - 2)))
+    if text:
+        print("\n".join(f"{indent}{line}" for line in filled(text, width() - len(indent))))
 
 
 def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe") -> None:
     """Print title, summary and rows of a table, and how to see the columns that do not fit."""
-    from plumbob.bench.tables.aligned import filled
     from plumbob.reference.arguments import name_list
 
-    print_summary(table)
+    print()
+    print_filled(table.title)
+    print_filled(table.summary.sentence)
+    for point in table.summary.points:
+        print_filled(point, "  ")
     if missing := print_lines(table):
         count = f"{len(missing)} of {len(table.columns)} columns"
-        sentence = f"{count} left out ({name_list(missing)}); all: {shown_by}"
-        print("\n".join(filled(sentence, width())))
+        print_filled(f"{count} left out ({name_list(missing)}); all: {shown_by}")
 
 
 def print_lines(table: "Table") -> list[str]:

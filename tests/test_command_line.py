@@ -330,7 +330,8 @@ def test_files_that_differ_exit_1(capsys, robots):
     assert "Of 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
 
 
-EVERY_COMMAND = ("", "verify", "check", "bench", "report", "show", "compare", "history", "records")
+EVERY_COMMAND = ("", "verify", "check", "bench", "which", "report", "show", "compare", "history")
+EVERY_COMMAND += ("records",)
 EVERY_COMMAND += ("records list", "records merge", "records drop")
 
 

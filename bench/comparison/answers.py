@@ -15,7 +15,7 @@ from ..tables.table import words
 from .rows import ChangeVerdict, Pair, RowChange, RowKey
 
 # Arrays of measured times [s], by suite; the default is for all other suites.
-_DEFAULT_TIMES = frozenset({"seconds", "setup"})
+_DEFAULT_TIMES = frozenset({"seconds", "setup", "overhead"})
 _TIMES: Mapping[str, frozenset[str]] = {
     "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"})
 }

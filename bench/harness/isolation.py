@@ -1,6 +1,7 @@
 """Run jobs in a process of their own; end it when it stays silent, keep its earlier messages."""
 
 import contextlib
+import math
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any, NamedTuple
@@ -34,6 +35,7 @@ class JobOutcome(NamedTuple):
     numbers: Mapping[str, Any] | None = None  # the result of a calculation
     is_silent: bool = False  # whether the worker was ended for its silence
     remark: str = ""  # the remark of the solver's adapter, else ""
+    overhead: float = math.nan  # of a solve's time, what the solver does not use [s]
 
     @property
     def note(self) -> str:

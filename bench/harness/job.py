@@ -4,14 +4,17 @@ import contextlib
 import ctypes
 import functools
 import importlib
+import math
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..peers.ik.protocol import Solve, attempt
-from ..peers.ik.restarts import restarted
+from ..peers.ik.overhead import overhead
+from ..peers.ik.protocol import SolverOutput, attempt
+from ..peers.ik.restarts import digest_of, restarted
 from ..peers.protocol import NoAnswerError, OwnTime, describe, remark_of
 from ..problems.robots import UnableError
 from .isolation import WorkerProcess
@@ -43,20 +46,25 @@ class Job(NamedTuple):
         """Yield the messages of the job, each as soon as it is there."""
         try:
             adapter = importlib.import_module(self.module)
-            ask, setup = time_call(lambda: self._prepared(adapter))
+            prepare = partial(adapter.prepare, self.model, self.tolerance, **self.settings)
+            ask, setup = time_call(prepare)
+            if self.restarts:
+                ask = restarted(ask, self.model, self.restarts)
             first = self._solved(ask(self.targets.request(0))) if self.warms_up else None
             if self.restarts and first is not None and first.claim < 0:
                 raise UnableError("not started again, for it claims nothing of its answers")
         except Exception as error:  # an exception of an engine is its result
             yield from unfit(error, self.entrant)
         else:
-            yield Ready(setup, remark_of(adapter))
+            yield Ready(setup, remark_of(adapter), self._overhead(adapter, prepare))
             yield from announced(self._answers(ask), self.entrant)
             yield Finished()
 
-    def _prepared(self, adapter: Any) -> Any:
-        ask = adapter.prepare(self.model, self.tolerance, **self.settings)
-        return restarted(ask, self.model, self.restarts) if self.restarts else ask
+    def _overhead(self, adapter: Any, prepare: Callable[[], Any]) -> float:
+        """Return the time of a solve that the solver does not use [s], NaN of users' solvers."""
+        if self.entrant or not self.warms_up:
+            return math.nan
+        return overhead(adapter, prepare, self.targets.request(0))
 
     def _answers(self, ask: Any) -> Iterator[Solved]:
         """Solve the targets in order within the budget."""
@@ -64,20 +72,21 @@ class Job(NamedTuple):
         for i in range(self.targets.shape[0]):
             if budget.is_spent:
                 return
-            solve = ask(self.targets.request(i))
+            request = self.targets.request(i)
+            solve = ask(request)
             # So that caches are as in a loop of solves and nothing else.
             for _ in range(REPEATS if self.warms_up else 0):
                 if previous is None:
                     break
                 repeated = attempt(previous)
                 budget.excuse(repeated.time.overhead if repeated.time else 0.0)
-            seed_shared_generators(i)
+            seed_shared_generators(digest_of(*request))
             solved = self._solved(solve)
             budget.excuse(solved.overhead)
             previous = solve if solved.seconds < QUICK else None
             yield solved
 
-    def _solved(self, solve: Solve) -> Solved:
+    def _solved(self, solve: Callable[[], SolverOutput]) -> Solved:
         output, seconds = time_call(lambda: attempt(solve))
         q, trouble = np.full(self.targets.shape[1], np.nan), output.error
         if output.q is not None:

@@ -3,6 +3,7 @@
 A solver may print, crash or hang, so it works in a process of its own, which `isolation` starts.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ class Ready(NamedTuple):
 
     setup: float  # how long the set-up took, without imports [s]
     remark: str = ""  # how to read the solver's numbers, else ""
+    overhead: float = math.nan  # of a solve's time, what the solver does not use [s]
 
 
 class Solved(NamedTuple):

@@ -65,11 +65,11 @@ class StepSolver(Solver):
     is_linear: bool = False  # whether it solves a linear system, and so makes a single iteration
     converges: bool = False  # whether it solves a step to the end, in few iterations
     followed: int = 200  # iterations of a step with recorded residual and error; 0 for none
-    counted: int = 2000  # the maximum of a step in which powers of ten of the error are counted
     certified: int = 3000  # the maximum before an answer is certified
     # iterations of a step in a work-precision diagram
     ladder: tuple[int, ...] = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-    motion: tuple[int, ...] = (1, 10, 100)  # iterations of a frame there
+    # steps of a frame there, and iterations of each
+    motion: tuple[tuple[int, int], ...] = ((1, 10), (10, 10), (20, 10), (80, 2), (80, 10))
 
 
 _Row = TypeVar("_Row")
@@ -183,6 +183,8 @@ class Peer(Adapter):
     precision: str = field(default="", kw_only=True)
     # whether it is a Python loop of ours on the package's kinematics
     loop: bool = field(default=False, kw_only=True)
+    # what one would choose it for
+    use: str = field(default="", kw_only=True)
 
     def label_of(self, entry: PeerEntry) -> str:
         """Return how an entry is written."""
@@ -216,7 +218,7 @@ class ClothPeer(Adapter):
     # the constant settings of its adapter
     settings: Mapping[str, Any] = field(default_factory=dict)
     ladder: tuple[int, ...] = ()  # iterations in a step, where it iterates
-    motion: tuple[int, ...] = ()  # iterations a frame of a motion
+    motion: tuple[tuple[int, int], ...] = ()  # steps of a frame of a motion, iterations of each
     converges: bool = False  # whether it solves a step to the end
 
 

@@ -17,11 +17,19 @@ from plumbob.bench.harness.progress import TROUBLE, Progress, listening
 from plumbob.bench.text import visible
 
 from ..help_text import block, fitted
-from ..terminal import lines_in_a_pipe, print_ending, print_tables, progress, width
+from ..terminal import (
+    lines_in_a_pipe,
+    print_ending,
+    print_filled,
+    print_tables,
+    progress,
+    width,
+)
 from .options import (
     FAILED,
     REPORT,
     SUCCESS,
+    Entrants,
     Fresh,
     Output,
     Text,
@@ -69,45 +77,48 @@ EXAMPLES = "\n\n".join([
 _GAP = re.compile(r"( {2,})")
 
 
+Suites = Annotated[Texts, argument("SUITE", "Suites to measure; all if none.")]
+Quick = Annotated[bool, flag("Measure fewer targets and rounds.", "--quick")]
+Solvers = Annotated[Texts, option("NAME", "Measure only this solver; repeatable.")]
+Problems = Annotated[Texts, option("NAME", "Only this problem, or your .py, model or folder.")]
+Robots = Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")]
+Targets = Annotated[int | None, option("N", "Random targets per problem; for robots a tenth.")]
+Effector = Annotated[Text, option("NAME", "Link of your models that must reach the target.")]
+Pins = Annotated[Text, option("RULE", "Pinned vertices of your OBJ: far, top or 0,10.")]
+Listing = Annotated[bool, flag("List problems and solvers, and stop.", "--list")]
+DryRun = Annotated[bool, flag("List what would be measured, and stop.", "--dry-run")]
+Verbose = Annotated[bool, flag("Print every table as well.", "--verbose")]
+Address = Annotated[str, option("local|dask://HOST:PORT", "Where to measure; see docs/cluster.md.")]
+MixMachines = Annotated[
+    bool, flag("With Dask: mix times of several machines in a table.", "--mix-machines")
+]
+
+
 def bench(  # noqa: PLR0913 -- one parameter an option
     context: typer.Context,
-    suites: Annotated[Texts, argument("SUITE", "Suites to measure; all if none.")] = None,
+    suites: Suites = None,
     *,
     output: Output = REPORT,
     fresh: Fresh = False,
-    quick: Annotated[bool, flag("Measure fewer targets and rounds.", "--quick")] = False,
-    entrants: Annotated[
-        Texts, option("SOLVER", "Your my_ik.py or module:object; repeatable.", "--with")
-    ] = None,
-    solver: Annotated[Texts, option("NAME", "Measure only this solver; repeatable.")] = None,
-    problem: Annotated[
-        Texts, option("NAME", "Only this problem, or your .py, model or folder.")
-    ] = None,
-    robot: Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")] = None,
-    targets: Annotated[
-        int | None, option("N", "Random targets per problem; for robots a tenth.")
-    ] = None,
-    effector: Annotated[
-        Text, option("NAME", "Link of your models that must reach the target.")
-    ] = None,
-    pins: Annotated[Text, option("RULE", "Pinned vertices of your OBJ: far, top or 0,10.")] = None,
-    listing: Annotated[bool, flag("List problems and solvers, and stop.", "--list")] = False,
-    dry: Annotated[bool, flag("List what would be measured, and stop.", "--dry-run")] = False,
-    verbose: Annotated[bool, flag("Print every table as well.", "--verbose")] = False,
-    executor: Annotated[
-        str, option("local|dask://HOST:PORT", "Where to measure; see docs/cluster.md.")
-    ] = "local",
-    mix_machines: Annotated[
-        bool, flag("With Dask: mix times of several machines in a table.", "--mix-machines")
-    ] = False,
+    quick: Quick = False,
+    entrants: Entrants = None,
+    solver: Solvers = None,
+    problem: Problems = None,
+    robot: Robots = None,
+    targets: Targets = None,
+    effector: Effector = None,
+    pins: Pins = None,
+    listing: Listing = False,
+    dry: DryRun = False,
+    verbose: Verbose = False,
+    executor: Address = "local",
+    mix_machines: MixMachines = False,
 ) -> int:
     """Measure problems with solvers. Records are kept, so that a run can be continued.
 
     Your solver is opened as by plumbob verify, and gets a row in every table of the suites ik and
     cloth. Installed packages enter solvers by the entry point plumbob.solvers.
     """
-    from plumbob.bench.harness.executors import executor_at
-
     from .selection import MeasurementRequest, choose
 
     names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
@@ -117,20 +128,42 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     )
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:
-        from . import plan
+        return _print_plan(names, choice, None if listing else output)
+    return _measure(names, choice, output, fresh, (executor, mix_machines), verbose)
 
-        for line in plan.listed(names, choice) if listing else plan.dry_run(names, choice, output):
-            cells = (cell if cell.isspace() else visible(cell) for cell in _GAP.split(line))
-            print("\n".join(fitted("".join(cells), width())))
-        return SUCCESS
+
+def _print_plan(names: list[str], choice: "Choice", output: Path | None) -> int:
+    """Print the problems and solvers, or with a folder what would be measured for it."""
+    from . import plan
+
+    lines = plan.dry_run(names, choice, output) if output else plan.listed(names, choice)
+    for line in lines:
+        cells = (cell if cell.isspace() else visible(cell) for cell in _GAP.split(line))
+        print("\n".join(fitted("".join(cells), width())))
+    return SUCCESS
+
+
+def _measure(
+    names: list[str],
+    choice: "Choice",
+    output: Path,
+    fresh: bool,
+    address: tuple[str, bool],
+    verbose: bool,
+) -> int:
+    """Measure suites and print the answer, after every table if that is wished."""
+    from plumbob.bench.harness.executors import executor_at
+
     writable(output)
-    with closing(executor_at(executor, mix_machines)) as place:
+    with closing(executor_at(*address)) as place:
         code = run_suites(names, choice, output, fresh, place)
     if verbose:
         print_tables(names, output)
     print_ending(names, output)
     folder = "" if output == REPORT else f" -o {shlex.quote(str(output))}"
-    print(visible(f"All tables: this command with --verbose; page: plumbob report{folder}"))
+    print_filled(
+        visible(f"Read on: `plumbob report{folder}` writes the page; --verbose prints all tables.")
+    )
     return code
 
 
@@ -171,7 +204,7 @@ def run_suites(
         )
     if fresh:
         run.forget(suites, scale, output)
-    events = _run_with_progress(suites, scale, output, executor, before_times)
+    events = run_with_progress(suites, scale, output, executor, before_times)
     _print_counts(events, output)
     reasons: dict[str, list[str]] = {}
     for event in events:
@@ -187,13 +220,14 @@ def run_suites(
     return FAILED if failures else SUCCESS
 
 
-def _run_with_progress(
+def run_with_progress(
     suites: Sequence[str],
     scale: "str | Choice",
     output: Path,
-    executor: "Executor | None",
-    before_times: Callable[[], object],
+    executor: "Executor | None" = None,
+    before_times: Callable[[], object] = bool,
 ) -> "list[Event]":
+    """Run suites with a progress bar, and return all events."""
     from plumbob.bench.harness import run
     from plumbob.bench.harness.executors import THIS_PROCESS
     from plumbob.bench.harness.experiment import EXPERIMENTS

@@ -68,7 +68,7 @@ def report(  # noqa: PLR0913 -- one parameter an option
     from plumbob.bench.tables import selection
 
     table = selection.selected(table, columns or [], rows or [], order)
-    return _write(_formatted(table, form, width), output)
+    return _write(formatted(table, form, width), output)
 
 
 def write_report(output: Path) -> int:
@@ -109,7 +109,8 @@ def _list_columns(table: "Table") -> int:
     return SUCCESS
 
 
-def _formatted(table: "Table", form: str, width: str) -> str:
+def formatted(table: "Table", form: str, width: str = "page") -> str:
+    """Return a table in one of `FORMATS`; LaTeX for a width."""
     from plumbob.bench.tables import writers
     from plumbob.bench.tables.latex import latex
 

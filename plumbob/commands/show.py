@@ -1,6 +1,7 @@
 """The command `show`: the arm drawing a curve or the cloth, by Plumbob's solvers and the user's."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +11,9 @@ from ..help_text import block
 from ..terminal import progress
 from .options import REPORT, SUCCESS, File, Text, argument, flag, option, valid_name, writable
 from .verify import program_of
+
+if TYPE_CHECKING:
+    from plumbob.bench.show.your_solver import YourSolver
 
 EXAMPLES = block(
     "Examples",
@@ -22,32 +26,32 @@ EXAMPLES = block(
 )
 
 
+Scene = Annotated[Text, argument("SCENE", "arm, cloth, or the curve that the arm draws.")]
+Picture = Annotated[
+    File, option("FILE", "File ending in .gif, .svg, .html or .bvh.", "--output", "-o")
+]
+Yours = Annotated[Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")]
+Solver = Annotated[
+    Text, option("NAME", "Plumbob's solver: fabrik, ccd ...; for the cloth: newton ...")
+]
+Coherent = Annotated[bool, flag("Move the arm as smoothly as possible, in a loop.", "--coherent")]
+
+
 def show(
     context: typer.Context,
-    scene: Annotated[
-        Text, argument("SCENE", "arm, cloth, or the curve that the arm draws.")
-    ] = None,
+    scene: Scene = None,
     *,
-    file: Annotated[
-        File, option("FILE", "File ending in .gif, .svg, .html or .bvh.", "--output", "-o")
-    ] = None,
-    solver: Annotated[
-        Text, option("NAME", "Plumbob's solver: fabrik, ccd ...; for the cloth: newton ...")
-    ] = None,
-    coherent: Annotated[
-        bool, flag("Move the arm as smoothly as possible, in a loop.", "--coherent")
-    ] = False,
-    yours: Annotated[
-        Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")
-    ] = None,
+    file: Picture = None,
+    solver: Solver = None,
+    coherent: Coherent = False,
+    yours: Yours = None,
 ) -> int:
     """Write an animation, a picture or a page of the arm or the cloth.
 
     Your solver moves beside Plumbob's, with errors in colour. The motion of the arm can also be
     written as BVH, which animation programs open.
     """
-    from plumbob.bench.harness.record import check_regular
-    from plumbob.bench.show.scenes import SCENES, write
+    from plumbob.bench.show.scenes import SCENES
     from plumbob.bench.show.your_solver import YourSolver
 
     program = program_of(context)
@@ -62,17 +66,27 @@ def show(
     try:
         name = scene or (entrant.scene if entrant else "")
         path = file or REPORT / f"{name}.gif"
-        check_regular(path)
-        writable(path.parent)
-        with progress() as bar:
-            task = bar.add_task(name, total=None)
-
-            def update(frame: int, total: int) -> None:
-                bar.update(task, completed=frame, total=total)
-
-            write(name, path, solver, update, coherent, entrant)
+        _draw(name, path, solver, coherent, entrant)
     finally:
         if entrant:
             entrant.close()
     print(visible(str(path)))
     return SUCCESS
+
+
+def _draw(
+    name: str, path: Path, solver: str | None, coherent: bool, entrant: "YourSolver | None"
+) -> None:
+    """Write a scene to a file with a progress bar."""
+    from plumbob.bench.harness.record import check_regular
+    from plumbob.bench.show.scenes import write
+
+    check_regular(path)
+    writable(path.parent)
+    with progress() as bar:
+        task = bar.add_task(name, total=None)
+
+        def update(frame: int, total: int) -> None:
+            bar.update(task, completed=frame, total=total)
+
+        write(name, path, solver, update, coherent, entrant)

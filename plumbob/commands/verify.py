@@ -47,36 +47,40 @@ def program_of(context: typer.Context) -> list[str]:
     return list(context.meta.get(PROGRAM, ()))[1:]
 
 
+Solver = Annotated[Texts, argument("SOLVER", "my_ik.py, module:object, or -- and a program.")]
+Tasks = Annotated[Texts, option("NAME", "Judge only this task; repeatable.")]
+Template = Annotated[Text, option("LANGUAGE", "Write a starter: cpp, rust, javascript, ...")]
+Export = Annotated[File, option("DIR", "Write the cases as files and stop.", "--export-cases")]
+Answers = Annotated[File, option("DIR", "Judge the answers to exported cases.")]
+TimeLimit = Annotated[float | None, option("SECONDS", "Time limit of one request.")]
+MemoryLimit = Annotated[int | None, option("MIB", "Memory limit of the solver.", min=1)]
+Folder = Annotated[
+    File, option("DIR", "Write all three formats and failing cases.", "--output", "-o")
+]
+Language = Annotated[Text, option("LANG", "Language: en or zh; default: the locale.")]
+SelfTest = Annotated[bool, flag("Test verify itself with all known faults.", "--self-test")]
+
+
 def verify(  # noqa: PLR0913 -- one parameter an option
     context: typer.Context,
-    solver: Annotated[
-        Texts, argument("SOLVER", "my_ik.py, module:object, or -- and a program.")
-    ] = None,
+    solver: Solver = None,
     *,
-    task: Annotated[Texts, option("NAME", "Judge only this task; repeatable.")] = None,
+    task: Tasks = None,
     names: Annotated[bool, flag("List the tasks and stop.", "--list")] = False,
-    template: Annotated[
-        Text, option("LANGUAGE", "Write a starter: cpp, rust, javascript, ...")
-    ] = None,
-    export: Annotated[
-        File, option("DIR", "Write the cases as files and stop.", "--export-cases")
-    ] = None,
-    answers: Annotated[File, option("DIR", "Judge the answers to exported cases.")] = None,
+    template: Template = None,
+    export: Export = None,
+    answers: Answers = None,
     rerun: Annotated[File, option("FILE", "Repeat a saved failing case.")] = None,
     thorough: Annotated[bool, flag("Run more cases; this takes longer.", "--thorough")] = False,
     seed: Annotated[int, option("", "Seed of the random cases.", min=0)] = 0,
-    time_limit: Annotated[float | None, option("SECONDS", "Time limit of one request.")] = None,
-    memory_limit: Annotated[int | None, option("MIB", "Memory limit of the solver.", min=1)] = None,
+    time_limit: TimeLimit = None,
+    memory_limit: MemoryLimit = None,
     json: Annotated[File, option("FILE", "Write the verdict as JSON.")] = None,
     junit: Annotated[File, option("FILE", "Write the verdict as JUnit XML.")] = None,
     html: Annotated[File, option("FILE", "Write the verdict as a page.")] = None,
-    output: Annotated[
-        File, option("DIR", "Write all three formats and failing cases.", "--output", "-o")
-    ] = None,
-    lang: Annotated[Text, option("LANG", "Language: en or zh; default: the locale.")] = None,
-    self_test: Annotated[
-        bool, flag("Test verify itself with all known faults.", "--self-test")
-    ] = False,
+    output: Folder = None,
+    lang: Language = None,
+    self_test: SelfTest = False,
 ) -> int:
     """Judge your solver: is it right, how large are its errors, what is the mistake?
 
@@ -88,28 +92,37 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 
     os.environ |= {**one_thread(), **os.environ}
     from plumbob.crosscheck.verify.language import language_of
-    from plumbob.crosscheck.verify.output import listings
     from plumbob.crosscheck.verify.output.files import Files
     from plumbob.crosscheck.verify.output.question import ANSWERS, Question, limits
     from plumbob.crosscheck.verify.output.words import speaker
 
     language = lang or language_of()
-    say = speaker(language)
+    question = Question(tuple(task or ()), rerun, thorough, seed)
     if names:
-        return _print(listings.described(task or (), say))
-    if template:
-        return _print(listings.starter(template, Path(), say))
-    if export:
-        return _print(listings.exported(export, task or (), seed, thorough, say))
+        template = export = None
+    if names or template or export:
+        return _print(_listed(question, template, export, speaker(language)))
     if self_test:
         if task or solver or answers:
             raise ValueError("--self-test: expected no task or solver with it: it tries the judge")
-        return _self_test(say)
+        return _self_test(speaker(language))
     folder = [ANSWERS, str(answers)] if answers else []
     words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
-    question = Question(tuple(task or ()), rerun, thorough, seed)
     files = Files(json, junit, html, output)
     return _judge(words, limits(time_limit, memory_limit), question, files, language)
+
+
+def _listed(
+    question: "Question", template: str | None, export: Path | None, say: "Say"
+) -> Iterable[str]:
+    """Return lines on the tasks, or on the starter or cases that it writes."""
+    from plumbob.crosscheck.verify.output import listings
+
+    if template:
+        return listings.starter(template, Path(), say)
+    if export:
+        return listings.exported(export, question.tasks, question.seed, question.thorough, say)
+    return listings.described(question.tasks, say)
 
 
 def _judge(

@@ -250,12 +250,21 @@ def moved():
     ]  # fmt: skip
 
 
-def worked(solver, stiffness=1e3, sizes=(20, 20), seconds=(1e-3, 1e-2), error=(0.5, 1e-4)):
+def worked(
+    solver,
+    stiffness=1e3,
+    sizes=(20, 20),
+    seconds=(1e-3, 1e-2),
+    error=(0.5, 1e-4),
+    settings=(),
+    facts=(),
+):
     """One step of a cloth with ever more work."""
     which = {"problem": f"peers/one step/k{stiffness:g}", "solver": solver}
     arrays = {"particles": sizes, "seconds": seconds, "error": error}
-    facts = {"rungs": [f"{10**i} iterations" for i in range(len(sizes))]}
-    return sample("worked", **which, settings={"stiffness": stiffness}, arrays=arrays, facts=facts)
+    facts = {"rungs": [f"{10**i} iterations" for i in range(len(sizes))], **dict(facts)}
+    settings = {"stiffness": stiffness, **dict(settings)}
+    return sample("worked", **which, settings=settings, arrays=arrays, facts=facts)
 
 
 def fell(solver, stiffness=1e3, **changed):
@@ -267,11 +276,6 @@ def fell(solver, stiffness=1e3, **changed):
 def missing_engine(package):
     """A cloth engine that is not installed."""
     return sample("missing_engine", solver=package)
-
-
-def needed(solver, counts, tried=100):
-    """Iterations to each power of ten."""
-    return sample("needed", solver=solver, arrays={"needed": counts, "tried": tried})
 
 
 def bounded(solver, limit):
@@ -287,7 +291,7 @@ def as_liu(solver, seconds):
 MAKERS = (
     *(record, read_by_a_peer, compared, drawn, followed, drifted, beyond, claim, entered, reached),
     *(timed, stepped, swung, two_dampers, stepping, certified, raced, solving, lacking),
-    *(republished, worked, fell, moved, needed, bounded, as_liu),
+    *(republished, worked, fell, moved, bounded, as_liu),
 )
 
 
@@ -369,7 +373,6 @@ def records():
         *(worked(solver) for solver in ("Plumbob Newton", "MuJoCo Euler")),
         fell("Plumbob Newton"),
         missing_engine("pybullet"),
-        needed("newton", [1, 2, 3, 4, 5, 6, 7, np.nan]),
         bounded("MuJoCo Euler", 0.02),
         as_liu("local_global", 0.03),
         *pictured(),

@@ -92,7 +92,8 @@ def test_every_declared_column_has_a_cell(records, make):
     """A title in `tables.toml` that no row has would make an empty column."""
     solved = make.worked("MuJoCo Euler", error=(0.5, 1e-7))
     swing = make.swung("RK4", left=np.ones(11))
-    results = Results([*records, solved, make.fell("MuJoCo Euler"), swing])
+    near = make.fell("MuJoCo Euler", true=[np.nan, 1e-3, 1e-3])
+    results = Results([*records, solved, near, swing])
     for layout in (layout for section in SECTIONS for layout in section.layouts):
         rows = [row for row in layout.subjects(results) if isinstance(row, dict)]
         if rows and not callable(layout.columns):
@@ -211,9 +212,8 @@ def test_success_is_counted_by_the_residual_not_by_the_solver(records):
 
 def test_convergence_counts_iterations_drift_and_converged_steps(records):
     table = cloth.convergence(Results(records))
-    counts, falling, few, newton = table.summary.points
+    counts, few, newton = table.summary.points
     assert counts == "lab cloth, stiffness × 1: local/global 2 and Newton 2"
-    assert falling == "falling cloth, 1,000 N/m, 20 × 20: Newton 6"
     assert few.endswith("the cloth drifts by 0.200 m, 10.0 % of its path")
     assert newton.startswith("Newton converged in 3 of 3")
     assert "at most 3 iterations" in newton
@@ -225,12 +225,9 @@ def test_convergence_counts_iterations_drift_and_converged_steps(records):
 def test_iterations_that_do_not_suffice_are_said_so(make):
     made = make.stepped("newton")
     short = replace(made, arrays=made.arrays | {"error": np.array([1.0, 0.5])})
-    long = make.needed("lbfgs", [1, 2, 3, 4] + [np.nan] * 4)
-    table = cloth.convergence(Results([short, long]))
+    table = cloth.convergence(Results([short]))
     assert "Newton more than 1" in table.summary.points[0]
-    assert "L-BFGS more than 100" in table.summary.points[1]
-    for decade, count in (("1e-3", 3), ("1e-4", 4), ("1e-6", None)):
-        assert column(table, f"iterations to {decade}") == [None, count]
+    assert column(table, "iterations to 1e-4") == [None]
 
 
 def test_times_are_medians_beside_ours(records):

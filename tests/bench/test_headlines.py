@@ -206,11 +206,11 @@ def test_without_rivals_there_is_no_headline(make):
 def test_a_step_is_solved_first_by_an_engine(make):
     newton = make.worked("Plumbob Newton", error=(1e-3, 1e-9), seconds=(1e-3, 2e-3))
     hasty = make.worked("MuJoCo Euler", error=(0.5, 0.4))
-    question = "Fastest in a step solved to 1e-6"
+    question = "Fastest in a step solved to 1e-4"
     assert headlines.headlines(Results([newton, hasty])) == []  # nobody else solves it
     arrives = make.worked("MuJoCo discrete", error=(0.5, 1e-8), seconds=(1e-3, 8e-3))
     factor = (
-        "In a step solved to 1e-6, Plumbob (ours) is the fastest on 1 of 1 cloth, 4.0 times faster "
+        "In a step solved to 1e-4, Plumbob (ours) is the fastest on 1 of 1 cloth, 4.0 times faster "
         "than the best other engine, MuJoCo"
     )
     assert sentence([newton, hasty, arrives], question) == f"{factor}."
@@ -221,7 +221,7 @@ def test_a_step_is_solved_first_by_an_engine(make):
     mine = make.worked("Mine", error=(1e-3, 1e-9), seconds=(1e-4, 2e-4))
     assert ", Mine is the fastest" in sentence([newton, mine], question)
     assert wins([newton, mine]) == [
-        "Mine is faster than Plumbob (ours) in a step solved to 1e-6 on 1 of 1 cloth (20 × 20, "
+        "Mine is faster than Plumbob (ours) in a step solved to 1e-4 on 1 of 1 cloth (20 × 20, "
         "1,000 N/m), by a factor of 10."
     ]
 

@@ -1,14 +1,16 @@
 """The adapters: each engine, where it is installed, finds poses that are evaluated as solved."""
 
 import importlib
+import itertools
 import sys
+import types
 
 import numpy as np
 import pytest
 
-from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.job import Job
 from plumbob.bench.harness.worker import Solved
+from plumbob.bench.peers.ik import overhead, protocol
 from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.protocol import OwnTime
@@ -47,8 +49,8 @@ def answers(peer, entry, name, targets):
 
 @pytest.fixture
 def arm(peer):
-    """An arm that a peer takes: EAIK takes no seven joints."""
-    name = "ur5" if module(peer) == "eaik" else "iiwa14"
+    """An arm that a peer takes: some take no seven joints."""
+    name = "ur5" if module(peer) in {"eaik", "ur_analytic"} else "iiwa14"
     if not is_installed(name):
         pytest.skip("example-robot-data is not installed")
     return name
@@ -60,7 +62,9 @@ def test_from_a_start_beside_the_solution_a_peer_finds_it(peer, arm, rng):
     q = 0.7 * evaluator.robot.draw(rng, FEW)
     starts = q + rng.uniform(-0.1, 0.1, q.shape)
     targets = Targets(*evaluator.forward(q), starts, np.zeros(FEW, int))
-    solved, evaluation = answers(peer, peer.entries[0], arm, targets)
+    # with 5 ms, TRAC-IK misses one on a busy machine
+    entry = peer.entries[-1 if module(peer) == "trac_ik" else 0]
+    solved, evaluation = answers(peer, entry, arm, targets)
     assert evaluation.solved.all()
     assert all(answer.claim in (1, -1) and not answer.trouble for answer in solved)
 
@@ -109,7 +113,7 @@ def test_the_registry_has_the_licences_of_the_packages(peer):
 
 def test_the_answer_to_a_target_is_the_same_again_and_in_another_order(peer, arm):
     """TRAC-IK goes by the clock, in two threads; the toolbox draws from a generator of all C code,
-    which the bench seeds by the number of the target.
+    which the bench seeds by the target.
     """
     if module(peer) == "trac_ik":
         pytest.skip("its answers depend on the clock")
@@ -120,8 +124,7 @@ def test_the_answer_to_a_target_is_the_same_again_and_in_another_order(peer, arm
             [(answer.claim, answer.q.tobytes()) for answer in answers(peer, entry, arm, order)[0]]
             for order in orders
         )
-        assert first == second
-        assert module(peer) == "toolbox" or first == backwards[::-1]
+        assert first == second == backwards[::-1]
 
 
 # Solvers that do not look at limits, or hardly.
@@ -178,13 +181,24 @@ def test_every_entry_has_a_name_of_its_own_within_its_kind():
     assert {kind for kind, _ in names} == {ONE_START, RESTARTS}
 
 
-def test_the_choice_among_its_solutions_is_not_charged_to_eaik():
-    """The bench's loop over them took as long as the library."""
-    pytest.importorskip("eaik")
-    from plumbob.bench.peers.ik import eaik
+def test_only_the_calls_of_a_solver_are_timed_and_the_rest_of_a_loop_is_overhead(monkeypatch):
+    """Every reading of the clock takes a second, of which a metered function sees one."""
+    seconds = itertools.count()
+    for module in (protocol, overhead):
+        monkeypatch.setattr(module, "perf_counter", lambda: float(next(seconds)))
+    read = protocol.Solve(lambda: next(seconds), lambda q: (q, next(seconds) < 0))
+    assert read().time == OwnTime(2.0)
 
-    targets = robot_targets("ur5", 2)
-    ask = eaik.prepare(robot("ur5"), TOLERANCE)
-    for i in range(len(targets.starts)):
-        answer, whole = stopwatch.time_call(ask(targets.request(i)))
-        assert 0 < answer.time.seconds < whole
+    def prepare():
+        step = overhead.library(lambda: next(seconds))
+
+        def solve():
+            return step(), next(seconds)
+
+        return lambda request: protocol.Solve(solve, lambda answer: (None, None))
+
+    one_call, loop = types.SimpleNamespace(), types.SimpleNamespace(METERED=True)
+    assert prepare()(None)().time == OwnTime(3.0)
+    assert overhead.overhead(loop, prepare, None) == 5.0 - 2.0
+    assert overhead.overhead(one_call, prepare, None) == 1.0
+    assert not overhead.is_metered()

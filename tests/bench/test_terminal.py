@@ -223,7 +223,18 @@ def test_a_missed_claim_is_said_first(tmp_path):
     assert "bench check" in outcome.outcome(written, 80)[0]
 
 
-COMMANDS = ["", "verify", "check", "bench", "report", "show", "compare", "history", "records"]
+COMMANDS = [
+    "",
+    "verify",
+    "check",
+    "bench",
+    "which",
+    "report",
+    "show",
+    "compare",
+    "history",
+    "records",
+]
 COMMANDS += ["records list", "records merge", "records drop"]
 
 

@@ -16,7 +16,7 @@ from ...tables.columns import spread_of, words_in
 from ...tables.layout import Layout
 from ...tables.results import Results, by_problem, counted, grouped, label, listed, settings
 from ...tables.table import Summary, words
-from ..cloth_peers import DECADES, NEEDED, SOLVED
+from ..cloth_peers import DECADES, SOLVED
 from ..pictures.figures import falling_cloth
 from . import DAMPERS, FEW, ONE_STEP, SWING
 
@@ -59,7 +59,7 @@ def convergence_chart(results: Results) -> Sketch | None:
 
 def _convergence_rows(results: Results) -> list[Row]:
     """Return a row for every solver on every cloth, cloth by cloth."""
-    tasks = {ONE_STEP: _one_step, FEW: _few_iterations, SWING: _swing, NEEDED: _needed}
+    tasks = {ONE_STEP: _one_step, FEW: _few_iterations, SWING: _swing}
     records = [record for task in tasks for record in results.all("cloth", task=task)]
     rows = []
     for (cloth, solver), group in grouped(records, _cloth_and_solver).items():
@@ -71,11 +71,7 @@ def _convergence_rows(results: Results) -> list[Row]:
 
 
 def _cloth_and_solver(record: Record) -> tuple[str, str]:
-    cloth = f"lab cloth, {record.title}"
-    if record.facts["task"] == NEEDED:
-        size, stiffness = record.details.size, words(int(record.details.stiffness))
-        cloth = f"falling cloth, {stiffness} N/m, {size} × {size}"
-    return cloth, label(record.solver)
+    return f"lab cloth, {record.title}", label(record.solver)
 
 
 def _one_step(record: Record) -> Row:
@@ -88,15 +84,6 @@ def _one_step(record: Record) -> Row:
         "smallest error": errors.min(),
         "iterations tried": errors.size - 1,
     }
-
-
-def _needed(record: Record) -> Row:
-    counts = {
-        f"iterations to {decade}": None if np.isnan(count) else int(count)
-        for decade, count in zip(DECADES, record.values.needed, strict=True)
-    }
-    smallest, iterations = record.values.smallest_error, record.values.iterations
-    return {**counts, "smallest error": smallest, "iterations tried": iterations}
 
 
 def _few_iterations(record: Record) -> Row:

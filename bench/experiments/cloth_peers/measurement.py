@@ -1,19 +1,19 @@
 """The same cloth for every installed solver: work and precision, limits of stability.
 
-Each solver runs in a worker process. Its positions are compared with converged implicit Euler and
-with the true motion.
+Each solver runs in a worker process. Its step is compared with the minimiser to 25 digits, its
+motion with the true motion. Every sweep runs every solver with all of its settings, so no figure
+but the times depends on the machine, and solvers whose sweeps differ are seen.
 """
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
-from plumbob.reference import ImplicitEuler, MassSpring, State
+from plumbob.reference import MassSpring, State
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
@@ -21,7 +21,7 @@ from ...harness.isolation import JobOutcome, WorkerProcess
 from ...harness.measure import not_installed
 from ...harness.values import Values
 from ...peers import registry
-from ...peers.registry import EXPLICIT, LINEARISED, UNDECLARED, ClothPeer
+from ...peers.registry import EXPLICIT, ITERATED, LINEARISED, UNDECLARED, ClothPeer
 from ...problems.falling_cloth import (
     FRAME,
     SIDE,
@@ -33,11 +33,12 @@ from ...problems.falling_cloth import (
     highest_mode,
     own_cloth,
 )
+from ...problems.own import OwnProblem
 from ..published import problem as published
-from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
+from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
-from .truth import ClothTruth, implicit_motion, inertial_positions, truth_of
-from .values import IterationCounts, LiuFrame, MotionWork, StabilityLimits, StepWork
+from .truth import ClothTruth, first_step, inertial_positions, truth_of
+from .values import LiuFrame, MotionWork, StabilityLimits, StepWork
 
 # Explicit steps a frame, relative to symplectic Euler's limit of stability.
 MARGINS = (1.1, 2.0, 4.0)
@@ -45,15 +46,17 @@ MARGINS = (1.1, 2.0, 4.0)
 PARTS = (1, 4, 16)
 # Residual of solvers that converge, in motions.
 RESIDUAL, RESIDUAL_LABEL = 1e-6, "1e-6"
-# Repetitions of one step, within a twentieth of the budget of a ladder.
-REPEATS, _REPEATING = 5, 0.05
-# A ladder ends with the first rung of this error.
-NEAR_ENOUGH = 1e-9
-# Time limits of a silent frame of a large cloth and of its set-up [s].
-_PATIENCE, _START_PATIENCE = 60.0, 300.0
-
-# Particles a side of the cloth on which iterations are counted.
-NEEDED_SIZE = 20
+# Passes over all solvers, in alternating order, so that the drift of the machine affects all of
+# them; repetitions of one step in each, of which the last counts.
+SWEEPS, REPEATS, LIU_REPEATS = 3, 2, 5
+# A solver that is silent for so long [s] over a frame, or over its set-up, has not finished: far
+# more than any solver takes on any machine in use.
+_PATIENCE, _START_PATIENCE = 120.0, 600.0
+# What errors are measured against.
+_ARBITERS = {
+    ONE_STEP: "the minimiser to 25 digits, by decimal arithmetic",
+    MOTION: "Runge-Kutta with steps halved until they agree",
+}
 
 # A mode is unstable if, from this amplitude [m], it grows by this factor in this number of steps.
 STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
@@ -61,20 +64,16 @@ BISECTION, _DOUBLINGS = 2e-4, 30
 # An undeclared solver that is stable at this multiple of symplectic Euler's limit is implicit.
 _IMPLICIT_MULTIPLE = 8.0
 
-# The parts of a cloth's ladder that use its whole budget.
-_LADDER_PARTS = 2.0
-
 
 class Level(NamedTuple):
-    """A size of the cloth: particles a side, frames of a motion, budget of a ladder [s]."""
+    """A size of the cloth: particles a side, and frames of a motion."""
 
     size: int
     frames: int
-    budget: float
 
 
-QUICK = (Level(20, 3, 0.2),)
-FULL = (Level(20, 30, 2.0), Level(40, 10, 3.0), Level(100, 2, 30.0))
+QUICK = (Level(20, 3),)
+FULL = (Level(20, 10), Level(40, 5), Level(100, 1))
 QUICK_STIFFNESS = STIFFNESSES[1:2]
 # The shortest benchmarks of a full scale [s].
 _FULL_SECONDS = 1.0
@@ -98,62 +97,79 @@ class Fall(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield a step, a motion and the limit of every solver, and a block for each missing package.
+    """Yield steps and motions of every solver, sweep by sweep, and limits of stability.
 
-    Larger cloths and the cloth of Liu et al. are for the full scale.
+    Each missing package has a block. Larger cloths and the cloth of Liu et al. are for the full
+    scale.
     """
     peers = registry.cloth_peers(scale.entrants)
     for package in dict.fromkeys(peer.package for peer in peers if not peer.is_installed):
         yield _block(MISSING, "all", package, partial(not_installed, package), {})
-    for stiffness in STIFFNESSES:
-        settings = {"size": NEEDED_SIZE, "stiffness": stiffness, "frame": FRAME}
-        for solver in registry.step_solvers():
-            measure = partial(iterations_needed, solver, stiffness)
-            yield _block(NEEDED, f"iterations/k{stiffness:g}", solver, measure, settings)
-    for peer in (peer for peer in peers if peer.is_installed):
-        yield from blocks_of(peer, scale)
+    installed = [peer for peer in peers if peer.is_installed]
+    for sweep in range(1, SWEEPS + 1):
+        order = installed[:: 1 if sweep % 2 else -1]
+        for cloth in _cloths(scale):
+            yield from (block for peer in order for block in _works(peer, cloth, sweep))
+    for peer in installed:
+        yield from _stability_blocks(peer, levels(scale))
     settings = {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME}
     for solver in published.LIU_2013 if levels(scale) == FULL else ():
         yield _block(LIU, "liu2013", solver, partial(liu_2013, solver), settings)
 
 
 def _block(task: str, name: str, solver: str, measure: Any, settings: Any, **more: Any) -> Block:
-    facts = {"task": task}
+    facts = {"task": task, **more.pop("facts", {})}
     return Block("cloth", f"peers/{name}", solver, measure, settings, facts=facts, **more)
 
 
-def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
-    """Yield a step, a motion and, if it is explicit, the limit of a solver."""
+class _Cloth(NamedTuple):
+    """A falling cloth at all sizes of a scale."""
+
+    name: str
+    settings: Mapping[str, Any]
+    falls: Sequence[Fall]
+    own: OwnProblem | None = None
+
+
+def _cloths(scale: Scale) -> Iterator[_Cloth]:
+    """Yield the bench's cloths, then the user's."""
     sizes = levels(scale)
     for k in STIFFNESSES:
         falls = [Fall(level, partial(falling_cloth, level.size, k)) for level in sizes]
-        yield from _falling(peer, f"k{k:g}", {"stiffness": k, "frame": FRAME}, falls)
+        yield _Cloth(f"k{k:g}", {"stiffness": k, "frame": FRAME}, falls)
     for own in scale.problems:
         if own.cloth is not None:
             system, _ = own.cloth
             settings = {"stiffness": float(system.stiffnesses.mean()), "frame": own.h}
             fall = Fall(sizes[0]._replace(size=system.particle_count), partial(own_cloth, own))
-            for block in _falling(peer, own.name, settings, [fall]):
-                yield replace(block, facts={**block.facts, "cloth": own.name}).on(own)
+            yield _Cloth(own.name, settings, [fall], own)
+
+
+def _works(peer: ClothPeer, cloth: _Cloth, sweep: int) -> Iterator[Block]:
+    """Yield the motion of a cloth, and its step unless the solver is explicit."""
+    settings = {**cloth.settings, "version": peer.version, "sweep": sweep}
+    size = sum(fall.level.size for fall in cloth.falls)
+    tasks = {MOTION: ("motion", motion)}
+    if peer.kind != EXPLICIT:
+        tasks = {ONE_STEP: ("one step", one_step), **tasks}
+    for task, (name, measure) in tasks.items():
+        work, facts = partial(measure, peer, cloth.falls), {"kind": peer.kind}
+        facts["arbiter"] = _ARBITERS[task]
+        if cloth.own is not None:
+            facts["cloth"] = cloth.own.name
+        block = _block(
+            task, f"{name}/{cloth.name}", peer.title, work, settings, size=size, facts=facts
+        ).of(peer.entrant)
+        yield block if cloth.own is None else block.on(cloth.own)
+
+
+def _stability_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
+    """Yield the limit of stability of an explicit solver that does not iterate."""
     if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
         stiffnesses = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
         measure, size = partial(stability, peer, stiffnesses), len(stiffnesses)
         version = {"size": STABILITY_SIZE, "version": peer.version}
         block = _block(STABILITY, "stability", peer.title, measure, version, size=size)
-        yield block.of(peer.entrant)
-
-
-def _falling(
-    peer: ClothPeer, cloth: str, settings: Mapping[str, Any], falls: Sequence[Fall]
-) -> Iterator[Block]:
-    """Yield a step and a motion of a cloth at some sizes."""
-    settings = {**settings, "version": peer.version}
-    size, seconds = (sum(fall.level[i] for fall in falls) for i in (0, 2))
-    for task, name, measure in ((ONE_STEP, "one step", one_step), (MOTION, "motion", motion)):
-        work, budget = partial(measure, peer, falls), _LADDER_PARTS * seconds
-        block = _block(
-            task, f"{name}/{cloth}", peer.title, work, settings, size=size, budget=budget
-        )
         yield block.of(peer.entrant)
 
 
@@ -166,24 +182,21 @@ class Rung(NamedTuple):
 
 def step_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
     """Return the rungs for a step of a frame, from cheap to expensive."""
-    return _rungs(peer, frequency, peer.ladder, (1,))
+    if peer.kind == ITERATED:
+        return [_rung(peer, _counted(n, "iteration"), iterations=n) for n in peer.ladder]
+    return [_rung(peer, "1 step", substeps=1)]
 
 
 def motion_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
-    """Return the rungs for a motion; steps of part of a frame are nearer to the truth."""
-    return _rungs(peer, frequency, peer.motion, PARTS)
-
-
-def _rungs(
-    peer: ClothPeer, frequency: float, iterations: tuple[int, ...], parts: tuple[int, ...]
-) -> list[Rung]:
+    """Return the rungs for a motion: steps of part of a frame, which are nearer to the truth."""
     stable = [explicit_substeps(frequency, margin) for margin in MARGINS]
-    substeps = {EXPLICIT: stable, LINEARISED: parts, UNDECLARED: sorted({*parts, *stable})}
-    if peer.kind in substeps:
-        return [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps[peer.kind]]
-    rungs = [_rung(peer, _counted(n, "iteration"), iterations=n) for n in iterations]
-    if peer.converges and len(parts) > 1:
-        for n in parts:
+    substeps = {EXPLICIT: stable, LINEARISED: PARTS, UNDECLARED: sorted({*PARTS, *stable})}
+    rungs = [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps.get(peer.kind, ())]
+    for n, iterations in peer.motion:
+        label = f"{_counted(n, 'step')} of {_counted(iterations, 'iteration')}"
+        rungs.append(_rung(peer, label, substeps=n, iterations=iterations))
+    if peer.converges:
+        for n in PARTS:
             label = f"{_counted(n, 'step')} to {RESIDUAL_LABEL}"
             rungs.append(_rung(peer, label, tolerance=RESIDUAL, substeps=n))
     return rungs
@@ -197,8 +210,8 @@ def _counted(count: int, name: str) -> str:
     return f"{count:,} {name}{'' if count == 1 else 's'}"
 
 
-# The notes on set-ups that ran out of time, by adapter, entrant and number of particles.
-_given_up: dict[tuple[str, str, int], str] = {}
+# The notes on solvers that did not finish, by their titles and the number of particles.
+_unfinished: dict[tuple[str, int], str] = {}
 
 
 class RungResults:
@@ -210,14 +223,15 @@ class RungResults:
         self._remarks: list[tuple[int, str, bool]] = []  # particles, sentence, whether it failed
 
     def run(self, cloth: FallingCloth, rung: Rung, shape: Shape) -> JobOutcome:
-        """Return the outcome of a rung; a set-up that ran out of time is not repeated."""
-        task = self._peer.module, self._peer.entrant_name, len(cloth.start.positions)
-        if task in _given_up:
-            outcome = JobOutcome(0.0, [], _given_up[task])
+        """Return the outcome of a rung; a solver that did not finish is not tried again."""
+        task = self._peer.title, len(cloth.start.positions)
+        if task in _unfinished:
+            outcome = JobOutcome(0.0, [], _unfinished[task])
         else:
             outcome = worker_process().perform(job(self._peer, cloth, rung.settings, shape))
-        if outcome.is_silent and not outcome.is_lost:
-            _given_up[task] = outcome.note
+        if outcome.is_silent:
+            outcome = outcome._replace(trouble=f"not finished: {outcome.trouble}")
+            _unfinished[task] = outcome.trouble
         if outcome.note:
             sentence = f"{cloth.size} × {cloth.size}, {rung.label}: {outcome.note}"
             self._remarks.append((cloth.size, sentence, bool(outcome.trouble)))
@@ -236,36 +250,27 @@ class RungResults:
 
 
 def one_step(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
-    """Take the same step at increasing cost; keep time and error.
-
-    Stop when the budget is spent or the error is reached.
-    """
+    """Take the same step at increasing cost; keep time and error."""
     results = RungResults(peer)
     for fall in falls:
-        level, cloth, truth, spent_seconds = fall.level, fall.make(), fall.truth, 0.0
+        cloth, truth = fall.make(), fall.truth
         for rung in step_rungs(peer, cloth.beat):
-            shape = Shape(1, REPEATS, _REPEATING * level.budget, cloth.frame)
-            outcome = results.run(cloth, rung, shape)
+            outcome = results.run(cloth, rung, Shape(1, REPEATS, cloth.frame))
             if not outcome.solved:
                 break
-            seconds = np.array([frame.seconds for frame in outcome.solved])
-            error = step_error(outcome.solved[-1].q, truth)
-            row = {"particles": level.size, "error": error, "rung": rung.label}
-            results.rows.append({**row, "seconds": metrics.spread(seconds).median})
-            spent_seconds += float(seconds.sum())
-            if error <= NEAR_ENOUGH or spent_seconds > level.budget:
-                break
-    return results.measured(StepWork)
+            last = outcome.solved[-1]
+            row = {"particles": fall.level.size, "error": step_error(last.q, truth)}
+            results.rows.append({**row, "seconds": last.seconds, "rung": rung.label})
+    return results.measured(StepWork, rounding=[rounding(fall.truth) for fall in falls])
 
 
 def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
-    """Move on frame after frame; keep the distances from implicit Euler and from the truth."""
+    """Move on frame after frame; keep time and distance from the truth."""
     results = RungResults(peer)
     for fall in falls:
         level, cloth, truth = fall.level, fall.make(), fall.truth
         for rung in motion_rungs(peer, cloth.beat):
-            shape = Shape(level.frames, 1, level.budget, cloth.frame)
-            outcome = results.run(cloth, rung, shape)
+            outcome = results.run(cloth, rung, Shape(level.frames, 1, cloth.frame))
             row = {"particles": level.size, "target_frames": level.frames, "rung": rung.label}
             results.rows.append(row | _distances(outcome, truth, cloth.extent))
             if not outcome.solved:
@@ -276,22 +281,29 @@ def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
 
 
 def _distances(outcome: JobOutcome, truth: ClothTruth, extent: float) -> dict[str, Any]:
-    """Return times, and distances from the references after the last frame that was reached."""
+    """Return times, and the distance from the truth after the last frame that was reached."""
     frames = len(outcome.solved)
     seconds = np.array([frame.seconds for frame in outcome.solved])
     positions = np.array([frame.q for frame in outcome.solved])
     positions = positions.reshape(frames, *truth.inertial.shape)
-    row = {
+    is_diverged = diverged(positions, truth.true[:frames], extent)
+    distance = np.nan
+    if frames and not is_diverged:
+        error = metrics.rms_distance(positions[-1], truth.true[frames - 1])
+        distance = max(error, truth.unsure)  # nobody is nearer than the truth is known
+    return {
         "frames": frames,
         "seconds": metrics.spread(seconds).median,
         "setup": outcome.setup,
-        "diverged": diverged(positions, truth.true[:frames], extent),
+        "diverged": is_diverged,
+        "true": distance,
+        "path": truth.path[frames - 1] if frames else np.nan,
     }
-    for name, motion in (("implicit", truth.implicit), ("true", truth.true)):
-        is_near = frames and not row["diverged"]
-        end = motion[frames - 1]
-        row[name] = metrics.rms_distance(positions[-1], end) if is_near else np.nan
-    return row
+
+
+def rounding(truth: ClothTruth) -> float:
+    """Return the error of the converged step rounded to single precision."""
+    return step_error(truth.first.positions.astype(np.float32).astype(float), truth)
 
 
 def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
@@ -309,22 +321,6 @@ def diverged(positions: np.ndarray, true: np.ndarray, extent: float = SIDE) -> b
     if not np.isfinite(positions).all():
         return True
     return bool((np.abs(positions - true) > extent).any())
-
-
-def iterations_needed(solver: str, stiffness: float) -> Measured:
-    """Count the iterations of a step to errors of a tenth, a hundredth and so on."""
-    cloth = falling_cloth(NEEDED_SIZE, stiffness)
-    truth = truth_of(cloth, 1)
-    iterates = ImplicitEuler(cloth.system, h=FRAME, solver=solver).iterates(cloth.start)
-    errors = []
-    limit = registry.step_solvers()[solver].counted
-    for _, iterate in zip(range(limit + 1), iterates, strict=False):
-        errors.append(step_error(iterate.positions, truth))
-        if errors[-1] <= NEAR_ENOUGH:
-            break
-    needed = [metrics.first_below(np.array(errors), float(decade)) for decade in DECADES]
-    counts = np.array([np.nan if count is None else count for count in needed])
-    return Measured(IterationCounts(counts, len(errors) - 1, min(errors)))
 
 
 def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
@@ -357,7 +353,7 @@ def is_stable(
         ArithmeticError: if the solver fails.
     """
     settings = {**peer.settings, **peer.spec, "substeps": STABILITY_STEPS}
-    shape = Shape(1, 1, np.inf, h * STABILITY_STEPS)
+    shape = Shape(1, 1, h * STABILITY_STEPS)
     arrays, entrant = system.arrays, peer.entrant_name
     job = ClothJob(peer.module, arrays, start, settings, shape, entrant)
     outcome = worker_process().perform(job)
@@ -393,15 +389,14 @@ def liu_2013(solver: str) -> Measured:
     """Take steps of a cloth of the paper's size, by the paper's ten iterations or by Newton."""
     cloth = falling_cloth(published.LIU_2013_SIZE, published.LIU_2013_STIFFNESS)
     frame = published.LIU_2013_FRAME
-    exact = implicit_motion(cloth, 1, frame)[0]
     settings = {"solver": solver, **published.LIU_2013[solver].settings}
-    shape, peer = Shape(1, REPEATS, 5.0, frame), registry.cloth_peers()[0]
+    shape, peer = Shape(1, LIU_REPEATS, frame), registry.cloth_peers()[0]
     outcome = worker_process().perform(job(peer, cloth, settings, shape))
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     seconds = np.array([step.seconds for step in outcome.solved])
-    inertial = inertial_positions(cloth, frame)
-    error = metrics.relative_error(outcome.solved[-1].q, exact, inertial)
+    exact, inertial = first_step(cloth, frame), inertial_positions(cloth, frame)
+    error = exact.error(outcome.solved[-1].q, inertial)
     return Measured(LiuFrame(seconds, error, cloth.system.particle_count))
 
 

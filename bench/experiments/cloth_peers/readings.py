@@ -1,13 +1,16 @@
-"""The settings of solvers on falling cloths as points: their errors and times."""
+"""The settings of solvers on falling cloths as points: their errors and times.
 
-from collections.abc import Iterator
+A point joins all sweeps: its errors are those of the first, its time is the median.
+"""
+
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ...harness.record import Record
 from ...peers import registry
-from ...tables.results import Results
+from ...tables.results import Results, grouped
 from ...tables.table import words
 
 
@@ -19,7 +22,9 @@ class Point(NamedTuple):
     solver: str
     rung: str  # the setting
     values: dict[str, float]  # the measured numbers, by name
-    record: Record
+    record: Record  # of the first sweep
+    spread: float = 0.0  # largest difference between the errors of two sweeps
+    drift: float = 1.0  # the longest of the sweeps' times over the shortest
 
     @property
     def own(self) -> str:
@@ -47,30 +52,46 @@ class Point(NamedTuple):
         return not self.values["diverged"] and self.values["frames"] == self.values["wanted"]
 
     @property
+    def motion_error(self) -> float:
+        """The distance of a motion from the truth, relative to the distance moved; inf if lost."""
+        return self.values["true"] / self.values["path"] if self.is_whole else np.inf
+
+    @property
     def remark(self) -> str:
         """The remarks of its record on its cloth."""
         counts, sentences = self.record.values.remark_particles, self.record.details.remarks
         remarks = zip(counts, sentences, strict=True)
         return "; ".join(sentence for count, sentence in remarks if count == self.particles)
 
-    def number(self, name: str) -> float | None:
-        """Return a measured number, None where it is NaN."""
-        number = self.values[name]
-        return None if np.isnan(number) else number
-
 
 def points(results: Results, task: str) -> list[Point]:
     """Return all points of a task, cloth by cloth: stiffness first, then particles."""
-    every = [p for record in results.all("cloth", task=task) for p in _points_of(record)]
+    records = [record for record in results.all("cloth", task=task) if record.values is not None]
+    sweeps = grouped(records, lambda record: (record.problem, record.solver))
+    every = [point for group in sweeps.values() for point in _points_of(group)]
     return sorted(every, key=lambda point: (point.own, point.stiffness, point.particles))
 
 
-def _points_of(record: Record) -> Iterator[Point]:
-    if record.values is None:
-        return
-    count = record.values.particles.size
+def _points_of(sweeps: Sequence[Record]) -> Iterator[Point]:
+    """Yield the points of a solver on a cloth, by all sweeps."""
+    sweeps = sorted(sweeps, key=lambda record: record.details.sweep)
+    by_sweep = [dict(_rungs(record)) for record in sweeps]
+    record, details = sweeps[0], sweeps[0].details
+    for (particles, rung), values in by_sweep[0].items():
+        same = [rungs[particles, rung] for rungs in by_sweep if (particles, rung) in rungs]
+        seconds = np.array([other["seconds"] for other in same])
+        errors = np.array([other.get("error", other.get("true")) for other in same])
+        spread = float(np.ptp(errors)) if np.isfinite(errors).all() else 0.0
+        drift = float(seconds.max() / seconds.min()) if seconds.min() > 0.0 else 1.0
+        values["seconds"] = float(np.median(seconds))
+        point = (details.stiffness, particles, record.solver, rung, values, record)
+        yield Point(*point, spread, drift)
+
+
+def _rungs(record: Record) -> Iterator[tuple[tuple[int, str], dict[str, float]]]:
+    """Yield particles and setting of each rung with its numbers."""
+    count = len(record.details.rungs)
     columns = {name: array for name, array in record.arrays.items() if array.size == count}
     for i, rung in enumerate(record.details.rungs):
         values = {name: float(array[i]) for name, array in columns.items()}
-        stiffness, particles = record.details.stiffness, int(values["particles"])
-        yield Point(stiffness, particles, record.solver, rung, values, record)
+        yield (int(values["particles"]), rung), values

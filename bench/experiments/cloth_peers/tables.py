@@ -1,6 +1,10 @@
-"""The same cloth for every solver: work against precision, motions, limits of stability."""
+"""The same cloth for every solver: steps to the minimiser, and motions to the truth.
 
-from collections.abc import Iterable, Iterator, Sequence
+They are two problems with a table each: solvers that minimise the objective of an implicit step
+stand in both, all others only in the table of motions.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,6 +14,7 @@ from ...figures.chart import Axis, Chart, Panel, Series, series
 from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers.registry import LINEARISED
 from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
@@ -17,8 +22,8 @@ from ...tables.layout import Layout
 from ...tables.results import Results, grouped, label, listed
 from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
-from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY, TARGETS
-from .measurement import AMPLITUDE, BISECTION, GROWTH, REPEATS, STABILITY_SIZE, STABILITY_STEPS
+from . import LIU, MISSING, MOTION, MOTION_TARGETS, NEAR, ONE_STEP, SOLVED, STABILITY, TARGETS
+from .measurement import AMPLITUDE, BISECTION, GROWTH, STABILITY_SIZE, STABILITY_STEPS, SWEEPS
 from .readings import Point, points
 
 # The cells of a row by the titles of their columns, and its records.
@@ -30,7 +35,9 @@ CAPTIONS = Captions(
     gravity=f"{GRAVITY:g}",
     fall=f"{FALLING * FRAME:g}",
     frame=words_in(FRAME, "ms"),
-    repeats=str(REPEATS),
+    sweeps=str(SWEEPS),
+    solved=SOLVED,
+    near=NEAR,
     stability_size=str(STABILITY_SIZE),
     amplitude=words(AMPLITUDE),
     growth=f"{GROWTH:g}",
@@ -40,15 +47,9 @@ CAPTIONS = Captions(
     liu_frame=words_in(published.LIU_2013_FRAME, "ms"),
     liu_tolerance=words(published.LIU_2013["newton"].settings["tolerance"]),
 )
-# A motion within this distance of the true one [m] is hard to tell from it by eye.
-NEAR = 1e-2
 # Larger errors are those of motions that diverged, and are not drawn.
 MAX_ERROR = 10.0
-ERRORS = {
-    "error": "error |x − x*| / |y − x*|",
-    "implicit": "rms distance [m]",
-    "true": "rms distance [m]",
-}
+ERRORS = {"error": "error |x − x*| / |y − x*|", "true": "rms distance from the truth [m]"}
 
 
 def work_precision(name: str, task: str, error: str, results: Results) -> Sketch | None:
@@ -95,7 +96,6 @@ def _is_visible(point: Point, error: str) -> bool:
 
 
 step_chart = partial(work_precision, "work_precision_step", ONE_STEP, "error")
-implicit_chart = partial(work_precision, "work_precision_implicit", MOTION, "implicit")
 truth_chart = partial(work_precision, "work_precision_truth", MOTION, "true")
 
 
@@ -105,39 +105,84 @@ def _missing(results: Results) -> list[Row]:
     return [{"cloth": "every cloth", "solver": r.solver, **r.notes} for r in records]
 
 
-def _step_rows(results: Results) -> list[Row]:
-    groups = grouped(points(results, ONE_STEP), lambda point: (point.cloth, point.solver))
-    return [*map(_step_row, groups.values()), *_missing(results)]
+def _ranked(rows: Iterable[Row], best: str, target: str) -> list[Row]:
+    """Return rows cloth by cloth, those that reach the target first by time, others by error."""
+
+    def rank(row: Row) -> tuple[float, float]:
+        smallest = row[best]
+        error = np.inf if smallest is None or isinstance(smallest, str) else smallest
+        return row.get(f"time to {target}", np.inf), error
+
+    groups = grouped(rows, lambda row: str(row["cloth"]))
+    return [row for group in groups.values() for row in sorted(group, key=rank)]
 
 
-def _step_row(settings: Sequence[Point]) -> Row:
-    """Return a solver's errors and times on a cloth, of the cheapest setting for each target."""
-    best = min(settings, key=lambda point: point.values["error"])
-    error, first = best.values["error"], settings[0]
+def _row(settings: Sequence[Point], errors: Sequence[float], targets: Mapping[str, float]) -> Row:
+    """Return the cells of a solver on a cloth: the cheapest setting for each target."""
+    best, first = settings[int(np.argmin(errors))], settings[0]
     row: Row = {
         "points": settings,
+        "best": best,
         "cloth": first.cloth,
         "solver": first.solver,
-        "smallest error": "diverged" if np.isinf(error) else error,
         "setting for the smallest error": best.rung,
-        "remark": first.remark,
+        "difference between sweeps": max(point.spread for point in settings),
+        "slowest over fastest sweep": max(point.drift for point in settings),
     }
-    for target in TARGETS:
-        arrivals = [point for point in settings if point.values["error"] <= float(target)]
-        if arrivals:
-            cheapest = min(arrivals, key=lambda point: point.seconds)
+    for target, limit in targets.items():
+        near = [point for point, error in zip(settings, errors, strict=True) if error <= limit]
+        if near:
+            cheapest = min(near, key=lambda point: point.seconds)
             row |= {f"time to {target}": cheapest.seconds, f"setting for {target}": cheapest.rung}
             row |= {target: cheapest}
     return row
 
 
+def _step_rows(results: Results) -> list[Row]:
+    groups = grouped(points(results, ONE_STEP), lambda point: (point.cloth, point.solver))
+    rows = _ranked(map(_step_row, groups.values()), "smallest error", SOLVED)
+    return rows + _missing(results)
+
+
+def _step_row(settings: Sequence[Point]) -> Row:
+    row = _row(settings, [point.values["error"] for point in settings], TARGETS)
+    error = row["best"].values["error"]
+    smallest = "diverged" if np.isinf(error) else error
+    kind = settings[0].record.details.kind
+    linear = "one linearised step" if kind == LINEARISED else ""
+    remark = "; ".join(filter(None, (linear, settings[0].remark)))
+    return {**row, "smallest error": smallest, "remark": remark}
+
+
+def _rounding(rows: Sequence[Row]) -> dict[str, str]:
+    """Return the range of the errors of minimisers rounded to single precision."""
+    records = [row["points"][0].record for row in rows if "points" in row]
+    errors = [r.values.rounding for r in records if r.values.rounding is not None]
+    ends = dict.fromkeys(map(words, metrics.extent(np.concatenate(errors)))) if errors else "–"
+    return {"rounding": " to ".join(ends), **_agreement(rows)}
+
+
+def _agreement(rows: Sequence[Row]) -> dict[str, str]:
+    """Return a sentence on the drift of times, and on solvers whose sweeps gave other errors."""
+    measured = [row for row in rows if "points" in row]
+    differing = {row["solver"]: 0 for row in measured if row["difference between sweeps"] > 0.0}
+    drift = words(max([1.0, *(row["slowest over fastest sweep"] for row in measured)]))
+    errors = f"equal to the bit but for {listed(list(differing))}" if differing else "the same bits"
+    sentence = f"Of equal runs the times differ by a factor of at most {drift}; the errors are"
+    return {"agreement": f"{sentence} {errors}."}
+
+
 def _step_summary(rows: Sequence[Row]) -> Summary:
+    return _summary(rows, TARGETS, "The fastest solvers of one implicit step, by its error:")
+
+
+def _summary(rows: Sequence[Row], targets: Mapping[str, float], title: str) -> Summary:
     measured = [row for row in rows if "points" in row]
     sentences = [
-        f"{cloth}: {listed([f'to {target} {_fastest(group, target)}' for target in TARGETS])}"
+        f"{cloth}: {listed([f'to {target} {_fastest(group, target)}' for target in targets])}"
         for cloth, group in grouped(measured, lambda row: str(row["cloth"])).items()
     ]
-    return Summary("Fastest solver in one step:", tuple(sentences)) if measured else NO_SUMMARY
+    return Summary(title, tuple(sentences)) if measured else NO_SUMMARY
 
 
 def _fastest(rows: Sequence[Row], target: str) -> str:
@@ -151,7 +196,7 @@ def _fastest(rows: Sequence[Row], target: str) -> str:
 
 
 one_step = Layout(
-    **CAPTIONS.of("cloth_peers_step"),
+    **CAPTIONS.of("cloth_peers_step", _rounding),
     subjects=_step_rows,
     summary=_step_summary,
     figures=(step_chart,),
@@ -164,11 +209,13 @@ def _motion_rows(results: Results) -> list[Row]:
         for record in results.all("cloth", task=STABILITY)
         for stiffness, cells in _limits(record)
     }
+    groups = grouped(points(results, MOTION), lambda point: (point.cloth, point.solver))
     rows = [
-        _motion_row(point, {} if point.own else limits.get((point.solver, point.stiffness), {}))
-        for point in points(results, MOTION)
+        _motion_row(group, {} if own else limits.get((solver, group[0].stiffness), {}))
+        for (_, solver), group in groups.items()
+        for own in [group[0].own]
     ]
-    return rows + _missing(results)
+    return _ranked(rows, "smallest distance from the truth", NEAR) + _missing(results)
 
 
 def _limits(record: Record) -> Iterator[tuple[float, Row]]:
@@ -181,58 +228,32 @@ def _limits(record: Record) -> Iterator[tuple[float, Row]]:
         yield stiffness, cells
 
 
-def _motion_row(point: Point, limit: Row) -> Row:
-    frame, details = point.number("seconds"), point.record.details
+def _motion_row(settings: Sequence[Point], limit: Row) -> Row:
+    errors = [point.motion_error for point in settings]
+    row = _row(settings, errors, MOTION_TARGETS)
     stability = limit["stability"].details.remark if limit else ""
+    is_whole = np.isfinite(min(errors))
     return {
-        "point": point,
-        "cloth": point.cloth,
-        "solver": point.solver,
-        "setting for a frame": point.rung,
-        "distance from implicit Euler": point.number("implicit"),
-        "distance from the truth": point.number("true"),
-        "time for a frame": frame,
-        "remark": "; ".join(filter(None, (_fate(point), stability))),
-        "frames": int(point.values["frames"]),
-        "time for a simulated second": frame and metrics.ratio(frame, details.frame),
+        **row,
+        "smallest distance from the truth": min(errors) if is_whole else None,
+        "smallest distance": row["best"].values["true"] if is_whole else None,
+        "remark": "; ".join(filter(None, (*_fates(settings), stability))),
         **limit,
     }
 
 
-def _fate(point: Point) -> str:
-    """Return why a motion did not reach its end, "" if it did."""
-    if point.values["diverged"]:
-        return "diverged"
-    if point.is_whole:
-        return ""
-    return point.remark or f"out of time before frame {int(point.values['frames']) + 1}"
+def _fates(settings: Sequence[Point]) -> Iterator[str]:
+    """Yield which settings did not reach the end of the motion, and why."""
+    if diverged := [point.rung for point in settings if point.values["diverged"]]:
+        yield f"diverged with {listed(diverged)}"
+    if settings[0].remark:
+        yield settings[0].remark
 
 
 def _motion_summary(rows: Sequence[Row]) -> Summary:
-    motions: list[Point] = [row["point"] for row in rows if "point" in row]
-    if not motions:
-        return NO_SUMMARY
-    diverged = list(dict.fromkeys(point.solver for point in motions if point.values["diverged"]))
-    sentence = "No motion diverged."
-    if diverged:
-        sentence = f"Diverged with some settings: {listed(diverged)}."
-    whole = grouped((point for point in motions if point.is_whole), lambda point: point.cloth)
-    sentences = [f"{cloth}: {_nearest(group)}" for cloth, group in whole.items()]
-    nearest = " Nearest solver to the truth:" if sentences else ""
-    return Summary(sentence + nearest, (*sentences, *_stable(rows)))
-
-
-def _nearest(whole: Sequence[Point]) -> str:
-    best = min(whole, key=lambda point: point.values["true"])
-    sentence = f"{best.solver} by {best.rung}, {words(best.values['true'])} m"
-    near = [point for point in whole if point.values["true"] <= NEAR]
-    if not near:
-        return sentence
-    fastest = min(near, key=lambda point: point.seconds)
-    return (
-        f"{sentence}; the fastest within {words(NEAR)} m {fastest.solver} by {fastest.rung}, "
-        f"{words_in(fastest.seconds, 'ms')} a frame"
-    )
+    title = "The fastest solvers of a motion, by its distance from the truth:"
+    summary = _summary(rows, MOTION_TARGETS, title)
+    return summary._replace(points=(*summary.points, *_stable(rows)))
 
 
 def _stable(rows: Sequence[Row]) -> Iterable[str]:
@@ -244,21 +265,21 @@ def _stable(rows: Sequence[Row]) -> Iterable[str]:
 
 def _certainty(rows: Sequence[Row]) -> dict[str, str]:
     """Return the change of the true motions by halved steps [m], and the range of their order."""
-    records = {id(row["point"].record): row["point"].record for row in rows if "point" in row}
+    records = [row["points"][0].record for row in rows if "points" in row]
     if not records:
-        return dict.fromkeys(("unsure", "low", "high"), "–")
-    orders = np.concatenate([record.values.order for record in records.values()])
-    unsure = max(float(record.values.unsure.max()) for record in records.values())
+        return dict.fromkeys(("unsure", "low", "high", "agreement"), "–")
+    orders = np.concatenate([record.values.order for record in records])
+    unsure = max(float(record.values.unsure.max()) for record in records)
     low, high = metrics.extent(orders)
-    return {"unsure": words(unsure), "low": words(low), "high": words(high)}
+    numbers = {"unsure": words(unsure), "low": words(low), "high": words(high)}
+    return {**numbers, **_agreement(rows)}
 
 
 motion = Layout(
     **CAPTIONS.of("cloth_peers_motion", _certainty),
     subjects=_motion_rows,
-    ranked=lambda row: "point" not in row or row["point"].is_whole,
     summary=_motion_summary,
-    figures=(implicit_chart, truth_chart),
+    figures=(truth_chart,),
 )
 
 

@@ -1,18 +1,22 @@
-"""The records of falling cloths: work and precision, iterations, limits of stability."""
+"""The records of falling cloths: work and precision, limits of stability."""
 
 import msgspec
 
 from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
-from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
+from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY
 
 
 class StepWork(Values, frozen=True):
-    """A step at increasing cost, (rung,)."""
+    """A step at increasing cost, (rung,), and the precision that single precision allows, (size,).
+
+    A sweep measures every rung once.
+    """
 
     particles: Integers1  # along a side
     seconds: Floats1
     error: Floats1  # |x - x*| / |y - x*|
     remark_particles: Integers1  # along a side of the cloth of each remark, (remark,)
+    rounding: Floats1 | None = None  # the error of x* rounded to single precision
 
 
 class MotionWork(Values, frozen=True):
@@ -23,20 +27,12 @@ class MotionWork(Values, frozen=True):
     target_frames: Integers1 = msgspec.field(name="wanted")
     seconds: Floats1  # for a frame
     setup: Floats1  # time to set the solver up [s]
-    implicit: Floats1  # final distance from converged implicit Euler [m]
     true: Floats1  # final distance from the true motion [m]
+    path: Floats1  # distance that the true motion moved until then [m]
     diverged: Booleans1
     remark_particles: Integers1  # along a side of the cloth of each remark, (remark,)
     order: Floats1  # observed, of the true motion
     unsure: Floats1  # distance by which halved steps move the true motion [m]
-
-
-class IterationCounts(Values, frozen=True):
-    """Iterations to each of `DECADES`, NaN where the iteration limit is too low."""
-
-    needed: Floats1
-    iterations: int = msgspec.field(name="tried")
-    smallest_error: float = msgspec.field(name="least")
 
 
 class StabilityLimits(Values, frozen=True):
@@ -64,6 +60,9 @@ class FallDetails(Details, frozen=True):
     cloth: str = ""  # the name of a user's cloth
     rungs: tuple[str, ...] = ()  # the settings, (rung,)
     remarks: tuple[str, ...] = ()
+    kind: str = ""  # how the solver's settings differ, see `registry`
+    sweep: int = 1  # the pass over all solvers in which it was measured
+    arbiter: str = ""  # what the errors are measured against, and to how many digits
 
 
 class ClothDetails(Details, frozen=True):
@@ -75,7 +74,6 @@ class ClothDetails(Details, frozen=True):
 KINDS = {
     ONE_STEP: Kind(StepWork, FallDetails),
     MOTION: Kind(MotionWork, FallDetails),
-    NEEDED: Kind(IterationCounts, FallDetails),
     STABILITY: Kind(StabilityLimits, ClothDetails),
     LIU: Kind(LiuFrame, ClothDetails),
     MISSING: Kind(Values, ClothDetails),

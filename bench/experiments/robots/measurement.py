@@ -152,7 +152,7 @@ def solve(job: RobotJob, targets: Targets) -> Measured:
     robot, outcome = evaluator.robot, _performed(job, targets, Budget(job.budget))
     arrays = _evaluated(job, targets, outcome.solved) if outcome.solved else {}
     return Measured(
-        RobotSolves(**arrays, setup=outcome.setup),
+        RobotSolves(**arrays, setup=outcome.setup, overhead=outcome.overhead),
         {"remark": outcome.note},
         {
             "strata": list(STRATA),
@@ -179,7 +179,9 @@ def _performed(job: RobotJob, targets: Targets, budget: Budget) -> JobOutcome:
         return outcome._replace(solved=solves)
     following = _performed(job, targets.after(len(solves)), budget)
     solves += following.solved
-    return following._replace(setup=outcome.setup, solved=solves, trouble=raised(solves))
+    return following._replace(
+        setup=outcome.setup, overhead=outcome.overhead, solved=solves, trouble=raised(solves)
+    )
 
 
 def _evaluated(job: RobotJob, targets: Targets, solves: list[Solved]) -> dict[str, np.ndarray]:

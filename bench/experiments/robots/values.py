@@ -20,6 +20,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
         exception: whether the solver raised, or its process was lost.
         stratum: the number of each target's stratum.
         setup: how long the solver took before the first [s].
+        overhead: of the time of a solve, what the harness adds [s]; NaN if that is not known.
         bound: how near any pose may come to a target out of reach [m].
     """
 
@@ -32,6 +33,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
     exception: Booleans1 | None = None
     stratum: Integers1 | None = None
     setup: float
+    overhead: float | None = None
     bound: Floats1 | None = None
 
     def __post_init__(self) -> None:

@@ -7,8 +7,10 @@
 - XPBD: extended position based dynamics (Macklin, Müller, Chentanez 2016) corrects all springs at
   once and adds their corrections of a particle, without averaging.
 
-Collisions between particles are left out, as the reference has none. A pinned particle has mass
-zero. A spring's rest length would be taken from the particles' places, and is overwritten.
+The launches of a frame are captured once and replayed, as Newton's examples do: launched one by one
+from Python they take up to twenty times as long. Collisions between particles are left out, as the
+reference has none. A pinned particle has mass zero. A spring's rest length would be taken from the
+particles' places, and is overwritten. `docs/peers/newton.md` gives the reasons for all settings.
 """
 
 from typing import Any
@@ -19,7 +21,7 @@ import warp as wp
 from newton.solvers import SolverSemiImplicit, SolverVBD, SolverXPBD
 
 from plumbob.reference import MassSpring, State
-from plumbob.reference.arguments import FloatArray, IndexArray
+from plumbob.reference.arguments import FloatArray
 
 from .protocol import Mover
 
@@ -31,75 +33,57 @@ SOLVERS: dict[str, Any] = {
 
 
 def prepare(
-    system: MassSpring,
-    frame: float,
-    solver: str = "VBD",
-    substeps: int = 1,
-    own: int = 0,
-    **limits: int,
+    system: MassSpring, frame: float, solver: str = "VBD", substeps: int = 1, **limits: int
 ) -> Mover:
-    """Return a solver, stepping so many times a frame, with `iterations` a step if it iterates.
-
-    With `own`, VBD uses the colours that Newton computes, not the colours of the springs.
-    """
+    """Return a solver, stepping so many times a frame, with `iterations` a step if it iterates."""
     wp.config.log_level = wp.LOG_ERROR
     with wp.ScopedDevice("cpu"):
-        particles = model(system, own_colours=bool(own))
-        return _Steps(particles, SOLVERS[solver](particles, **limits), frame / substeps, substeps)
+        particles = model(system)
+        return _Frames(particles, SOLVERS[solver](particles, **limits), frame / substeps, substeps)
 
 
-class _Steps:
-    """Steps of a solver of Newton's, so many a frame."""
+class _Frames:
+    """Frames of so many steps of a solver of Newton's, captured as a graph."""
 
     def __init__(self, particles: Any, solver: Any, h: float, substeps: int) -> None:
-        self._now, self._next = particles.state(), particles.state()
-        self._solver, self._control = solver, particles.control()
-        self._substeps, self._h = substeps, h
+        self._state = now = particles.state()
+        following, control = particles.state(), particles.control()
+        with wp.ScopedCapture() as capture:
+            for _ in range(substeps):
+                now.clear_forces()
+                solver.step(now, following, control, None, h)
+                now, following = following, now
+            if now is not self._state:  # after an odd number of steps
+                wp.copy(self._state.particle_q, now.particle_q)
+                wp.copy(self._state.particle_qd, now.particle_qd)
+        self._graph, self._used = capture.graph, (solver, now, following, control)
 
     def begin(self, state: State) -> None:
-        for buffer in (self._now, self._next):
-            buffer.particle_q.assign(state.positions.astype(np.float32))
-            buffer.particle_qd.assign(state.velocities.astype(np.float32))
+        self._state.particle_q.assign(state.positions.astype(np.float32))
+        self._state.particle_qd.assign(state.velocities.astype(np.float32))
 
     def advance(self) -> None:
-        for _ in range(self._substeps):
-            self._now.clear_forces()
-            self._solver.step(self._now, self._next, self._control, None, self._h)
-            self._now, self._next = self._next, self._now
+        wp.capture_launch(self._graph)
 
     def positions(self) -> FloatArray:
-        return np.array(self._now.particle_q.numpy(), dtype=float)
+        return np.array(self._state.particle_q.numpy(), dtype=float)
 
 
-def model(system: MassSpring, *, own_colours: bool = False) -> Any:
-    """Return the model, coloured by its springs, or by Newton, which sees none."""
+def model(system: MassSpring) -> Any:
+    """Return the model, coloured by Newton's own algorithm along the springs.
+
+    `ModelBuilder.color` sees triangles and bending edges only, so it would give all particles of a
+    model of springs one colour.
+    """
     builder = newton.ModelBuilder(gravity=wp.vec3(*system.gravity))
     nowhere = wp.vec3(0.0, 0.0, 0.0)
     for mass, free in zip(system.masses, system.free, strict=True):
         builder.add_particle(nowhere, nowhere, float(mass) if free else 0.0, radius=0.0)
     for (i, j), k, c in zip(system.springs, system.stiffnesses, system.dampings, strict=True):
         builder.add_spring(int(i), int(j), float(k), float(c), 0.0)
-    if own_colours:
-        builder.color()
-    else:
-        builder.set_coloring(colours(system.springs, system.particle_count))
-    particles: Any = builder.finalize(device="cpu")
+    springs = wp.array(system.springs.astype(np.int32), dtype=int)
+    builder.set_coloring(newton.utils.color_graph(system.particle_count, springs))
+    particles: Any = builder.finalize()
     particles.spring_rest_length.assign(system.rest_lengths.astype(np.float32))
     particles.particle_grid = None
     return particles
-
-
-def colours(springs: IndexArray, particle_count: int) -> list[IndexArray]:
-    """Return groups of particles, no two of a group joined by a spring.
-
-    In order, each particle takes the first colour that its neighbours do not have.
-    """
-    neighbours: list[list[int]] = [[] for _ in range(particle_count)]
-    for i, j in springs.tolist():
-        neighbours[i].append(j)
-        neighbours[j].append(i)
-    colour = np.full(particle_count, -1)
-    for i, adjacent in enumerate(neighbours):
-        used = set(colour[adjacent])
-        colour[i] = next(number for number in range(particle_count) if number not in used)
-    return [np.flatnonzero(colour == number) for number in range(colour.max() + 1)]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio
 
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 
 def prepare(
@@ -29,7 +29,7 @@ def prepare(
         targets = [pinocchio.SE3(R, x) for x, R in request.poses]
         q0 = to_pinocchio(robot, request.start)
 
-        def solve() -> SolverOutput:
+        def solve() -> tuple[FloatArray, bool]:
             q = q0
             for iteration in range(iterations + 1):
                 e, J = _error(model, data, q, frames, targets, robot.oriented)
@@ -38,9 +38,9 @@ def prepare(
                     break
                 damped = J @ J.T + damping * np.eye(len(e))
                 q = pinocchio.integrate(model, q, -step * (J.T @ np.linalg.solve(damped, e)))
-            return SolverOutput(from_pinocchio(robot, q), is_done)
+            return q, is_done
 
-        return solve
+        return Solve(solve, lambda answer: (from_pinocchio(robot, answer[0]), answer[1]))
 
     return ask
 

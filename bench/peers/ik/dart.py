@@ -7,16 +7,7 @@ the joints' limits. DART's own restarts draw from a generator without a seed, so
 import dartpy
 import numpy as np
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    SolverOutput,
-    Tolerance,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 
 def prepare(
@@ -48,13 +39,12 @@ def prepare(
         target.set_rotation(request.rotations[0])
         target.set_translation(request.positions[0])
 
-        def solve() -> SolverOutput:
+        def solve() -> bool:
             target_frame.setTransform(target)
             skeleton.setPositions(request.start)
-            claim = bool(ik.solveAndApply(True))
-            return SolverOutput(skeleton.getPositions(), claim)
+            return bool(ik.solveAndApply(True))
 
-        return solve
+        return Solve(solve, lambda claim: (skeleton.getPositions(), claim))
 
     return ask
 

@@ -20,17 +20,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.solvers import IpoptSolver, NloptSolver, SnoptSolver, SolverOptions
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    SolverOutput,
-    Tolerance,
-)
+from .overhead import library
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
+METERED = True
 # A solver, and its names for the tolerance on constraints and the maximum of iterations.
 SOLVERS: dict[str, tuple[Any, str, str]] = {
     "SNOPT": (SnoptSolver, "Major feasibility tolerance", "Major iterations limit"),
@@ -67,19 +60,22 @@ def prepare(
         bounds = plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()
         middle = np.nan_to_num(np.mean(bounds, axis=0))  # balls have none
         program.AddQuadraticErrorCost(centring * np.eye(len(middle)), middle, unknowns)
+    run = library(engine.Solve)
+    setters = [library(frame.SetPoseInParentFrame) for frame in frames]
+
+    def read(solution: Any) -> tuple[FloatArray, bool]:
+        return coordinates.from_drake(solution.GetSolution(unknowns)), solution.is_success()
 
     def ask(request: PoseRequest) -> Solve:
         targets = [RigidTransform(RotationMatrix(R), x) for x, R in request.poses]
         q0 = coordinates.to_drake(request.start)
 
-        def solve() -> SolverOutput:
-            for frame, target in zip(frames, targets, strict=True):
-                frame.SetPoseInParentFrame(context, target)
-            solution = engine.Solve(program, q0, options)
-            q = coordinates.from_drake(solution.GetSolution(unknowns))
-            return SolverOutput(q, bool(solution.is_success()))
+        def solve() -> Any:
+            for set_target, target in zip(setters, targets, strict=True):
+                set_target(context, target)
+            return run(program, q0, options)
 
-        return solve
+        return Solve(solve, read)
 
     return ask
 

@@ -5,16 +5,16 @@ out, and so are solutions beyond the limits, after whole revolutions are tried. 
 Its time is that of `calculate_IK`: the choice among all solutions is its user's.
 """
 
-from time import perf_counter
+from functools import partial
+from typing import Any
 
 import numpy as np
 from eaik.pybindings import EAIK
 
-from ...problems.robots import LIMIT_TOLERANCE, UnableError, links
-from ..protocol import OwnTime
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, Tolerance
+from ...problems.robots import UnableError, links
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from .solutions import first_within
 
-REVOLUTION = 2.0 * np.pi
 MAXIMUM_HINGES = 6
 
 
@@ -32,30 +32,13 @@ def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
     if not engine.has_known_decomposition():
         raise UnableError("knows no decomposition of this arm")
 
+    def read(solutions: Any) -> tuple[FloatArray | None, bool]:
+        return first_within(robot, solutions.Q[~np.array(solutions.is_LS, dtype=bool)])
+
     def ask(request: PoseRequest) -> Solve:
-        target = request.matrix
-
-        def solve() -> SolverOutput:
-            begin = perf_counter()
-            solutions = engine.calculate_IK(target)
-            time = OwnTime(perf_counter() - begin)
-            for q, is_approximate in zip(solutions.Q, solutions.is_LS, strict=True):
-                q = within(robot, np.asarray(q))
-                if not is_approximate and ((q >= robot.lower) & (q <= robot.upper)).all():
-                    return SolverOutput(q, True, time)
-            return SolverOutput(None, False, time)
-
-        return solve
+        return Solve(partial(engine.calculate_IK, request.matrix), read)
 
     return ask
-
-
-def within(robot: BenchRobot, q: FloatArray) -> FloatArray:
-    """Return angles brought within the limits by whole revolutions where that can be done."""
-    q = q + REVOLUTION * np.ceil((robot.lower - LIMIT_TOLERANCE - q) / REVOLUTION).clip(0.0)
-    q = q - REVOLUTION * np.ceil((q - robot.upper - LIMIT_TOLERANCE) / REVOLUTION).clip(0.0)
-    nearest = np.clip(q, robot.lower, robot.upper)
-    return np.where(np.abs(q - nearest) <= LIMIT_TOLERANCE, nearest, q)
 
 
 def axes_at_zero(robot: BenchRobot) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,5 +1,6 @@
 """A user's solver for robots: hinges in a row, a tool, poses within limits."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from ...problems.robots import links
 from ..contestant import opened, remark
 from ..entrant import ROBOT_TASK, Spec
 from ..protocol import NoAnswerError
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance, UnableError
+from .protocol import Ask, BenchRobot, PoseRequest, SolverOutput, Tolerance, UnableError
 
 __all__ = ["prepare", "remark", "robot_inputs"]
 
@@ -29,7 +30,7 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, spec: Spec = "") -> Ask:
     solver, inputs = opened(spec), robot_inputs(robot)
     inputs |= {"tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation}
 
-    def ask(request: PoseRequest) -> Solve:
+    def ask(request: PoseRequest) -> Callable[[], SolverOutput]:
         target = {"target_position": request.positions[0], "start": request.start}
         target["target_rotation"] = rotation.from_matrix(request.rotations[0])
 

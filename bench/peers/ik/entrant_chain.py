@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray
 from ...problems.chains import ChainRequest
 from ..contestant import opened, remark
 from ..entrant import CHAIN_TASK, Spec
-from .protocol import Solve, SolverOutput
+from .protocol import SolverOutput
 
 __all__ = ["joint_positions", "prepare", "remark"]
 
@@ -21,7 +21,7 @@ STRETCH = 1e-6
 
 def prepare(
     skeleton: Skeleton, tolerance: float, spec: Spec = "", method: str = ""
-) -> Callable[[ChainRequest], Solve]:
+) -> Callable[[ChainRequest], Callable[[], SolverOutput]]:
     """Return a user's solver, set up for a skeleton that ends at its effector.
 
     An output holds the iterations, NaN if unstated, and the joints' positions in a row.
@@ -37,7 +37,7 @@ def prepare(
         variables = {"local_rotations": start, "target": target, "max_iterations": iterations}
         return {**constants, **variables}
 
-    def ask(request: ChainRequest) -> Solve:
+    def ask(request: ChainRequest) -> Callable[[], SolverOutput]:
         def solve() -> SolverOutput:
             answer, time = solver.answer(CHAIN_TASK, inputs(*request))
             positions = joint_positions(skeleton, answer)

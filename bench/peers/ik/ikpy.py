@@ -4,12 +4,13 @@ It solves for the last link of a chain, which is the effector here, and does not
 """
 
 import warnings
+from functools import partial
 from typing import Any
 
 import ikpy.chain
 import numpy as np
 
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 
 def prepare(
@@ -36,10 +37,7 @@ def prepare(
         target, q0 = (request.positions[0], request.rotations[0], "all"), np.zeros(len(moving))
         q0[moving] = request.start
 
-        def solve() -> SolverOutput:
-            q = chain.inverse_kinematics(*target, initial_position=q0, **options)
-            return SolverOutput(q[moving], None)
-
-        return solve
+        solve = partial(chain.inverse_kinematics, *target, initial_position=q0, **options)
+        return Solve(solve, lambda q: (q[moving], None))
 
     return ask

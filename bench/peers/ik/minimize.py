@@ -11,7 +11,7 @@ import numpy as np
 from mujoco import minimize
 
 from ...problems.evaluate import mujoco_model
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 SILENT = minimize.Verbosity.SILENT
 
@@ -35,14 +35,17 @@ def prepare(
     reach = _Reach(robot)
 
     def ask(request: PoseRequest) -> Solve:
-        def solve() -> SolverOutput:
-            reach.aim(request.positions[0], request.rotations[0])
-            problem = (request.start[:, None], reach.residuals, bounds, reach.jacobian)
-            q, _ = minimize.least_squares(*problem, **options)
-            errors = np.linalg.norm(reach.residual(q.ravel()).reshape(2, 3), axis=-1)
-            return SolverOutput(q.ravel(), bool((errors <= tolerance).all()))
+        problem = (request.start[:, None], reach.residuals, bounds, reach.jacobian)
 
-        return solve
+        def solve() -> FloatArray:
+            reach.aim(request.positions[0], request.rotations[0])
+            return minimize.least_squares(*problem, **options)[0].ravel()
+
+        def read(q: FloatArray) -> tuple[FloatArray, bool]:
+            errors = np.linalg.norm(reach.residual(q).reshape(2, 3), axis=-1)
+            return q, bool((errors <= tolerance).all())
+
+        return Solve(solve, read)
 
     return ask
 

@@ -1,13 +1,17 @@
 """mink: differential inverse kinematics on MuJoCo by quadratic programs, iterated to a target.
 
-Each step asks for a part of the error (`gain`, over 1 s) within the joint limits. With full steps,
-the damping of the task must not be zero: they then jump about.
+Each step asks for a part of the error (`gain`, over 1 s) within the joint limits, and takes at most
+the part `limit_gain` of the way to a limit. With full steps, the damping of the task must not be
+zero: they then jump about.
 """
 
 import mink
 
 from ...problems.evaluate import mujoco_model
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance, arrived, iterate
+from .overhead import library
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance, arrived, iterate
+
+METERED = True
 
 
 def prepare(
@@ -17,23 +21,26 @@ def prepare(
     damping: float = 1e-12,
     lm_damping: float = 0.01,
     gain: float = 1.0,
+    limit_gain: float = 0.95,
 ) -> Ask:
     """Return the solver, set up for a robot."""
     configuration = mink.Configuration(mujoco_model(robot))
-    limits, cost = [mink.ConfigurationLimit(configuration.model)], float(robot.oriented)
+    limits, cost = [mink.ConfigurationLimit(configuration.model, limit_gain)], float(robot.oriented)
     tasks = [
         mink.FrameTask(effector, "body", 1.0, cost, gain, lm_damping)
         for effector in robot.effectors
     ]
 
     options = {"solver": "daqp", "damping": damping, "limits": limits}
+    solve_ik, integrate = library(mink.solve_ik), library(configuration.integrate_inplace)
+    compute_errors = [library(task.compute_error) for task in tasks]
+    setters, update = [library(task.set_target) for task in tasks], library(configuration.update)
 
     def step() -> None:
-        velocity = mink.solve_ik(configuration, tasks, 1.0, **options)
-        configuration.integrate_inplace(velocity, 1.0)
+        integrate(solve_ik(configuration, tasks, 1.0, **options), 1.0)
 
     def is_done() -> bool:
-        return arrived([task.compute_error(configuration) for task in tasks], robot, tolerance)
+        return arrived([compute(configuration) for compute in compute_errors], robot, tolerance)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [
@@ -41,13 +48,12 @@ def prepare(
             for x, R in request.poses
         ]
 
-        def solve() -> SolverOutput:
-            for task, target in zip(tasks, targets, strict=True):
-                task.set_target(target)
-            configuration.update(request.start)
-            claim = iterate(step, is_done, iterations)
-            return SolverOutput(configuration.q.copy(), claim)
+        def solve() -> bool:
+            for set_target, target in zip(setters, targets, strict=True):
+                set_target(target)
+            update(request.start)
+            return iterate(step, is_done, iterations)
 
-        return solve
+        return Solve(solve, lambda claim: (configuration.q.copy(), claim))
 
     return ask

@@ -5,6 +5,7 @@ Its wheels pin a Pinocchio older than ours, so it works in a process of an envir
 """
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,10 @@ from plumbob.crosscheck.child_process import ChildProcess, LostError
 from ...problems.robots import UnableError
 from ..protocol import OwnTime
 from ..registry import environment_python
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
+from .overhead import is_metered, report_library
+from .protocol import Ask, BenchRobot, PoseRequest, SolverOutput, Tolerance
 
+METERED = True
 PROGRAM = Path(__file__).with_name("placo_program.py")
 
 
@@ -34,23 +37,28 @@ def prepare(
     """
     robot.require_chain()
     program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
-    task: dict[str, Any] = {
+    task = {
         "text": robot.text,
         "effector": robot.effectors[0],
         "joints": robot.joints,
+        "regularization": regularization,
+        "weight": weight,
+        "is_metered": is_metered(),
+        "iterations": iterations,
+        "limits": tolerance,
     }
-    task |= {"regularization": regularization, "weight": weight}
     try:
-        _answer(program, {**task, "iterations": iterations, "limits": tolerance})
+        _answer(program, task)
     except ConnectionError:
         why = "PlaCo does not read the robot, or orders its joints otherwise"
         raise UnableError(why) from None
 
-    def ask(request: PoseRequest) -> Solve:
+    def ask(request: PoseRequest) -> Callable[[], SolverOutput]:
         question = {"target": request.matrix.tolist(), "start": request.start.tolist()}
 
         def solve() -> SolverOutput:
-            claim, seconds, q = _answer(program, question)
+            claim, seconds, q, library_seconds = _answer(program, question)
+            report_library(library_seconds)
             return SolverOutput(np.array(q), claim, OwnTime(float(seconds)))
 
         return solve

@@ -1,11 +1,12 @@
 """Plumbob's own solvers, through their public interface, on the model that its readers make."""
 
+from functools import partial
 from typing import Any
 
-from plumbob.reference import Outcome, Target, rotation, solve_ik
+from plumbob.reference import IKSolution, Outcome, Target, rotation, solve_ik
 from plumbob.reference.formats import mjcf, urdf
 
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 
 def prepare(
@@ -27,10 +28,10 @@ def prepare(
         quaternions = rotation.from_matrix(R) if robot.oriented else [None] * len(x)
         targets = [*map(Target, x, quaternions, robot.effectors)]
 
-        def solve() -> SolverOutput:
-            solution = solve_ik(articulation, start, targets, **settings)
-            return SolverOutput(solution.coordinates, solution.outcome == Outcome.CONVERGED)
-
-        return solve
+        return Solve(partial(solve_ik, articulation, start, targets, **settings), _read)
 
     return ask
+
+
+def _read(solution: IKSolution) -> tuple[FloatArray | None, bool]:
+    return solution.coordinates, solution.outcome == Outcome.CONVERGED

@@ -2,17 +2,19 @@
 
 An adapter is a module with a function `prepare(robot, tolerance, **settings)`: it sets the engine
 up for a robot and returns a function `ask(request)`. That puts a target in the engine's own types
-and returns the call to be timed, which returns a `SolverOutput`: neither conversions nor set-up
-count as time of a solve. For a robot that it cannot solve `prepare` raises `UnableError`.
+and returns a `Solve`, of which only the solver's own calls are timed: neither conversions nor
+set-up count. For a robot that it cannot solve `prepare` raises `UnableError`. An adapter that calls
+its solver in a loop of its own passes the solver's functions through `overhead.library`.
 
 If the engine's kinematics is compared as well, its adapter has a function `kinematics(robot)`,
 which returns a `Forward`.
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
-
-import numpy as np
+from dataclasses import dataclass
+from math import hypot
+from time import perf_counter
+from typing import Any, NamedTuple
 
 from plumbob.reference.arguments import FloatArray
 
@@ -33,25 +35,49 @@ class SolverOutput(NamedTuple):
     error: str = ""  # the exception of the solver, else ""
 
 
-Solve = Callable[[], SolverOutput]
-Ask = Callable[[PoseRequest], Solve]
+@dataclass(frozen=True, slots=True)
+class Solve:
+    """A target that is to be solved.
+
+    Attributes:
+        call: the calls of the solver that its user makes for a target, which are timed.
+        read: converts what `call` returns to coordinates, None for none, and a claim.
+    """
+
+    call: Callable[[], Any]
+    read: Callable[[Any], tuple[Any, bool | None]]
+
+    def __call__(self) -> SolverOutput:
+        """Return the answer, and the time of `call`."""
+        begin = perf_counter()
+        answer = self.call()
+        time = OwnTime(perf_counter() - begin)
+        return SolverOutput(*self.read(answer), time)
+
+
+Ask = Callable[[PoseRequest], Callable[[], SolverOutput]]
 # Coordinates to the effectors' positions [m], (effector, 3), and rotations, (effector, 3, 3).
 Forward = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
-def attempt(solve: Solve) -> SolverOutput:
+def attempt(solve: Callable[[], SolverOutput]) -> SolverOutput:
     """Return the answer of a solve; an exception is a failed attempt with its error."""
+    begin = perf_counter()
     try:
         return solve()
     except Exception as error:  # an exception of an engine is its result
-        return SolverOutput(None, False, error=describe(error))
+        return SolverOutput(None, False, OwnTime(perf_counter() - begin), describe(error))
 
 
 def arrived(errors: Sequence[FloatArray], robot: BenchRobot, tolerance: Tolerance) -> bool:
     """Return whether the effectors' errors, (6,) each, position first, are within the tolerance."""
-    sizes = np.linalg.norm(np.reshape(errors, (-1, 2, 3)), axis=-1)
-    limits = (tolerance.position, tolerance.rotation if robot.oriented else np.inf)
-    return bool((sizes <= limits).all())
+    for error in errors:
+        x, y, z, *rotation_vector = error.tolist()
+        if hypot(x, y, z) > tolerance.position:
+            return False
+        if robot.oriented and hypot(*rotation_vector) > tolerance.rotation:
+            return False
+    return True
 
 
 def iterate(step: Callable[[], object], is_done: Callable[[], bool], iterations: int) -> bool:

@@ -2,27 +2,20 @@
 
 Without limits it takes a damping; the default of 0.5 converges too slowly for our tolerance. With
 limits it pulls towards them in the null space of the effector's motion, does not take the damping,
-hardly arrives and oversteps them all the same. It never says whether it has arrived: a caller who
-starts it again must look at its forward kinematics, which `check` does. `IK_SDLS` ends the process,
-and is left out.
+hardly arrives and oversteps them all the same. It never says whether it has arrived: for restarts
+`check` compares the forward kinematics of its answer with the target, untimed. `IK_SDLS` ends the
+process, and is left out.
 """
 
 import functools
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pybullet
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    SolverOutput,
-    Tolerance,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 
 def prepare(
@@ -54,13 +47,13 @@ def prepare(
         pose = request.positions[0].tolist(), request.quaternion.tolist()
         start = request.start.tolist()
         poses = {"currentPositions": start} | ({"restPoses": start} if limits else {})
+        target = body.number, body.effector, *pose
+        solve = partial(pybullet.calculateInverseKinematics, *target, **poses, **options)
 
-        def solve() -> SolverOutput:
-            target = body.number, body.effector, *pose
-            q = np.array(pybullet.calculateInverseKinematics(*target, **poses, **options))
-            return SolverOutput(q, body.is_at(q, request, tolerance) if check else None)
+        def read(q: tuple[float, ...]) -> tuple[tuple[float, ...], bool | None]:
+            return q, body.is_at(q, request, tolerance) if check else None
 
-        return solve
+        return Solve(solve, read)
 
     return ask
 
@@ -90,7 +83,7 @@ class BulletBody:
         self._joints = [fact[0] for fact in facts if fact[2] == pybullet.JOINT_REVOLUTE]
         self.effector = next(f[0] for f in facts if f[12].decode() == robot.effectors[0])
 
-    def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def forward(self, q: Sequence[float] | FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the effector's position [m], (1, 3), and rotation, (1, 3, 3)."""
         for joint, angle in zip(self._joints, q, strict=True):
             pybullet.resetJointState(self.number, joint, angle, physicsClientId=self.client)
@@ -100,7 +93,7 @@ class BulletBody:
         R = np.array(pybullet.getMatrixFromQuaternion(state[5])).reshape(1, 3, 3)
         return np.array(state[4])[None], R
 
-    def is_at(self, q: FloatArray, request: PoseRequest, tolerance: Tolerance) -> bool:
+    def is_at(self, q: Sequence[float], request: PoseRequest, tolerance: Tolerance) -> bool:
         """Return whether these coordinates bring the effector to its target."""
         position, rotation = self.forward(q)
         distance = np.linalg.norm(position - request.positions)

@@ -5,20 +5,13 @@ It starts from as many configurations at once as it is given. In single precisio
 targets end in a singular matrix; here it works in double precision.
 """
 
+from typing import Any
+
 import numpy as np
 import pytorch_kinematics
 import torch
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    SolverOutput,
-    Tolerance,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 from .restarts import generator_of
 
 
@@ -55,15 +48,18 @@ def prepare(
         poses = robot.draw(generator_of(*request), attempts - 1)
         starts = torch.tensor(np.vstack([request.start, poses]))
 
-        def solve() -> SolverOutput:
+        def solve() -> Any:
             solver.initial_config = starts
-            output = solver.solve(target)
-            best = int(output.converged[0].int().argmax())
-            return SolverOutput(output.solutions[0, best].numpy(), bool(output.converged_any[0]))
+            return solver.solve(target)
 
-        return solve
+        return Solve(solve, _read)
 
     return ask
+
+
+def _read(output: Any) -> tuple[FloatArray, bool]:
+    best = int(output.converged[0].int().argmax())
+    return output.solutions[0, best].numpy(), bool(output.converged_any[0])
 
 
 def kinematics(robot: BenchRobot) -> Forward:

@@ -1,11 +1,13 @@
 """Restarts for solvers without restarts: from random poses until the solver claims success."""
 
 import zlib
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from ..protocol import total
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, SolverOutput, attempt
+from .protocol import Ask, BenchRobot, PoseRequest, SolverOutput, attempt
 
 _SEED = 1986
 
@@ -21,9 +23,10 @@ def restarted(ask: Ask, robot: BenchRobot, restarts: int) -> Ask:
     def is_success(output: SolverOutput) -> bool:
         if not output.claim or output.q is None:
             return False
-        return bool((output.q >= robot.lower).all() and (output.q <= robot.upper).all())
+        q = np.asarray(output.q)
+        return bool((q >= robot.lower).all() and (q <= robot.upper).all())
 
-    def ask_again(request: PoseRequest) -> Solve:
+    def ask_again(request: PoseRequest) -> Callable[[], SolverOutput]:
         poses = robot.draw(generator_of(*request), restarts)
         attempts = [ask(request._replace(start=q.copy())) for q in (request.start, *poses)]
 
@@ -44,9 +47,14 @@ def restarted(ask: Ask, robot: BenchRobot, restarts: int) -> Ask:
     return ask_again
 
 
-def generator_of(*target: FloatArray) -> np.random.Generator:
+def generator_of(*target: Any) -> np.random.Generator:
     """Return a target's own generator, always with the same seed."""
+    return np.random.default_rng([_SEED, digest_of(*target)])
+
+
+def digest_of(*target: Any) -> int:
+    """Return an unsigned number of 32 bits that depends on all parts of a target."""
     digest = 0
     for part in target:
         digest = zlib.crc32(np.ascontiguousarray(part).tobytes(), digest)
-    return np.random.default_rng([_SEED, digest])
+    return digest

@@ -5,12 +5,13 @@ Its `tol` bounds half the squared error, positions and angles together, so the d
 """
 
 import warnings
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...problems.robots import links
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -42,13 +43,8 @@ def prepare(
     run: Any = {"LM": chain.ik_LM, "NR": chain.ik_NR, "GN": chain.ik_GN}[method]
 
     def ask(request: PoseRequest) -> Solve:
-        target = request.matrix
-
-        def solve() -> SolverOutput:
-            solution = run(target, q0=request.start, **options)
-            return SolverOutput(solution.q, bool(solution.success))
-
-        return solve
+        solve = partial(run, request.matrix, q0=request.start, **options)
+        return Solve(solve, lambda solution: (solution.q, bool(solution.success)))
 
     return ask
 

@@ -6,10 +6,12 @@ tolerance is on two norms of three components each, so eps is that over the squa
 """
 
 import math
+from collections.abc import Sequence
+from functools import partial
 
 import pytracik
 
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 
 def prepare(
@@ -23,11 +25,11 @@ def prepare(
 
     def ask(request: PoseRequest) -> Solve:
         target = (*request.positions[0], *request.quaternion)
-
-        def solve() -> SolverOutput:
-            code, *q = pytracik.ik(engine, request.start, *target)
-            return SolverOutput(q, True) if code >= 0 else SolverOutput(None, False)
-
-        return solve
+        return Solve(partial(pytracik.ik, engine, request.start, *target), _read)
 
     return ask
+
+
+def _read(answer: Sequence[float]) -> tuple[Sequence[float] | None, bool]:
+    code, *q = answer
+    return (q, True) if code >= 0 else (None, False)

@@ -1,0 +1,91 @@
+"""ur_analytic_ik: closed forms for the arms of Universal Robots, with constants of the maker.
+
+A robot is one of its models if both agree on the effector: apart from a half turn of the root,
+which the maker's files have, and from a tool. Its time is that of `inverse_kinematics`, which
+returns all solutions: the choice among them is its user's.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import ur_analytic_ik
+
+from ...problems.evaluate import Evaluator
+from ...problems.robots import UnableError
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from .solutions import first_within
+
+HINGES, SAMPLES = 6, 20
+# Of positions [m] and of rotation matrices: a model whose lengths are rounded otherwise is another.
+AGREEMENT = 1e-6
+
+
+class RobotModel(NamedTuple):
+    """A model, and its frames in the robot's."""
+
+    solver: Any  # the module of its functions
+    root: FloatArray  # the transform from the robot's root to the model's, (4, 4)
+    tool: FloatArray  # from the model's effector to the robot's, (4, 4)
+
+    def pose(self, q: FloatArray) -> FloatArray:
+        """Return the robot's effector by the model's kinematics, (4, 4)."""
+        return self.root @ self.solver.forward_kinematics(*q) @ self.tool
+
+
+def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
+    """Return the solver, set up for a robot; it takes no tolerance."""
+    model = model_of(robot)
+    from_root, from_tool = np.linalg.inv(model.root), np.linalg.inv(model.tool)
+
+    def read(solutions: Sequence[FloatArray]) -> tuple[FloatArray | None, bool]:
+        return first_within(robot, np.reshape(solutions, (-1, HINGES)))
+
+    def ask(request: PoseRequest) -> Solve:
+        target = from_root @ request.matrix @ from_tool
+        return Solve(partial(model.solver.inverse_kinematics, target), read)
+
+    return ask
+
+
+def kinematics(robot: BenchRobot) -> Forward:
+    """Return its forward kinematics of the effector."""
+    model = model_of(robot)
+
+    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        T = model.pose(q)
+        return T[None, :3, 3], T[None, :3, :3]
+
+    return forward
+
+
+def model_of(robot: BenchRobot) -> RobotModel:
+    """Return the model whose forward kinematics is the robot's.
+
+    Raises:
+        UnableError: if there is none.
+    """
+    robot.require_chain()
+    if len(robot.joints) == HINGES:
+        half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+        names = [name for name in dir(ur_analytic_ik) if name.startswith("ur")]
+        solvers = [getattr(ur_analytic_ik, name) for name in names]
+        q = robot.draw(np.random.default_rng(0), SAMPLES)
+        poses = _poses(robot, np.vstack([np.zeros(HINGES), q]))
+        for solver in solvers:
+            for root in (np.eye(4), half_turn):
+                tool = np.linalg.inv(root @ solver.forward_kinematics(*np.zeros(HINGES))) @ poses[0]
+                model = RobotModel(solver, root, tool)
+                errors = [model.pose(row) - pose for row, pose in zip(q, poses[1:], strict=True)]
+                if np.abs(errors).max() <= AGREEMENT:
+                    return model
+    raise UnableError("has models of Universal Robots only")
+
+
+def _poses(robot: BenchRobot, q: FloatArray) -> FloatArray:
+    """Return the effector's transforms, (row, 4, 4)."""
+    positions, rotations = Evaluator(robot).forward(q)
+    poses = np.tile(np.eye(4), (len(q), 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = rotations[:, 0], positions[:, 0]
+    return poses

@@ -1,0 +1,90 @@
+"""Which solver to choose for a robot: rows in order, advice by the records, and the command."""
+
+import numpy as np
+import pytest
+
+from plumbob.bench.peers import opening, registry
+from plumbob.bench.report.which import solvers_on_robot
+from plumbob.bench.tables.results import Results
+from plumbob.cli import run_command
+
+ARM = """<robot name="arm"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+<joint name="1" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2"/></joint>
+<joint name="2" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+<origin xyz="0.4 0 0"/><limit lower="-2" upper="2"/></joint>
+<joint name="3" type="{kind}"><parent link="b"/><child link="c"/><axis xyz="1 0 0"/>
+<origin xyz="0.3 0 0"/><limit lower="-2" upper="2"/></joint></robot>"""
+
+
+def table_of(*records):
+    return solvers_on_robot(Results(records), "arm.urdf")
+
+
+def test_a_solver_has_a_row_with_its_best_settings_and_the_best_is_first(make):
+    times = np.r_[np.full(190, 1e-5), np.full(10, 1e-3)]
+    table = table_of(
+        make.solving("mink", 60, seconds=1e-3),
+        make.solving("Plumbob LM", 80, seconds=times),
+        make.solving("Plumbob LM, 100 restarts", 200, "restarts", seconds=times),
+        make.solving("pink, 20 restarts", 200, "restarts", seconds=2e-3),
+    )
+    solvers, solved, medians, p95, *_ = zip(*table.rows, strict=True)
+    assert solvers == ("Plumbob LM (ours)", "pink", "mink")
+    assert solved == pytest.approx((100.0, 100.0, 30.0))
+    assert medians == pytest.approx((10.0, 2e3, 1e3))
+    assert p95[0] == pytest.approx(1e6 * np.quantile(times, 0.95))
+    assert table.title == "arm.urdf, 7 joints to hand: 200 targets"
+    assert table.summary.sentence == (
+        "Choose Plumbob LM, 100 restarts (ours): it solves 100 % of the targets with a median of "
+        "10.0 µs, the fastest of 2 that solve the most within chance."
+    )
+
+
+def test_the_advice_is_for_whoever_is_best(make):
+    best = make.solving("pink", 200, seconds=1e-3)
+    ours, loop = make.solving("Plumbob LM", 100), make.solving("Pinocchio’s closed loop", 200)
+    said = table_of(best, ours, loop).summary.sentence
+    assert said.startswith("Choose pink: it solves 100 % of the targets, more than any other,")
+    nobody = table_of(make.solving("pink", 0)).summary.sentence
+    assert nobody == "No solver reaches a target: does --link name the link that you mean?"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, in_this_process):
+    """A folder with an arm and one whose last joint slides, where only Plumbob is installed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(opening, "installed", list)
+    monkeypatch.setattr(registry, "PEERS", registry.PEERS[:1])
+    monkeypatch.setattr("plumbob.bench.experiments.robots.measurement.worker_process",
+                        in_this_process)  # fmt: skip
+    for name, kind in (("arm", "revolute"), ("slider", "prismatic")):
+        (tmp_path / f"{name}.urdf").write_text(ARM.format(kind=kind))
+    return tmp_path
+
+
+def test_the_command_tries_60_targets_prints_a_line_a_solver_and_advises(folder, capsys):
+    assert run_command(["which", "arm.urdf", "--link", "c"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "arm.urdf, 3 joints to c: 60 targets"
+    assert any(line.startswith("Plumbob LM (ours) ") for line in lines)
+    assert lines[-1].startswith("Choose Plumbob LM")
+    assert sorted(folder.iterdir()) == [folder / "arm.urdf", folder / "slider.urdf"]
+    assert run_command(["which", "arm.urdf", "--format", "csv"]) == 0
+    assert capsys.readouterr().out.startswith("solver,solved [%],median [µs],")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["no.urdf"], "ROBOT: expected a file of type .urdf or .xml or .mjcf, got no.urdf"),
+        (["arm.urdf", "--link", "x"], "--link: expected one of base, a, b, c, got 'x'"),
+        (["slider.urdf"], "slider.urdf: expected hinges to 'c', got a slide; --link names the link "
+                          "that must reach the targets"),
+        (["arm.urdf", "--format", "xls"], "unknown format 'xls': expected one of md, tex, csv, "
+                                          "html"),
+    ],
+)  # fmt: skip
+def test_misuse_exits_2_with_one_sentence(folder, capsys, arguments, message):
+    assert run_command(["which", *arguments]) == 2
+    assert capsys.readouterr() == ("", f"plumbob: {message}\n")
