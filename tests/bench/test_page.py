@@ -138,7 +138,7 @@ VISIBLE_WORDS = (
     r"document.body.innerText.split(/\s+/).filter(word => /[\p{L}\d]/u.test(word)).length"
 )
 # A full run with every peer has fewer than 2,500 on its page; the figures of this one are left out.
-MOST_WORDS = 2000
+MOST_WORDS = 2400
 
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
@@ -157,7 +157,7 @@ def test_the_first_screen_answers_and_shows_a_map_and_a_player(browser, size):
         "Where others win",
         "a <b>slide</b> rule",
         "Quick run: 60 targets a stratum",
-        "EAIK, Drake, ",
+        "Not installed: EAIK, ",
     ):
         assert words in message
     assert browser.run("document.querySelector('.findings').innerText").count(" fastest") <= 3
@@ -193,7 +193,7 @@ def test_a_switch_shows_one_start_or_restarts_on_the_whole_page(table):
 def test_a_robot_of_the_map_leads_to_its_rows_the_best_first(browser):
     browser.run("""new Promise(done => {
         addEventListener("hashchange", () => done(), {once: true});
-        [...document.querySelectorAll(".map a")].find(a => a.textContent === "the UR5").click(); })""")
+        [...document.querySelectorAll(".map a")].find(a => a.text === "the UR5").click(); })""")
     assert set(column(browser, 1)) == {"the UR5"}
     shares = [float(text.split()[0]) for text in column(browser, 4)]
     assert len(shares) == ONE_START
@@ -212,7 +212,7 @@ def test_every_claim_is_a_dot_left_of_its_tolerance(browser):
     found = browser.run("""[...document.querySelectorAll(".dots a")].map(a =>
         [a.ariaLabel, parseFloat(a.style.left), document.getElementById(a.hash.slice(1)).id])""")
     assert found == [["spring forces: 50.0 % of its tolerance", pytest.approx(96.2, abs=0.1),
-                      "check:spring-forces-held-mujoco-spatial-tendons"]]  # fmt: skip
+                      "check:spring-forces-held-ours"]]  # fmt: skip
 
 
 # Tables and figures are unfolded and made invisible, but for what marks the edges of their boxes;
@@ -317,6 +317,7 @@ def test_a_key_sorts_and_escape_closes_a_menu(table):
     table.run(f"""document.querySelector('[id="{MAIN}"] thead button').focus()""")
     table.press("Enter")
     assert "sort=0" in address_of(table)
+    click(table, f'[id="{MAIN}"] .bar > summary')
     table.run(f"""document.querySelector('[id="{MAIN}"] .menu summary').focus()""")
     table.press("Enter")
     assert table.run("document.querySelectorAll('.menu[open]').length") == 1
@@ -331,7 +332,7 @@ def test_rows_are_filtered_by_solver_and_problem_and_counted(table):
     assert set(column(table, 1)) == {"the UR5"}
     check(table, "ikpy")
     check(table, "pink")
-    assert column(table, 3) == ["pink", "ikpy"]
+    assert sorted(column(table, 3)) == ["ikpy", "pink"]
     assert texts(table, f'[id="{MAIN}"] .status') == [f"2 of {len(ROBOTS) * len(ENTRIES)} rows"]
 
 
@@ -457,7 +458,8 @@ def test_numbers_are_aligned_and_shares_have_bars_and_intervals(table):
     assert len(points) == 1
 
 
-NAMELESS = """[...document.querySelectorAll('a, button, summary, input, [role=region], nav, table, th')]
+NAMELESS = """[...document.querySelectorAll(
+    'a, button, summary, input, [role=region], nav, table, th')]
   .filter(e => !(e.ariaLabel || e.textContent.trim() || e.labels?.[0]?.textContent.trim()))
   .map(e => e.outerHTML.slice(0, 80))"""
 # Texts that differ too little from what is behind them, by WCAG's contrast ratio.
@@ -474,8 +476,8 @@ PALE = """(() => {
     .map(x => x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4)
     .reduce((sum, x, i) => sum + x * [0.2126, 0.7152, 0.0722][i], 0.05);
   const behind = e => {
-    while (e.parentElement && rgba(getComputedStyle(e).backgroundColor)[3] < 255) e = e.parentElement;
-    return getComputedStyle(e).backgroundColor;
+    const colour = getComputedStyle(e).backgroundColor;
+    return rgba(colour)[3] < 255 && e.parentElement ? behind(e.parentElement) : colour;
   };
   const texts = [...document.querySelectorAll("body *:not(svg *, script, th.same)")].filter(e =>
     e.checkVisibility() && [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim()));
@@ -486,7 +488,8 @@ PALE = """(() => {
 })()"""
 LANDMARKS = """[...document.querySelectorAll('[role=region], nav, section[aria-label]')]
     .map(e => e.ariaLabel)"""
-UNFOLDED = """document.querySelectorAll('details:not(.menu)').forEach(fold => { fold.open = true; });
+UNFOLDED = """
+    document.querySelectorAll('details:not(.menu)').forEach(fold => { fold.open = true; });
     new Promise(done => setTimeout(done, 300))"""
 
 

@@ -19,7 +19,7 @@ from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Layout
-from ...tables.results import Results, grouped, label, listed
+from ...tables.results import Results, grouped, label, listed, most_often
 from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, MOTION_TARGETS, NEAR, ONE_STEP, SOLVED, STABILITY, TARGETS
@@ -173,7 +173,7 @@ def _agreement(rows: Sequence[Row]) -> dict[str, str]:
 
 
 def _step_summary(rows: Sequence[Row]) -> Summary:
-    return _summary(rows, TARGETS, "The fastest solvers of one implicit step, by its error:")
+    return _summary(rows, TARGETS, "the error of one implicit step")
 
 
 def _summary(rows: Sequence[Row], targets: Mapping[str, float], title: str) -> Summary:
@@ -182,7 +182,16 @@ def _summary(rows: Sequence[Row], targets: Mapping[str, float], title: str) -> S
         f"{cloth}: {listed([f'to {target} {_fastest(group, target)}' for target in targets])}"
         for cloth, group in grouped(measured, lambda row: str(row["cloth"])).items()
     ]
-    return Summary(title, tuple(sentences)) if measured else NO_SUMMARY
+    if not measured:
+        return NO_SUMMARY
+    target = [*targets][-1]
+    arrivals = [row[target] for row in measured if target in row]
+    firsts = [
+        min(of_cloth, key=lambda point: point.seconds).solver
+        for of_cloth in grouped(arrivals, lambda point: point.cloth).values()
+    ]
+    first = f"is {most_often(firsts, 'cloth')}" if firsts else "is reached by nobody"
+    return Summary(f"The fastest to {target}, {title}, {first}.", tuple(sentences))
 
 
 def _fastest(rows: Sequence[Row], target: str) -> str:
@@ -251,7 +260,7 @@ def _fates(settings: Sequence[Point]) -> Iterator[str]:
 
 
 def _motion_summary(rows: Sequence[Row]) -> Summary:
-    title = "The fastest solvers of a motion, by its distance from the truth:"
+    title = "a distance from the true motion"
     summary = _summary(rows, MOTION_TARGETS, title)
     return summary._replace(points=(*summary.points, *_stable(rows)))
 
@@ -305,7 +314,10 @@ def _liu_summary(rows: Sequence[Row]) -> Summary:
         f"error of {words(row['our error'])}, published {words_in(row['published time'], 'ms')}"
         for row in rows
     )
-    return Summary(f"A frame of {_vertices(rows)['vertices']} vertices:", tuple(sentences))
+    ratios = [row["published time"] / row["our time"] for row in rows]
+    least, greatest = map(words, metrics.extent(np.array(ratios)))
+    sentence = f"On another machine, our times are {least} to {greatest} times shorter."
+    return Summary(sentence, tuple(sentences))
 
 
 liu_2013 = Layout(

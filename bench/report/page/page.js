@@ -54,7 +54,7 @@
       this.chosen = make("p", { className: "chosen", hidden: true });
       this.more = button(() => { this.limit = Infinity; this.show(); });
       this.more.className = "more";
-      const bar = make("div", { className: "bar", role: "group", ariaLabel: this.table.caption.textContent });
+      const bar = make("details", { className: "bar" }, make("summary", {}, "Filter and copy"));
       this.heads.forEach((head, j) => {
         head.append(button(() => this.change(() => this.sortBy(j)), ...head.childNodes));
         const values = [...new Set(this.rows.map(row => plain(row.cells[j])))];
