@@ -34,7 +34,7 @@ def with_solvers(records, count):
                 for r in records
                 if r.suite == suite and r.solver in (first, "Plumbob LM", "Plumbob Newton",
                     "Plumbob, compiled", "RK4", "ccd", "newton")
-                and r.facts.get("task") not in ("swing", "few iterations", "dampers")
+                and r.facts.get("task") not in ("few iterations", "dampers")
             ]  # fmt: skip
     return Results(list({r.key: r for r in found}.values()))
 

@@ -21,8 +21,6 @@ from . import COHERENT, COLD, CURVE, DRIFT, WARM
 MODES = (COLD, WARM, COHERENT)
 # The step that closes a curve is as large as the others if it exceeds them by at most this share.
 ALIKE = 0.01
-# Repetitions of the curve that is drawn several times.
-REPETITIONS = (1, 2, 3)
 _CAPTIONS = Captions(__file__)
 
 
@@ -87,19 +85,6 @@ def _points(rows: Sequence[Row]) -> Iterator[str]:
         hits, total = np.sum([row[f"within tolerance, {mode}"][:2] for row in rows], axis=0)
         frames = f"{words(int(hits))} of {words(int(total))} frames"
         yield f"{mode}: {angle} ({worst['curve']}, {worst['solver']}); {frames}"
-    counts = [row["iterations over all frames at once"] for row in rows]
-    yield f"all frames are changed together {words(min(counts))} to {words(max(counts))} times"
-    warm = [
-        row[title] for row in rows if (title := f"drift, {WARM}, after {REPETITIONS[-1]}") in row
-    ]
-    titles = [f"drift, {COHERENT}, after {i}" for i in REPETITIONS]
-    closed = [row[title] for row in rows for title in titles if title in row]
-    if warm and closed:
-        yield (
-            f"after three repetitions warm starts leave the arm {words_in(min(warm), '°')} to "
-            f"{words_in(max(warm), '°')} from its first pose; the drift of the closed coherent "
-            f"motion is never more than {words_in(max(closed), '°')}"
-        )
 
 
 def jitter_chart(results: Results) -> Sketch | None:

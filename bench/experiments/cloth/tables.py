@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Outcome
-
 from ...figures.chart import Axis, Chart, Panel, series
 from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.columns import spread_of, words_in
+from ...tables.columns import words_in
 from ...tables.layout import Layout
 from ...tables.results import (
     Results,
@@ -27,7 +25,7 @@ from ...tables.results import (
 from ...tables.table import Summary, words
 from ..cloth_peers import DECADES, SOLVED
 from ..pictures.figures import falling_cloth
-from . import DAMPERS, FEW, ONE_STEP, SWING
+from . import DAMPERS, FEW, ONE_STEP
 
 # Iterations after which errors are listed.
 LISTED = (1, 10, 100, 1000)
@@ -68,19 +66,15 @@ def convergence_chart(results: Results) -> Sketch | None:
 
 def _convergence_rows(results: Results) -> list[Row]:
     """Return a row for every solver on every cloth, cloth by cloth."""
-    tasks = {ONE_STEP: _one_step, FEW: _few_iterations, SWING: _swing}
+    tasks = {ONE_STEP: _one_step, FEW: _few_iterations}
     records = [record for task in tasks for record in results.all("cloth", task=task)]
     rows = []
-    for (cloth, solver), group in grouped(records, _cloth_and_solver).items():
-        row: Row = {"cloth": cloth, "solver": solver, "records": group}
+    for (title, solver), group in grouped(records, lambda r: (r.title, r.solver)).items():
+        row: Row = {"cloth": f"lab cloth, {title}", "solver": label(solver), "records": group}
         for record in group:
             row |= tasks[record.facts["task"]](record)
         rows.append(row)
     return [row for cloth in grouped(rows, lambda row: str(row["cloth"])).values() for row in cloth]
-
-
-def _cloth_and_solver(record: Record) -> tuple[str, str]:
-    return f"lab cloth, {record.title}", label(record.solver)
 
 
 def _one_step(record: Record) -> Row:
@@ -110,22 +104,12 @@ def _steps_of(count: int) -> str:
     return f"steps of {counted(count, 'iteration')}"
 
 
-def _swing(record: Record) -> Row:
-    solved = [outcome for outcome in Outcome if outcome.solved]
-    cells: Row = {"converged steps": metrics.share(np.isin(record.values.outcome, solved))}
-    for title, name in (("iterations", "iterations"), ("residual", "residual")):
-        median, _, largest = spread_of(record, name)
-        cells |= {f"{title} of converged steps, median": median}
-        cells |= {f"{title} of converged steps, largest": largest}
-    return cells | {"steps at the rounding floor": int(record.values.at_floor.sum())}
-
-
 def _convergence_summary(rows: Sequence[Row]) -> Summary:
     points = [
         f"{cloth}: {listed([_count(row) for row in of_cloth if row.get('iterations tried')])}"
         for cloth, of_cloth in grouped(rows, lambda row: str(row["cloth"])).items()
     ]
-    points += [*_single_iterations(rows), *_newton(rows)]
+    points += _single_iterations(rows)
     title = f"iterations to {SOLVED}"
     cloths = grouped((row for row in rows if row.get(title)), lambda row: str(row["cloth"]))
     firsts = [min(of_cloth, key=lambda r: r[title])["solver"] for of_cloth in cloths.values()]
@@ -151,21 +135,6 @@ def _single_iterations(rows: Sequence[Row]) -> Iterator[str]:
                 f"each: a median error of {words_in(row[f'{title}, median error'], '%')}; the "
                 f"cloth drifts by {words(drift)} m, {words_in(share, '%')} of its path"
             )
-
-
-def _newton(rows: Sequence[Row]) -> Iterator[str]:
-    swings = [row for row in rows if "converged steps" in row]
-    if swings:
-        shares = [row["converged steps"] for row in swings]
-        iterations, residual = (
-            max(row[f"{name} of converged steps, largest"] for row in swings)
-            for name in ("iterations", "residual")
-        )
-        yield (
-            f"Newton converged in {words(sum(share.hits for share in shares))} of "
-            f"{words(sum(share.total for share in shares))} consecutive steps, with at most "
-            f"{counted(int(iterations), 'iteration')} and a residual of at most {words(residual)}"
-        )
 
 
 convergence = Layout(
