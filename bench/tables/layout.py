@@ -7,7 +7,17 @@ from typing import Any
 from ..harness.record import Record
 from ..peers import registry
 from .results import Results, settings
-from .table import NO_SUMMARY, Column, Source, Summary, Table, best_cells, cells
+from .table import (
+    NO_SUMMARY,
+    Column,
+    Source,
+    Summary,
+    Table,
+    best_cells,
+    cells,
+    ranked_rows,
+    with_rows,
+)
 
 # Returns the sketch of a figure, None if its records are missing.
 Figure = Callable[[Results], Any]
@@ -47,7 +57,7 @@ class Layout:
     leads: Callable[[Any], Mapping[str, bool]] = lambda subject: {}
 
     def __call__(self, results: Results) -> Table:
-        """Return the table with a row for each subject."""
+        """Return the table with a row for each subject, the best of each group first."""
         subjects = list(self.subjects(results))
         columns = tuple(self.columns(subjects) if callable(self.columns) else self.columns)
         measured = self.measured
@@ -66,7 +76,7 @@ class Layout:
             tuple(map(source, subjects)),
             provenance(list(dict.fromkeys(records_of(subjects)))),
         )
-        return self._with_leaders(table, subjects)
+        return with_rows(self._with_leaders(table, subjects), ranked_rows(table))
 
     def _with_leaders(self, table: Table, subjects: Sequence[Any]) -> Table:
         """Return a table whose best cells are those of the tests that decide, where there are."""
