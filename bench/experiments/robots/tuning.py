@@ -16,7 +16,7 @@ import itertools
 import json
 import math
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -45,7 +45,7 @@ EQUAL_TIMES = 1.25
 _SHIFT = 1e-5
 # A worker is ended that has not finished a robot after so long [s].
 _PATIENCE = 3600.0
-Settings = Mapping[str, Any]
+Settings = dict[str, Any]
 
 
 class Search(NamedTuple):
@@ -159,15 +159,16 @@ def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int)
             errors = [f"{name}: {error}"] * count
     time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else -1.0
     bits = np.packbits(solved).tobytes().hex()
-    names = (*search[:2], dict(settings), search.peer.version)
+    names = (*search[:2], settings, search.peer.version)
     return Trial(*names, count, round(time, 1), bits, len(errors), errors[0] if errors else "")
 
 
 def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
     """Return the settings to try on all targets, from their trials on the first."""
-    share = {json.dumps(trial.settings): trial.share for trial in trials}
-    order = sorted(search.candidates, key=lambda settings: -share[json.dumps(settings)])
-    best = [*order[: math.ceil(len(order) / 4)], search.default, search.before]
+    tried = [trial for trial in trials if trial.settings in search.candidates]
+    order = sorted(tried, key=lambda trial: (-trial.share, search.candidates.index(trial.settings)))
+    best = [trial.settings for trial in order[: math.ceil(len(order) / 4)]]
+    best += [search.default, search.before]
     return [settings for i, settings in enumerate(best) if settings not in best[:i]]
 
 
