@@ -134,7 +134,7 @@ def not_asked(results: Results) -> list[str]:
 
 def _recorded_names() -> dict[str, set[str]]:
     """Return the names of each peer's entries in records, by its title."""
-    return {peer.title: set(map(peer.label_of, peer.entries)) for peer in registry.PEERS}
+    return {peer.shown: set(map(peer.label_of, peer.entries)) for peer in registry.PEERS}
 
 
 def _robot_groups(results: Results) -> Iterator[tuple[str, str, dict[str, list[Score]]]]:
