@@ -62,6 +62,11 @@ class Search(NamedTuple):
         """The solver."""
         return next(peer for peer in PEERS if peer.title == self.solver)
 
+    def ordered(self, trials: Sequence["Trial"]) -> list["Trial"]:
+        """Return the trials of candidates in their order."""
+        candidates = [trial for trial in trials if trial.settings in self.candidates]
+        return sorted(candidates, key=lambda trial: self.candidates.index(trial.settings))
+
     @property
     def settings(self) -> list[Settings]:
         """All settings that are tried."""
@@ -165,8 +170,7 @@ def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int)
 
 def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
     """Return the settings to try on all targets, from their trials on the first."""
-    tried = [trial for trial in trials if trial.settings in search.candidates]
-    order = sorted(tried, key=lambda trial: (-trial.share, search.candidates.index(trial.settings)))
+    order = sorted(search.ordered(trials), key=lambda trial: -trial.share)
     best = [trial.settings for trial in order[: math.ceil(len(order) / 4)]]
     best += [search.default, search.before]
     return [settings for i, settings in enumerate(best) if settings not in best[:i]]
@@ -179,7 +183,7 @@ def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
     those tie whose times are equal to the fastest; of these it is the default, if there and without
     exceptions, or the one with the greatest share.
     """
-    candidates = [trial for trial in trials if trial.settings in search.candidates]
+    candidates = search.ordered(trials)
     best = max(candidates, key=lambda trial: trial.share).solved.ravel()
     tied = [
         trial
