@@ -67,9 +67,9 @@ class StepSolver(Solver):
     followed: int = 200  # iterations of a step with recorded residual and error; 0 for none
     certified: int = 3000  # the maximum before an answer is certified
     # iterations of a step in a work-precision diagram
-    ladder: tuple[int, ...] = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+    ladder: tuple[int, ...] = (1, 3, 10, 30, 100, 300, 1000)
     # steps of a frame there, and iterations of each
-    motion: tuple[tuple[int, int], ...] = ((1, 10), (10, 10), (20, 10), (80, 2), (80, 10))
+    motion: tuple[tuple[int, int], ...] = ((1, 10), (10, 10), (40, 10))
 
 
 _Row = TypeVar("_Row")
