@@ -358,7 +358,7 @@ def test_the_terminal_shows_ten_lines_the_worst_first_and_exits_1(capsys, folder
     assert (code, err) == (1, "")
     lines = out.splitlines()
     assert len(lines) <= 10
-    assert lines[0] == "STOP: 1 row beyond the limits of --fail"
+    assert lines[0] == "STOP: 1 row beyond the limits"
     assert "LESS RIGHT arm/circle, ccd, residual (warm false): 0.0003" in lines[2]
     assert plumbob(capsys, "compare", "old", "new")[0] == 0
     assert plumbob(capsys, "compare", "old", "old", "--fail", "accuracy,time:0%,gone")[0] == 0
@@ -383,7 +383,10 @@ MISUSE = {
     "nothing": ([], "expected OLD and NEW, or --rerun REV, got 0 folders"),
     "both": (["old", "new", "--rerun", "HEAD"], "expected OLD and NEW, or --rerun REV"),
     "no records": (["old", "nowhere"], "no records in nowhere"),
-    "limits": (["old", "new", "--fail", "speed"], "--fail: expected accuracy"),
+    "limits": (
+        ["old", "new", "--fail", "speed"],
+        "--fail: expected accuracy or accuracy:SHARE, time:SHARE, solved:POINTS",
+    ),
     "suite": (["--rerun", "HEAD", "--suite", "x"], "unknown suite 'x': expected one of check"),
 }
 

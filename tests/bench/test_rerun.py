@@ -201,7 +201,9 @@ def test_what_cannot_be_measured_is_said_and_nothing_is_left(repository):
     with pytest.raises(ValueError, match="something to measure in both revisions, got nothing"):
         side_by_side(repository, words=("no such solver",))
     (repository / "bench" / "experiments" / "__init__.py").write_text("raise OSError('broken')")
-    with pytest.raises(ValueError, match="a process of the rerun ended: OSError: broken"):
+    with pytest.raises(
+        ValueError, match="--rerun: the working copy cannot be measured: OSError: broken"
+    ):
         side_by_side(repository)
     assert worktrees(repository) == 1
 
@@ -276,8 +278,8 @@ def test_another_project_is_refused_and_nothing_is_measured(capsys, tmp_path, mo
     project = tmp_path / "project"
     project.mkdir()
     refusal = (
-        "plumbob: --rerun: expected to be run in a clone of Plumbob, whose revisions it measures, "
-        f"got {project}: change to a clone, or compare two folders of records\n"
+        "plumbob: --rerun: expected --with and a solver of yours, or to be run in a clone of "
+        f"Plumbob, got {project}\n"
     )
     monkeypatch.chdir(project)
     for prepare in (
@@ -299,7 +301,7 @@ def test_the_command_measures_the_clone_in_which_it_is_run(capsys, repository, m
     code = cli.run_command(["compare", *arguments])
     out, err = capsys.readouterr()
     assert code == 1
-    assert out.splitlines()[0] == "STOP: 2 rows beyond the limits of --fail"
+    assert out.splitlines()[0] == "STOP: 2 rows beyond the limits"
     assert "plumbob: pair 2 of 2" in err
 
 
