@@ -91,7 +91,8 @@ def compare(  # noqa: PLR0913 -- one parameter an option
         rows = _side_by_side(rerun, entrants or [], suites or [], only or [], pairs)
         old, new = rerun, "the working copy"
     elif len(paths) == 2 and not rerun:
-        rows = comparison.compare(*map(_records, paths), bool({"solved", "error"} & {*limits}))
+        before, after = map(_records, paths)
+        rows = comparison.compare(before, after, not {"solved", "error"}.isdisjoint(limits))
         old, new = map(str, paths)
     else:
         got = f"{len(paths)} folder{'' if len(paths) == 1 else 's'}"

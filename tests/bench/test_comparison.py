@@ -27,6 +27,12 @@ def verdicts(old, new):
     return [(row.verdict, row.quantity) for row in compare(old, new).rows]
 
 
+def stopped(rows, **limits):
+    """The rows that fail a gate, without the limit behind their sentences."""
+    names = {(row.key, row.quantity) for row in failing(rows, limits)}
+    return [row for row in rows if (row.key, row.quantity) in names]
+
+
 def test_a_run_beside_itself_differs_in_nothing(records):
     made = compare(records, records)
     assert {row.verdict for row in made.rows} == {ChangeVerdict.SAME}
@@ -55,7 +61,7 @@ def test_the_last_digit_of_one_number_is_seen_whatever_else_changed(
     assert ChangeVerdict.SLOWER in {row.verdict for row in rows}
     if step > 0:
         assert rows[0] == found
-        assert failing(rows, {"accuracy": 0.0}) == [found]
+        assert stopped(rows, accuracy=0.0) == [found]
 
 
 WORSE = {
@@ -177,7 +183,8 @@ def test_a_slowdown_beyond_the_drift_is_called_and_one_within_is_undecided(make)
     assert made.rows[0].verdict == ChangeVerdict.SLOWER
     assert made.rows[0].key[2] == "s0"
     assert made.rows[0].ratio.low < 1.2 < made.rows[0].ratio.high
-    assert failing(made.rows, {"time": 0.1}) == made.rows[:1]
+    assert stopped(made.rows, time=0.1) == made.rows[:1]
+    assert failing(made.rows, {"time": 0.1})[0].why.endswith("(1.16 to 1.29) (limit 1.1)")
     assert failing(made.rows, {"time": 0.5}) == []
     assert called_rows(compare(new, old).rows) == ["s0"]
     old, new = two_runs(make, rng, drift=0.3, factor=1.2)
@@ -281,7 +288,7 @@ def test_a_change_is_a_share_of_the_larger_number_and_a_gate_stops_from_there_on
     rows = compare([old], [new]).rows
     (row,) = (row for row in rows if row.quantity == "largest_angle")
     assert (row.verdict, row.change) == (ChangeVerdict.CHANGED, 0.5)
-    assert failing(rows, {"accuracy": 0.5}) == [row]
+    assert stopped(rows, accuracy=0.5) == [row]
     assert failing(rows, {"accuracy": 0.51}) == []
 
 
@@ -376,6 +383,30 @@ def test_markdown_and_json_hold_what_was_found(capsys, folders):
     assert sum(content["counts"].values()) == len(content["rows"])
     ranks = [ORDER.index(ChangeVerdict(row["verdict"])) for row in content["rows"]]
     assert ranks == sorted(ranks)
+
+
+def test_a_gate_says_which_statistic_failed_and_by_how_much(make):
+    """To the point for shares and to the factor for errors; within the limit nothing fails."""
+    old = [make.solving("a", 59, count=60), make.worked("b", error=(0.5, 1e-4))]
+    new = [make.solving("a", 55, count=60), make.worked("b", error=(0.5, 3e-4))]
+    rows = compare(old, new, statistics=True).rows
+    assert [row.why for row in failing(rows, {"solved": 0.01, "error": 1.0})] == [
+        "smallest error grew from 1.0e-4 to 3.0e-4 (limit 2 times)",
+        "share solved fell from 98.3 % to 91.7 % (limit 1 point)",
+    ]
+    assert failing(rows, {"solved": 0.07, "error": 2.5}) == []
+    assert failing(compare(new, old, statistics=True).rows, {"solved": 0.0, "error": 0.0}) == []
+    assert not {"share solved", "smallest error"} & {row.quantity for row in compare(old, new).rows}
+
+
+def test_a_baseline_is_a_run_under_a_name(capsys, folders):
+    code, out, _ = plumbob(capsys, "compare", "old", "--save", "v1")
+    assert code == 0
+    assert "plumbob compare v1 NEW" in out
+    RecordFile("old").drop(lambda record: True)
+    assert plumbob(capsys, "compare", "v1", "new", "--fail", "accuracy")[0] == 1
+    assert plumbob(capsys, "compare", "new", "--save", "v1")[0] == 0  # in place of the other
+    assert plumbob(capsys, "compare", "v1", "new", "--fail", "accuracy,gone")[0] == 0
 
 
 MISUSE = {
