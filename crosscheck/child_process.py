@@ -110,13 +110,8 @@ def pickled(message: object) -> bytes:
 class ChildProcess:
     """A program in a session of its own, with messages on its three pipes.
 
-    It ends with this object, and with this process, however this process ends.
-
-    Attributes:
-        pid: its process.
-        partial: the bytes received after the last message.
-        request_length: the length of the last message to it [B].
-        last_words: the end of its standard error.
+    It ends with this object, and with this process, however this process ends. `partial` holds the
+    bytes received after the last message, `last_words` the end of its standard error.
     """
 
     def __init__(
@@ -128,21 +123,12 @@ class ChildProcess:
         memory: float = math.inf,
         longest: float = math.inf,
     ) -> None:
-        """Start a program.
+        """Start a program; raise OSError if that fails, ValueError if the command holds NUL.
 
-        Args:
-            command: the program and its arguments.
-            take: removes the first message from the received bytes and returns it, or () if there
-                is none yet; with pickled objects, prints of the program are discarded.
-            folder: its working directory.
-            environment: ours if None.
-            memory: limit of its memory, with all that it starts [B]. A limited program is not
-                trusted: processes that leave its group and session are ended with it.
-            longest: limit of the length of its messages [B].
-
-        Raises:
-            OSError: if it cannot be started.
-            ValueError: if the command holds a NUL character.
+        `take` removes the first message from the received bytes and returns it, or () if there is
+        none yet; with pickled objects, prints of the program are discarded. A program whose memory,
+        with all that it starts, is limited [B] is not trusted: processes that leave its group and
+        session are ended with it. `longest` limits its messages [B].
         """
         self._take, self._memory, self._longest = take, memory, longest
         self._marker = new_marker() if memory < math.inf else 0
@@ -196,14 +182,9 @@ class ChildProcess:
             self._selector.register(self._process.stdin, selectors.EVENT_WRITE)
 
     def receive(self, seconds: float = math.inf, processor: float = math.inf) -> Any:
-        """Return the next message.
+        """Return the next message, within limits of time and of the program's processor time [s].
 
-        Args:
-            seconds: limit of the time to wait [s].
-            processor: limit of the processor time of the program, after a `TICK` [s].
-
-        Raises:
-            LostError: if none comes in time, the program ended, or exceeds a limit.
+        Raise LostError if none comes in time, the program ended, or exceeds a limit.
         """
         start = looked = time.monotonic()
         self._looks.clear()
@@ -221,11 +202,7 @@ class ChildProcess:
         return message[0]
 
     def leave(self, seconds: float) -> tuple[bool, int]:
-        """Close its input and kill it if it still runs after some time [s].
-
-        Returns:
-            Whether it ended in time, and the number of processes that it left running.
-        """
+        """Close its input, end all after some time [s]; return whether it left, and its strays."""
         self._forget(self._process.stdin)
         with contextlib.suppress(OSError):
             self._process.stdin.close()
@@ -421,8 +398,7 @@ class CallProcess:
     def call(self, function: Callable[..., CallResult], *arguments: object) -> CallResult:
         """Return the result of a function of a module, which must not raise.
 
-        Raises:
-            LostError: if the process ended, or the call took too much processor time or too long.
+        Raise LostError if the process ended, or the call took too much processor time or too long.
         """
         try:
             if self._child is None:

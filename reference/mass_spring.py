@@ -23,7 +23,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy import uint64 as at
 from numpy.typing import ArrayLike
 
 from .arguments import (
@@ -179,9 +178,7 @@ class MassSpring(KeepsReadOnly):
     @functools.cached_property
     def spring_sums(self) -> FloatArray:
         """The sums of k r [N] and of 2 k [N/m] over the springs of each particle, (particle, 2)."""
-        sums = np.zeros((self.particle_count, 2))
-        _sums(self.arrays.springs, self.arrays.rest_lengths, self.arrays.stiffnesses, sums)
-        return sums
+        return _sums(*self.arrays[:4])
 
     @functools.cached_property
     def regions(self) -> Regions | None:
@@ -272,17 +269,20 @@ def rest_vectors(system: MassSpring, positions: ArrayLike) -> FloatArray:
     Of all vectors of length r_i, d_i is the nearest to the spring's own vector (Liu et al. 2013).
     For a slack tension-only spring, d_i is the spring's own vector.
     """
-    return _rest_vectors(_positions(system, positions), system.arrays)
+    length, u = _frames(system, positions)
+    slack = system.tension_only & (system.rest_lengths > 0.0) & (length <= system.rest_lengths)
+    return np.where(slack, length, system.rest_lengths)[:, None] * u
 
 
 def lengths(system: MassSpring, positions: ArrayLike) -> FloatArray:
     """Return the length of each spring [m], shape (spring,)."""
-    return _lengths(_positions(system, positions), system.arrays.springs)
+    return _frames(system, positions)[0]
 
 
 def stretches(system: MassSpring, positions: ArrayLike) -> FloatArray:
     """Return l - r of each spring [m], shape (spring,), zero for a slack tension-only spring."""
-    return _stretches(_positions(system, positions), system.arrays)
+    stretch = lengths(system, positions) - system.rest_lengths
+    return np.where(system.tension_only, np.maximum(stretch, 0.0), stretch)
 
 
 def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
@@ -423,43 +423,15 @@ def transverse_share(length, rest_length):
     return 1.0 if rest_length == 0.0 else 0.0
 
 
-def spring_lengths(x, springs):
-    """Return the length of every spring, shape (spring,)."""
-    lengths = np.empty(len(springs))
-    for s in range(len(springs)):
-        lengths[s], _ = spring_frame(x, springs[s, 0], springs[s, 1])
-    return lengths
-
-
-def sum_springs(springs, rest_lengths, stiffnesses, sums):
-    """Add k r and 2 k of every spring to the sums of both its particles, (particle, 2)."""
+def sum_springs(masses, springs, rest_lengths, stiffnesses):
+    """Return the sums of k r and of 2 k over the springs of each particle, (particle, 2)."""
+    sums = np.zeros((len(masses), 2))
     for s in range(len(springs)):
         k = stiffnesses[s]
-        for end in range(2):
-            i = at(springs[s, end])
+        for i in springs[s]:
             sums[i, 0] += k * rest_lengths[s]
             sums[i, 1] += 2.0 * k
-
-
-def spring_stretches(x, system):
-    """Return l - r of every spring, 0 if slack, shape (spring,)."""
-    stretches = np.empty(len(system.springs))
-    for s in range(len(system.springs)):
-        length, _ = spring_frame(x, system.springs[s, 0], system.springs[s, 1])
-        stretches[s] = spring_stretch(length, system.rest_lengths[s], system.tension_only[s])
-    return stretches
-
-
-def spring_rest_vectors(x, system):
-    """Return d of every spring, shape (spring, 3); see `mass_spring.rest_vectors`."""
-    vectors = np.empty((len(system.springs), 3))
-    for s in range(len(system.springs)):
-        length, u = spring_frame(x, system.springs[s, 0], system.springs[s, 1])
-        rest_length = system.rest_lengths[s]
-        if is_slack(length, rest_length, system.tension_only[s]):
-            rest_length = length
-        store_vector(vectors, s, scale(rest_length, u))
-    return vectors
+    return sums
 
 
 def spring_stretch(length, rest_length, tension_only):
@@ -485,10 +457,7 @@ def spring_frame(x, i, j):
 
 pulls = Kernel(spring_pulls)
 blocks = Kernel(stiffness_blocks)
-_lengths = Kernel(spring_lengths)
 _sums = Kernel(sum_springs)
-_stretches = Kernel(spring_stretches)
-_rest_vectors = Kernel(spring_rest_vectors)
 
 
 def _system(system: MassSpring) -> MassSpring:
@@ -497,6 +466,14 @@ def _system(system: MassSpring) -> MassSpring:
 
 def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
     return coordinates("positions", positions, _system(system).particle_count, 3)
+
+
+def _frames(system: MassSpring, positions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the lengths and the directions of all springs, as `spring_frame` does of one."""
+    p = np.subtract(*_positions(system, positions)[system.springs.T])
+    length = np.linalg.norm(p, axis=1)
+    p[length < COINCIDENT] = 1.0, 0.0, 0.0
+    return length, (1.0 / np.where(length < COINCIDENT, 1.0, length))[:, None] * p
 
 
 def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:

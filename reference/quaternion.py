@@ -233,12 +233,6 @@ def cosine(t):
     return t * c + 1.0
 
 
-def angle_between(a, b):
-    """Return the angle [rad] of the rotation from a to b, from 0 to pi."""
-    v = logarithm(multiply(b, conjugate(a)))
-    return norm(v)
-
-
 def rotation_about(axis, angle):
     """Return the rotation by an angle [rad] about a unit axis."""
     c, s = half_angle(angle)

@@ -5,8 +5,8 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.kinematics.faults import switches
-from plumbob.crosscheck.verify.kinematics.laws import HOLDS
 from plumbob.crosscheck.verify.kinematics.predictions import predict_forward, predict_track, solve
+from plumbob.crosscheck.verify.laws import HOLDS
 from plumbob.crosscheck.verify.verify import verify
 from plumbob.reference import Skeleton, forward_kinematics, solve_ik, track
 

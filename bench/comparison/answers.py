@@ -10,7 +10,6 @@ import numpy as np
 from plumbob.reference.arguments import distinct_texts
 
 from ..harness.metrics import chance_of_pairs
-from ..harness.record import Record
 from ..tables.table import words
 from .rows import ChangeVerdict, Pair, RowChange, RowKey
 
@@ -24,7 +23,7 @@ _MEMORY = frozenset({("cloth_scale", "before"), ("cloth_scale", "memory")})
 # Arrays that are better when smaller.
 _ERRORS = frozenset({
     "residual", "error", "position", "rotation", "beyond", "excess", "drift", "difference",
-    "positions", "rotations", "jacobians", "implicit", "true", "diverged", "above",
+    "positions", "rotations", "jacobians", "above",
 })  # fmt: skip
 # In other suites the distance of a target, which is an input.
 _DISTANCES = frozenset({("cloth", "distance"), ("newton", "distance")})
@@ -55,17 +54,6 @@ def worse_sign(suite: str, name: str) -> int:
     if name in _ERRORS or (suite, name) in _DISTANCES:
         return 1
     return -1 if name in _MERITS else 0
-
-
-def unfinished_motions(record: Record) -> np.ndarray:
-    """Return which motions the time limit ended early, (motion,); empty for other records.
-
-    A failed solver leaves a remark; records with remarks have no excuse.
-    """
-    arrays = record.arrays
-    if not {"frames", "wanted"} <= arrays.keys() or np.size(arrays.get("remark_particles", ())):
-        return np.zeros(0, dtype=bool)
-    return np.asarray(arrays["frames"] < arrays["wanted"])
 
 
 def compare_answers(key: RowKey, pair: Pair) -> RowChange:
@@ -145,18 +133,9 @@ def _common_targets(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.nd
     return old, new
 
 
-def _common_motions(pair: Pair, old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two arrays without the motions that a time limit ended in either run."""
-    unfinished = [unfinished_motions(record)[: np.size(old)] for record in pair]
-    if old.ndim == 1 and all(len(flags) == len(old) == len(new) for flags in unfinished):
-        finished = ~np.any(unfinished, axis=0)
-        return old[finished], new[finished]
-    return old, new
-
-
 def _compare_array(key: RowKey, name: str, pair: Pair) -> RowChange:
     """Return the change of an array of answers."""
-    old, new = _common_motions(pair, *_common_targets(pair.old.arrays[name], pair.new.arrays[name]))
+    old, new = _common_targets(pair.old.arrays[name], pair.new.arrays[name])
     if old.shape != new.shape:
         why = f"shape {old.shape}, now {new.shape}"
         return RowChange(key, name, ChangeVerdict.CHANGED, 1.0, why)

@@ -50,7 +50,7 @@ def standings(results: Results) -> list[Headline]:
     steps = points(results, cloth_peers.ONE_STEP)
     motions = [point for point in points(results, cloth_peers.MOTION) if point.is_whole]
     ranks += _cloth_ranks("step", "error", "error {}", steps)
-    ranks += _cloth_ranks("motion", "true", "{} m from the truth", motions)
+    ranks += _cloth_ranks("motion", "error", "error {}", motions)
     is_ranked = [" ranks " in headline.sentence for headline in ranks]
     first = [rank for rank, flag in zip(ranks, is_ranked, strict=True) if flag]
     others = [rank for rank, flag in zip(ranks, is_ranked, strict=True) if not flag]

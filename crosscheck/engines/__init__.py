@@ -6,10 +6,7 @@ from .pinocchio_robot import PinocchioRobot
 from .robot_engine import RobotEngine
 from .skeleton_engine import SKELETON_ENGINES, SkeletonEngine, forward_kinematics_by
 
-ROBOT_ENGINES: dict[str, type[RobotEngine]] = {
-    "Pinocchio": PinocchioRobot,
-    "MuJoCo": MujocoRobot,
-}
+ROBOT_ENGINES: dict[str, type[RobotEngine]] = {"Pinocchio": PinocchioRobot, "MuJoCo": MujocoRobot}
 
 __all__ = [
     "ROBOT_ENGINES",

@@ -30,7 +30,8 @@ class MujocoMassSpring:
     A free particle is a body at the world's origin with three slide joints, so that its qpos are
     its global position; a pinned one is a body without joints, positioned by `update_forces`. A
     spring is a spatial tendon between the sites of two bodies. Its `springlength` is the rest
-    length, or for a tension-only spring the interval from zero to it.
+    length, or for a tension-only spring the interval from zero to it. `columns` are the indices of
+    each free particle's coordinates in qpos and qvel, (free, 3).
 
     The integrator "discrete" omits the stiffness of a tendon that is exactly at its rest length and
     then differs from Gauss-Newton: do not start from the rest lengths.
@@ -39,11 +40,6 @@ class MujocoMassSpring:
     matrix. For point masses on three slides along the axes, which MuJoCo marks `body_simple`, that
     is its diagonal. Otherwise it would be the 3 x 3 blocks, as for "implicit". Both drop the
     coupling of different bodies.
-
-    Attributes:
-        model, data: MuJoCo's.
-        bodies: MuJoCo's index of each particle's body, found by name.
-        columns: indices of each free particle's coordinates in qpos and qvel, shape (free, 3).
     """
 
     def __init__(

@@ -43,13 +43,8 @@ class MujocoRobot(RobotEngine):
     Its links are MuJoCo's bodies. A body without a name is called "body#3" by its index, a joint
     without one "body#3/hinge1". MuJoCo orders bodies and joints depth first: all are found by name.
     A URDF's mimic joints become equality constraints, which kinematics does not enforce: this class
-    sets the coordinates of followers and adds their columns of the Jacobian to those of their
-    leaders.
-
-    Attributes:
-        model, data: MuJoCo's.
-        joints: MuJoCo's index of each joint.
-        followers: the joints that follow others, each after its leader.
+    sets the coordinates of followers, each after its leader, and adds their columns of the Jacobian
+    to those of their leaders.
     """
 
     def _read(self, path: Path, mimic: bool) -> None:

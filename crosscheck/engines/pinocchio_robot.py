@@ -38,10 +38,6 @@ class PinocchioRobot(RobotEngine):
     cosine and sine, quaternions are (x, y, z, w), and the linear velocity of a free joint is in its
     own, moving frame. Several joints of one body in an MJCF file form one composite joint, whose
     parts are found from the file.
-
-    Attributes:
-        model, data: Pinocchio's.
-        joints: the indices of each joint's coordinates and velocities.
     """
 
     def _read(self, path: Path, mimic: bool) -> None:

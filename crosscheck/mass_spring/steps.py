@@ -40,14 +40,14 @@ def damper_steps(integrator: str, case: int) -> Comparison:
     return _compare_with(integrator, case, semi_implicit(system, state, h, external, D))
 
 
-def gauss_newton_steps(case: int, *, damped: bool) -> Comparison:
+def gauss_newton_steps(damped: bool, case: int) -> Comparison:
     """Compare the state after a Gauss-Newton step with MuJoCo's discrete."""
     system, state, external, h = samples.network(case, damped=damped)
     end = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
     return _compare_with("discrete", case, end, damped=damped)
 
 
-def implicit_balances(case: int, *, damped: bool) -> Comparison:
+def implicit_balances(damped: bool, case: int) -> Comparison:
     """Compare M (x - y) of our converged step with h² f(x), with MuJoCo's forces at our x.
 
     The scale is |M (x - y)| + h² sum |spring force|.
@@ -136,15 +136,12 @@ def _balance(
 def _forces_at_end(
     system: MassSpring, state: State, x: FloatArray, h: float
 ) -> tuple[FloatArray, float]:
-    """Return MuJoCo's forces at the end x of an implicit step, and the springs' total tension.
+    """Return MuJoCo's forces at the end x of an implicit step [N], (free, 3), and all tension [N].
 
     Springs and gravity are MuJoCo's at x. The damper of the step is -c (l(x) - l_n)/h, a tendon of
     stiffness c/h and rest length l_n in MuJoCo, with l_n its own length of the spring at x_n.
-    MuJoCo's damper at the velocity (x - x_n)/h differs: it takes the component of the
-    velocity along the spring at x, which is not zero for a spring that only rotates.
-
-    Returns:
-        Forces on the free particles [N], shape (free, 3); sum of |force| over all springs [N].
+    MuJoCo's damper at the velocity (x - x_n)/h differs: it takes the component of the velocity
+    along the spring at x, which is not zero for a spring that only rotates.
     """
     dampers = MassSpring(
         system.masses,

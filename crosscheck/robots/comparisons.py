@@ -47,10 +47,8 @@ def sweep_in_parts(engine: str, model: RobotFile, part: float = PART) -> Iterato
     """Read a model and evaluate it by an engine in random configurations, some links at a time.
 
     If the reference or the engine refuses the mimic joints, these move independently for both.
-
-    Raises:
-        UnreadableError: if the engine does not read the file.
-        ValueError: if only the reference does not read it.
+    Raise UnreadableError if the engine does not read the file, ValueError if only the reference
+    does not.
     """
     try:
         yield from _sweep(engine, model, part)

@@ -100,9 +100,7 @@ def find(paths: Iterable[str | Path]) -> FileSelection:
 def check(files: Iterable[ModelFile], patience: float = 60.0) -> Iterator[CheckedFile]:
     """Yield the readings of each file, in a child process that survives crashes and time-outs.
 
-    Args:
-        files: as `find` returns them.
-        patience: limit of processor time for an engine and a file [s].
+    An engine may take so much processor time for a file [s].
     """
     files = tuple(files)
     included = {path for file in files for path in _includes(file)}

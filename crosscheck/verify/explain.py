@@ -5,7 +5,7 @@ of it suffices.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import chain, groupby
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,11 +47,9 @@ def explain(
 ) -> tuple[tuple[Explanation, ...], int]:
     """Return the variants that reproduce most answers, nearest first, and the number compared.
 
-    Args:
-        variants: in ascending order of the number of faults.
-        exchanges: the answers to compare, the most telling first: small, and wrong.
-        tolerance: the relative difference from a prediction that rounding explains.
-        describe: puts faults into words, given the keys of a class that no answer tells apart.
+    The variants come in ascending order of the number of faults, the most telling answers first:
+    small, and wrong. `tolerance` is the relative difference that rounding explains; `describe` puts
+    the faults into words, given the keys of a class that no answer tells apart.
     """
     answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
     count, matches = 0, list[Match]()
@@ -73,10 +71,16 @@ def explain(
 
 
 def _telling(matches: Sequence[Match]) -> list[Match]:
-    """Return the perfect matches, or else those better than the faultless variant's."""
-    right = max((match.share for match in matches if not match.variant.faults), default=0.0)
-    best = max((match.share for match in matches), default=0.0)
-    return [match for match in matches if match.share == 1.0 or right < match.share <= best < 1.0]
+    """Return the perfect matches, or else all, that explain more than any part of their faults."""
+
+    def is_needless(match: Match) -> bool:
+        faults = set(match.variant.faults)
+        return any(
+            set(part.variant.faults) < faults and part.share >= match.share for part in matches
+        )
+
+    perfect = [match for match in matches if match.share == 1.0]
+    return [match for match in perfect or matches if not is_needless(match)]
 
 
 def _match(
@@ -200,23 +204,3 @@ def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -
                     why=finding.sentence,
                 )
     return None
-
-
-def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
-    """Return hints at mistakes that no variant has."""
-    findings = chain.from_iterable(judgement.findings for judgement in judgements)
-    broken = {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
-    hints = []
-    if broken & {"equal answers", "equal requests"}:
-        hints.append(sentence(
-            "Equal requests get different answers. Look for state that is left over from the "
-            "request before, and for memory that is read before it is written or dangles (in "
-            "Eigen, a product kept with auto); a sanitizer (-fsanitize=address,undefined, or "
-            "valgrind) finds the latter."
-        ))  # fmt: skip
-    if "untouched inputs" in broken:
-        hints.append(sentence(
-            "The solver modifies the skeleton that it receives, so every later answer is for a "
-            "different skeleton. Copy what you change."
-        ))  # fmt: skip
-    return tuple(hints)

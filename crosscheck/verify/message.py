@@ -38,8 +38,7 @@ _BOM = b"\xef\xbb\xbf"
 # Texts, which stay as they are, and words such as NaN. A text without an end matches as well:
 # looking for the end of each text within it would take quadratic time.
 _WORDS = re.compile(
-    r'"(?:[^"\\]|\\.)*+"?|([+-]?)\b(nan(?:\(\w*\))?|inf(?:inity)?)(?!\w)',
-    re.IGNORECASE | re.DOTALL,
+    r'"(?:[^"\\]|\\.)*+"?|([+-]?)\b(nan(?:\(\w*\))?|inf(?:inity)?)(?!\w)', re.IGNORECASE | re.DOTALL
 )
 _TYPE_NAMES = {str: "a text", int: "an integer", float: "a number", bool: "a boolean"}
 

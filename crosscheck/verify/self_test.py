@@ -1,6 +1,9 @@
-"""Test the judge: laws catch every known fault, the search names it, honest solvers are right."""
+"""Test the judge: laws catch every known fault, the search names it, honest solvers are right.
 
-import inspect
+A fault counts as caught also by a reservation (RIGHT BUT): where a fault is small, as a sign that
+matters in few cases, the user is told of it even if no answer is wrong.
+"""
+
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -21,7 +24,7 @@ from .kinematics.faults import FAULTS, switches
 from .kinematics.predictions import predict_forward, predict_track, solve
 from .kinematics.robot_inverse_kinematics import FAULTS as ROBOT_FAULTS
 from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
-from .kinematics.robot_solver import solve_by_reference, solve_wrongly
+from .kinematics.robot_inverse_kinematics import solve_by_reference, solve_wrongly
 from .kinematics.textbook import Switches
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
 from .mass_spring.model import Integrator, StepModel, simulate
@@ -175,8 +178,6 @@ class Stepper:
     ) -> None:
         self.model, self.faults, self.precision = model, tuple(faults), precision
         self.first_h: dict[tuple[bytes, bytes], float] = {}
-        every = inspect.Parameter("inputs", inspect.Parameter.VAR_KEYWORD)
-        self.__signature__ = inspect.Signature([every])
 
     def __call__(self, **inputs: Any) -> dict[str, Any]:
         """Return positions and velocities, rounded to the precision."""

@@ -60,17 +60,10 @@ def verify(
     thorough: bool = False,
     notify: Notify = lambda task, count, total: None,
 ) -> Report:
-    """Try a solver at its tasks and return the report.
+    """Try a solver at its tasks, by default all that it offers, and return the report.
 
-    Args:
-        contestant: the solver.
-        tasks: a choice of the tasks that it offers, None for all.
-        seed: of the random cases.
-        thorough: whether to ask the long list of cases.
-        notify: called before each case with the task, the number of cases done, and of all.
-
-    Raises:
-        ValueError: if it does not offer a task.
+    The cases are random by the seed; there are more if `thorough`. `notify` is called before each
+    with the task, the number of cases done, and of all. Raise ValueError if a task is not offered.
     """
     greeting = contestant.greeting
     reports = []

@@ -32,8 +32,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, instance, number
-from ..backend.compiled import Kernel
-from ..mass_spring import spring_lengths
+from ..mass_spring import lengths
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor, factorize
 from .objective import Objective
@@ -230,7 +229,7 @@ def hessian_change(objective: Objective, x: FloatArray, radius: float) -> tuple[
         COVERED and L, or the reason why g may not be twice differentiable there and NaN.
     """
     system, ends = objective.effective, objective.effective.springs
-    k, r, length = objective.h**2 * system.stiffnesses, system.rest_lengths, _lengths(x, ends)
+    k, r, length = objective.h**2 * system.stiffnesses, system.rest_lengths, lengths(system, x)
     free_ends = system.free[ends].sum(axis=1)
     error = GRADIENT_ROUNDING * EPS * (length + _rest_length_terms(objective))
     reach = SLACK * np.sqrt(free_ends) * radius + error
@@ -269,7 +268,7 @@ def rounding_errors(objective: Objective, x: FloatArray) -> RoundingErrors:
     rounding errors of y, of the external forces and of the effective springs.
     """
     system, h, springs = objective.system, objective.h, objective.effective.springs
-    k, length = h * h * objective.effective.stiffnesses, _lengths(x, springs)
+    k, length = h * h * objective.effective.stiffnesses, lengths(objective.effective, x)
     rest_terms, m, free = _rest_length_terms(objective), system.masses, system.free
     coordinate_norms = _norms(x) + _norms(objective.y) + _norms(objective.x_n)
     loads = _norms(objective.external) + m * np.linalg.norm(system.gravity)
@@ -308,15 +307,9 @@ def _sum_over_springs(
     count: int, springs: IndexArray, at_first: FloatArray, at_second: FloatArray
 ) -> FloatArray:
     """Return the sum over each particle's springs of the value at its end, shape (particle,)."""
-    i, j = springs.T
-    total = np.zeros(count)
-    np.add.at(total, i, at_first)
-    np.add.at(total, j, at_second)
-    return total
+    ends = np.column_stack([at_first, at_second]).ravel()
+    return np.asarray(np.bincount(springs.ravel(), ends, count), dtype=np.float64)
 
 
 def _norms(vectors: FloatArray) -> FloatArray:
     return np.linalg.norm(vectors, axis=1)
-
-
-_lengths = Kernel(spring_lengths)

@@ -193,17 +193,12 @@ def residuals(state, target):
 
 def merit_of(state, target):
     """Return the root of the sum of weighted squares of distances and of lever times angles [m]."""
-    total = 0.0
+    total, lever = 0.0, LEVER * state.mechanism.reach
     for e in range(len(state.mechanism.effectors)):
         distance, angle = errors(state.mechanism, target, state.data, e)
-        total += weighted_square(state.mechanism, target["weight"][e], distance, angle)
+        square = distance * distance + lever * lever * angle * angle
+        total += target["weight"][e] * square
     return math.sqrt(total)
-
-
-def weighted_square(mechanism, weight, distance, angle):
-    """Return the share of an effector in the square of the merit [m²]."""
-    lever = LEVER * mechanism.reach
-    return weight * (distance * distance + lever * lever * angle * angle)
 
 
 def least_residual(mechanism, target):

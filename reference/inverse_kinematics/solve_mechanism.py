@@ -18,7 +18,6 @@ from ..articulation import (
 )
 from ..backend.compiled import Kernel, bind
 from ..quaternion import (
-    angle_between,
     load_quaternion,
     load_vector,
     made_unit,
@@ -51,8 +50,8 @@ from .mechanism import (
     residuals,
     scatter,
     store_ball,
+    store_effector,
     update_forward_kinematics,
-    weighted_square,
 )
 from .restarts import (
     COST,
@@ -147,7 +146,9 @@ def solve_mechanisms(
         for j in range(len(joints)):
             _, Q = joint_transform(joints, j, q)
             store_quaternion(local[i], j, Q)
-        distance, angle, merit = errors_of_pose(mechanism, target, positions[i], rotations)
+        place_effectors(mechanism, data, positions[i], rotations)
+        distance, angle, _, _ = residuals(state, target)
+        merit = merit_of(state, target)
         fill_figures(figures[i], distance, angle, iterations, merit, bound)
         reached = distance <= limits.tolerance and angle <= limits.tolerance_rotation
         figures[i, OUTCOME] = outcome_of(reached, bound > limits.tolerance, stalled).value
@@ -192,19 +193,12 @@ def mechanism_criteria(mechanism, bound, limits):
     )
 
 
-def errors_of_pose(mechanism, target, positions, rotations):
-    """Return the largest distance [m] and angle [rad] of a pose of all joints, and its merit."""
-    largest, largest_angle, total = 0.0, 0.0, 0.0
+def place_effectors(mechanism, data, positions, rotations):
+    """Put the effectors where a pose of all joints of the articulation has them."""
     for e in range(len(mechanism.effectors)):
-        j, angle = mechanism.effectors["source"][e], 0.0
-        distance = norm(subtract(load_vector(target["position"], e), load_vector(positions, j)))
-        if mechanism.effectors["oriented"][e]:
-            angle = angle_between(
-                load_quaternion(rotations, j), load_quaternion(target["rotation"], e)
-            )
-        largest, largest_angle = max(largest, distance), max(largest_angle, angle)
-        total += weighted_square(mechanism, target["weight"][e], distance, angle)
-    return largest, largest_angle, math.sqrt(total)
+        j = mechanism.effectors["source"][e]
+        x, R = load_vector(positions, j), load_quaternion(rotations, j)
+        store_effector(mechanism, data, e, x, R)
 
 
 def perturb_mechanism(state, _target, _criteria, first):

@@ -90,8 +90,9 @@ class PoseJudgement:
                 f"rotations put the joints, and change a link's length by up to "
                 f"{self.length_error:.2g} m."
             )
-        deviation = f"Quaternions are up to {self.norm_deviation:.2g} off unit length."
-        return " ".join([*sentences, deviation])
+        if self.norm_deviation:
+            sentences.append(f"Quaternions are up to {self.norm_deviation:.2g} off unit length.")
+        return " ".join(sentences)
 
 
 def judge_pose(

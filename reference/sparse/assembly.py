@@ -25,14 +25,16 @@ class BlockSum:
         spring = np.repeat(np.arange(s), np.diff(columns.indptr))
         self._ends = np.full((s, 2), -1, dtype=np.int32)
         self._ends[spring, np.arange(columns.nnz) - columns.indptr[spring]] = columns.indices
-        self._starts, self._rows = _pattern_of_pairs(self._ends, n)
+        self._scalar = _pattern(_joined(self._ends, n))
+        self._starts, self._rows = self._scalar.indptr, self._scalar.indices
         self._places = _block_places(self._ends, self._starts, self._rows)
-        self._scalar = _pattern(self._starts, self._rows)
 
     @functools.cached_property
     def _wide(self) -> tuple[Any, IndexArray]:
-        starts, rows, diagonal = _widened(self._starts, self._rows)
-        return _pattern(starts, rows), diagonal
+        ones = np.broadcast_to(np.int8(1), (len(self._rows), 3, 3))
+        wide = _pattern(scipy.sparse.bsr_array((ones, self._rows, self._starts)).tocsr())
+        columns = np.repeat(np.arange(wide.shape[1], dtype=np.int32), np.diff(wide.indptr))
+        return wide, np.flatnonzero(wide.indices == columns)
 
     @property
     def diagonal(self) -> IndexArray:
@@ -50,10 +52,22 @@ class BlockSum:
         return _filled(self._scalar, data)
 
 
-def _pattern(starts: IndexArray, rows: IndexArray) -> Any:
+def _joined(ends: IndexArray, count: int) -> Any:
+    """Return all pairs that a spring joins and the diagonal as entries, sparse CSC."""
+    i, j = ends[(ends >= 0).all(axis=1)].T
+    diagonal = np.arange(count, dtype=np.int32)
+    rows, columns = np.concatenate([i, j, diagonal]), np.concatenate([j, i, diagonal])
+    ones = np.ones(len(rows), np.int8)
+    pairs = scipy.sparse.coo_array((ones, (rows, columns)), (count, count)).tocsc()
+    pairs.sort_indices()
+    return pairs
+
+
+def _pattern(symmetric: Any) -> Any:
     """Return a sparse CSC matrix of zeros without memory; its pattern is read-only."""
-    size, zeros = len(starts) - 1, np.broadcast_to(0.0, len(rows))
-    matrix = scipy.sparse.csc_array((zeros, frozen(rows), frozen(starts)), (size, size))
+    rows, starts = frozen(symmetric.indices), frozen(symmetric.indptr)
+    zeros = np.broadcast_to(0.0, len(rows))
+    matrix = scipy.sparse.csc_array((zeros, rows, starts), symmetric.shape)
     matrix.has_canonical_format = True
     return matrix
 
@@ -63,53 +77,6 @@ def _filled(pattern: Any, data: FloatArray) -> Any:
     matrix = copy.copy(pattern)
     matrix.data = data
     return matrix
-
-
-def join_ends(ends, count):
-    """Return the pattern of all pairs that a spring joins and of the diagonal, columns sorted."""
-    starts = np.zeros(count + 2, np.int64)
-    starts[2:] = 1
-    for s in range(len(ends)):
-        if ends[s, 0] >= 0 and ends[s, 1] >= 0:
-            starts[ends[s, 0] + 2] += 1
-            starts[ends[s, 1] + 2] += 1
-    for c in range(count):
-        starts[c + 2] += starts[c + 1]
-    next_start, rows = starts.copy(), np.empty(starts[count + 1], np.int32)
-    for c in range(count):
-        push_row(rows, starts, c, c)
-    for s in range(len(ends)):
-        if ends[s, 0] >= 0 and ends[s, 1] >= 0:
-            push_row(rows, starts, ends[s, 0], ends[s, 1])
-            push_row(rows, starts, ends[s, 1], ends[s, 0])
-    return without_repeats(starts, sorted_columns(starts, next_start, rows))
-
-
-def push_row(rows, ends, column, row):
-    """Append a row to the column that ends at ends[column + 1]."""
-    rows[ends[column + 1]] = row
-    ends[column + 1] += 1
-
-
-def sorted_columns(starts, ends, rows):
-    """Return the rows of a symmetric pattern sorted: transposed, column after column."""
-    result = np.empty(len(rows), np.int32)
-    for c in range(len(starts) - 2):
-        for e in range(starts[c], starts[c + 1]):
-            push_row(result, ends, rows[e], c)
-    return result
-
-
-def without_repeats(starts, rows):
-    """Return starts and rows of sorted columns, each row once."""
-    ends, p = np.zeros(len(starts) - 1, np.int32), 0
-    for c in range(len(starts) - 2):
-        for e in range(starts[c], starts[c + 1]):
-            if e == starts[c] or rows[e] != rows[p - 1]:
-                rows[p] = rows[e]
-                p += 1
-        ends[c + 1] = p
-    return ends, rows[:p].copy()
 
 
 def block_places(ends, starts, rows):
@@ -135,23 +102,6 @@ def find(rows, first, last, row):
         else:
             last = middle
     return first
-
-
-def widen_pattern(starts, rows):
-    """Return the pattern with 3 x 3 entries for each entry, and the places of its diagonal."""
-    wide_starts = np.zeros(3 * len(starts) - 2, np.int32)
-    wide_rows = np.empty(9 * len(rows), np.int32)
-    diagonal, p = np.empty(3 * len(starts) - 3, np.int64), 0
-    for column in range(len(starts) - 1):
-        for c in range(3):
-            for e in range(starts[column], starts[column + 1]):
-                for r in range(3):
-                    wide_rows[p] = 3 * rows[e] + r
-                    if wide_rows[p] == 3 * column + c:
-                        diagonal[3 * column + c] = p
-                    p += 1
-            wide_starts[3 * column + c + 1] = p
-    return wide_starts, wide_rows, diagonal
 
 
 def sum_blocks(blocks, places, ends, starts):
@@ -181,8 +131,6 @@ def sum_weights(weights, diagonal, places, starts, rows):
     return data
 
 
-_pattern_of_pairs = Kernel(join_ends)
 _block_places = Kernel(block_places)
-_widened = Kernel(widen_pattern)
 _summed_blocks = Kernel(sum_blocks)
 _summed_weights = Kernel(sum_weights)

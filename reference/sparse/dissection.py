@@ -7,12 +7,8 @@ grows evenly from a to b, and its level sets are straight, while level sets of a
 Whatever the threshold t of a coordinate f, the vertices with f >= t that have a neighbour with
 f < t are a separator, and one sweep over the edges counts them for every t.
 
-Small pieces are ordered by minimum degree: eliminating a vertex joins all its neighbours, and the
-vertex with the fewest goes first (Tinney and Walker 1967, "Direct Solutions of Sparse Network
-Equations by Optimally Ordered Triangular Factorization"). Neighbours outside of the piece count
-although they are eliminated later: without this halo (Pellegrini, Roman, Amestoy 2000, "Hybridizing
-Nested Dissection and Halo Approximate Minimum Degree") the vertices on a piece's rim would always
-seem to have the least degree.
+Pieces that cannot be split well are ordered from the inside out: the neighbours of a piece are
+eliminated later, so that the vertices on its rim, which have many of them, go last.
 """
 
 import math
@@ -20,8 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-LEAF = 20  # pieces of at most so many vertices are ordered by minimum degree
-HARD = 2000  # so are pieces of at most so many vertices that have no good separator
+LEAF = 4  # pieces of at most so many vertices are not split
 LEAST_SHARE = 0.2  # of a piece: what the smaller half must have
 LARGEST_SHARE = 0.3  # of a piece: what a good separator may have
 AXES = 4  # coordinates of a vertex
@@ -47,7 +42,7 @@ class Search(NamedTuple):
 def nested_dissection(graph, order):
     """Reorder the vertices in `order` in place, so that eliminating them leaves little fill."""
     n = len(order)
-    local = np.full(n, -1, np.int32)
+    inside = np.zeros(n, np.bool_)
     search = Search(
         np.zeros(n, np.int32),
         np.zeros((AXES, n), np.int32),
@@ -62,7 +57,7 @@ def nested_dissection(graph, order):
         first, last, measured = pieces[waiting, 0], pieces[waiting, 1], pieces[waiting, 2]
         piece = order[first:last]
         if len(piece) <= LEAF:
-            minimum_degree(graph, piece, local)
+            put_rim_last(graph, piece, inside)
             continue
         if not measured:
             region = enter(search, piece, region + 1)
@@ -78,8 +73,8 @@ def nested_dissection(graph, order):
             waiting = push(pieces, waiting, first + left, first + left + right, 1)
         elif measured:
             waiting = push(pieces, waiting, first, last, 0)
-        elif len(piece) <= HARD:
-            minimum_degree(graph, piece, local)
+        else:
+            put_rim_last(graph, piece, inside)
 
 
 def push(pieces, waiting, first, last, measured):
@@ -273,63 +268,18 @@ def divide(search, axis, t, piece):
     return left, right
 
 
-def minimum_degree(graph, piece, local):
-    """Reorder the vertices of a piece in place; `local` is -1 everywhere, before and after.
-
-    Of several vertices of least degree, the longest unchanged goes first: so
-    elimination moves about, as it does where many are eliminated at once (Liu 1985, "Modification
-    of the Minimum-Degree Algorithm by Multiple Elimination").
-    """
-    adjacent = adjacency(graph, piece, local)
-    count, width = adjacent.shape
-    vertices, ranks = np.empty(count, np.int32), np.zeros(count, np.int64)
-    for v in range(count):
-        vertices[v] = piece[v]
-        for u in range(width):
-            ranks[v] += int(adjacent[v, u])
-        ranks[v] *= count + 1
-    for position in range(count):
-        lowest = 0
-        for v in range(count):
-            if ranks[v] < ranks[lowest]:
-                lowest = v
-        piece[position] = vertices[lowest]
-        eliminate(adjacent, ranks, lowest, position + 1)
-        ranks[lowest] = (width + 1) * (count + 1)  # never the lowest again
-
-
-def adjacency(graph, piece, local):
-    """Return the adjacency of the piece to piece and halo, as 0 and 1."""
-    count, entries = len(piece), 0
-    for i in range(count):
-        local[piece[i]] = i
-        entries += graph.indptr[piece[i] + 1] - graph.indptr[piece[i]]
-    halo, width = np.empty(entries, np.int32), count
-    for v in piece:
-        for u in graph.indices[graph.indptr[v] : graph.indptr[v + 1]]:
-            if local[u] < 0:
-                local[u], halo[width - count] = width, u
-                width += 1
-    adjacent = np.zeros((count, width), np.uint8)
-    for i in range(count):
-        for u in graph.indices[graph.indptr[piece[i]] : graph.indptr[piece[i] + 1]]:
-            adjacent[i, local[u]] = 1
-        adjacent[i, i] = 0
-    for v in piece:
-        local[v] = -1
-    for v in halo[: width - count]:
-        local[v] = -1
-    return adjacent
-
-
-def eliminate(adjacent, ranks, v, now):
-    """Join all neighbours of v and take it out; their ranks are degree, then time of change."""
-    count, width = adjacent.shape
-    for u in range(count):
-        if adjacent[v, u]:
-            degree = 0
-            for w in range(width):
-                adjacent[u, w] |= adjacent[v, w]
-                degree += int(adjacent[u, w])
-            adjacent[u, u] = adjacent[u, v] = 0
-            ranks[u] = (degree - 2) * (count + 1) + now
+def put_rim_last(graph, piece, inside):
+    """Reorder a piece by the number of neighbours outside; `inside` is False before and after."""
+    outside = np.zeros(len(piece), np.int32)
+    inside[piece] = True
+    for i in range(len(piece)):
+        for e in range(graph.indptr[piece[i]], graph.indptr[piece[i] + 1]):
+            outside[i] += not inside[graph.indices[e]]
+    inside[piece] = False
+    places = np.zeros(outside.max() + 2, np.int32)
+    for count in outside:
+        places[count + 1] += 1
+    places = np.cumsum(places)
+    for i, v in enumerate(piece.copy()):
+        piece[places[outside[i]]] = v
+        places[outside[i]] += 1

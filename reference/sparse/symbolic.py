@@ -44,10 +44,10 @@ def analyse(graph, order):
     `order` lists all vertices of the graph; it is overwritten.
     """
     nested_dissection(graph, order)
-    parents = elimination_tree(graph, order, inverse(order))
+    parents, counts = elimination_tree(graph, order, inverse(order))
     relabelling = postorder(parents)
     order, parents = composed(order, relabelling), relabelled(parents, relabelling)
-    counts = column_counts(graph, order, inverse(order), parents)
+    counts = composed(counts, relabelling)
     member = fundamental(parents, counts)
     relabelling, columns = gather(member, amalgamate(member, parents, counts))
     order, parents = composed(order, relabelling), relabelled(parents, relabelling)
@@ -82,104 +82,43 @@ def relabelled(parents, relabelling):
 
 
 def elimination_tree(graph, order, place):
-    """Return the parent of each column of P A P', -1 for a root (Liu 1990, algorithm 4.2).
+    """Return the parent of each column of P A P', -1 for a root, and the lengths of L's columns.
 
-    `order` lists the vertices as they are eliminated, and `place` is its inverse.
+    Row i of L has entries in the columns of row i of A and in their ancestors up to i, so that
+    climbing from each of them finds both (Davis 2005, "Algorithm 849: A Concise Sparse Cholesky
+    Factorization Package"). `order` lists the vertices as they are eliminated, `place` inverts it.
     """
     n = len(order)
-    parents, ancestors = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    parents, visited, counts = np.full(n, -1, np.int32), np.empty(n, np.int32), np.ones(n, np.int32)
     for i in range(n):
+        visited[i] = i
         v = order[i]
         for e in range(graph.indptr[v], graph.indptr[v + 1]):
             k = place[graph.indices[e]]
-            while k >= 0 and k < i:  # climb to the root, and let the path point at i
-                above = ancestors[k]
-                ancestors[k] = i
-                if above < 0:
+            while k < i and visited[k] != i:
+                visited[k] = i
+                counts[k] += 1
+                if parents[k] < 0:
                     parents[k] = i
-                k = above
-    return parents
+                k = parents[k]
+    return parents, counts
 
 
 def postorder(parents):
-    """Return the nodes of a forest so that every subtree is consecutive and ends in its root."""
-    n = len(parents)
-    eldest, sibling = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
-    for j in range(n - 1, -1, -1):
-        if parents[j] >= 0:
-            sibling[j], eldest[parents[j]] = eldest[parents[j]], j
-    result, path, count = np.empty(n, np.int32), np.empty(n, np.int32), 0
-    for root in range(n):
-        if parents[root] >= 0:
-            continue
-        path[0], depth = root, 1
-        while depth > 0:
-            j = path[depth - 1]
-            child = eldest[j]
-            if child >= 0:
-                eldest[j] = sibling[child]
-                path[depth] = child
-                depth += 1
-            else:
-                result[count] = j
-                count, depth = count + 1, depth - 1
-    return result
+    """Return the nodes of a forest so that every subtree is consecutive and ends in its root.
 
-
-def column_counts(graph, order, place, parents):
-    """Return the number of entries in each column of L, the diagonal included.
-
-    The nodes are in postorder. Row i of L is the subtree of the nodes k with a_ik not zero and
-    their ancestors up to i; adding up over all rows, each leaf of a subtree adds 1 and each
-    meeting of two paths subtracts 1 (Gilbert, Ng, Peyton 1994, "An Efficient Algorithm to
-    Compute Row and Column Counts for Sparse Cholesky Factorization").
+    Parents come after their children; entry -1 is the node above all roots.
     """
-    n = len(order)
-    first, counts = first_descendants(parents)
-    last_leaf, latest = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
-    roots = np.arange(n).astype(np.int32)
-    for j in range(n):
-        if parents[j] >= 0:
-            counts[parents[j]] -= 1
-        v = order[j]
-        for e in range(graph.indptr[v], graph.indptr[v + 1]):
-            i = place[graph.indices[e]]
-            if i > j and first[j] > latest[i]:  # j is a leaf of row i's subtree
-                counts[j] += 1
-                if last_leaf[i] >= 0:
-                    counts[current_root(roots, last_leaf[i])] -= 1
-                last_leaf[i] = j
-            if i > j:
-                latest[i] = max(latest[i], first[j])
-        if parents[j] >= 0:
-            roots[j] = parents[j]
-    for j in range(n):
-        if parents[j] >= 0:
-            counts[parents[j]] += counts[j]
-    return counts
-
-
-def first_descendants(parents):
-    """Return the first node of each subtree in postorder, and 1 for each leaf, else 0."""
     n = len(parents)
-    first, counts = np.arange(n).astype(np.int32), np.ones(n, np.int32)
+    sizes, ends = np.ones(n + 1, np.int32), np.full(n + 1, n, np.int32)
     for j in range(n):
-        if parents[j] >= 0:
-            counts[parents[j]] = 0
-            first[parents[j]] = min(first[parents[j]], first[j])
-    return first, counts
-
-
-def current_root(roots, leaf):
-    """Return the current root of a node's tree, and let the path to it point there."""
-    root = leaf
-    while roots[root] != root:
-        root = roots[root]
-    while leaf != root:
-        above = roots[leaf]
-        roots[leaf] = root
-        leaf = above
-    return root
+        sizes[parents[j]] += sizes[j]
+    result = np.empty(n, np.int32)
+    for j in range(n - 1, -1, -1):
+        ends[j] = ends[parents[j]] - 1
+        ends[parents[j]] -= sizes[j]
+        result[ends[j]] = j
+    return result
 
 
 def entries(width, height):
@@ -203,9 +142,7 @@ def fundamental(parents, counts):
 
 def amalgamate(member, parents, counts):
     """Return the final supernode that each supernode becomes a part of."""
-    count = 0
-    for s in member:
-        count = max(count, s + 1)
+    count = member[-1] + 1 if len(member) > 0 else 0
     last = np.zeros(count, np.int64)
     width, filled = np.zeros(count, np.int64), np.zeros(count, np.int64)
     for j in range(len(member)):
@@ -286,9 +223,7 @@ def row_lists(graph, order, place, member, above, starts):
     rows in order leaves every list sorted.
     """
     rows, filled = np.empty(starts[-1], np.int32), starts.copy()
-    visited = np.empty(len(above), np.int32)
-    for s in range(len(above)):
-        visited[s] = -1
+    visited = np.full(len(above), -1, np.int32)
     for i in range(len(order)):
         visited[member[i]] = i
         v = order[i]

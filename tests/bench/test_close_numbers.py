@@ -9,8 +9,9 @@ from plumbob.bench.comparison.answers import compare_answers
 from plumbob.bench.comparison.rows import Pair, row_key
 from plumbob.bench.experiments.check import tables as check
 from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.kinematics import inverse_kinematics, laws, resample
+from plumbob.crosscheck.verify.kinematics import inverse_kinematics, pose_laws, resample
 from plumbob.crosscheck.verify.kinematics.polylines import Polyline
+from plumbob.crosscheck.verify.laws import HOLDS
 from plumbob.crosscheck.verify.output import comparison
 from plumbob.reference import Skeleton, arguments
 from plumbob.reference.articulation import Articulation
@@ -39,14 +40,14 @@ def body(lower, upper):
 
 
 def claimed_residual():
-    case = Case("", "", {"tolerance": 1e-6}, "", laws.HOLDS)
+    case = Case("", "", {"tolerance": 1e-6}, "", HOLDS)
     (finding,) = inverse_kinematics.claims(1e-5, 1e-9, {"residual": 1e-5 * (1 + 2e-3)}, case)
     return finding.sentence
 
 
 def spaced(gap, spacing):
     points = np.array([[0.0, 0, 0], [gap, 0, 0], [1.0, 0, 0]])
-    case = Case("", "", {"curve": points, "spacing": spacing, "closed": False}, "", laws.HOLDS,
+    case = Case("", "", {"curve": points, "spacing": spacing, "closed": False}, "", HOLDS,
                 facts={"line": Polyline(points, (0,), False)})  # fmt: skip
     gaps = np.array([gap])
     return resample._gaps_by_spacing([gaps, gaps, gaps], case, 0.0).sentence
@@ -71,7 +72,9 @@ SENTENCES = {
     ),
     "URDF": lambda _: message(urdf.parse, robot(3.0 * CLOSE, 3.0), crossed_limits="refused"),
     "MJCF": lambda _: message(mjcf.parse, body(3.0 * CLOSE, 3.0)),
-    "unit quaternions": lambda _: laws.unit(np.array([1.0 - 2.0**-24]), 0.0).sentence,
+    "unit quaternions": lambda _: (
+        pose_laws.unit_quaternions(np.array([1.0 - 2.0**-24]), 0.0).sentence
+    ),
     "residual": lambda _: claimed_residual(),
     "spacing": lambda _: spaced(0.5 * (1 + 1e-5), 0.5),
     "records' sizes": sizes,

@@ -1,6 +1,8 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
 import importlib
+import subprocess
+import sys
 from functools import partial
 
 import numpy as np
@@ -125,7 +127,7 @@ def test_the_highest_mode_is_one_and_none_is_higher(cloth):
 def test_the_truth_is_of_order_four_and_surer_than_any_error_measured():
     answers = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
     assert answers.order == pytest.approx(4.0, abs=0.15)
-    assert answers.unsure < 0.1 * MOTION_TARGETS[NEAR] * answers.path[-1]
+    assert answers.unsure < 0.1 * MOTION_TARGETS[NEAR]
 
 
 def test_the_truth_is_where_symplectic_euler_goes_at_order_one(cloth):
@@ -177,14 +179,15 @@ def test_errors_do_not_care_how_the_world_is_turned_or_particles_are_numbered(rn
     assert metrics.rms_distance(*moved[:2]) == pytest.approx(metrics.rms_distance(x, exact))
 
 
-def test_a_motion_has_diverged_if_one_particle_is_ever_too_far(rng):
-    true = rng.standard_normal((4, 7, 3))
-    assert not peers_cloth.diverged(true + 1.9, true)
+def test_a_motion_has_diverged_if_one_particle_is_ever_too_far():
+    answers = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
+    assert peers_cloth.motion_error(answers.true, answers) == answers.unsure
+    start = falling_cloth(SIZE, STIFFNESS).start.positions
+    assert peers_cloth.motion_error(np.array([start, start]), answers) == pytest.approx(1.0)
     for bad in (3.0, np.nan, -np.inf):
-        positions = true.copy()
-        positions[1, 2, 0] += bad
-        assert peers_cloth.diverged(positions, true)
-    assert not peers_cloth.diverged(true[:0], true[:0])
+        positions = answers.true.copy()
+        positions[0, 2, 0] += bad
+        assert peers_cloth.motion_error(positions, answers) == np.inf
 
 
 # The adapters.
@@ -413,24 +416,21 @@ FALL = peers_cloth.Fall(peers_cloth.Level(SIZE, 5), partial(falling_cloth, SIZE,
 
 
 @pytest.mark.parametrize(
-    ("manner", "frames", "lost", "why"),
+    ("manner", "remark", "trouble"),
     [
-        ("well", 5, False, ""),
-        ("hangs", 2, False, "5 × 5, as it is: not finished: ended after 0.5 s of silence"),
-        ("crashes", 2, False, "5 × 5, as it is: its process ended with code 3"),
-        ("explodes", 3, True, ""),
+        ("well", "", ""),
+        ("hangs", "not finished: ended after 0.5 s of silence", True),
+        ("crashes", "its process ended with code 3", True),
+        ("explodes", "diverged", False),
     ],
 )
-def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, lost, why):
+def test_every_manner_becomes_one_point(worker, monkeypatch, manner, remark, trouble):
     monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
     monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
-    measured = peers_cloth.motion(fake_peer(manner), [FALL])
-    arrays, facts = measured.arrays, measured.facts
-    assert arrays["frames"].tolist() == [frames]
-    assert arrays["diverged"].tolist() == [lost]
-    assert np.isfinite(arrays["true"]).all() == (not lost)
-    remarks = [why] if why else []
-    assert facts == {"rungs": ["as it is"], "remarks": remarks, "trouble": why}
+    measured = peers_cloth.work(MOTION, fake_peer(manner), [FALL])
+    assert np.isfinite(measured.arrays["error"]).tolist() == [manner == "well"]
+    assert measured.facts["remarks"] == [remark]
+    assert measured.facts["trouble"] == (remark if trouble else "")
 
 
 @pytest.fixture
@@ -448,17 +448,15 @@ def test_a_solver_that_did_not_finish_is_not_tried_again(monkeypatch):
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_unfinished", {})
-    measured = peers_cloth.motion(fake_peer("well"), [FALL, FALL])
-    arrays, facts = measured.arrays, measured.facts
+    measured = peers_cloth.work(MOTION, fake_peer("well"), [FALL, FALL])
     assert len(jobs) == 1
-    assert arrays["frames"].tolist() == [0, 0]
-    assert np.isnan(arrays["true"]).all()
-    assert all("not finished: ended" in remark for remark in facts["remarks"])
+    assert np.isinf(measured.arrays["error"]).all()
+    assert all("not finished: ended" in remark for remark in measured.facts["remarks"])
 
 
 def test_a_ladder_is_run_whole_and_says_what_single_precision_allows(here):
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    measured = peers_cloth.one_step(newton, [FALL])
+    measured = peers_cloth.work(ONE_STEP, newton, [FALL])
     errors = measured.arrays["error"]
     assert len(measured.facts["rungs"]) == len(errors) == len(newton.ladder)
     assert errors[-1] < 1e-12
@@ -479,6 +477,33 @@ def test_explicit_solvers_take_no_implicit_step_and_all_move():
     cloths = len(orders[0]) // len(set(orders[0]))
     solvers = orders[0][: len(orders[0]) // cloths]
     assert orders == [(solvers if i % 2 == 0 else solvers[::-1]) * cloths for i in range(3)]
+
+
+def errors_of_all(peers):
+    """The errors of every peer in a step and a motion of a tiny cloth, to the bit."""
+    return {
+        (task, peer.title): peers_cloth.work(task, peer, [FALL]).arrays["error"].tobytes()
+        for task in (ONE_STEP, MOTION)
+        for peer in peers
+        if task == MOTION or peer.kind != EXPLICIT
+    }
+
+
+@pytest.mark.slow
+def test_a_busy_machine_changes_no_error(monkeypatch):
+    """Every installed peer computes the same bits beside two busy processes."""
+    worker = WorkerProcess(600.0, 120.0)
+    monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
+    peers = [peer for peer in registry.cloth_peers() if peer.is_installed]
+    quiet = errors_of_all(peers)
+    loop = [sys.executable, "-c", "while True: pass"]
+    busy = [subprocess.Popen(loop) for _ in range(2)]
+    try:
+        assert errors_of_all(peers) == quiet
+    finally:
+        for process in busy:
+            process.kill()
+        worker.close()
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
@@ -558,8 +583,7 @@ def test_the_table_of_one_step_ranks_by_time_to_the_criterion_then_by_error(make
     assert column(table, "time to 1e-4 [ms]") == [10.0, 500.0, None]
     assert column(table, "setting for 1e-4") == ["10 iterations", "10 iterations", None]
     assert column(table, "smallest error") == [1e-4, 1e-4, 0.4]
-    tired = "20 × 20, 10 iterations: tired"
-    assert column(table, "remark") == [tired, tired, f"one linearised step; {tired}"]
+    assert column(table, "remark") == ["10 iterations: tired"] * 3
     (point,) = table.summary.points
     assert point.endswith("to 1e-4 Plumbob Newton, 10.0 ms (then Newton engine, VBD, 500 ms)")
     assert "already an error of 9.0e-6;" in table.measured
@@ -583,19 +607,26 @@ def test_sweeps_are_joined_and_their_differences_reported(make):
 
 
 def test_the_table_of_motions_ranks_by_time_to_the_truth(make):
-    farther = make.fell("MuJoCo RK4", true=[np.nan, 3e-2, 1e-4])
-    near = make.fell("Plumbob Newton", true=[1.0, 5e-2, 5e-3], frames=[6, 6, 6])
-    table = tables.motion(Results([make.fell("MuJoCo Euler"), farther, near]))
+    farther = make.fell("MuJoCo RK4", error=[np.inf, np.inf, 3e-2])
+    near = make.fell("Plumbob Newton", error=[np.inf, 5e-2, 5e-3])
+    table = tables.motion(Results([farther, make.fell("MuJoCo Euler"), near]))
     assert column(table, "solver") == ["Plumbob Newton", "MuJoCo Euler", "MuJoCo RK4"]
-    assert column(table, "time to 10 % [ms]") == [1.0, 1.0, 1.0]
+    assert column(table, "time to 10 % [ms]") == [1.0, 1.0, 1000.0]
     assert column(table, "time to 1 % [ms]") == [1000.0, None, None]
-    assert column(table, "smallest distance from the truth [%]") == pytest.approx([0.5, 2.0, 3.0])
-    assert column(table, "remark") == ["diverged with 1 step"] * 3
-    first, *_ = table.summary.points
-    assert first.startswith("20 × 20, 1,000 N/m: to 10 % ")
+    assert column(table, "smallest error [%]") == pytest.approx([0.5, 2.0, 3.0])
+    assert column(table, "remark") == ["1 step: diverged"] * 3
+    (point,) = table.summary.points
+    assert point.endswith("to 1 % Plumbob Newton, 1,000 ms")
     assert "order of 3.50" in table.measured
-    place = [c.title for c in table.columns].index("smallest distance from the truth")
+    place = [c.title for c in table.columns].index("smallest error")
     assert {i for i, j in best_cells(table) if j == place} == {0}
+
+
+def test_one_linear_solve_is_labelled_a_linearised_step(make):
+    facts = {"kind": LINEARISED, "rungs": ["1 step"], "remarks": [""]}
+    arrays = {"sizes": [20], "seconds": [1e-3], "error": [0.4]}
+    table = tables.one_step(Results([make.worked("MuJoCo discrete", **arrays, facts=facts)]))
+    assert column(table, "remark") == ["one linearised step"]
 
 
 def test_a_missing_engine_has_a_row_in_both_tables(make):
@@ -612,7 +643,6 @@ def test_a_limit_of_stability_stands_beside_the_motions_in_units_of_the_theory(m
     table = tables.motion(Results(records))
     assert column(table, "stable up to [2/ω]") == [pytest.approx(1.0), None]
     assert column(table, "longest stable step [ms]")[0] == 20.0
-    assert table.summary.points[-1].endswith("2 / ω: a 1.00")
 
 
 def test_the_published_times_stand_beside_ours(make):

@@ -100,26 +100,6 @@ def test_a_run_cut_sooner_is_compared_over_what_both_came_to(make):
     assert verdicts([old], [new])[0] == (ChangeVerdict.MORE_RIGHT, "solved")
 
 
-@pytest.mark.parametrize(
-    ("frames", "true", "remarks", "expected"),
-    [
-        ([3, 2], [1.0, 9.0], [], (ChangeVerdict.SAME, "")),
-        ([3, 2], [1.1, 9.0], [], (ChangeVerdict.LESS_RIGHT, "true")),
-        ([3, 2], [1.0, 2.0], [20], (ChangeVerdict.CHANGED, "frames")),
-        ([3, 3], [1.0, 2.5], [], (ChangeVerdict.LESS_RIGHT, "true")),
-    ],
-)
-def test_motions_that_a_clock_ended_are_left_out_and_those_that_failed_are_not(
-    make, frames, true, remarks, expected
-):
-    whole = {"frames": [3, 3], "wanted": [3, 3], "true": [1.0, 2.0], "remark_particles": []}
-    old = make.record(
-        "cloth", "peers/motion/k100", "p", {}, {k: np.array(v) for k, v in whole.items()}
-    )
-    new = changed(old, frames=frames, true=true, remark_particles=remarks)
-    assert verdicts([old], [new])[0] == expected
-
-
 def test_runs_of_other_sizes_are_not_compared(make):
     old = make.drawn("ccd", False, 1.0)
     assert verdicts([old], [replace(old, size=20)]) == [(ChangeVerdict.UNDECIDED, "")]

@@ -114,12 +114,12 @@ def test_on_cloths_a_rank_is_by_the_error_and_a_time_beside_who_comes_as_near(ma
 
 
 def test_motions_are_ranked_by_the_distance_from_the_truth(make):
-    """Of settings that got to the end: others are nearer, but diverged or were cut short."""
-    records = [make.fell("Plumbob Newton"), make.entered(make.fell("Mine", true=[0.0, 1e-2, 0.0]))]
+    mine = make.fell("Mine", error=[np.inf, 1e-2, 5e-2])
+    records = [make.fell("Plumbob Newton"), make.entered(mine)]
     standing = only(records)
     assert standing.question == "Mine, motion of 1 cloth"
     assert standing.sentence.startswith("Mine ranks 1 of 2: ")
-    assert "0.0100 m from the truth in 1.00 ms" in standing.sentence
+    assert "error 0.0100 in 1.00 ms" in standing.sentence
 
 
 def test_many_cloths_have_few_sentences_and_the_rank_on_all(make):

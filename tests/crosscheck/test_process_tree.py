@@ -12,6 +12,7 @@ import pytest
 from hostile_programs import case, program, running
 
 from plumbob.crosscheck import process_tree
+from plumbob.crosscheck.child_process import ChildProcess, Loss, LostError, python_process
 from plumbob.crosscheck.process_tree import carry, end_group, family
 
 ROOT = str(Path(__file__).parents[2])
@@ -149,3 +150,22 @@ def test_each_contestant_has_one_guard_and_it_leaves(tmp_path):
     assert guards() == 1
     contestant.close()
     assert guards() == 0
+
+
+def loss(child, **limits):
+    with pytest.raises(LostError) as caught:
+        child.receive(60.0, **limits)
+    return caught.value.loss
+
+
+def test_processor_time_of_all_that_it_starts_is_limited():
+    spin = "import os\nos.fork()\nwhile True: pass"
+    child = ChildProcess([sys.executable, "-c", spin], memory=1 << 40)
+    assert loss(child, processor=0.5) is Loss.PROCESSOR
+    child.end()
+
+
+def test_a_signal_without_a_name_is_a_number():
+    child = python_process("import os; os.kill(os.getpid(), 40)")
+    assert loss(child) is Loss.ENDED
+    assert child.ending == "by signal 40"

@@ -6,6 +6,7 @@ and wholly if asked for slow tests.
 
 import re
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,71 +38,12 @@ from plumbob.crosscheck.verdict import check_claim
 from plumbob.reference import Articulation
 from plumbob.reference.formats import mjcf, urdf
 
-URDF = """<robot name="all">
-  <link name="base"/><link name="wrist"/><link name="arm"/><link name="tool"/><link name="rail"/>
-  <link name="finger"/><link name="thumb"/><link name="nail"/>
-  <joint name="wheel" type="continuous">
-    <parent link="arm"/><child link="wrist"/>
-    <origin xyz="0.3 0.1 -0.2" rpy="0.4 -0.7 1.9"/><axis xyz="0 1 0"/>
-  </joint>
-  <joint name="shoulder" type="revolute">
-    <parent link="base"/><child link="arm"/>
-    <origin xyz="0.1 0.2 0.5" rpy="0.3 0.5 -0.8"/><axis xyz="1 2 -2"/>
-    <limit lower="-1.5" upper="2" effort="1" velocity="1"/>
-  </joint>
-  <joint name="weld" type="fixed">
-    <parent link="wrist"/><child link="tool"/><origin xyz="0 0 0.4" rpy="-1.2 0.2 0.6"/>
-  </joint>
-  <joint name="lift" type="prismatic">
-    <parent link="base"/><child link="rail"/>
-    <origin xyz="-0.4 0 0.1" rpy="0.9 0 0.3"/><axis xyz="0 0 1"/>
-    <limit lower="-0.2" upper="0.6" effort="1" velocity="1"/>
-  </joint>
-  <joint name="grip" type="prismatic">
-    <parent link="tool"/><child link="finger"/>
-    <origin xyz="0 0.1 0" rpy="0 0.2 0"/><axis xyz="1 0 0"/>
-    <limit lower="0" upper="0.1" effort="1" velocity="1"/>
-  </joint>
-  <joint name="oppose" type="revolute">
-    <parent link="finger"/><child link="thumb"/>
-    <origin xyz="0.1 0 0" rpy="0.1 0.2 0.3"/><axis xyz="0 -1 0"/>
-    <limit lower="-3" upper="3" effort="1" velocity="1"/>
-    <mimic joint="shoulder" multiplier="-0.5" offset="0.7"/>
-  </joint>
-  <joint name="root" type="fixed">
-    <parent link="thumb"/><child link="nail"/><origin xyz="0.2 0 0.1"/>
-  </joint>
-</robot>"""
+# One of everything, as a robot and as a character.
+URDF, MJCF = (
+    Path(__file__).with_name("models").joinpath(name).read_text(encoding="utf-8")
+    for name in ("all.urdf", "all.xml")
+)
 
-# Bodies breadth-first by name; a second joint on a body, each about an anchor of its own.
-MJCF = """<mujoco model="all">
-  <compiler angle="degree" eulerseq="zyx"/>
-  <worldbody>
-    <body name="trunk" pos="0 0 1.2">
-      <geom size="0.1"/><freejoint name="root"/>
-      <body name="hip" pos="0.2 0.1 -0.3" euler="20 -40 70">
-        <geom size="0.1"/>
-        <joint name="swing" type="hinge" axis="1 1 0" pos="0.05 0 0.1" range="-60 80"/>
-        <joint name="twist" type="hinge" axis="0 0 1" pos="0 0.07 0" range="-30 45"/>
-        <body name="shin" pos="0 0 -0.5" axisangle="0 1 0 35">
-          <geom size="0.1"/>
-          <joint name="slide" type="slide" axis="0 1 1" range="-0.2 0.3" ref="0.1"/>
-          <body name="foot" pos="0.1 0.2 -0.4">
-            <geom size="0.1"/>
-            <joint name="bend" axis="1 1 0" pos="0.05 0 0.1" range="-60 80" ref="25"/>
-            <body name="toe" pos="0.2 0 0"><geom size="0.1"/></body>
-          </body>
-        </body>
-      </body>
-      <body name="neck" pos="0 0 0.4" quat="0.8 0 0.6 0">
-        <geom size="0.1"/><joint name="neck" type="ball"/>
-        <body name="head" pos="0.1 0 0.2" zaxis="1 0 2">
-          <geom size="0.1"/><body name="nose" pos="0.1 0.1 0"><geom size="0.1"/></body>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>"""
 
 TEXTS = {ROBOTS: ("all.urdf", URDF), CHARACTERS: ("all.xml", MJCF)}
 ONE = ("hinge", "slide")
@@ -343,12 +285,7 @@ def test_refused_mimics_move_independently_for_both_with_a_reason(engine, small)
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
 @pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("cut.urdf", URDF[:500]),
-        ("cut.xml", MJCF[:500]),
-        ("other.xml", "<html/>"),
-    ],
+    ("name", "text"), [("cut.urdf", URDF[:500]), ("cut.xml", MJCF[:500]), ("other.xml", "<html/>")]
 )
 def test_the_reason_of_a_refusal_is_one_line(engine, name, text, tmp_path):
     (tmp_path / name).write_text(text)

@@ -57,23 +57,33 @@ def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Rec
     ]
     remarks = {r.title: r.details.remark for r in records if r.details.remark and version}
     reasons = grouped(remarks, remarks.__getitem__)
+    every = [getattr(record.values, "overhead", None) for record in records]
+    overheads = [overhead for overhead in every if overhead is not None and overhead >= 0.0]
     return {
         "records": records,
         "robot_records": robots,
-        "solver": peer.title,
+        "solver": peer.shown,
         "package": peer.package,
         "version": version or "not installed",
         "license": peer.license,
         "robots": title_of(*robot_names),
         "solves": peer.can,
-        "entries": listed([f"{e.kind} ({e.note})" if e.note else e.kind for e in peer.entries]),
+        "entries": listed(list(map(_entry, peer.entries))),
+        "harness overhead, median": _cell(float(np.median(overheads)) if overheads else math.nan),
         "remark": "; ".join(f"{listed(names)}: {reason}" for reason, names in reasons.items()),
     }
 
 
+def _entry(entry: PeerEntry) -> str:
+    """Return the start of an entry, its note, and who makes its restarts."""
+    maker = "made by the bench" if entry.restarts else ""
+    notes = "; ".join(filter(None, (entry.note, maker)))
+    return f"{entry.kind} ({notes})" if notes else entry.kind
+
+
 def _participant_summary(rows: Sequence[Row]) -> Summary:
     titles = {row["solver"] for row in rows}
-    missing = [peer.title for peer in registry.PEERS if peer.title not in titles]
+    missing = [peer.shown for peer in registry.PEERS if peer.shown not in titles]
     not_asked = f"; not selected: {', '.join(missing)}" if missing else ""
     count = sum(row["version"] != "not installed" for row in rows)
     robots = rows[0]["robot_records"].values()

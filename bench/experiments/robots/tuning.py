@@ -10,7 +10,6 @@ file of results continues an interrupted search.
 
 import argparse
 import contextlib
-import csv
 import functools
 import importlib
 import itertools
@@ -21,6 +20,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from ...harness.isolation import WorkerProcess
@@ -28,14 +28,14 @@ from ...harness.job import seed_shared_generators
 from ...harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
 from ...harness.stopwatch import processor_time_of
 from ...peers.ik.protocol import attempt
-from ...peers.ik.restarts import restarted
+from ...peers.ik.restarts import digest_of, restarted
 from ...peers.registry import PEERS, Peer
 from ...problems.evaluate import Targets, evaluator_of
 from ...problems.robot_targets import STRATA, stratum_poses
 from ...problems.robots import TUNING, seed_of
 from .measurement import TOLERANCE
 
-RESULTS = Path("docs/peers/tuning.csv")
+RESULTS = Path("docs/peers/tuning.jsonl")
 # Settings of a solver at the most, targets of each robot, and those on which all are tried.
 MAXIMUM, COUNT, SCREENED = 64, 200, 40
 SEED = 2011
@@ -68,44 +68,29 @@ class Search(NamedTuple):
         return [*self.candidates, *([] if self.before in self.candidates else [self.before])]
 
 
-class Trial(NamedTuple):
+class Trial(msgspec.Struct, frozen=True):
     """A solver with settings on the first targets of each tuning robot."""
 
     solver: str
     start: str
-    settings: Settings
+    settings: dict[str, Any]
     version: str  # of the solver's package
+    targets: int  # of each robot
     microseconds: float  # of processors for a target, the geometric mean
-    solved: np.ndarray  # (robot, target)
+    bits: str  # whether it solves each target, robot by robot, four in a digit to base 16
     trouble: str = ""  # why its process was lost, else ""
+
+    @property
+    def solved(self) -> np.ndarray:
+        """Whether it solves each target, (robot, target)."""
+        bits = np.unpackbits(np.frombuffer(bytes.fromhex(self.bits), dtype=np.uint8))
+        count = len(TUNING) * self.targets
+        return bits[:count].reshape(len(TUNING), self.targets).astype(bool)
 
     @property
     def share(self) -> float:
         """The share of targets that it solves."""
         return float(np.mean(self.solved))
-
-    @classmethod
-    def from_row(cls, row: Mapping[str, str]) -> "Trial":
-        """Return a trial from a row of the file of results."""
-        bits = np.unpackbits(np.frombuffer(bytes.fromhex(row["solved"]), dtype=np.uint8))
-        solved = bits[: len(TUNING) * int(row["targets"])].reshape(len(TUNING), -1).astype(bool)
-        settings = json.loads(row["settings"])
-        names = (row["solver"], row["start"], settings, row["version"])
-        return cls(*names, float(row["us"]), solved, row["trouble"])
-
-    @property
-    def row(self) -> dict[str, str]:
-        """Return it as a row of the file: a digit in base 16 holds four targets."""
-        return {
-            "solver": self.solver,
-            "start": self.start,
-            "settings": json.dumps(self.settings),
-            "version": self.version,
-            "targets": str(self.solved.shape[1]),
-            "us": f"{self.microseconds:.4g}",
-            "solved": np.packbits(self.solved).tobytes().hex(),
-            "trouble": self.trouble,
-        }
 
 
 def searches() -> list[Search]:
@@ -136,23 +121,24 @@ def tuning_targets(name: str, count: int) -> Targets:
     return Targets(positions[:count], rotations[:count], starts[:count], strata[:count])
 
 
-def answers(
-    module: str, name: str, count: int, settings: Settings
-) -> dict[str, list[float] | np.ndarray]:
+def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, Any]:
     """Return a solver's answers to targets of a robot, and their processor times [s]."""
     options, robot = dict(settings), evaluator_of(name).robot
     restarts = options.pop("bench_restarts", 0)
-    ask = importlib.import_module(module).prepare(robot, TOLERANCE, **options)
+    ask = importlib.import_module(peer.module).prepare(robot, TOLERANCE, **options)
     ask = restarted(ask, robot, restarts) if restarts else ask
     targets, seconds = tuning_targets(name, count), []
     attempt(ask(targets.request(0)))  # which compiles
     q = np.full(targets.starts.shape, math.nan)
     for i in range(count):
-        solve = ask(targets.request(i))
-        seed_shared_generators(i)
+        request = targets.request(i)
+        solve = ask(request)
+        seed_shared_generators(digest_of(*request))
         output, duration = processor_time_of(functools.partial(attempt, solve))
         q[i] = math.nan if output.q is None else output.q
-        seconds.append(output.time.seconds if output.time else duration)
+        # A solver that works in yet another process has a clock of its own.
+        own_time = output.time if peer.environment else None
+        seconds.append(own_time.seconds if own_time else duration)
     return {"q": q, "seconds": seconds}
 
 
@@ -162,24 +148,24 @@ def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int)
     trouble = ""
     for robot, name in enumerate(TUNING):
         try:
-            values = worker.calculate(answers, search.peer.module, name, count, settings)
+            values = worker.calculate(answers, search.peer, name, count, settings)
             targets = tuning_targets(name, count)
             evaluation = evaluator_of(name).evaluate(targets, values["q"], TOLERANCE)
             solved[robot], seconds = evaluation.solved, [*seconds, *values["seconds"]]
         except RuntimeError as error:
             trouble = f"{name}: {error}"
-    time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else math.inf
-    names = (search.solver, search.start, settings, search.peer.version)
-    return Trial(*names, time, solved, trouble)
+    time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else -1.0
+    bits = np.packbits(solved).tobytes().hex()
+    version = search.peer.version
+    return Trial(*search[:2], dict(settings), version, count, round(time, 1), bits, trouble)
 
 
 def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
     """Return the settings to try on all targets, from their trials on the first."""
     share = {json.dumps(trial.settings): trial.share for trial in trials}
     order = sorted(search.candidates, key=lambda settings: -share[json.dumps(settings)])
-    best = order[: math.ceil(len(order) / 4)]
-    extra = [settings for settings in (search.default, search.before) if settings not in best]
-    return [*best, *extra] if search.default != search.before else [*best, *extra[:1]]
+    best = [*order[: math.ceil(len(order) / 4)], search.default, search.before]
+    return [settings for i, settings in enumerate(best) if settings not in best[:i]]
 
 
 def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
@@ -202,11 +188,9 @@ def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
 
 
 def read(path: Path) -> list[Trial]:
-    """Return the trials of a file of results, none if it does not exist."""
-    if not path.exists():
-        return []
-    with path.open(encoding="utf-8", newline="") as file:
-        return [Trial.from_row(row) for row in csv.DictReader(file)]
+    """Return the trials of a file of results, a line each; none if it does not exist."""
+    lines = path.read_bytes().splitlines() if path.exists() else []
+    return [msgspec.json.decode(line, type=Trial) for line in lines]
 
 
 def trials_of(search: Search, trials: Sequence[Trial], count: int) -> list[Trial]:
@@ -214,7 +198,7 @@ def trials_of(search: Search, trials: Sequence[Trial], count: int) -> list[Trial
     return [
         trial
         for trial in trials
-        if (trial.solver, trial.start, trial.solved.shape[1]) == (*search[:2], count)
+        if (trial.solver, trial.start, trial.targets) == (*search[:2], count)
         and trial.settings in search.settings
     ]
 
@@ -223,22 +207,15 @@ def perform(search: Search, path: Path) -> Iterator[Trial]:
     """Perform the missing trials of a search; append each to the file and yield it."""
     with contextlib.closing(WorkerProcess(_PATIENCE)) as worker:
         for count in (SCREENED, COUNT):
-            first = trials_of(search, read(path), SCREENED)
+            trials = read(path)
+            first = trials_of(search, trials, SCREENED)
             settings = finalists(search, first) if count == COUNT else search.settings
-            done = [trial.settings for trial in trials_of(search, read(path), count)]
+            done = [trial.settings for trial in trials_of(search, trials, count)]
             for missing in (part for part in settings if part not in done):
                 result = trial(worker, search, missing, count)
-                _append(path, result)
+                with path.open("ab") as file:
+                    file.write(msgspec.json.encode(result) + b"\n")
                 yield result
-
-
-def _append(path: Path, trial: Trial) -> None:
-    is_new = not path.exists()
-    with path.open("a", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(trial.row), lineterminator="\n")
-        if is_new:
-            writer.writeheader()
-        writer.writerow(trial.row)
 
 
 def main() -> None:
@@ -253,9 +230,9 @@ def main() -> None:
             continue
         for result in perform(search, arguments.results):
             figures = f"{100 * result.share:5.1f} %  {result.microseconds:8.0f} µs"
-            print(figures, result.row["settings"], result.trouble, flush=True)
+            print(figures, json.dumps(result.settings), result.trouble, flush=True)
         best = chosen(search, trials_of(search, read(arguments.results), COUNT))
-        print(f"{search.solver}, {search.start}: {best.row['settings']}", flush=True)
+        print(f"{search.solver}, {search.start}: {json.dumps(best.settings)}", flush=True)
 
 
 if __name__ == "__main__":  # the worker imports this file by its name

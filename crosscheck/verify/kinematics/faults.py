@@ -11,7 +11,8 @@ from ..explain import either
 from ..sentence import Sentence, sentence
 from .textbook import Switches
 
-FILE = Path(__file__).with_name("faults.toml")
+TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+AS_THE_TEXTBOOK = sentence("It does what the textbook does.")
 
 
 class SwitchFault(NamedTuple):
@@ -27,14 +28,15 @@ class SwitchFault(NamedTuple):
 
 def _load() -> dict[str, tuple[SwitchFault, ...]]:
     """Return the faults that each method may have, the most frequent first."""
-    parts = {}
-    for part, entries in tomllib.loads(FILE.read_text(encoding="utf-8")).items():
-        parts[part] = tuple(
+    parts = {
+        part: tuple(
             SwitchFault(part, key, switch, number, Sentence(entry["sentence"], {}),
                         entry.get("honest", False))
             for key, entry in entries.items()
-            for switch, number in entry["switch"].items()
-        )  # fmt: skip
+            for switch, number in entry.get("switch", {}).items()
+        )
+        for part, entries in TABLE.items()
+    }  # fmt: skip
     forward, stop, follow = parts["forward"], parts["stop"], parts["follow"]
     faults = {
         "forward": forward,
@@ -88,8 +90,6 @@ def _is_likely(triple: Sequence[SwitchFault]) -> bool:
 
 def describe(method: str, keys: Sequence[str]) -> Sentence:
     """Return the sentences of a class of faults that no answer tells apart."""
-    faults = by_key(method)
-    right = sentence("It does what the textbook does.")
-    return either(
-        [[faults[name].sentence for name in key.split(" + ")] if key else [right] for key in keys]
-    )
+    sentences = {key: fault.sentence for key, fault in by_key(method).items()}
+    sentences[""] = AS_THE_TEXTBOOK
+    return either([[sentences[name] for name in key.split(" + ")] for key in keys])

@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
-from ..sentence import sentence
-from . import laws, rounding, skeletons
+from ..laws import digits, finding, judge_case, not_finite, of_joints
+from . import rounding, skeletons
+from .pose_laws import unit_quaternions
 from .report import diagnosis_of, report
 from .skeletons import CaseFamily, drawn
 
@@ -55,10 +56,10 @@ def _judge(exchange: Exchange, greeting: Greeting) -> CaseJudgement:
     reference = partial(forward_kinematics, skeleton, inputs["local_rotations"])
     expected = reference()
     outputs = exchange.answer.values if isinstance(exchange.answer, Answer) else {}
-    digits = min(_digits(outputs, expected, size), default=None)
-    return laws.judge_case(
-        exchange, greeting, lambda outputs: _findings(outputs, expected, size, greeting),
-        reference, expected._asdict(), digits,
+    return judge_case(
+        exchange, lambda outputs: _findings(outputs, expected, size, greeting),
+        rounding.repeats(greeting.epsilon, size), reference, expected._asdict(),
+        min(_digits(outputs, expected, size), default=None),
     )  # fmt: skip
 
 
@@ -66,14 +67,14 @@ def _digits(outputs: Mapping[str, Any], expected: Pose, size: float) -> Iterator
     """Yield the number of correct digits of each output; any multiple of q is one rotation."""
     if "positions" in outputs:
         error = np.linalg.norm(outputs["positions"] - expected.positions, axis=-1).max()
-        yield laws.digits(error, size)
+        yield digits(error, size)
     if "rotations" in outputs:
         rotations = outputs["rotations"]
         with np.errstate(all="ignore"):  # infinite components give NaN
             lengths = np.linalg.norm(rotations, axis=-1, keepdims=True)
             unit = rotations / np.where(lengths > 0.0, lengths, 1.0)
         errors = (np.abs(unit - expected.rotations), np.abs(unit + expected.rotations))
-        yield laws.digits(np.minimum(*(part.max(-1) for part in errors)).max(), 1.0)
+        yield digits(np.minimum(*(part.max(-1) for part in errors)).max(), 1.0)
 
 
 def _findings(
@@ -83,11 +84,11 @@ def _findings(
     if "positions" in outputs:
         tolerance = rounding.positions(greeting.epsilon, joints, size)
         errors = np.linalg.norm(outputs["positions"] - expected.positions, axis=-1)
-        message = sentence("Joint {joint} is {error:.2g} m from its correct position.")
+        is_finite = np.isfinite(errors).all()
         yield (
-            laws.of_joints("positions", errors, tolerance, "m", message)
-            if np.isfinite(errors).all()
-            else laws.no_numbers("positions", errors, tolerance)
+            of_joints("positions", errors, tolerance)
+            if is_finite
+            else not_finite("positions, not numbers", errors, tolerance)
         )
     if "rotations" in outputs:
         bound = rounding.rotations(greeting.epsilon, joints)
@@ -99,11 +100,8 @@ def _rotations(rotations: Any, expected: Any, bound: float) -> Iterator[Finding]
     lengths = np.linalg.norm(rotations, axis=-1)
     usable = np.isfinite(lengths) & (lengths > 0.0)
     if not usable.all():
-        joint = int(np.argmin(usable))
-        message = sentence("The rotation of joint {joint} is not a number or zero.", joint=joint)
-        yield Finding("rotations", Verdict.WRONG, np.inf, bound, "rad", message, joint)
+        yield finding("rotations, not numbers", tolerance=bound, index=int(np.argmin(usable)))
         return
-    angles = laws.angles(rotations / lengths[:, None], expected)
-    message = sentence("The rotation of joint {joint} is wrong by {error:.2g} rad.")
-    yield laws.unit(lengths, bound)
-    yield laws.of_joints("rotations", angles, bound, "rad", message)
+    yield unit_quaternions(lengths, bound)
+    angles = rotation.angle(rotations / lengths[:, None], expected)
+    yield of_joints("rotations", angles, bound)

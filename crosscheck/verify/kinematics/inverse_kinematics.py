@@ -16,8 +16,8 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
-from ..sentence import Sentence, sentence
-from . import laws, pose_laws, problems, rounding, sweeps
+from ..laws import digits, finding, judge_case
+from . import pose_laws, problems, rounding, sweeps
 from .pose_laws import AnsweredPose
 from .predictions import solve
 from .report import diagnosis_of, report
@@ -25,7 +25,7 @@ from .sweeps import PoseTrial, SweepComparison
 
 TASK = "inverse_kinematics"
 cases = problems.cases
-STOPS = "sweeps made"
+STOPS, SLOW = "sweeps made", "target reached, slow"
 # The methods of the textbook.
 METHODS = ("ccd", "fabrik")
 # Beyond reach the textbook's solvers need many sweeps: an honest solver may be so many times as far
@@ -60,26 +60,19 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     return report(TASK, method, [trial.judgement for trial in trials], diagnosis)
 
 
-def _forgive(case: Case, finding: Finding) -> Finding:
+def _forgive(case: Case, broken: Finding) -> Finding:
     """Return a reservation where an honest, slower solver misses a target that it approaches."""
     gained = case.facts["before"] - case.facts["least"]
-    is_missed = finding.law in ("target reached", "nearest point")
-    if not is_missed or finding.verdict is not Verdict.WRONG or finding.error >= gained:
-        return finding
-    return replace(finding, verdict=Verdict.RIGHT_BUT, sentence=_slow(finding.error))
+    is_missed = broken.law in ("target reached", "nearest point")
+    if not is_missed or broken.verdict is not Verdict.WRONG or broken.error >= gained:
+        return broken
+    return finding(SLOW, broken.error, broken.tolerance, law=broken.law)
 
 
-def _slow(error: float) -> Sentence:
-    return sentence(
-        "It converges slowly: {error:.2g} m remain after the maximum number of iterations.",
-        error=error,
-    )
-
-
-def _aggravate(finding: Finding) -> Finding:
+def _aggravate(broken: Finding) -> Finding:
     """Return a forgiven sweep as a wrong one: a fault reproduces it."""
-    is_forgiven = finding.law == sweeps.LAW and finding.verdict is Verdict.RIGHT_BUT
-    return replace(finding, verdict=Verdict.WRONG) if is_forgiven else finding
+    is_forgiven = broken.law == sweeps.LAW and broken.verdict is Verdict.RIGHT_BUT
+    return replace(broken, verdict=Verdict.WRONG) if is_forgiven else broken
 
 
 def _judge(trial: PoseTrial, method: str, greeting: Greeting) -> CaseJudgement:
@@ -96,13 +89,14 @@ def _judge(trial: PoseTrial, method: str, greeting: Greeting) -> CaseJudgement:
         inputs["target"], method or "fabrik",
         **{name: inputs[name] for name in ("effector", "tolerance", "max_iterations")},
     )  # fmt: skip
-    expected, digits = {}, None
+    expected, correct_digits = {}, None
     if method and trial.is_sweep and isinstance(trial.exchange.answer, Answer):
         local, x, _ = solve(method, inputs)
         expected = {"local_rotations": local, "positions": x}
         if pose.finite:
-            digits = laws.digits(pose.distance_to(x), case.facts["size"])
-    return laws.judge_case(trial.exchange, greeting, findings, reference, expected, digits)
+            correct_digits = digits(pose.distance_to(x), case.facts["size"])
+    allowed = rounding.repeats(greeting.epsilon, case.facts["size"])
+    return judge_case(trial.exchange, findings, allowed, reference, expected, correct_digits)
 
 
 def target_laws(
@@ -130,42 +124,23 @@ def reached(distance: float, slack: float, case: Case, method: str, greeting: Gr
         closest = float(np.linalg.norm(x[inputs["effector"]] - inputs["target"]))
         tolerance += AS_SLOW * max(0.0, closest - nearest)
     law = "target reached" if nearest == 0.0 else "nearest point"
-    verdict, message = Verdict.RIGHT, laws.HOLDS
-    if excess > tolerance or np.isnan(excess):
-        verdict, message = _miss(excess, case, method, greeting)
-    return Finding(law, verdict, excess, tolerance, "m", message)
+    return finding(_miss(excess, case, method, greeting), excess, tolerance, law=law)
 
 
-def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> tuple[Verdict, Sentence]:
-    """Return the verdict on a target that is missed by an excess [m]."""
+def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> str:
+    """Return the law that an excess [m] of the distance breaks."""
     nearest, reach, before = (case.facts[name] for name in ("least", "reach", "before"))
     is_degenerate, is_beyond = case.family in problems.DEGENERATE, nearest > 0.0
     is_nearer = excess < 0.5 * (before - nearest)
     if is_degenerate and excess + nearest <= before + 1e-6 * reach:
-        return Verdict.RIGHT_BUT, sentence(
-            "It stops {error:.2g} m from the nearest point it could reach: the pose does not "
-            "determine a direction to bend in. Bend the chain a little before the first sweep.",
-            error=excess,
-        )
+        return "target reached, undetermined"
     if excess <= rounding.STALL[greeting.precision] * reach:
-        return Verdict.RIGHT_BUT, sentence(
-            "It stalls {error:.2g} m from the target: small rotations are lost. Does the helper "
-            "that rotates one direction into another return the identity for small angles?",
-            error=excess,
-        )
+        return "target reached, stalled"
     if is_beyond and is_nearer:
-        return Verdict.RIGHT_BUT, sentence(
-            "The target cannot be reached; it comes within {error:.2g} m of the nearest point.",
-            error=excess,
-        )
+        return "nearest point, approached"
     if is_nearer and (not method or is_degenerate):
-        return Verdict.RIGHT_BUT, _slow(excess)
-    return Verdict.WRONG, sentence(
-        "It ends {error:.2g} m farther from the target than necessary."
-        if is_beyond
-        else "It ends {error:.2g} m from a target that it can reach.",
-        error=excess,
-    )
+        return SLOW
+    return "nearest point" if is_beyond else "target reached"
 
 
 def in_time(pose: AnsweredPose, case: Case, method: str, greeting: Greeting) -> list[Finding]:
@@ -173,51 +148,32 @@ def in_time(pose: AnsweredPose, case: Case, method: str, greeting: Greeting) -> 
     bound = case.facts["size"] * (1e-7 if greeting.precision == "double" else 1e-3)
     _, x, needed = solve(method, case.inputs)
     if pose.distance_to(x) <= bound:
-        return [Finding(STOPS, Verdict.RIGHT, 0.0, 0.0, "", laws.HOLDS)]
+        return [finding(STOPS, 0.0)]
     for count in range(needed + 1, case.inputs["max_iterations"] + 1):
         inputs = {**case.inputs, "tolerance": 0.0, "max_iterations": count}
         if pose.distance_to(solve(method, inputs)[1]) <= bound:
-            message = sentence(
-                "It makes {more} more sweeps than its tolerance requires.", more=count - needed
-            )
-            return [Finding(STOPS, Verdict.RIGHT_BUT, count - needed, 0.0, "", message)]
+            return [finding(STOPS, count - needed, more=count - needed)]
     return []
 
 
 def not_farther(distance: float, slack: float, case: Case) -> Finding:
     """Return whether sweeps have not taken the effector farther away, which none ever does."""
-    growth = distance - case.facts["before"]
-    message = sentence(
-        "A sweep takes the effector {error:.2g} m farther from its target. Every rotation of CCD "
-        "and every pass of FABRIK brings it nearer, or leaves it."
-    )
-    return laws.bounded("distance does not grow", growth, slack, "m", message)
+    return finding("distance does not grow", distance - case.facts["before"], slack)
 
 
 def claims(
     distance: float, slack: float, outputs: Mapping[str, Any], case: Case
 ) -> Iterator[Finding]:
     """Yield whether `converged` and `residual` are true."""
-    tolerance = case.inputs["tolerance"] + slack
+    tolerance = case.inputs["tolerance"]
     if outputs.get("converged"):
-        message = sentence("It reports success, but the effector is {error:.2g} m from the target.")
-        yield laws.bounded("claims", distance, tolerance, "m", message)
-    elif "converged" in outputs and distance <= case.inputs["tolerance"] - slack:
-        message = sentence(
-            "The effector is {error:.2g} m from the target, within the tolerance, but it "
-            "reports failure.",
-            error=distance,
-        )
-        yield Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", message)
+        yield finding("claims, success", distance, tolerance + slack)
+    elif "converged" in outputs and distance <= tolerance - slack:
+        yield finding("claims, failure", tolerance - distance, distance=distance)
     if "residual" in outputs and np.isfinite(outputs["residual"]):
-        error = abs(outputs["residual"] - distance)
+        error, bound = abs(outputs["residual"] - distance), slack + 1e-3 * distance
         claim, actual = distinct_texts(outputs["residual"], distance, 3)
-        message = sentence(
-            "It reports a residual of {claimed} m; the effector is {distance} m from the target.",
-            claimed=claim,
-            distance=actual,
-        )
-        yield laws.bounded("claims", error, slack + 1e-3 * distance, "m", message)
+        yield finding("claims, residual", error, bound, claimed=claim, distance=actual)
 
 
 def _equal_worlds(
@@ -229,12 +185,7 @@ def _equal_worlds(
     x[path] = scale * rotation.rotate(Q, x[path]) + shift
     size, amplification = trial.case.facts["size"], trial.case.facts["amplification"]
     tolerance = 2.0 * rounding.sweep(greeting.epsilon, len(x), size, amplification)
-    message = sentence(
-        "After the world is rotated, shifted or scaled, the answer to the same request differs "
-        "by {error:.2g} m: something depends on the origin or on an axis."
-    )
-    error = trial.pose.distance_to(x)
-    return laws.bounded("equal worlds", error, tolerance, "m", message, verdict=verdict)
+    return finding("equal worlds", trial.pose.distance_to(x), tolerance, verdict=verdict)
 
 
 def _diagnosis(

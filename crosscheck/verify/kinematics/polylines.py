@@ -6,15 +6,7 @@ from plumbob.reference.arguments import FloatArray
 
 
 class Polyline:
-    """A polyline whose strokes are joined by bridges; a closed one returns to its start.
-
-    Attributes:
-        points: of all strokes, and the first again if it is closed [m].
-        strokes: index of the first point of each stroke.
-        lengths: of the segments [m].
-        arc: length from the start to each point, with bridges [m].
-        bridges: which segments are bridges.
-    """
+    """A polyline whose strokes are joined by bridges; a closed one returns to its start."""
 
     def __init__(self, curve: FloatArray, strokes: tuple[int, ...], closed: bool) -> None:
         self.points = np.concatenate([curve, curve[:1]]) if closed else curve

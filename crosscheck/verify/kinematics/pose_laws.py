@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Skeleton, judge_pose
-from plumbob.reference.arguments import FloatArray, IndexArray
+from plumbob.reference import Skeleton, judge_pose, rotation
+from plumbob.reference.arguments import FloatArray, IndexArray, distinct_texts
 from plumbob.reference.judging import PoseJudgement
 
 from ..case import Case
 from ..greeting import Greeting
 from ..judgement import Finding, Verdict
-from ..sentence import sentence
-from . import laws, rounding
+from ..laws import finding, not_finite, of_joints
+from . import rounding
 from .predictions import with_effector_of
 
 # Below this share of the size, in single precision, rotations that a helper rounds to the identity
@@ -23,7 +23,6 @@ from .predictions import with_effector_of
 DEAD_JOINTS = 4.0
 # Larger positions are clipped to this [m]: `judge_pose` takes none beyond 1e75.
 FARTHEST = 1e74
-NEITHER = sentence("The answer has neither rotations nor positions.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +102,16 @@ def read_pose(
 def all_of(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
     """Return the findings about a pose that do not depend on its target."""
     if not pose.outputs:
-        return [laws.missing(NEITHER)]
+        return [finding("numbers, no pose")]
     return [*rotation_laws(pose, case, greeting), *position_laws(pose, case, greeting)]
+
+
+def unit_quaternions(lengths: FloatArray, tolerance: float) -> Finding:
+    """Return whether quaternions have unit length; other laws normalise them."""
+    errors = np.abs(lengths - 1.0)
+    joint = int(np.argmax(errors))
+    length, _ = distinct_texts(lengths[joint], 1.0)
+    return finding("unit quaternions", errors[joint], tolerance, index=joint, length=length)
 
 
 def rotation_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
@@ -117,35 +124,20 @@ def rotation_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Fi
     findings, is_finite = [], bool(np.isfinite(pose.local).all())
     if not usable.all():
         joint = int(np.argmin(usable))
-        message = sentence(
-            "The local rotation of joint {joint} is not a number or zero.", joint=joint
-        )
-        is_harmless = joint == effector and is_finite
-        verdict = Verdict.RIGHT_BUT if is_harmless else Verdict.BROKEN
-        findings.append(Finding("numbers", verdict, np.inf, bound, "", message, joint))
+        verdict = Verdict.RIGHT_BUT if joint == effector and is_finite else None
+        findings.append(finding("numbers, of a local rotation", verdict=verdict, index=joint))
     if not is_finite:
         return findings
     lengths = np.where(usable, lengths, 1.0)
     if usable.any():
-        findings.append(laws.unit(lengths, bound))
+        findings.append(unit_quaternions(lengths, bound))
     start = case.inputs["local_rotations"]
     rotations = np.where(usable[:, None], pose.raw / lengths[:, None], start)
-    angles = laws.angles(rotations, start / np.linalg.norm(start, axis=-1, keepdims=True))
+    angles = rotation.angle(rotations, start / np.linalg.norm(start, axis=-1, keepdims=True))
     angles[pose.path[:-1]] = 0.0
-    return [*findings, _unrotated(angles, bound, effector)]
-
-
-def _unrotated(angles: FloatArray, bound: float, effector: int) -> Finding:
-    """Return whether the joints off the path keep their rotations."""
-    joint = int(np.argmax(angles))
-    law, verdict = "joints off the path", Verdict.RIGHT_BUT if joint == effector else Verdict.WRONG
-    message = sentence(
-        "It rotates the effector itself by {error:.2g} rad, which moves the joints below it but "
-        "not the effector."
-        if joint == effector
-        else "It rotates joint {joint}, which is not on the path from the root to the effector."
-    )
-    return laws.bounded(law, angles[joint], bound, "rad", message, verdict=verdict, index=joint)
+    joint, key = int(np.argmax(angles)), "joints off the path"
+    key += ", the effector" if joint == effector else ""
+    return [*findings, finding(key, angles[joint], bound, index=joint)]
 
 
 def position_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
@@ -155,18 +147,13 @@ def position_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Fi
         return []
     bound = rounding.positions(greeting.epsilon, len(x), case.facts["size"], pose.drift)
     if not np.isfinite(x).all():
-        return [laws.no_numbers("numbers", x.sum(axis=-1), bound)]
+        return [not_finite("numbers, of a joint", x.sum(axis=-1), bound)]
     parents, offsets = case.inputs["parents"], case.inputs["offsets"]
     assert pose.judgement is not None
     assert pose.judgement.length_errors is not None
-    lengthened = sentence(
-        "The link to joint {joint} has another length than its offset, by {error:.2g} m."
-    )
-    moved = sentence("The root has moved by {error:.2g} m.")
-    distance = float(np.linalg.norm(x[0] - offsets[0]))
     return [
-        laws.bounded("root in place", distance, bound, "m", moved, index=0),
-        laws.of_joints("link lengths", pose.judgement.length_errors, bound, "m", lengthened),
+        finding("root in place", float(np.linalg.norm(x[0] - offsets[0])), bound, index=0),
+        of_joints("link lengths", pose.judgement.length_errors, bound),
         _branches(x, parents, offsets, 2.0 * bound),
         *_agreement(pose, case, 2.0 * bound, greeting),
     ]
@@ -181,11 +168,7 @@ def _branches(x: FloatArray, parents: IndexArray, offsets: FloatArray, bound: fl
             change = abs(float(np.linalg.norm(x[j] - x[sibling]) - length))
             if change > error:
                 error, joint = change, j
-    message = sentence(
-        "The distance from joint {joint} to another child of the same parent changes by "
-        "{error:.2g} m. A parent rotates all its children as one body."
-    )
-    return laws.bounded("branches", error, bound, "m", message, index=joint)
+    return finding("branches", error, bound, index=joint)
 
 
 def _agreement(pose: AnsweredPose, case: Case, bound: float, greeting: Greeting) -> list[Finding]:
@@ -195,6 +178,5 @@ def _agreement(pose: AnsweredPose, case: Case, bound: float, greeting: Greeting)
     if errors is None or pose.local is None or not np.isfinite(pose.local[carriers]).all():
         return []
     dead = DEAD_JOINTS * rounding.DEAD_ANGLE[greeting.precision] * case.facts["reach"]
-    message = sentence("Joint {joint} is {error:.2g} m from where the answer's rotations put it.")
-    verdict = Verdict.RIGHT_BUT if errors.max() <= dead else Verdict.WRONG
-    return [laws.of_joints("rotations agree with positions", errors, bound, "m", message, verdict)]
+    verdict = Verdict.RIGHT_BUT if errors.max() <= dead else None
+    return [of_joints("rotations agree with positions", errors, bound, verdict)]

@@ -6,8 +6,9 @@ from functools import partial
 
 from ..case import Case
 from ..contestant import Answer, Exchange
-from ..explain import explain, first_broken, hints_of
+from ..explain import explain, first_broken
 from ..judgement import CaseJudgement, Diagnosis, TaskReport, smallest_failure
+from ..laws import hints_of
 from ..sentence import Sentence
 from .faults import describe
 from .predictions import variants

@@ -14,8 +14,10 @@ from ..contestant import Answer, Exchange
 from ..explain import Variant, explain
 from ..greeting import Greeting
 from ..judgement import Diagnosis, Finding, TaskReport, Verdict
+from ..laws import finding, judge_case
 from ..sentence import Sentence, sentence
-from . import laws, rounding
+from . import rounding
+from .faults import AS_THE_TEXTBOOK, TABLE
 from .polylines import Polyline
 from .report import report
 from .skeletons import generator
@@ -83,8 +85,9 @@ def _curves(rng: np.random.Generator) -> list[Curve]:
 def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Judge points by the laws of resampling; strokes may be bridged or not."""
     judgements = [
-        laws.judge_case(
-            exchange, greeting, partial(_findings, exchange.case, greeting),
+        judge_case(
+            exchange, partial(_findings, exchange.case, greeting),
+            rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
             partial(_even, exchange.case),
         )
         for exchange in exchanges
@@ -124,26 +127,30 @@ def _distances(points: FloatArray, line: Polyline, bridged: bool) -> FloatArray:
 def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> list[Finding]:
     points = outputs.get("points")
     if points is None or not len(points):
-        return [laws.missing(sentence("The answer has no points."))]
+        return [finding("numbers, no points")]
     if not np.isfinite(points).all():
-        return [laws.missing(sentence("A point is not a number."))]
+        return [finding("numbers, of a point")]
     return point_laws(points, case, greeting)
 
 
 def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Finding]:
     """Return whether points are on the line, ordered, evenly spaced and of the requested count."""
-    line, bound = case.facts["line"], _bound(case, greeting)
+    line, bound, inputs = case.facts["line"], _bound(case, greeting), case.inputs
     distances = _distances(points, line, True)
     findings = [_on_line(points, distances, line, bound), _ends(points, case, bound)]
-    if "count" in case.inputs:
-        findings.append(_count(points, case))
+    if "count" in inputs:
+        excess = len(points) - inputs["count"]
+        is_start_repeated = inputs["closed"] and excess == 1
+        findings.append(finding(
+            "count", abs(excess), asked=inputs["count"], came=len(points),
+            verdict=Verdict.RIGHT_BUT if is_start_repeated else None,
+        ))  # fmt: skip
     if distances.max() <= bound:
         arc = line.arc_lengths(points, bound)
         step_back = float(np.max(-np.diff(arc), initial=0.0))
-        message = sentence("The points go back along the curve, by {error:.2g} m.")
-        findings.append(laws.bounded("order", step_back, 2.0 * bound, "m", message))
+        findings.append(finding("order", step_back, 2.0 * bound))
         findings.append(_gaps(points, arc, case, bound))
-        if case.inputs["closed"] and len(points) > 1:
+        if inputs["closed"] and len(points) > 1:
             findings.append(_closing(points, arc, line, bound))
     return findings
 
@@ -151,35 +158,13 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
 def _on_line(points: FloatArray, distances: FloatArray, line: Polyline, bound: float) -> Finding:
     """Return whether points are on the line, or between two of its points."""
     is_cut = all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(distances > bound))
-    message = sentence(
-        "Points of the curve are left out, so that corners are cut by {error:.2g} m."
-        if is_cut
-        else "Point {index} is {error:.2g} m off the polyline.",
-        index=int(np.argmax(distances)),
-    )
-    verdict = Verdict.RIGHT_BUT if is_cut else Verdict.WRONG
-    return laws.bounded("on the line", distances.max(), bound, "m", message, verdict=verdict)
+    key = "on the line, corners cut" if is_cut else "on the line"
+    return finding(key, distances.max(), bound, index=int(np.argmax(distances)))
 
 
 def _ends(points: FloatArray, case: Case, bound: float) -> Finding:
-    curve = case.inputs["curve"]
-    error = float(np.linalg.norm(points[0] - curve[0]))
-    if not case.inputs["closed"]:
-        error = max(error, float(np.linalg.norm(points[-1] - curve[-1])))
-    message = sentence(
-        "The curve's ends are not kept: the answer starts or ends {error:.2g} m from them."
-    )
-    return laws.bounded("ends", error, bound, "m", message)
-
-
-def _count(points: FloatArray, case: Case) -> Finding:
-    expected, count = case.inputs["count"], len(points)
-    message = sentence(
-        "It was asked for {asked} points and gives {came}.", asked=expected, came=count
-    )
-    is_start_repeated = case.inputs["closed"] and count == expected + 1
-    verdict = Verdict.RIGHT_BUT if is_start_repeated else Verdict.WRONG
-    return laws.bounded("count", abs(count - expected), 0.0, "", message, verdict=verdict)
+    errors = np.linalg.norm(points[[0, -1]] - case.inputs["curve"][[0, -1]], axis=-1)
+    return finding("ends", errors[: 1 if case.inputs["closed"] else 2].max(), bound)
 
 
 def _gaps(points: FloatArray, arc: FloatArray, case: Case, bound: float) -> Finding:
@@ -191,12 +176,9 @@ def _gaps(points: FloatArray, arc: FloatArray, case: Case, bound: float) -> Find
     if "count" not in case.inputs:
         return _gaps_by_spacing(measures, case, bound)
     error = min(_spread(gaps) for gaps in measures)
-    message = sentence(
-        "The points are not evenly spaced: a gap differs from the mean by {error:.0%}."
-    )
-    verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else Verdict.WRONG
+    verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else None
     tolerance = UNEVEN + 4.0 * bound / max(float(measures[2].mean()), bound)
-    return laws.bounded("spacing", error, tolerance, "", message, verdict=verdict)
+    return finding("spacing", error, tolerance, verdict=verdict)
 
 
 def _spread(gaps: FloatArray) -> float:
@@ -211,20 +193,11 @@ def _gaps_by_spacing(measures: Sequence[FloatArray], case: Case, bound: float) -
     widest = min(float(np.sort(gaps)[: len(gaps) - bridges].max(initial=0.0)) for gaps in measures)
     if widest > spacing * (1.0 + 1e-6) + 2.0 * bound:
         gap, limit = distinct_texts(widest, spacing, 3)
-        message = sentence(
-            "Neighbouring points are {gap} m apart, more than the {spacing} m asked for.",
-            gap=gap,
-            spacing=limit,
-        )
-        return Finding("spacing", Verdict.WRONG, widest, spacing, "m", message)
+        return finding("spacing, wide", widest, spacing, gap=gap, spacing=limit)
+    narrow = 0
     if len(chords) > 4.0 * line.length / spacing + 1.0 + bridges + len(case.inputs["curve"]):
-        count = int((chords < MIN_GAP * spacing - 2.0 * bound).sum())
-        message = sentence(
-            "{narrow} gaps are narrower than half the spacing: the points are uneven.",
-            narrow=count,
-        )
-        return Finding("spacing", Verdict.RIGHT_BUT, count, 0.0, "", message)
-    return Finding("spacing", Verdict.RIGHT, widest, spacing, "m", laws.HOLDS)
+        narrow = int((chords < MIN_GAP * spacing - 2.0 * bound).sum())
+    return finding("spacing, narrow", narrow, narrow=narrow)
 
 
 def _closing(points: FloatArray, arc: FloatArray, line: Polyline, bound: float) -> Finding:
@@ -232,22 +205,14 @@ def _closing(points: FloatArray, arc: FloatArray, line: Polyline, bound: float) 
     is_open = float(np.linalg.norm(points[-1] - points[0])) > bound
     gap = line.length - float(arc[-1]) if is_open else 0.0
     widest = float(np.diff(arc).max()) * (1.0 + UNEVEN)
-    gap_text, widest_text = distinct_texts(gap, widest, 3)
-    message = sentence(
-        "The side that closes the curve is left out: from the last point to the start it is "
-        "{gap} m, between others at most {widest} m.",
-        gap=gap_text,
-        widest=widest_text,
-    )
-    return laws.bounded("closing side", gap, widest + 2.0 * bound, "m", message)
+    shown, limit = distinct_texts(gap, widest, 3)
+    return finding("closing side", gap, widest + 2.0 * bound, gap=shown, widest=limit)
 
 
 def _expected_count(case: Case) -> int:
     """Return the number of points that a case requests."""
-    inputs = case.inputs
-    if "count" in inputs:
-        return int(inputs["count"])
-    return int(case.facts["line"].count(inputs["spacing"], inputs["closed"]))
+    spacing, closed = case.inputs.get("spacing"), case.inputs["closed"]
+    return int(case.inputs.get("count") or case.facts["line"].count(spacing, closed))
 
 
 def _even(case: Case, extra: int = 0) -> FloatArray:
@@ -256,23 +221,11 @@ def _even(case: Case, extra: int = 0) -> FloatArray:
     return line.even_points(_expected_count(case) + extra, case.inputs["closed"])
 
 
-def _without_end(case: Case) -> FloatArray:
-    """Leave out the last point of an open curve."""
-    line: Polyline = case.facts["line"]
-    return line.even_points(_expected_count(case), True)
-
-
 def _by_index(case: Case) -> FloatArray:
     """Space points by the number of samples instead of the length along the curve."""
     points, closed = case.facts["line"].points, bool(case.inputs["closed"])
     place = np.linspace(0.0, len(points) - 1.0, _expected_count(case), endpoint=not closed)
     return np.stack([np.interp(place, np.arange(len(points)), x) for x in points.T], axis=-1)
-
-
-def _left_open(case: Case) -> FloatArray:
-    """Leave out the segment from the end of a closed curve to its start."""
-    line = Polyline(case.inputs["curve"], case.facts["line"].strokes, False)
-    return line.even_points(_expected_count(case), False)
 
 
 def _samples_before(case: Case) -> FloatArray:
@@ -284,33 +237,26 @@ def _samples_before(case: Case) -> FloatArray:
     return points
 
 
-# The points that a faulty program answers, and the sentence about its fault.
-FAULTS: dict[str, tuple[Callable[[Case], FloatArray], Sentence]] = {
-    "by index": (_by_index, sentence(
-        "Points are spaced by the number of samples, not by the length along the curve: they are "
-        "as uneven as the samples. Add up the lengths of the segments and divide those.")),
-    "end left out": (_without_end, sentence(
-        "The last point is left out on open curves: divide the length by count - 1, so that the "
-        "end is kept.")),
-    "one point less": (partial(_even, extra=-1), sentence(
-        "There is one point less than asked for: the loop ends too early.")),
-    "one point more": (partial(_even, extra=1), sentence(
-        "There is one point more than asked for: count points, not gaps.")),
-    "left open": (_left_open, sentence(
-        "The segment from the end of a closed curve back to its start is missing.")),
-    "reversed": (lambda case: _even(case)[::-1], sentence(
-        "The points come in the reverse order of the curve.")),
-    "samples only": (_samples_before, sentence(
-        "Points are taken from the samples. Interpolate between two samples where the even length "
-        "falls between them.")),
-}  # fmt: skip
+# The points that a program with each fault answers.
+FAULTS: dict[str, Callable[[Case], FloatArray]] = {
+    "by index": _by_index,
+    "end left out": lambda case: case.facts["line"].even_points(_expected_count(case), True),
+    "one point less": partial(_even, extra=-1),
+    "one point more": partial(_even, extra=1),
+    "left open": lambda case: Polyline(
+        case.inputs["curve"], case.facts["line"].strokes, False
+    ).even_points(_expected_count(case), False),
+    "reversed": lambda case: _even(case)[::-1],
+    "samples only": _samples_before,
+}
 
 
 def _diagnosis(
     wrong_first: Sequence[Exchange], greeting: Greeting, behaviour: Sentence | None
 ) -> Diagnosis:
     """Return the faults that reproduce the answers."""
-    right = {"": (_even, sentence("It does what the textbook does."))}
+    sentences = {key: Sentence(entry["sentence"], {}) for key, entry in TABLE[TASK].items()}
+    sentences[""] = AS_THE_TEXTBOOK
 
     def variant(key: str, points: Callable[[Case], FloatArray]) -> Variant:
         return Variant((key,) if key else (), lambda case: {"points": points(case)})
@@ -318,8 +264,7 @@ def _diagnosis(
     def tolerance(case: Case) -> float:
         return max(1e-9, 64.0 * greeting.epsilon * len(case.inputs["curve"]))
 
-    faults = {**right, **FAULTS}
-    variants = [variant(key, points) for key, (points, _) in faults.items()]
-    explanations, count = explain(variants, wrong_first, tolerance, lambda keys: faults[keys[0]][1])
+    variants = [variant(key, points) for key, points in ({"": _even} | FAULTS).items()]
+    explanations, count = explain(variants, wrong_first, tolerance, lambda keys: sentences[keys[0]])
     faulty = tuple(explanation for explanation in explanations if explanation.faults != ("",))
     return Diagnosis(faulty, behaviour, variant_count=count)

@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plumbob.reference import rotation
+from plumbob.reference import Outcome, rotation, solve_ik
 from plumbob.reference.arguments import FloatArray
+from plumbob.reference.formats import urdf
 from plumbob.reference.judging import PoseJudgement
 
 from ..case import Case
@@ -15,10 +16,12 @@ from ..contestant import Answer, Exchange
 from ..explain import either
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
-from ..sentence import Sentence, sentence
-from . import laws, robot_models, rounding
+from ..laws import finding, judge_case, not_finite
+from ..sentence import Sentence
+from . import robot_models, rounding
+from .faults import TABLE
 from .report import report
-from .robot_models import ANYWHERE, BEYOND, IDENTITY, judgement_of
+from .robot_models import ANYWHERE, BEYOND, IDENTITY, judgement_of, mechanism, target_of
 
 TASK = robot_models.TASK
 cases = robot_models.cases
@@ -35,7 +38,7 @@ class Misreading(NamedTuple):
     """A wrong interpretation of a request."""
 
     sentence: Sentence  # the mistake, and its correction
-    misread: Callable[[Inputs], Inputs] = lambda inputs: {}  # the inputs with another meaning
+    misread: Callable[[Inputs], Inputs] = dict  # returns the inputs with another meaning
     scale: float = 1.0  # of the coordinates of hinges, in radians
     relative: bool = False  # whether coordinates count from the start
 
@@ -54,62 +57,45 @@ class Misreading(NamedTuple):
         return scaled - inputs["start"] if self.relative else scaled
 
 
-FAULTS: Mapping[str, Misreading] = {
-    "degrees": Misreading(
-        sentence("Your coordinates are in degrees. Answer in radians: multiply by pi / 180."),
-        scale=np.pi / 180.0,
-    ),
-    "rotation sense": Misreading(
-        sentence("Your hinges rotate in the wrong sense. A hinge rotates by q about its axis, "
-                 "counterclockwise as seen from the axis' tip."),
-        scale=-1.0,
-    ),
-    "relative": Misreading(
-        sentence("Your coordinates count from the start. Answer start + change."), relative=True
-    ),
-    "tool ignored": Misreading(
-        sentence("Your target is reached by the last joint, not by the tool, which is at "
-                 "tool_position and tool_rotation in that joint's frame."),
-        lambda inputs: {"tool_position": np.zeros(3), "tool_rotation": IDENTITY},
-    ),
-    "orientations ignored": Misreading(
-        sentence("You ignore the orientations of the joints' frames. A joint's frame is rotated "
-                 "in its parent's by orientations[j], before it moves."),
-        lambda inputs: {"orientations": rotation.identity(len(inputs["parents"]))},
-    ),
-    "axes of the parent": Misreading(
-        sentence("You take axes to be in the parent's frame. They are in the joint's own, which "
-                 "orientations[j] has rotated."),
-        lambda inputs: {
-            "axes": rotation.rotate(rotation.conjugate(inputs["orientations"]), inputs["axes"])
-        },
-    ),
-    "scalar last": Misreading(
-        sentence("You read the target's quaternion as x, y, z, w. It is w, x, y, z."),
-        lambda inputs: {"target_rotation": np.roll(inputs["target_rotation"], 1)},
-    ),
-    POSITION_ONLY: Misreading(
-        sentence("You bring the tool to its position and ignore its rotation."),
-        lambda inputs: {"target_rotation": None},
-    ),
+# The inputs that a fault reads otherwise.
+MISREAD: Mapping[str, Callable[[Inputs], Inputs]] = {
+    "tool ignored": lambda inputs: {"tool_position": np.zeros(3), "tool_rotation": IDENTITY},
+    "orientations ignored": lambda inputs: {
+        "orientations": rotation.identity(len(inputs["parents"]))
+    },
+    "axes of the parent": lambda inputs: {
+        "axes": rotation.rotate(rotation.conjugate(inputs["orientations"]), inputs["axes"])
+    },
+    "scalar last": lambda inputs: {"target_rotation": np.roll(inputs["target_rotation"], 1)},
+    POSITION_ONLY: lambda inputs: {"target_rotation": None},
+}
+FAULTS = {
+    key: Misreading(
+        Sentence(entry["sentence"], {}), MISREAD.get(key, dict), entry.get("scale", 1.0),
+        entry.get("relative", False),
+    )
+    for key, entry in TABLE["robots"].items()
 }  # fmt: skip
 
 
 def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Judge coordinates by the laws of poses; name the faults."""
     judgements = [
-        laws.judge_case(exchange, greeting, partial(_findings, exchange.case, greeting))
+        judge_case(
+            exchange, partial(_findings, exchange.case, greeting),
+            rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
+        )
         for exchange in exchanges
-    ]
+    ]  # fmt: skip
     return report(TASK, method, judgements, _diagnosis(judgements))
 
 
 def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> list[Finding]:
     q = outputs.get("q")
     if q is None:
-        return [laws.missing(sentence("The answer has no coordinates q."))]
+        return [finding("numbers, no coordinates")]
     if not np.isfinite(q).all():
-        return [laws.no_numbers("numbers", q, 0.0)]
+        return [not_finite("numbers, of a joint", q)]
     judgement = judgement_of(case.inputs, q)
     limits = _limits(judgement, q, case, greeting)
     return [limits, *_target_laws(judgement, outputs, case, greeting)]
@@ -120,10 +106,7 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
     joint = int(np.argmax(excess))
     largest = float(np.abs([case.inputs["lower"], case.inputs["upper"]]).max())
     bound = rounding.ROUNDINGS_A_JOINT * greeting.epsilon * largest
-    message = sentence(
-        "Joint {joint} is at {value:.6g}, {error:.2g} beyond its limit.", value=float(q[joint])
-    )
-    return laws.bounded("limits kept", excess[joint], bound, "rad", message, index=joint)
+    return finding("limits kept", excess[joint], bound, index=joint, value=float(q[joint]))
 
 
 def _target_laws(
@@ -135,35 +118,14 @@ def _target_laws(
     bound = judgement.tolerance + rounding.positions(greeting.epsilon, joints, size)
     angle_bound = judgement.tolerance_rotation + rounding.rotations(greeting.epsilon, joints)
     if case.family != BEYOND:
-        verdict = Verdict.RIGHT_BUT if case.family == ANYWHERE else Verdict.WRONG
-        too_far = sentence("It ends {error:.2g} m from a target that it can reach.")
-        rotated = sentence(
-            "The tool's rotation differs by {error:.2g} rad from a target that it can reach."
-        )
-        yield laws.bounded("target reached", distance, bound, "m", too_far, verdict=verdict)
-        yield laws.bounded("rotation reached", angle, angle_bound, "rad", rotated, verdict=verdict)
-    yield from _claims(distance, angle, bound, angle_bound, outputs)
-
-
-def _claims(
-    distance: float, angle: float, bound: float, angle_bound: float, outputs: Mapping[str, Any]
-) -> Iterator[Finding]:
-    """Yield a finding if `converged` is false."""
-    reached = distance <= bound and angle <= angle_bound
-    if outputs.get("converged") and not reached:
-        message = sentence(
-            "It reports success, but the tool is {distance:.2g} m and {angle:.2g} rad from the "
-            "target.",
-            distance=distance, angle=angle,
-        )  # fmt: skip
-        yield Finding("claims", Verdict.WRONG, distance, bound, "m", message)
-    if reached and not outputs.get("converged", True):
-        message = sentence(
-            "The effector is {error:.2g} m from the target, within the tolerance, but it "
-            "reports failure.",
-            error=distance,
-        )
-        yield Finding("claims", Verdict.RIGHT_BUT, distance, bound, "m", message)
+        verdict = Verdict.RIGHT_BUT if case.family == ANYWHERE else None
+        yield finding("target reached", distance, bound, verdict=verdict)
+        yield finding("rotation reached", angle, angle_bound, verdict=verdict)
+    # The larger of both errors, in multiples of its bound.
+    error = max(distance / bound, angle / angle_bound)
+    if "converged" in outputs and outputs["converged"] != (error <= 1.0):
+        key = "claims, success of a tool" if outputs["converged"] else "claims, failure of a tool"
+        yield finding(key, abs(error - 1.0), distance=distance, angle=angle)
 
 
 def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:
@@ -198,3 +160,46 @@ def _explains(fault: Misreading, judgement: CaseJudgement) -> bool:
     inputs = dict(fault.read(judgement.case.inputs))
     inputs |= {name: LENIENT * inputs[name] for name in ("tolerance", "tolerance_rotation")}
     return judgement_of(inputs, fault.coordinates(inputs, judgement.answer.values["q"])).reached
+
+
+# ---- solvers for the self-test, right or with a misreading of their requests
+
+RIGHT = Misreading(Sentence("", {}))
+# Restarts of a faulty solver without limits, whose own target the first solve has not reached.
+RESTARTS = 2
+LIMITS = ("tolerance", "tolerance_rotation", "max_iterations")
+
+
+def solve_wrongly(fault: Misreading | None, /, **inputs: Any) -> Mapping[str, Any]:
+    """Return the result of damped least squares on a misread request."""
+    fault = fault or RIGHT
+    request = fault.read(inputs)
+    q, reached = _solve(request, 0)
+    if fault is not RIGHT and not reached:
+        infinite = np.full(len(q), np.inf)
+        free, reached = _solve({**request, "lower": -infinite, "upper": infinite}, RESTARTS)
+        q = free if reached else q
+    return {"q": fault.answer(inputs, q)}
+
+
+def _solve(request: Mapping[str, Any], restarts: int) -> tuple[FloatArray, bool]:
+    """Return coordinates, and whether they reach the target."""
+    solution = solve_ik(
+        mechanism(request), request["start"], target_of(request), "damped_least_squares",
+        restarts=restarts, **{name: request[name] for name in LIMITS},
+    )  # fmt: skip
+    return solution.coordinates, bool(solution.outcome == Outcome.CONVERGED)
+
+
+def solve_by_reference(**inputs: Any) -> Mapping[str, Any]:
+    """Return the result of the reference's Levenberg-Marquardt on the request's URDF."""
+    robot = urdf.parse(inputs["urdf"]).articulation
+    links = [robot.names.index(f"link_{joint}") for joint in range(len(inputs["start"]))]
+    coordinates = [robot.coordinates_of(link).start for link in links]
+    start = np.empty(robot.coordinate_count)
+    start[coordinates] = inputs["start"]
+    target = target_of(inputs)._replace(effector="tool")
+    options = {name: inputs[name] for name in LIMITS}
+    solution = solve_ik(robot, start, target, "levenberg_marquardt", restarts=0, **options)
+    converged = bool(solution.outcome == Outcome.CONVERGED)
+    return {"q": solution.coordinates[coordinates], "converged": converged}

@@ -1,7 +1,9 @@
 """Robots of joints with limits: as the reference's articulations, as URDF, and as cases."""
 
 import math
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,6 +36,7 @@ AT, CLOSE, ANYWHERE, BEYOND = "start at the target", "near start", "any start", 
 FARTHEST = 1e74
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 _SEED = 1955
+_TEXT = Path(__file__).with_name("robots.toml").read_text(encoding="utf-8")
 
 
 def mechanism(inputs: Mapping[str, Any]) -> Articulation:
@@ -159,21 +162,10 @@ def _cases_of(
 
 
 def _robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
-    z, y = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
-    arm = [[0, 0, 0.3], [0, 0.1, 0], [0, 0, 0.4], [0, 0, 0.4], [0, 0.1, 0], [0, 0, 0.1]]
-    taller = [[0, 0, height] for height in (0.34, 0.2, 0.2, 0.2, 0.2, 0.2, 0.1)]
-    scara = [[0, 0, 0.4], [0.4, 0, 0], [0.3, 0, 0], [0, 0, -0.1]]
-    slide = np.array([False, False, True, False])
-    return {
-        "one hinge": _robot([z], [[0, 0, 0.2]], tool=[0.5, 0, 0]),
-        "two hinges": _robot([z, z], [[0, 0, 0.1], [0.6, 0, 0]], tool=[0.4, 0, 0]),
-        "a slide": _robot([z, z, z, z], scara, slide),
-        "a branch": _robot([z, y, y, y], [[0, 0, 0.2], [0, 0, 0.3], [0, 0.2, 0], [0.4, 0, 0]],
-                           parents=[-1, 0, 0, 1], tool=[0.2, 0, 0.1]),
-        "six hinges": _robot([z, y, y, y, z, y], arm, tool=[0, 0.05, 0.1]),
-        "seven hinges": _robot([z, y, z, y, z, y, z], taller, tool=[0, 0, 0.1]),
-        **{f"seven hinges in rotated frames {i}": _random_frames(rng) for i in range(1, 4)},
-    }  # fmt: skip
+    robots = {name: _robot(**entry) for name, entry in tomllib.loads(_TEXT).items()}
+    return robots | {
+        f"seven hinges in rotated frames {i}": _random_frames(rng) for i in range(1, 4)
+    }
 
 
 def _random_frames(rng: np.random.Generator) -> dict[str, Any]:
@@ -191,7 +183,7 @@ def _robot(
     tool: Any = (0.0, 0.0, 0.1), tool_rotation: Any = (1.0, 0.0, 0.0, 0.0),
 ) -> dict[str, Any]:  # fmt: skip
     count = len(axes)
-    slides = np.zeros(count, dtype=bool) if slides is None else slides
+    slides = np.zeros(count, dtype=bool) if slides is None else np.array(slides)
     return {
         "parents": np.array(np.arange(count) - 1 if parents is None else parents),
         "origins": np.array(origins, dtype=float),

@@ -27,6 +27,11 @@ def rotations(epsilon: float, joints: int) -> float:
     return ROUNDINGS_A_JOINT * joints * epsilon
 
 
+def repeats(epsilon: float, size: float) -> float:
+    """Return how far two answers to a request may differ: threads may add up in another order."""
+    return ROUNDINGS_A_JOINT * epsilon * max(size, 1.0)
+
+
 def sweep(epsilon: float, joints: int, size: float, amplification: float) -> float:
     """Return how far rounding moves a joint in a sweep that enlarges small changes [m]."""
     return SWEEP_ROUNDINGS * joints * epsilon * size * max(1.0, amplification)

@@ -11,13 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from plumbob.reference import rotation
+
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
+from ..laws import HOLDS
 from ..sentence import Sentence, sentence
-from . import laws, pose_laws, rounding
+from . import pose_laws, rounding
 from .faults import FAULTS, by_key, describe, switches
 from .predictions import predict_inverse, solve
 from .report import diagnosis_of
@@ -97,7 +100,7 @@ def compare(
         else "Its sweeps are those of {method}.",
         method=NAMES[method],
     )
-    verdict, message, damped = Verdict.RIGHT, laws.HOLDS, None
+    verdict, message, damped = Verdict.RIGHT, HOLDS, None
     if wrong:
         honest = honest_variant(trials, method, greeting)
         damped = damping_of(trials, greeting) if method == "ccd" and honest is None else None
@@ -111,7 +114,7 @@ def compare(
         name: [
             Finding(LAW, verdict, error, bound, "m", message)
             if name in wrong
-            else Finding(LAW, Verdict.RIGHT, error, bound, "m", laws.HOLDS)
+            else Finding(LAW, Verdict.RIGHT, error, bound, "m", HOLDS)
         ]
         for name, (error, bound) in errors.items()
     }
@@ -234,12 +237,13 @@ def _damping(trials: Sequence[PoseTrial], switched: Switches) -> tuple[float, fl
     for trial in trials:
         if trial.pose.local is None or trial.case.facts["sweeps"] != 1:
             continue
-        start, path = trial.case.inputs["local_rotations"], trial.pose.path
+        links = trial.pose.path[:-1]
+        start = trial.case.inputs["local_rotations"][links]
         local, _, _ = solve("ccd", trial.case.inputs, switched)
-        first = path[0] if switched.order == 1 else path[-2]
-        angles = laws.angles(trial.pose.local, start)
-        gain = float(angles[first] / laws.angles(local, start)[first])
-        largest = max(largest, float(angles[path].max()))
+        first = 0 if switched.order == 1 else -1
+        angles = rotation.angle(trial.pose.local[links], start)
+        gain = float(angles[first] / rotation.angle(local[links], start)[first])
+        largest = max(largest, float(angles.max()))
     return gain, largest
 
 

@@ -17,8 +17,9 @@ from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
+from ..laws import HOLDS, finding, judge_case
 from ..sentence import sentence
-from . import laws, pose_laws, problems, rounding, skeletons, sweeps
+from . import pose_laws, problems, rounding, skeletons, sweeps
 from .inverse_kinematics import METHODS
 from .pose_laws import AnsweredPose
 from .predictions import forward, path_to, predict_track
@@ -66,7 +67,7 @@ def _is_smooth(problem: CurveProblem) -> bool:
     """Return whether both textbook solvers track a curve without large rotations of joints."""
     start, curve = problem
     inputs = problems.request(start, TOLERANCE, problems.EASY, "") | {"curve": curve}
-    case = Case("", TASK, inputs, "", laws.HOLDS)
+    case = Case("", TASK, inputs, "", HOLDS)
     path = path_to(start.skeleton.parents, start.effector)
     for method in METHODS:
         x = predict_track(method, Switches(), case)["positions"]
@@ -129,8 +130,7 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
 def _is_wrong(judgement: CaseJudgement) -> bool:
     """Return whether frames break a law, or jump."""
     return judgement.verdict >= Verdict.WRONG or any(
-        finding.verdict and finding.law in ("continuity", CONTINUES)
-        for finding in judgement.findings
+        found.verdict and found.law in ("continuity", CONTINUES) for found in judgement.findings
     )
 
 
@@ -169,13 +169,14 @@ def _judge(exchange: Exchange, method: str, greeting: Greeting) -> CaseJudgement
     def findings(outputs: Mapping[str, Any]) -> list[Finding]:
         frames = frames_of(exchange)
         if not frames:
-            return [laws.missing(pose_laws.NEITHER)]
+            return [finding("numbers, no pose")]
         findings = [*_frame_laws(frames, greeting), *_continuity([frame.pose for frame in frames])]
         return (
             [*findings, _continues(exchange, method, greeting)] if method in METHODS else findings
         )
 
-    return laws.judge_case(exchange, greeting, findings, reference)
+    allowed = rounding.repeats(greeting.epsilon, exchange.case.facts["size"])
+    return judge_case(exchange, findings, allowed, reference)
 
 
 def _continues(exchange: Exchange, method: str, greeting: Greeting) -> Finding:
@@ -186,13 +187,7 @@ def _continues(exchange: Exchange, method: str, greeting: Greeting) -> Finding:
         difference(predict_track(method, Switches(frame_start=start), exchange.case), answer.values)
         for start in (0, 1)
     )
-    if not warm > bound >= cold:
-        return Finding(CONTINUES, Verdict.RIGHT, 0.0, 0.0, "", laws.HOLDS)
-    message = sentence(
-        "Every frame starts from the first pose, so that joints may jump. Start each frame from "
-        "the one before."
-    )
-    return Finding(CONTINUES, Verdict.RIGHT_BUT, 1.0, 0.0, "", message)
+    return finding(CONTINUES, float(warm > bound >= cold))
 
 
 def _frame_laws(frames: Sequence[Frame], greeting: Greeting) -> list[Finding]:
@@ -202,14 +197,12 @@ def _frame_laws(frames: Sequence[Frame], greeting: Greeting) -> list[Finding]:
         findings = pose_laws.all_of(pose, case, greeting)
         if pose.finite:
             findings.append(_on_target(pose, case, greeting))
-        for finding in findings:
-            rank = finding.verdict, finding.error
-            previous = worst.get(finding.law)
+        for found in findings:
+            previous = worst.get(found.law)
+            rank = found.verdict, found.error
             if previous is None or rank > (previous.verdict, previous.error):
-                message = finding.sentence
-                if finding.verdict:
-                    message = sentence("Frame {frame}: {what}", frame=i, what=message)
-                worst[finding.law] = replace(finding, sentence=message)
+                words = sentence("Frame {frame}: {what}", frame=i, what=found.sentence)
+                worst[found.law] = replace(found, sentence=words) if found.verdict else found
     return list(worst.values())
 
 
@@ -217,10 +210,8 @@ def _on_target(pose: AnsweredPose, case: Case, greeting: Greeting) -> Finding:
     joints, size, error = len(pose.positions), case.facts["size"], pose.distance
     slack = rounding.positions(greeting.epsilon, joints, size, pose.drift)
     share = rounding.STALL[greeting.precision] if case.inputs["method"] in METHODS else SLOW
-    message = sentence("It ends {error:.2g} m from a target that it can reach.")
-    verdict = Verdict.RIGHT_BUT if error <= share * case.facts["reach"] else Verdict.WRONG
-    bound = case.inputs["tolerance"] + slack
-    return laws.bounded("target reached", error, bound, "m", message, verdict=verdict)
+    verdict = Verdict.RIGHT_BUT if error <= share * case.facts["reach"] else None
+    return finding("target reached", error, case.inputs["tolerance"] + slack, verdict=verdict)
 
 
 def _continuity(poses: Sequence[AnsweredPose]) -> list[Finding]:
@@ -230,11 +221,5 @@ def _continuity(poses: Sequence[AnsweredPose]) -> list[Finding]:
         return []
     distances = np.linalg.norm(np.diff(x, axis=0), axis=-1)
     frame, k = np.unravel_index(int(np.argmax(distances)), distances.shape)
-    joint, error = int(poses[0].path[k]), float(distances[frame, k])
-    message = sentence(
-        "Joint {joint} jumps by {error:.2g} m from frame {frame} to the next: start each frame "
-        "from the one before.",
-        frame=int(frame),
-    )
-    verdict = Verdict.RIGHT_BUT
-    return [laws.bounded("continuity", error, JUMP, "m", message, verdict=verdict, index=joint)]
+    error, joint = distances[frame, k], int(poses[0].path[k])
+    return [finding("continuity", error, JUMP, index=joint, frame=int(frame))]

@@ -4,7 +4,7 @@ Zero of the gravitational energy is where the solver has it: the states of a cas
 several places, and only differences to the first of them count.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import Any
@@ -18,21 +18,12 @@ from ..contestant import Answer, Exchange
 from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..laws import digits, finding, judge_case
 from ..sentence import sentence
-from ..timing import time_call
-from . import laws
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, combined
-from .laws import correct_digits
 from .model import StepModel
-from .problem import (
-    SpringProblem,
-    all_forces,
-    elastic_energy,
-    problem_of,
-    state_of,
-    system_of,
-)
+from .problem import SpringProblem, all_forces, elastic_energy, problem_of, state_of, system_of
 
 TASK = "energy"
 Energies = Mapping[str, Any]
@@ -104,69 +95,50 @@ def _judge_case(
     case, answer = exchange.case, exchange.answer
     p = problem_of(case.inputs)
     system, state = system_of(p), state_of(p)
-    _, seconds = time_call(
-        lambda: potential_energy(system, state.positions) + kinetic_energy(system, state)
-    )
     expected, allowed = predict((), p), tolerance(p, greeting.epsilon)
-    if not isinstance(answer, Answer):
-        return CaseJudgement(case, answer, (), expected, None, seconds)
-    if not np.isfinite(list(answer.values.values())).all():
-        findings = [laws.not_finite(sentence("Energies hold NaN or infinity."))]
-        return CaseJudgement(case, answer, tuple(findings), expected, None, seconds)
-    energies = answer.values
-    gaps = {name: abs(energies[name] - expected[name]) for name in FORMULAS if name in energies}
-    findings = [_formula(name, gap, allowed) for name, gap in gaps.items()]
-    findings += _sums(energies, allowed)
+    outputs = answer.values if isinstance(answer, Answer) else {}
+    gaps = {name: abs(outputs[name] - expected[name]) for name in FORMULAS if name in outputs}
     before = next((e for e in exchanges if e.case.name == case.facts.get("from")), None)
-    if before is not None and isinstance(before.answer, Answer):
-        q = problem_of(before.case.inputs)
-        findings += _work(q, p, before.answer.values, energies, 4.0 * allowed)
-    findings += [laws.equal_requests(exchange, dict.fromkeys(PARTS, allowed))]
-    findings += laws.remarks(answer)
+
+    def findings(energies: Energies) -> Iterator[Finding]:
+        if not np.isfinite(list(energies.values())).all():
+            yield finding("finite numbers", name="energies")
+            return
+        for name, gap in gaps.items():
+            yield finding("energy formula", gap, allowed, law=name, name=name)
+        for name, gap in _sums(energies).items():
+            yield finding("sum of energies", gap, 4.0 * allowed, name=name)
+        if before is not None and isinstance(before.answer, Answer):
+            start = problem_of(before.case.inputs)
+            for name, gap in _work(start, p, before.answer.values, energies).items():
+                yield finding("energy and work", gap, 4.0 * allowed, name=name)
+
     size = max(expected[name] for name in FORMULAS)
-    digits = correct_digits(max(gaps.values()), size) if gaps and size > allowed else None
-    return CaseJudgement(case, answer, tuple(findings), expected, digits, seconds)
+    return judge_case(
+        exchange, findings, allowed,
+        lambda: potential_energy(system, state.positions) + kinetic_energy(system, state),
+        expected, digits(max(gaps.values()), size) if gaps and size > allowed else None,
+    )  # fmt: skip
 
 
-def _formula(name: str, gap: float, allowed: float) -> Finding:
-    message = sentence(
-        "The {name} energy differs by {gap:.2g} J from its formula.", name=name, gap=gap
-    )
-    return laws.bounded(name, gap, allowed, "J", message)
-
-
-def _sums(energies: Energies, allowed: float) -> list[Finding]:
-    """Return whether the parts add up, where the answer holds all of them."""
-    findings = []
-    for whole, parts in SUMS.items():
-        if all(name in energies for name in (whole, *parts)):
-            gap = abs(energies[whole] - sum(energies[name] for name in parts))
-            message = sentence(
-                "The {whole} energy differs by {gap:.2g} J from the sum of its parts.",
-                whole=whole,
-                gap=gap,
-            )
-            findings.append(laws.bounded("sum of energies", gap, 4.0 * allowed, "J", message))
-    return findings
+def _sums(energies: Energies) -> dict[str, float]:
+    """Return how far energies are from the sums of their parts, where all of them are known."""
+    return {
+        whole: abs(energies[whole] - sum(energies[name] for name in parts))
+        for whole, parts in SUMS.items()
+        if {whole, *parts} <= energies.keys()
+    }
 
 
 def _work(
-    p: SpringProblem, q: SpringProblem, before: Energies, after: Energies, allowed: float
-) -> list[Finding]:
-    """Return whether energies change by the work of forces between the two states."""
-    findings = []
-    for name, work in works(p, q).items():
-        if name not in before or name not in after:
-            continue
-        gap = abs((after[name] - before[name]) + work)
-        message = sentence(
-            "Between two configurations, the change of the {name} energy differs by {gap:.2g} J "
-            "from the work of the forces.",
-            name=name,
-            gap=gap,
-        )
-        findings.append(laws.bounded("energy and work", gap, allowed, "J", message))
-    return findings
+    p: SpringProblem, q: SpringProblem, before: Energies, after: Energies
+) -> dict[str, float]:
+    """Return how far changes of energies are from the work of forces between the two states."""
+    return {
+        name: abs(after[name] - before[name] + work)
+        for name, work in works(p, q).items()
+        if name in before and name in after
+    }
 
 
 def works(p: SpringProblem, q: SpringProblem) -> dict[str, float]:

@@ -113,10 +113,13 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
             fields["integrator"] = Integrator(**entry["integrator"], **values)
         elif aspect == "time" and values:
             fields["time"] = float(Fraction(values["time"]))
-        key = entry.get("key", f"{aspect} {entry.get('value')}").format(**values)
+        elif aspect in values and aspect in StepModel._fields:
+            fields[aspect] = values[aspect]
+        name = " ".join(map(str, fields.get("integrator", ()))) or f"{aspect} {entry.get('value')}"
+        key = entry.get("key", name).format(**values)
         message, parts = Sentence(entry["sentence"], values), tuple(entry.get("parts", ()))
         rare = entry.get("rare", False)
-        rare = values["strength"] in rare if isinstance(rare, list) else rare
+        rare = any(x in rare for x in values.values()) if isinstance(rare, list) else rare
         yield Option(key, aspect, message, _change(entry, values), fields, parts, rare)
 
 

@@ -14,12 +14,11 @@ from ..contestant import Answer, Exchange
 from ..explain import Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
+from ..laws import digits, finding, judge_case
 from ..sentence import Sentence, sentence
-from ..timing import time_call
-from . import laws
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
-from .laws import correct_digits
+from .laws import symmetry
 from .model import StepModel
 from .problem import (
     SpringProblem,
@@ -64,38 +63,28 @@ def _judge_case(
 ) -> CaseJudgement:
     case, answer = exchange.case, exchange.answer
     p = problem_of(case.inputs)
-    system, state = system_of(p), state_of(p)
-    forces, seconds = time_call(lambda: reference_forces(system, state))
-    if not isinstance(answer, Answer):
-        return CaseJudgement(case, answer, (), {"forces": forces}, None, seconds)
-    output, allowed, digits = answer.values["forces"], tolerance(p, greeting.epsilon), None
-    if np.isfinite(output).all():
-        symmetry = laws.symmetry(exchange, exchanges, {"forces": 2.0 * allowed})
-        findings = [
-            _formula(p, output, forces, allowed),
-            _balance(p, output, allowed),
-            *([symmetry] if symmetry else []),
-            laws.equal_requests(exchange, {"forces": 2.0 * allowed}),
-            *laws.remarks(answer),
-        ]
-        size = float(np.abs(forces).max())
-        if size > allowed:
-            digits = correct_digits(float(np.abs(output - forces).max()), size)
-    else:
-        findings = [laws.not_finite(sentence("Forces hold NaN or infinity."))]
-    return CaseJudgement(case, answer, tuple(findings), {"forces": forces}, digits, seconds)
+    reference = partial(reference_forces, system_of(p), state_of(p))
+    forces, allowed, correct_digits = reference(), tolerance(p, greeting.epsilon), None
+
+    def findings(outputs: Mapping[str, Any]) -> Iterator[Finding]:
+        output = outputs["forces"]
+        if not np.isfinite(output).all():
+            yield finding("finite numbers", name="forces")
+            return
+        yield _formula(p, output, forces, allowed)
+        yield _balance(p, output, allowed)
+        yield from filter(None, [symmetry(exchange, exchanges, {"forces": 2.0 * allowed})])
+
+    size = float(np.abs(forces).max())
+    if isinstance(answer, Answer) and size > allowed:
+        correct_digits = digits(float(np.abs(answer.values["forces"] - forces).max()), size)
+    expected = {"forces": forces}
+    return judge_case(exchange, findings, 2.0 * allowed, reference, expected, correct_digits)
 
 
 def _formula(p: SpringProblem, output: FloatArray, expected: FloatArray, allowed: float) -> Finding:
-    gap = np.abs(output - expected).max(axis=1)
-    index, worst = int(gap.argmax()), float(gap.max())
-    message = sentence(
-        "The force on particle {where} is wrong by {gap:.2g} N {term}.",
-        where=index,
-        gap=worst,
-        term=_likeness(p, output - expected),
-    )
-    return laws.bounded("force formula", worst, allowed, "N", message, index)
+    gap, term = np.abs(output - expected).max(axis=1), _likeness(p, output - expected)
+    return finding("force formula", gap.max(), allowed, index=int(gap.argmax()), term=term)
 
 
 def _likeness(p: SpringProblem, error: FloatArray) -> Sentence:
@@ -121,10 +110,8 @@ def _likeness(p: SpringProblem, error: FloatArray) -> Sentence:
 
 def _balance(p: SpringProblem, output: FloatArray, allowed: float) -> Finding:
     """Springs and dampers pull both ends alike: the sum of forces is the weight."""
-    gap = float(np.abs(output.sum(0) - p.constant.sum(0)).max())
-    message = sentence("The sum of all forces differs by {gap:.2g} N from the weight.", gap=gap)
-    limit = allowed * np.sqrt(p.count) * 2.0
-    return laws.bounded("momentum balance", gap, limit, "N", message)
+    gap = np.abs(output.sum(0) - p.constant.sum(0)).max()
+    return finding("momentum balance", gap, allowed * np.sqrt(p.count) * 2.0)
 
 
 def _predict(faults: tuple[Option, ...], case: Case) -> Mapping[str, Any]:

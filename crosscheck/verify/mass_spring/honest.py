@@ -1,85 +1,43 @@
 """The choices that an honest solver may make, and which of them a greeting leaves open."""
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 from ..greeting import Step
-from ..sentence import Sentence, sentence
+from ..sentence import sentence
 from .faults import ASPECTS, STEP_FAULTS, Option, options_of, read_table
 from .model import EXPLICIT, Integrator
 
-EXPLICIT_SUBSTEPS = (1, 2, 3, 4, 5, 8, 10, 16, 20, 30, 50, 100, 1000)
-FREQUENT_SUBSTEPS = (1, 2, 3, 5, 10, 100, 1000)
-LOCAL_GLOBAL_ITERATIONS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 30, 50, 100)
-NEWTON_ITERATIONS = (1, 2, 3, 4, 5, 10)
-HESSIANS = ("exact", "gauss", "projected")
-STARTS = ("x_n", "y")
-SCALINGS = (0.9, 0.95, 0.98, 0.99, 0.995, 0.999)
 # Dampers that explicit methods can have, and of these the ones that only symplectic Euler has.
 EXPLICIT_DAMPERS = ("none", "explicit", "diagonal", "blocks", "matrix")
 SYMPLECTIC_DAMPERS = ("diagonal", "blocks", "matrix")
 IMPLICIT_DAMPERS = ("length_rate", "end_velocity", "explicit", "none")
 _TABLE = read_table("honest.toml")
-_WORDS = _TABLE.pop("words")
-HONEST = {
-    aspect: tuple(option for entry in entries for option in options_of(aspect, entry))
-    for aspect, entries in _TABLE.items()
-}
 
 
-def _integrators(step: Step) -> tuple[Option, ...]:
-    """Return the integrators known, the declared number of iterations among them."""
-    local, newton = ({*counts, step.iterations or 1}
-                     for counts in (LOCAL_GLOBAL_ITERATIONS, NEWTON_ITERATIONS))  # fmt: skip
-    steps = [
-        Integrator("newton", start, n, hessian)
-        for n in sorted(newton) for start in STARTS for hessian in HESSIANS
-    ]  # fmt: skip
-    linearised = len(STARTS) * len(HESSIANS)
-    return tuple(map(_integrator_option, (
-        Integrator("converged", "y"), Integrator("symplectic"), Integrator("explicit"),
-        *steps[:linearised],
-        *(Integrator("local_global", start, n) for n in sorted(local) for start in STARTS),
-        *steps[linearised:],
-        Integrator("taylor"), Integrator("runge_kutta"),
-    )))  # fmt: skip
-
-
-def _integrator_option(integrator: Integrator) -> Option:
-    name, start, n = integrator.method, integrator.start, integrator.iterations
-    if name == "newton":
-        name += f" {integrator.hessian}, {'one' if n == 1 else 'several'}"
-    words, key = _WORDS[name], " ".join(map(str, integrator))
-    message = Sentence(words["sentence"], {"n": n, "start": start})
-    fields, rare = {"integrator": integrator}, words.get("rare", False)
-    return Option(key, "integrator", message, fields=fields, rare=rare)
-
-
-def _substeps(n: int) -> Option:
-    message = sentence("one step") if n == 1 else sentence("{n} substeps", n=n)
-    fields, rare = {"substeps": n}, n not in FREQUENT_SUBSTEPS
-    return Option(f"substeps {n}", "substeps", message, fields=fields, rare=rare)
-
-
-def _scaling(factor: float) -> Option:
-    message = (
-        sentence("velocities as they come")
-        if factor == 1.0
-        else sentence("velocities times {factor}", factor=factor)
-    )
-    fields, rare = {"scaling": factor}, factor != 1.0
-    return Option(f"scaling {factor}", "scaling", message, fields=fields, rare=rare)
-
-
+@cache
 def honest(step: Step) -> dict[str, tuple[Option, ...]]:
     """Return, for each aspect, the honest choices, the usual choice first."""
-    counts = sorted({*EXPLICIT_SUBSTEPS, step.substeps or 1})
-    factors = dict.fromkeys((1.0, step.damping_factor or 1.0, *SCALINGS))
-    return HONEST | {
-        "integrator": _integrators(step),
-        "substeps": tuple(map(_substeps, counts)),
-        "scaling": tuple(map(_scaling, factors)),
-    }
+    numbers = {
+        "iterations": step.iterations, "substeps": step.substeps, "scaling": step.damping_factor,
+    }  # fmt: skip
+    return {
+        aspect: tuple(
+            option
+            for entry in entries
+            for option in options_of(aspect, entry | {"each": {
+                name: _including(values, numbers.get(name))
+                for name, values in entry.get("each", {}).items()
+            }})
+        )
+        for aspect, entries in _TABLE.items()
+    }  # fmt: skip
+
+
+def _including(values: list[Any], declared: float | None) -> list[Any]:
+    """Return values with the declared one; 1 has an entry of its own."""
+    return values if declared in (None, 1) else sorted({*values, declared})
 
 
 def declared(option: Option, step: Step) -> bool:

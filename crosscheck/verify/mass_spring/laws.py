@@ -10,9 +10,9 @@ import numpy as np
 from plumbob.reference.judging import StepJudgement, judge_step
 
 from ..contestant import Answer, Exchange
-from ..explain import largest_gap
 from ..judgement import Finding, Verdict
-from ..sentence import Sentence, sentence
+from ..laws import finding
+from ..sentence import Sentence
 from .model import StepModel
 from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of
 
@@ -85,11 +85,6 @@ def coordinate_gap(p: SpringProblem, name: str, expected: Any, output: Any) -> f
     return float(gap.max(initial=0.0))
 
 
-def correct_digits(gap: float, size: float) -> float:
-    """Return how many digits of a number of this size are right, at most 16."""
-    return float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))
-
-
 @dataclass(frozen=True, eq=False)
 class StepContext:
     """An answer to a step, and the facts that its laws need."""
@@ -124,34 +119,9 @@ class StepContext:
 
 
 def _graded(error: float, size: float, allowed: float) -> Verdict:
-    """Return the verdict on an error relative to a size with its rounding."""
-    if error <= SOLVED:
-        return Verdict.RIGHT
+    """Return the verdict on a relative error that is not right, for a size with its rounding."""
     gap = error * (size + allowed / SOLVED)
     return Verdict.RIGHT_BUT if gap <= IMPRECISE * size + ROUNDED * allowed else Verdict.WRONG
-
-
-def bounded(
-    law: str, error: float, tolerance: float, unit: str, message: Sentence, index: int | None = None
-) -> Finding:
-    """Return the finding that an error is within its tolerance, or wrong."""
-    verdict = Verdict.RIGHT if error <= tolerance else Verdict.WRONG
-    return Finding(law, verdict, error, tolerance, unit, message, index)
-
-
-def unsure(law: str, error: float, message: Sentence) -> Finding:
-    """Return the finding that a law can be neither confirmed nor refuted."""
-    return Finding(law, Verdict.UNDECIDED, error, SOLVED, "", message)
-
-
-def not_finite(message: Sentence) -> Finding:
-    """Return the finding that an answer holds NaN or infinity."""
-    return Finding("finite numbers", Verdict.BROKEN, np.inf, 0.0, "", message)
-
-
-def remarks(answer: Answer) -> list[Finding]:
-    """Return the remarks on an answer as findings."""
-    return [Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", remark) for remark in answer.remarks]
 
 
 def pins(context: StepContext) -> Finding | None:
@@ -160,45 +130,37 @@ def pins(context: StepContext) -> Finding | None:
     if len(p.pinned) == 0 or x is None:
         return None
     offsets = np.linalg.norm(x - p.positions, axis=-1)[..., p.pinned].reshape(-1, len(p.pinned))
-    worst, tolerance = float(offsets.max()), context.allowed.positions
-    verdict = Verdict.RIGHT if worst <= tolerance else Verdict.WRONG
+    worst, strict = float(offsets.max()), context.allowed.positions
+    tolerance = strict + IMPRECISE * float(np.abs(x - p.positions).max())
+    if context.expected:
+        expected = (context.expected["positions"] - p.positions)[..., p.pinned, :]
+        tolerance += 2.0 * float(np.abs(expected).max())
     is_exact = context.model.pins in ("eliminated", "overwritten") and context.pins_declared
-    if verdict is Verdict.WRONG and not is_exact:
-        tolerance += IMPRECISE * float(np.abs(x - p.positions).max())
-        if context.expected:
-            expected = (context.expected["positions"] - p.positions)[..., p.pinned, :]
-            tolerance += 2.0 * float(np.abs(expected).max())
-        verdict = Verdict.RIGHT_BUT if worst <= tolerance else Verdict.WRONG
-    message = sentence("A pinned particle moves by {error:.2g} m.", error=worst)
+    verdict = Verdict.RIGHT_BUT if worst <= tolerance and not is_exact else Verdict.WRONG
     index = int(p.pinned[offsets.max(axis=0).argmax()])
-    return Finding("pins", verdict, worst, tolerance, "m", message, index)
+    return finding("pins", worst, strict, verdict=verdict, index=index)
 
 
 def declared_step(context: StepContext) -> Finding | None:
     """Return how far positions are from the declared or recognised step."""
-    law, p = "declared step", context.problem
+    p = context.problem
     if "positions" not in context.answers:
         return None
     if not context.recognised:
-        return unsure(
-            law, np.inf, sentence("The step matches no known method, and none was declared.")
-        )
+        return finding("declared step, unknown", tolerance=SOLVED)
     if not context.expected or not np.isfinite(context.expected["positions"]).all():
-        return unsure(law, np.inf, sentence("The declared step has no finite result here."))
+        return finding("declared step, not finite", tolerance=SOLVED)
     answers = {"positions": context.answers["positions"]}
     error = relative_gap(p, context.expected, answers, context.allowed)
     gap = np.linalg.norm(context.expected["positions"] - answers["positions"], axis=-1)
-    index = int(gap.reshape(-1, p.count).max(axis=0).argmax())
-    message = sentence(
-        "Positions are up to {gap:.2g} m from those of {model}, at particle {where}.",
-        gap=float(gap.max()),
-        model=context.description,
-        where=index,
-    )
     verdict = _graded(error, context.displacement, context.allowed.positions)
     if verdict is Verdict.WRONG and not p.steps:
         verdict = _excused(context)
-    return Finding(law, verdict, error, SOLVED, "", message, index)
+    return finding(
+        "declared step", error, SOLVED, verdict=verdict,
+        index=int(gap.reshape(-1, p.count).max(axis=0).argmax()),
+        gap=float(gap.max()), model=context.description,
+    )  # fmt: skip
 
 
 def _excused(context: StepContext) -> Verdict:
@@ -225,26 +187,17 @@ def _indefinite(p: SpringProblem) -> bool:
 
 def minimiser(context: StepContext) -> Finding | None:
     """Return how far positions are from converged implicit Euler, relative to how far y is."""
-    law, p = "minimiser", context.problem
+    p = context.problem
     judgement = context.judgement if "positions" in context.answers else None
     if judgement is None or not judgement.outcome.solved:
         return None
-    error = judgement.error
     rounded = judgement.distance <= context.allowed.positions * np.sqrt(3.0 * p.count)
-    if error <= SOLVED or rounded or judgement.same_minimiser is False:
-        message = sentence("The step is the converged one of implicit Euler.")
-        return Finding(law, Verdict.RIGHT, error, SOLVED, "", message)
-    if not context.recognised:
-        return unsure(law, error, sentence(
-            "It is {distance:.2g} m from the minimiser of implicit Euler.",
-            distance=judgement.distance))  # fmt: skip
-    message = sentence(
-        "This is not converged implicit Euler: the positions differ from its minimiser x* by "
-        "{error:.2g} |y - x*|, where y - x* is the displacement that the springs cause in a "
-        "step.",
-        error=error,
-    )
-    return Finding(law, Verdict.RIGHT_BUT, error, SOLVED, "", message)
+    is_right = rounded or judgement.same_minimiser is False
+    return finding(
+        "minimiser" if context.recognised else "minimiser, of an unknown step",
+        judgement.error, SOLVED,
+        verdict=Verdict.RIGHT if is_right else None, distance=judgement.distance,
+    )  # fmt: skip
 
 
 def velocities(context: StepContext) -> Finding | None:
@@ -259,13 +212,10 @@ def velocities(context: StepContext) -> Finding | None:
     gap = coordinate_gap(p, "velocities", expected, context.answers["velocities"])
     size = float(np.abs(expected).max(initial=0.0))
     error = gap / (size + context.allowed.velocities / SOLVED)
-    message = sentence(
-        "Velocities differ by up to {gap:.2g} m/s from those that the step implies.", gap=gap
-    )
-    if not np.isfinite(gap):
-        return unsure("velocities", error, message)
     verdict = _graded(error, size, context.allowed.velocities)
-    return Finding("velocities", verdict, error, SOLVED, "", message)
+    if not np.isfinite(gap):
+        verdict = Verdict.UNDECIDED
+    return finding("velocities", error, SOLVED, verdict=verdict, gap=gap)
 
 
 def momentum(context: StepContext) -> Finding | None:
@@ -285,8 +235,7 @@ def momentum(context: StepContext) -> Finding | None:
     tolerance = 4.0 * context.allowed.positions
     if method == "converged":
         tolerance += UNBALANCED * float(np.abs(x - p.positions).max())
-    message = sentence("Springs move the centre of mass by {gap:.2g} m; they cannot.", gap=gap)
-    return bounded("momentum", gap, tolerance, "m", message)
+    return finding("momentum", gap, tolerance)
 
 
 def consistency(context: StepContext) -> Finding | None:
@@ -298,32 +247,8 @@ def consistency(context: StepContext) -> Finding | None:
     free = np.setdiff1d(np.arange(p.count), p.pinned)
     gap = float(np.abs((v - p.velocities) / p.h - expected)[free].max())
     scale = float(np.abs(expected[free]).max())
-    message = sentence(
-        "In a small step the acceleration differs from f / m by {gap:.2g} m/s²; f / m is up to "
-        "{scale:.2g} m/s².",
-        gap=gap,
-        scale=scale,
-    )
     tolerance = CONSISTENT * scale + 2.0 * context.allowed.velocities / p.h
-    return bounded("consistency", gap, tolerance, "m/s²", message)
-
-
-def equal_requests(exchange: Exchange, allowed: Mapping[str, float]) -> Finding:
-    """Return how far two answers to a request differ in the named outputs."""
-    answer, repeat = exchange.answer, exchange.repeat
-    if not isinstance(answer, Answer) or not isinstance(repeat, Answer):
-        message = sentence("The repeated request got no answer.")
-        return Finding("equal requests", Verdict.BROKEN, np.inf, 0.0, "", message)
-    shared = [name for name in allowed if name in answer.values and name in repeat.values]
-    gaps = {name: largest_gap(answer.values[name], repeat.values[name]) for name in shared}
-    worst = max(gaps, key=lambda name: gaps[name] / max(allowed[name], 1e-300), default="")
-    gap, tolerance = gaps.get(worst, 0.0), allowed.get(worst, 0.0)
-    message = sentence(
-        "Two answers to the same request differ by {gap:.2g} in {name}: it starts from noise, "
-        "keeps state, or reads memory that was never written.",
-        gap=gap, name=worst,
-    ) if gap else sentence("Equal requests have equal answers.")  # fmt: skip
-    return bounded("equal requests", gap, tolerance, "", message)
+    return finding("consistency", gap, tolerance, scale=scale)
 
 
 def symmetry(
@@ -344,10 +269,4 @@ def symmetry(
         ratio = float(gap.max()) / allowed[name]
         if not ratio <= worst:
             worst, index, worst_name = ratio, int(gap.argmax()), name
-    message = sentence(
-        "When the scene is shifted, rotated, mirrored or renumbered, {name} do not change "
-        "accordingly; the error is largest at particle {where}.",
-        name=worst_name, where=index,
-    ) if worst > 1.0 else sentence("Shifting, rotating, mirroring and renumbering the scene "
-                                   "make no difference.")  # fmt: skip
-    return bounded("symmetry", worst, 1.0, "", message, index)
+    return finding("symmetry", worst, 1.0, index=index, name=worst_name)

@@ -13,14 +13,7 @@ import numpy as np
 
 from plumbob.reference.arguments import BoolArray, FloatArray
 
-from .problem import (
-    SpringProblem,
-    accelerations,
-    damper_forces,
-    frames,
-    spring_forces,
-    stretches,
-)
+from .problem import SpringProblem, accelerations, damper_forces, frames, spring_forces, stretches
 
 # Newton's method ends in rounding long before this on systems of this size.
 MAX_ITERATIONS = 200

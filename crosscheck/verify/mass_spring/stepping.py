@@ -1,7 +1,8 @@
 """Judge steps and motions by the declared or inferred model and by laws."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain, product
 from typing import NamedTuple
 
@@ -9,19 +10,20 @@ import numpy as np
 
 from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import State
 
 from ..case import Case
 from ..contestant import Answer, Exchange
-from ..explain import either, first_broken, hints_of
+from ..explain import either, first_broken
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..laws import digits, finding, hints_of, judge_case
 from ..sentence import Sentence, sentence
-from ..timing import time_call
 from . import laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
-from .honest import HONEST, compatible, domains, honest
-from .laws import SOLVED, StepContext, correct_digits, relative_gap, rounding
+from .honest import compatible, domains, honest
+from .laws import SOLVED, StepContext, relative_gap, rounding
 from .model import StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
 from .search import ModelMatch, ModelSearch, Probe, probes_of
@@ -115,56 +117,55 @@ def _judge_case(
     if not isinstance(answer, Answer):
         return CaseJudgement(case, answer, (), {})
     _, model = apply(options, p, StepModel())
-    expected = predicted(p, model)
+    expected, positions = predicted(p, model), answer.values.get("positions")
     context = StepContext(
         p, answer.values, rounding(p, model, greeting.epsilon), model, recognised,
         describe_model(options), expected, greeting.step.pins is not None,
     )  # fmt: skip
-    findings = tuple(_findings(exchange, exchanges, context)) + tuple(laws.remarks(answer))
-    seconds = _reference_seconds(p, model)
-    if not recognised:
-        return CaseJudgement(case, answer, findings, {}, None, seconds)
-    digits = None
-    if expected and "positions" in answer.values:
-        gap = float(np.abs(expected["positions"] - answer.values["positions"]).max())
-        size = float(np.abs(expected["positions"]).max())
-        digits = correct_digits(gap, size) if np.isfinite(gap) else None
-    return CaseJudgement(case, answer, findings, expected, digits, seconds)
+    correct_digits = None
+    if recognised and expected and positions is not None:
+        gap = float(np.abs(expected["positions"] - positions).max())
+        if np.isfinite(gap):
+            correct_digits = digits(gap, float(np.abs(expected["positions"]).max()))
+    # What rounding and an iterative solver may leave of two answers that should be alike.
+    allowed = {
+        name: 4.0 * getattr(context.allowed, name)
+        + SOLVED * float(np.abs(answer.values.get(name, origin) - origin).max(initial=0.0))
+        for name, origin in (("positions", p.positions), ("velocities", 0.0))
+    }
+    judgement = judge_case(
+        exchange, lambda outputs: _findings(exchange, exchanges, context, allowed), allowed,
+        partial(_reference_step, p, model), expected if recognised else {}, correct_digits,
+    )  # fmt: skip
+    steps = (p.steps or 1) * (model.substeps if model.integrator.explicit else 1)
+    return replace(judgement, reference_seconds=steps * (judgement.reference_seconds or 0.0))
 
 
 def _findings(
-    exchange: Exchange, exchanges: Sequence[Exchange], context: StepContext
+    exchange: Exchange,
+    exchanges: Sequence[Exchange],
+    context: StepContext,
+    allowed: Mapping[str, float],
 ) -> list[Finding]:
     """Return the findings of all laws that apply."""
-    values = context.answers
-    invalid = [name for name, numbers in values.items() if not np.isfinite(numbers).all()]
+    outputs = context.answers.items()
+    invalid = [name for name, numbers in outputs if not np.isfinite(numbers).all()]
     if invalid:
-        message = sentence("{name} hold NaN or infinity.", name=", ".join(invalid))
-        return [laws.not_finite(message)]
-    # What rounding and an iterative solver may leave of two answers that should be alike.
-    origins = {"positions": context.problem.positions, "velocities": 0.0}
-    limits = {
-        name: 4.0 * getattr(context.allowed, name)
-        + SOLVED * float(np.abs(values.get(name, origin) - origin).max(initial=0.0))
-        for name, origin in origins.items()
-    }
+        return [finding("finite numbers", name=", ".join(invalid))]
     findings = [law(context) for law in LAWS]
     if exchange.case.facts.get("consistent"):
         findings.append(laws.consistency(context))
     if context.model.damper != "diagonal":
-        findings.append(laws.symmetry(exchange, exchanges, limits))
-    findings.append(laws.equal_requests(exchange, limits))
-    return [finding for finding in findings if finding is not None]
+        findings.append(laws.symmetry(exchange, exchanges, allowed))
+    return [found for found in findings if found is not None]
 
 
-def _reference_seconds(p: SpringProblem, model: StepModel) -> float:
-    """Return the compiled reference's time for as many steps of the same kind [s]."""
+def _reference_step(p: SpringProblem, model: StepModel) -> State:
+    """Return the end of one step of the same kind by the compiled reference."""
     system, state = system_of(p), state_of(p)
     if model.integrator.explicit:
-        _, seconds = time_call(lambda: symplectic_euler(system, state, p.h))
-        return seconds * model.substeps * (p.steps or 1)
-    _, seconds = time_call(lambda: ImplicitEuler(system, h=p.h).step(state))
-    return seconds * (p.steps or 1)
+        return symplectic_euler(system, state, p.h)
+    return ImplicitEuler(system, h=p.h).step(state).state
 
 
 def _diagnose(
@@ -201,8 +202,9 @@ def _nearest(search: ModelSearch) -> Sentence:
     """Return which of the known steps comes nearest to the answers to the probes."""
     usual = {option.aspect: option for option in honest_options((), search.step)}
     steps = []
-    for integrator, damper in product(honest(search.step)["integrator"], HONEST["damper"]):
-        velocity = HONEST["velocity"][integrator.fields["integrator"].explicit]
+    choices = honest(search.step)
+    for integrator, damper in product(choices["integrator"], choices["damper"]):
+        velocity = choices["velocity"][integrator.fields["integrator"].explicit]
         step = usual | {"integrator": integrator, "damper": damper, "velocity": velocity}
         if compatible(step):
             gaps = _gaps(tuple(step.values()), search.probes, search.epsilon)
@@ -220,8 +222,8 @@ def _nearest(search: ModelSearch) -> Sentence:
 def _laws_that_hold(judgements: Sequence[CaseJudgement]) -> Sentence:
     """Return the laws that no answer breaks."""
     verdicts: dict[str, Verdict] = {}
-    for finding in chain.from_iterable(judgement.findings for judgement in judgements):
-        verdicts[finding.law] = max(finding.verdict, verdicts.get(finding.law, Verdict.RIGHT))
+    for found in chain.from_iterable(judgement.findings for judgement in judgements):
+        verdicts[found.law] = max(found.verdict, verdicts.get(found.law, Verdict.RIGHT))
     names = ", ".join(law for law, verdict in verdicts.items() if not verdict)
     return sentence("Laws that hold in every case: {laws}.", laws=names or "–")
 

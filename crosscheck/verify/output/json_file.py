@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from ..contestant import Answer
+from ..contestant import Answer, Failure
 from ..judgement import CaseJudgement, Finding, Report, TaskReport
 from ..message import plain
 from ..sentence import all_visible
@@ -59,22 +59,20 @@ def _task(task: TaskReport, say: Say) -> Record:
 def _case(judgement: CaseJudgement, say: Say) -> Record:
     """Return a case; `seconds` is the solver's own time, null if only the round trip was timed."""
     case, answer = judgement.case, judgement.answer
-    fields: Record = {"seconds": None, "failure": None, "failure_text": None, "remarks": []}
-    if isinstance(answer, Answer):
-        fields["seconds"] = None if answer.untimed else answer.seconds
-        fields["remarks"] = list(map(say, answer.remarks))
-    else:
-        fields["failure"], fields["failure_text"] = answer.kind.value, say(answer.sentence)
+    own = answer if isinstance(answer, Answer) else None
+    failure = answer if isinstance(answer, Failure) else None
     return {
         "name": case.name, "family": case.family, "about": say(case.about),
-        "verdict": _name(judgement), "digits": judgement.digits, "seconds": fields["seconds"],
+        "verdict": _name(judgement), "digits": judgement.digits,
+        "seconds": own.seconds if own and not own.untimed else None,
         "reference_seconds": judgement.reference_seconds,
-        "failure": fields["failure"], "failure_text": fields["failure_text"],
+        "failure": failure and failure.kind.value,
+        "failure_text": failure and say(failure.sentence),
         "findings": [
             {"law": finding.law, "verdict": _name(finding), "error": finding.error,
              "tolerance": finding.tolerance, "unit": finding.unit, "text": say(finding.sentence),
              "where": finding.index}
             for finding in judgement.findings
         ],
-        "remarks": fields["remarks"],
+        "remarks": list(map(say, own.remarks)) if own else [],
     }  # fmt: skip

@@ -8,11 +8,7 @@ from ..judgement import CaseJudgement, Report, TaskReport, Verdict
 from .words import Say, explanations, title
 
 # JUnit's element for a verdict that is not good.
-_ELEMENTS = {
-    Verdict.UNDECIDED: "skipped",
-    Verdict.WRONG: "failure",
-    Verdict.BROKEN: "error",
-}
+_ELEMENTS = {Verdict.UNDECIDED: "skipped", Verdict.WRONG: "failure", Verdict.BROKEN: "error"}
 
 
 def text(report: Report, say: Say) -> str:

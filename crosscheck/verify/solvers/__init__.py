@@ -30,15 +30,10 @@ serve(spec, folder, float(patience))
 
 
 def open_contestant(spec: str | Path | Sequence[str], limits: ProcessLimits = LIMITS) -> Contestant:
-    """Return a solver of any kind; its process starts with the first request.
+    """Return a solver of any kind, whose process starts with the first request.
 
-    Args:
-        spec: a command as a list of words; a Python file, file.py:object or module:object; a
-            program's file; or a folder of answers.
-        limits: of its process.
-
-    Raises:
-        ValueError: if there is no solver of that name.
+    It is a command as a list of words; a Python file, file.py:object or module:object; a program's
+    file; or a folder of answers. Raise ValueError if there is none of that name.
     """
     if not isinstance(spec, str | Path):
         return ProgramContestant(spec, limits=limits)

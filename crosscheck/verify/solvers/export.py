@@ -24,20 +24,11 @@ def export_cases(
     seed: int = 0,
     thorough: bool = False,
 ) -> int:
-    """Write all cases that suit a solver into a folder, with instructions for the answers.
+    """Write all cases that suit a solver, with instructions for the answers; return their number.
 
-    Args:
-        folder: a new or empty folder, or that of an earlier export, whose answers stay.
-        greeting: of the solver; if None, that of the folder's greeting.json, or else all tasks.
-        tasks: a selection of its tasks.
-        seed: of the random cases.
-        thorough: whether to write the long list of cases.
-
-    Returns:
-        the number of cases.
-
-    Raises:
-        ValueError: if the folder holds something else, or greeting.json is not understood.
+    The folder is new or empty, or that of an earlier export, whose answers stay. Without a
+    greeting, that of its greeting.json counts, or else all tasks. Raise ValueError if it holds
+    something else, or greeting.json is not understood.
     """
     _check_is_export(folder)
     if greeting is None and (folder / GREETING).is_file():
@@ -57,11 +48,7 @@ def export_cases(
 def write_cases(
     folder: Path, cases: Sequence[Case], greeting: Greeting, seed: int = 0, thorough: bool = False
 ) -> None:
-    """Write these cases, each into a folder of its own.
-
-    Raises:
-        ValueError: if two would share a folder, or the folder holds something else.
-    """
+    """Write these cases, each into a folder of its own; raise ValueError if two would share one."""
     _check_is_export(folder)
     places: dict[str, Case] = {}
     for case in cases:

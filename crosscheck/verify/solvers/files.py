@@ -38,11 +38,7 @@ def _plain(name: str) -> str:
 
 
 def read_greeting(folder: Path) -> Greeting:
-    """Return the greeting in greeting.json of a folder.
-
-    Raises:
-        ValueError: if it is not there, or not understood.
-    """
+    """Return the greeting in greeting.json of a folder; raise ValueError without a valid one."""
     path = folder / GREETING
     if not path.is_file():
         raise ValueError(f"answers: expected a folder of exported cases, got {folder}")
@@ -74,14 +70,9 @@ def _exported(task: Task) -> set[str]:
 
 
 class FileContestant:
-    """A solver that answers by files; each is read for its request.
+    """A solver that answers by files; `seed` and `thorough` are those of its cases.
 
-    Attributes:
-        folder: of the export.
-        seed, thorough: of its cases, to be passed to `verify`.
-
-    Raises:
-        ValueError: if it is no folder of exported cases.
+    Raise ValueError if it is no folder of exported cases.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -106,8 +97,7 @@ class FileContestant:
     def greeting(self) -> Greeting:
         """The greeting in greeting.json, with the tasks that have answers if there are any.
 
-        Raises:
-            NoGreetingError: if it is not understood.
+        Raise NoGreetingError if it is not understood.
         """
         offered = self._offered()
         solved = {
@@ -157,11 +147,7 @@ def _is_current(path: Path, case: Case) -> bool:
 
 
 def _read_answer(place: Path, case: Case) -> Answer | Failure:
-    """Return the answer in answer.json of a folder, or in the tables.
-
-    Raises:
-        ValueError: if they are not understood.
-    """
+    """Return the answer in answer.json or in the tables; raise ValueError if it is invalid."""
     task = TASKS[case.task]
     counts = task.counts(case.inputs)
     if (place / ANSWER).is_file():

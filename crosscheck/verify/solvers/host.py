@@ -13,8 +13,6 @@ import inspect
 import io
 import os
 import sys
-import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -23,16 +21,9 @@ import msgspec
 
 from ...child_process import take_streams
 from ..contestant import Answer, Failure, FailureKind
-from ..functions import call, describe_exception, is_beside, takes
+from ..functions import call, describe_exception, takes
 from ..greeting import PROTOCOL
-from ..message import (
-    GREETING,
-    Request,
-    decode_greeting,
-    decode_request,
-    encode_answer,
-    excerpt,
-)
+from ..message import GREETING, Request, decode_greeting, decode_request, encode_answer, excerpt
 from ..sentence import did_you_mean
 from ..task import TASKS
 
@@ -50,14 +41,9 @@ class OfferError(ValueError):
 
 
 class PythonSolver:
-    """The tasks that a Python file or object offers.
+    """The functions of a Python file or object by task or method, and the fields of its greeting.
 
-    Attributes:
-        functions: by the name of a task, or of a method of inverse kinematics.
-        greeting: fields of the greeting.
-
-    Raises:
-        OfferError: if it offers no task, or its declaration is not understood.
+    Raise OfferError if it offers no task, or its declaration is not understood.
     """
 
     def __init__(self, source: object, name: str, declared: object) -> None:
@@ -154,9 +140,7 @@ def _failed(failure: Failure) -> dict[str, Any]:
 def load(spec: str) -> PythonSolver:
     """Return the solver in a Python file, file:object or module:object.
 
-    Raises:
-        OfferError: if it offers no task.
-        Exception: any exception of the solver while it is loaded.
+    Raise OfferError if it offers no task, and any exception of the solver while it is loaded.
     """
     place, _, attribute = spec.partition(":")
     path = Path(place)
@@ -217,60 +201,29 @@ def _protocol_streams() -> Iterator[tuple[BinaryIO, BinaryIO, _Prints]]:
         yield requests, answers, prints
 
 
-class _Watch(threading.Thread):
-    """Says on standard error in which line the solver is, each time that it took so long."""
-
-    def __init__(self, folder: str, patience: float) -> None:
-        super().__init__(daemon=True)
-        self._folder, self._patience = folder, patience
-        self._solver = threading.get_ident()
-        self._since: float | None = None
-
-    @contextlib.contextmanager
-    def working(self) -> Iterator[None]:
-        """Watch the solver while the block lasts."""
-        self._since = time.monotonic()
-        yield
-        self._since = None
-
-    def run(self) -> None:
-        """Look at the solver ten times in its patience."""
-        while True:
-            time.sleep(self._patience / 10)
-            since, now = self._since, time.monotonic()
-            if since is not None and now - since > self._patience:
-                self._since = now
-                self._note_line()
-
-    def _note_line(self) -> None:
-        solver_file = Path(self._folder) / "solver.py"
-        frame = sys._current_frames().get(self._solver)
-        while frame is not None and not is_beside(Path(frame.f_code.co_filename), solver_file):
-            frame = frame.f_back
-        if frame is not None:
-            file = Path(frame.f_code.co_filename).name
-            os.write(2, f"It was in line {frame.f_lineno} of {file}.\n".encode())
+@contextlib.contextmanager
+def _watched(patience: float) -> Iterator[None]:
+    """Note on standard error where the solver is, each time that the block lasts so long [s]."""
+    faulthandler.dump_traceback_later(patience, repeat=True, file=2)
+    yield
+    faulthandler.cancel_dump_traceback_later()
 
 
 def serve(spec: str, folder: str, patience: float) -> None:
     """Answer requests about a solver until they end.
 
-    Args:
-        spec: as of `load`.
-        folder: that of the solver and its other modules.
-        patience: after which its line is noted on standard error [s].
+    The folder is that of the solver and its other modules; after so much patience [s] its lines are
+    noted on standard error.
     """
     faulthandler.enable(all_threads=False)
     with _protocol_streams() as (requests, answers, prints):
         sys.argv = [spec]
         if folder not in sys.path:
             sys.path.insert(0, folder)
-        watch = _Watch(folder, patience)
-        watch.start()
-        with watch.working():
+        with _watched(patience):
             solver, failure = load_safely(spec, folder)
         for line in requests:
-            with watch.working():
+            with _watched(patience):
                 request = decode_request(line)
                 fields = solver.answer(request) if solver else failure
             answers.write(encode_answer(request.id, **{**fields, **prints.take()}))

@@ -13,8 +13,11 @@ from ..sentence import Sentence, sentence
 
 # How many lines of standard error are shown.
 STDERR_SHOWN = 3
-# Our own frames, and a list that Python ends its last words with, are nothing to show.
-_HIDDEN = (str(Path(__file__).parents[1]), 'File "<string>"', "Extension modules:")
+# Our own frames, and the lines around a list of frames, are nothing to show.
+_HIDDEN = (
+    *(str(Path(__file__).parents[1]), 'File "<string>"'),
+    *("Extension modules:", "Timeout (", "Thread 0x"),
+)
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
@@ -69,6 +72,11 @@ def failure_of(
     return FailureError(FailureKind(entry["kind"]), message)
 
 
+def garbage(key: str, **values: object) -> FailureError:
+    """Return why the output of a program is no answer."""
+    return FailureError(FailureKind.GARBAGE, Sentence(_TABLE["garbage"][key]["sentence"], values))
+
+
 def ending(code: int) -> Sentence:
     """Return how a program ended, from its exit code or minus the number of a signal."""
     if code >= 0:
@@ -81,44 +89,26 @@ def ending(code: int) -> Sentence:
 
 def not_started(program: str, error: Exception) -> FailureError:
     """Return why a program could not be started."""
-    why = str(getattr(error, "strerror", None) or error)
     match error:
         case FileNotFoundError() if Path(program).is_file() and os.sep not in program:
-            message = sentence(
-                "There is no command {program}; for the file here write ./{program}.",
-                program=program,
-            )
+            key = "no command, but a file"
         case FileNotFoundError() if not Path(program).exists():
-            message = sentence("There is no command {program}.", program=program)
+            key = "no command"
         case PermissionError():
-            message = sentence("{program} cannot be executed: chmod +x {program}", program=program)
+            key = "not executable"
         case _:
-            message = sentence(
-                "{program} cannot be started ({why}): is it built for this machine, and does a "
-                "script begin with #!?",
-                program=program,
-                why=why,
-            )
-    return FailureError(FailureKind.CRASHED, message)
+            key = "not for this machine"
+    values = {"program": program, "why": str(getattr(error, "strerror", None) or error)}
+    return FailureError(FailureKind.CRASHED, Sentence(_TABLE["start"][key]["sentence"], values))
 
 
 def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:
     """End a program's input, then all that still runs; return remarks on how it left."""
     has_left, strays = process.leave(patience)
-    if not has_left:
-        return (sentence("It does not exit when its input ends."),)
-    remarks = []
-    if strays:
-        remarks.append(
-            sentence(
-                "It left processes running that it had started ({count}); they were ended.",
-                count=strays,
-            )
-        )
-    if process.code:
-        remarks.append(
-            sentence(
-                "When its input ended, it did not exit normally: {how}.", how=ending(process.code)
-            )
-        )
-    return tuple(remarks)
+    code = process.code if has_left else 0
+    values = {"count": strays, "how": ending(code)}
+    remarks = {"stays": not has_left, "leaves processes": strays > 0, "ends badly": code != 0}
+    table = _TABLE["departure"]
+    return tuple(
+        Sentence(table[key]["sentence"], values) for key, holds in remarks.items() if holds
+    )

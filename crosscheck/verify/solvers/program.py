@@ -14,15 +14,19 @@ from ..greeting import Greeting
 from ..sentence import Sentence, sentence
 from ..task import TASKS
 from .claimed_time import ClaimedTimes
-from .losses import LIMITS, FailureError, ProcessLimits, departure, failure_of, not_started
+from .losses import (
+    LIMITS,
+    FailureError,
+    ProcessLimits,
+    departure,
+    failure_of,
+    garbage,
+    not_started,
+)
 
 
 class ProgramContestant:
-    """A program, started for its first request, and anew after a loss.
-
-    Attributes:
-        remarks: on the program apart from its answers, as on processes that it left running.
-    """
+    """A program, started for its first request, and anew after a loss."""
 
     def __init__(
         self, command: Sequence[str], folder: Path | None = None, limits: ProcessLimits = LIMITS
@@ -43,11 +47,7 @@ class ProgramContestant:
 
     @property
     def greeting(self) -> Greeting:
-        """Its description of itself.
-
-        Raises:
-            NoGreetingError: if it cannot be started, or its greeting is not understood.
-        """
+        """Its description of itself; raise NoGreetingError if it does not start or greet."""
         if self._greeting is None:
             try:
                 self._ready()
@@ -142,41 +142,22 @@ class ProgramContestant:
             fields = self._decode(received)
             if fields is not None:
                 return fields, seconds, size
-        raise FailureError(
-            FailureKind.GARBAGE,
-            sentence(
-                "It printed more than {count} lines that are no answers, for example: {line}",
-                count=self._limits.prints,
-                line=message.shown(self._print or b"", 80),
-            ),
-        )
+        example = message.shown(self._print or b"", 80)
+        raise garbage("prints", count=self._limits.prints, line=example)
 
     def _decode(self, line: bytes) -> Mapping[str, Any] | None:
         """Return the answer of a line, or None for a print."""
         try:
             fields = message.decode_object(line)
         except ValueError as error:
-            words = sentence("It answered with a broken line: {why}", why=str(error))
-            raise FailureError(FailureKind.GARBAGE, words) from None
+            raise garbage("broken line", why=str(error)) from None
         if fields is None or not line.lstrip(b"\xef\xbb\xbf \t").startswith(b"{"):
             self._print = self._print or line.strip() or None
         number = fields.get("id") if fields is not None else self._number
         if number == self._number and not isinstance(number, bool):
             return fields
-        if number is None:
-            words = sentence(
-                "It answered request {number} without an id: each request is answered once, with "
-                "its own id.",
-                number=self._number,
-            )
-        else:
-            words = sentence(
-                "It answered request {number} with the id {id}: each request is answered "
-                "once, with its own id.",
-                number=self._number,
-                id=message.shown(repr(number), 40),
-            )
-        raise FailureError(FailureKind.GARBAGE, words)
+        key = "no id" if number is None else "another id"
+        raise garbage(key, number=self._number, id=message.shown(repr(number), 40))
 
     def _with_prints(self, error: FailureError) -> FailureError:
         """Return a loss with an example of the program's earlier prints, if there are any."""

@@ -35,20 +35,13 @@ def _digits(cell: float | bool) -> str:
 
 
 def read_table(field: Field, counts: Mapping[str, int], data: bytes) -> Any:
-    """Return an array, or a single number, from CSV.
+    """Return an array, or a single number, from CSV; raise ValueError if it is not understood.
 
     Cells stand between commas, semicolons, tabs or spaces; the decimal sign may be a comma where
     that is clear. Names in the first line, a comma at the end of each line, lines that begin with
     # and empty ones are left aside. The numbers run along rows, the last index fastest, and a row
-    holds the last axis, the last few axes, or a number.
-
-    Args:
-        field: its definition.
-        counts: the numbers that the words of its shape stand for; a word may be missing.
-        data: the file.
-
-    Raises:
-        ValueError: if it is not understood.
+    holds the last axis, the last few axes, or a number. `counts` are the numbers that the words of
+    the field's shape stand for; a word may be missing.
     """
     lines = [
         (number, line.strip()) for number, line in enumerate(_text(field, data).splitlines(), 1)

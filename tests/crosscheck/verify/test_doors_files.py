@@ -2,6 +2,8 @@
 
 import csv
 import json
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -133,73 +135,42 @@ def test_answers_in_json_are_read_each_time_the_same(folder, name):
     assert "whether equal requests have equal answers is not known" in str(contestant.remarks[0])
 
 
-CSV = {
-    "commas": "1,2,3\n4,5,nan\n",
-    "commas and spaces": " 1, 2, 3\n 4, 5, NaN",
-    "commas at the end": "1,2,3,\n4,5,nan,\n",
-    "names": "x,y,z\n1,2,3\n4,5,-nan(ind)\n",
-    "names in quotes": '"x","y","z"\n"1","2","3"\n"4","5","null"\n',
-    "comments": "# x y z\n1 2 3\n\n4 5 nan\n",
-    "semicolons": "1;2;3\r\n4;5;NaN\r\n",
-    "decimal commas": "1,0;2,0;3,0\n4,0;5e0;nan\n",
-    "tabs and decimal commas": "1,0\t2,0\t3,0\n4,0\t5\tnan\n",
-    "spaces and decimal commas": "1,0 2,0 3,0\n4,0 5,0 nan\n",
-    "a row": "1,2,3,4,5,nan",
-    "a column": "1\n2\n3\n4\n5\nnan\n",
-    "a column of decimal commas": "1,0\n2,0\n3,0\n4,0\n5,0\nnan\n",
-    "old Windows": "1,2,3\r\n4,5,-1.#IND\r\n",
-}
+DATA = tomllib.loads(Path(__file__).with_name("answer_files.toml").read_text("utf-8"))
 ENCODINGS = ["utf-8", "utf-8-sig", "utf-16"]
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
-@pytest.mark.parametrize("name", CSV)
+@pytest.mark.parametrize("name", DATA["csv"])
 def test_answers_in_csv_are_understood(folder, name, encoding):
     place = folder / place_of(CASES[0])
-    (place / "answer_positions.csv").write_bytes(CSV[name].encode(encoding))
+    (place / "answer_positions.csv").write_bytes(DATA["csv"][name].encode(encoding))
     answer = FileContestant(folder).answer(CASES[0])
     assert isinstance(answer, Answer), answer.sentence
     np.testing.assert_array_equal(answer.values["positions"], POSITIONS)
     assert answer.seconds == 0.0
 
 
-@pytest.mark.parametrize(
-    ("data", "words"),
-    [
-        (b"", "expected shape (2, 3), got (0, 3)"),
-        (b"1,2,3\n", "expected shape (2, 3), got (1, 3)"),
-        (b"1,2\n3,4\n", "expected 1 or 3 or 6 numbers a line, got 2"),
-        (b"1,2,3\n4,5\n", "expected 3 numbers in line 2 as before, got 2"),
-        (b"1,2,3\n4,x,6\n", "expected a number in line 2, got 'x'"),
-        (b"1,2,3\n4,,6\n", "expected a number in line 2, got ''"),
-        (b"1_0,2,3\n4,5,6\n", "expected a number in line 1, got '1_0'"),
-        (b"1;2,5;3\n4;5;1.000,5\n", "expected a number in line 2, got '1.000,5'"),
-        (b"\xff\x00\x81", "expected a text file in UTF-8"),
-        (b"0,1,2,3\n1,4,5,6\n", "expected 1 or 3 or 6 numbers a line, got 4"),
-    ],
-)
-def test_tables_that_are_not_understood_say_where(folder, data, words):
+WRONG_TABLES = [
+    *DATA["wrong_table"],
+    {"data": "\udcff\0", "words": "expected a text file in UTF-8"},
+]
+
+
+@pytest.mark.parametrize("row", WRONG_TABLES, ids=lambda row: row["words"])
+def test_tables_that_are_not_understood_say_where(folder, row):
+    data = row["data"].encode(errors="surrogateescape")
     (folder / place_of(CASES[0]) / "answer_positions.csv").write_bytes(data)
     failure = FileContestant(folder).answer(CASES[0])
     assert failure.kind is FailureKind.GARBAGE
-    assert f"positions: {words}" in str(failure.sentence)
+    assert f"positions: {row['words']}" in str(failure.sentence)
 
 
-@pytest.mark.parametrize(
-    ("data", "kind", "words"),
-    [
-        (b"[1, 2]", "garbage", "answer.json: expected a JSON object, got '[1, 2]'"),
-        (b"", "garbage", "answer.json: expected a JSON object, got ''"),
-        (b'{"positions": [[1, 2, 3]]}', "garbage", "expected shape (2, 3), got (1, 3)"),
-        (b'{"positions": [', "garbage", "expected JSON"),
-        (b'{"error": "no trees"}', "refused", "no trees"),
-    ],
-)
-def test_json_that_is_not_understood_says_why(folder, data, kind, words):
-    (folder / place_of(CASES[0]) / "answer.json").write_bytes(data)
+@pytest.mark.parametrize("row", DATA["wrong_json"], ids=lambda row: row["words"])
+def test_json_that_is_not_understood_says_why(folder, row):
+    (folder / place_of(CASES[0]) / "answer.json").write_text(row["data"])
     failure = FileContestant(folder).answer(CASES[0])
-    assert failure.kind == kind
-    assert words in str(failure.sentence)
+    assert failure.kind == row["kind"]
+    assert row["words"] in str(failure.sentence)
 
 
 @pytest.mark.parametrize("name", ["answers.json", "answer_position.csv", "Answer.JSON"])

@@ -105,21 +105,9 @@ def words(failure):
     return f"{failure.kind}: {failure.sentence}"
 
 
-ANSWERS = {
-    "an array": "np.ones((2, 3)) / 3",
-    "lists": "[[1 / 3] * 3] * 2",
-    "single precision": "np.full((2, 3), 1 / 3, dtype=np.float32)",
-    "a tuple": "np.ones((2, 3)) / 3, np.eye(4)[:2]",
-    "rotations first": "np.eye(4)[:2]",
-    "a dict": "{'positions': np.ones((2, 3)) / 3, 'other': object()}",
-    "not numbers": "np.full((2, 3), [np.nan, np.inf, -np.inf])",
-    "tiny ones": "np.full((2, 3), 5e-324)",
-}
-
-
-@pytest.mark.parametrize("name", ANSWERS)
+@pytest.mark.parametrize("name", TABLE["answers"])
 def test_an_answer_is_what_the_function_returns_bit_for_bit(inside, name):
-    expression = ANSWERS[name]
+    expression = TABLE["answers"][name]
     contestant = inside(f"import numpy as np\n{FORWARD}return {expression}\n")
     expected = call(lambda parents: eval(expression), TASKS["forward_kinematics"], case(2).inputs)
     answer = contestant.answer(case(2))
@@ -245,19 +233,8 @@ def test_an_argument_that_no_input_has_is_told_with_those_there_are(inside, argu
     assert re.search(message, said), said
 
 
-PRINTS = {
-    "print": ("print('joint 1')", True),
-    "much": ("print('joint 1' * 10**6)", True),
-    "bytes": ("sys.stdout.buffer.write(b'joint 1\\xff')", True),
-    "a line and a half": ("print('joint 1\\nand', end='')", True),
-    "a shell past Python": ("os.system('echo hello')", False),
-    "a system call": ("os.write(1, b'hello\\n' * 1000)", False),
-}
-
-
-@pytest.mark.parametrize("name", PRINTS)
-def test_prints_do_no_harm_and_are_remarked(solver, name):
-    body, remarked = PRINTS[name]
+@rows("prints")
+def test_prints_do_no_harm_and_are_remarked(solver, body, remarked):
     contestant = solver(f"import os, sys\n{FORWARD}{body}\n    return offsets\n")
     for _ in range(2):
         remarks = contestant.answer(case(2)).remarks
@@ -286,10 +263,7 @@ def test_the_demonstration_below_the_main_guard_does_not_run(inside):
     assert inside(text).greeting.tasks == ("forward_kinematics",)
 
 
-@pytest.mark.parametrize(
-    "names",
-    [("crosscheck", "message"), ("reference", "host", "task")],
-)
+@pytest.mark.parametrize("names", [("crosscheck", "message"), ("reference", "host", "task")])
 def test_modules_beside_the_file_are_its_own(solver, names):
     imports = "".join(f"import {name}\n" for name in names if name != "crosscheck")
     last = names[-1]

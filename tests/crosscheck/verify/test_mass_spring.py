@@ -13,7 +13,7 @@ from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting, Step, System
 from plumbob.crosscheck.verify.judgement import CaseJudgement, Finding, Report, Verdict
-from plumbob.crosscheck.verify.mass_spring import energy, forces, search, stepping
+from plumbob.crosscheck.verify.mass_spring import energy, search, stepping
 from plumbob.crosscheck.verify.mass_spring.cases import task_cases, trace_of
 from plumbob.crosscheck.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, apply
 from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel, simulate
@@ -81,7 +81,6 @@ def wrapped(stepper, change):
         state = stepper(**inputs)
         return state | {"positions": state["positions"] + change(**inputs)}
 
-    step.__signature__ = stepper.__signature__
     return step
 
 
@@ -197,28 +196,6 @@ def test_steps_of_the_reference_and_of_mujoco_are_not_accused(name):
     assert_not_accused(report(step, step=declared))
 
 
-@pytest.mark.slow
-def test_a_float_explicit_step_of_a_thousand_substeps_is_not_accused():
-    """The sum of 1,000 increments, each rounded, is 5e-5 m off."""
-
-    def step(**inputs):
-        p = problem_of(inputs)
-        half = np.float32
-        x, v = p.positions.astype(half), p.velocities.astype(half)
-        free = np.ones(p.count, dtype=half)
-        free[p.pinned] = 0
-        hs = half(p.h / 1000)
-        for _ in range(1000):
-            now = p.changed(positions=x.astype(float), velocities=v.astype(float))
-            a = (all_forces(now) / p.masses[:, None]).astype(half) * free[:, None]
-            x, v = x + hs * v, v + hs * a
-        return {"positions": x, "velocities": v}
-
-    declared = Step("explicit", substeps=1000, damper="explicit")
-    judged = report(step, step=declared, precision="single")
-    assert judged.verdict <= Verdict.RIGHT_BUT, broken_laws(judged)
-
-
 def test_one_iteration_is_not_taken_for_convergence():
     judged = report(Stepper(StepModel(Integrator("local_global"))), step=DECLARED["converged"][1])
     assert judged.verdict is Verdict.WRONG
@@ -281,7 +258,7 @@ def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told(monkeypat
     median, worst = (float(x) for x in re.search(r"by (\S+) in .* by (\S+) in", nearest).groups())
     assert 0.0 < median <= worst < 0.1
     laws_that_hold = set(holds.removesuffix(".").partition(": ")[2].split(", "))
-    assert laws_that_hold == {"pins", "momentum", "equal requests", "symmetry", "consistency"}
+    assert laws_that_hold == {"pins", "momentum", "equal answers", "symmetry", "consistency"}
     screen = " ".join(" ".join(terminal.lines(
         Report(Greeting(1, ("mass_spring_step",)), [judged], 0),
         Presentation(speaker("en"), "en", ["x.py"]), terminal.ENDLESS,
@@ -323,11 +300,10 @@ def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family)
 def test_noise_is_named():
     rng = np.random.default_rng(3)
     noise = wrapped(
-        Stepper(LINEARISED),
-        lambda positions, **inputs: 7e-4 * rng.standard_normal(positions.shape),
+        Stepper(LINEARISED), lambda positions, **inputs: 7e-4 * rng.standard_normal(positions.shape)
     )
     judged = report(noise, step=DECLARED["linearised"][1])
-    assert "equal requests" in broken_laws(judged)
+    assert "equal answers" in broken_laws(judged)
     assert any("-fsanitize" in str(hint) for hint in judged.diagnosis.hints)
 
 
@@ -466,17 +442,3 @@ def test_every_fault_of_energies_is_caught_and_named(key):
 
 def test_the_zero_of_gravity_is_free():
     assert report(energies([], shift=42.0), "energy").verdict is Verdict.RIGHT
-
-
-def test_keys_of_faults_are_distinct_and_have_a_sentence():
-    for options in (STEP_FAULTS, FORCE_FAULTS):
-        assert all(str(one.sentence).endswith(".") for one in options)
-    assert len({fault.key for fault in STEP_FAULTS}) >= 90
-    assert len(list(forces.variants())) > 1000
-
-
-def test_answers_of_every_case_are_judged():
-    model, declared = DECLARED["linearised"]
-    judged = report(Stepper(model), step=declared)
-    assert all(isinstance(one.answer, Answer) and one.findings for one in judged.judgements)
-    assert judged.digits > 12

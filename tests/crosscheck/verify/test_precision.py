@@ -242,8 +242,7 @@ def test_the_precision_is_said_once_for_all_tasks_and_nothing_contradicts_it(lan
         return {name: as_float(value) for name, value in functions[task](**inputs).items()}
 
     door = FunctionContestant(
-        {task: lambda task=task, **inputs: rounding(task, **inputs) for task in functions},
-        greeting,
+        {task: lambda task=task, **inputs: rounding(task, **inputs) for task in functions}, greeting
     )
     report = verify(door)
     say = speaker(language)

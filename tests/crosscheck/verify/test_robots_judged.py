@@ -11,9 +11,13 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.kinematics import robot_models
-from plumbob.crosscheck.verify.kinematics.robot_inverse_kinematics import FAULTS, TASK, judge
+from plumbob.crosscheck.verify.kinematics.robot_inverse_kinematics import (
+    FAULTS,
+    TASK,
+    judge,
+    solve_wrongly,
+)
 from plumbob.crosscheck.verify.kinematics.robot_models import CLOSE, tool_pose
-from plumbob.crosscheck.verify.kinematics.robot_solver import solve_wrongly
 from plumbob.crosscheck.verify.verify import judge_cases
 from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import urdf

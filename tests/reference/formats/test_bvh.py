@@ -16,7 +16,7 @@ from plumbob.reference import (
     track,
 )
 from plumbob.reference.formats import FormatWarning, bvh
-from plumbob.reference.formats.bvh.writer import ORDERS, euler_angles
+from plumbob.reference.formats.bvh import ORDERS, euler_angles
 
 ONE_JOINT = """HIERARCHY
 ROOT hip

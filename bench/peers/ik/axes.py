@@ -1,8 +1,8 @@
-"""The choice among all solutions of a target, which some analytic solvers leave to their user."""
+"""A chain's axes, and the choice among all solutions, for solvers that read no robot files."""
 
 import numpy as np
 
-from ...problems.robots import LIMIT_TOLERANCE
+from ...problems.robots import LIMIT_TOLERANCE, links
 from .protocol import BenchRobot, FloatArray
 
 REVOLUTION = 2.0 * np.pi
@@ -23,3 +23,18 @@ def within(robot: BenchRobot, q: FloatArray) -> FloatArray:
     q = q - REVOLUTION * np.ceil((q - robot.upper - LIMIT_TOLERANCE) / REVOLUTION).clip(0.0)
     nearest = np.clip(q, robot.lower, robot.upper)
     return np.where(np.abs(q - nearest) <= LIMIT_TOLERANCE, nearest, q)
+
+
+def axes_at_zero(robot: BenchRobot) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return axes (joint, 3), offsets between them (joint + 1, 3), and the effector's rotation.
+
+    All are in the frame of the root, with every joint at zero.
+    """
+    T, axes, places = np.eye(4), [], [np.zeros(3)]
+    for transform, axis in links(robot):
+        T = T @ transform
+        if axis is not None:
+            axes.append(T[:3, :3] @ axis)
+            places.append(T[:3, 3])
+    places.append(T[:3, 3])
+    return np.array(axes), np.diff(places, axis=0), T[:3, :3]

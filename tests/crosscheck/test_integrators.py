@@ -1,9 +1,13 @@
-"""How integrators treat the energy: the series, and what is known of it."""
+"""The energy over time of each integrator, and how far the end of a step is from balance."""
 
+import numpy as np
 import pytest
 
 from plumbob.crosscheck import samples
 from plumbob.crosscheck.mass_spring.integrators import SIMULATORS, energy_series, mechanical_energy
+from plumbob.crosscheck.mass_spring.steps import balance_residual
+from plumbob.crosscheck.tolerances import TOLERANCES
+from plumbob.reference.implicit_euler import ImplicitEuler
 
 
 @pytest.mark.parametrize("motion", SIMULATORS)
@@ -20,3 +24,14 @@ def test_steps_must_come_out_even():
     system, state, h = samples.oscillator(0)
     with pytest.raises(ValueError, match="steps: expected a multiple of 3, got 7"):
         energy_series(SIMULATORS["Runge-Kutta"], system, state, h, steps=7, every=3)
+
+
+def test_moved_pins_are_where_the_step_took_them():
+    system, state, external, h = samples.network(0, damped=False)
+    pins_at = state.positions[system.pinned] + 0.1
+    settings = {"h": h, "tolerance": 1e-14}
+    x = ImplicitEuler(system, **settings).step(state, external, pins_at).state.positions
+    assert balance_residual(system, state, x, h, external) < TOLERANCES["balance"].value
+    x = ImplicitEuler(system, **settings).step(state, external).state.positions
+    x = np.where(system.free[:, None], x, x + 0.1)
+    assert balance_residual(system, state, x, h, external) > 1e-6

@@ -1,0 +1,123 @@
+"""Findings by the laws in `laws.toml`, and the judgement of a case from them."""
+
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from .contestant import Answer, Exchange
+from .explain import largest_gap
+from .judgement import CaseJudgement, Finding, Verdict
+from .sentence import Sentence, sentence
+from .timing import time_call
+
+HOLDS = sentence("It holds.")
+LAWS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+def finding(
+    key: str,
+    error: float = np.inf,
+    tolerance: float = 0.0,
+    *,
+    verdict: Verdict | None = None,
+    index: int | None = None,
+    law: str | None = None,
+    **values: object,
+) -> Finding:
+    """Return RIGHT if an error is within its tolerance, else what an entry of `laws.toml` says.
+
+    The key is a law, or a law and a reason after a comma; the sentence has the fields {error},
+    {index} of the worst joint, particle or point, and `values`. `verdict` and `law` replace those
+    of the entry.
+    """
+    entry, error = LAWS[key], float(error)
+    if verdict is None:
+        verdict = Verdict[entry.get("verdict", "WRONG")]
+    if error <= tolerance:
+        verdict = Verdict.RIGHT
+    words = Sentence(entry["sentence"], {"error": error, "index": index, **values})
+    return Finding(
+        law or key.partition(",")[0], verdict, error, tolerance, entry.get("unit", ""),
+        words if verdict else HOLDS, index,
+    )  # fmt: skip
+
+
+def of_joints(
+    key: str, errors: FloatArray, tolerance: float, verdict: Verdict | None = None
+) -> Finding:
+    """Return the finding about the worst joint, at the first wrong one: there the fault begins."""
+    worst, wrong = int(np.argmax(errors)), errors > tolerance
+    index = int(np.argmax(wrong)) if wrong.any() else worst
+    return finding(key, errors[worst], tolerance, verdict=verdict, index=index, joint=worst)
+
+
+def not_finite(key: str, outputs: FloatArray, tolerance: float = 0.0) -> Finding:
+    """Return the finding that outputs of a joint are NaN or infinite."""
+    return finding(key, tolerance=tolerance, index=int(np.argmin(np.isfinite(outputs))))
+
+
+def digits(error: float, size: float) -> float:
+    """Return the number of correct digits of a number of this size, at most 16."""
+    if not np.isfinite(error):
+        return 0.0
+    return float(np.clip(-np.log10(max(error / size, 1e-16)), 0.0, 16.0))
+
+
+def judge_case(
+    exchange: Exchange,
+    laws: Callable[[Mapping[str, Any]], Iterable[Finding]],
+    allowed: float | Mapping[str, float],
+    reference: Callable[[], Any] | None = None,
+    expected: Mapping[str, Any] | None = None,
+    correct_digits: float | None = None,
+) -> CaseJudgement:
+    """Return the judgement of an answer by the laws of its task and of all tasks.
+
+    `laws` returns the findings about its outputs, `reference` is the call to time, and two answers
+    to a request may differ by `allowed`, in any output or by its name.
+    """
+    answer, findings = exchange.answer, list[Finding]()
+    seconds = time_call(reference)[1] if reference else None
+    if isinstance(answer, Answer):
+        findings += laws(answer.values)
+        findings += [equal_answers(exchange, allowed), *map(_remark, answer.remarks)]
+    return CaseJudgement(
+        exchange.case, answer, tuple(findings), expected or {}, correct_digits, seconds
+    )
+
+
+def equal_answers(exchange: Exchange, allowed: float | Mapping[str, float]) -> Finding:
+    """Return how far two answers to a request differ, in the worst of the outputs."""
+    answer, repeat = exchange.answer, exchange.repeat
+    if not isinstance(answer, Answer) or not isinstance(repeat, Answer):
+        return finding("equal answers, none")
+    bounds = allowed if isinstance(allowed, Mapping) else dict.fromkeys(answer.values, allowed)
+    findings = [
+        finding("equal answers", largest_gap(output, repeat.values.get(name)), bounds[name],
+                output=name)
+        for name, output in answer.values.items()
+        if name in bounds
+    ]  # fmt: skip
+    ratios = [found.error / max(found.tolerance, 1e-300) for found in findings]
+    return findings[int(np.argmax(ratios))] if findings else finding("equal answers", 0.0)
+
+
+def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
+    """Return hints at mistakes that no variant has, from the laws that are broken."""
+    findings = chain.from_iterable(judgement.findings for judgement in judgements)
+    broken = {found.law for found in findings if found.verdict >= Verdict.WRONG}
+    hints = (entry for law, entry in LAWS["hints"].items() if law in broken)
+    return tuple(Sentence(entry["sentence"], {}) for entry in hints)
+
+
+def _remark(remark: Sentence) -> Finding:
+    """Return the finding of an oddity; a changed skeleton spoils every later request."""
+    spoils = remark.values.get("name") in ("offsets", "parents")
+    law, verdict = ("untouched inputs", Verdict.WRONG) if spoils else ("remarks", Verdict.RIGHT_BUT)
+    return Finding(law, verdict, 1.0, 0.0, "", remark)

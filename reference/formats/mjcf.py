@@ -1,0 +1,442 @@
+"""The kinematic part of an MJCF file, MuJoCo's own format.
+
+Joint 0 of the articulation is the world. Bodies follow depth first in the order of the file, and
+the coordinates equal those of MuJoCo's qpos. Every body becomes a joint with its name and pose. A
+body with several joints becomes one joint for each, named "body/joint", except that the last one
+has the name of the body; if its anchor is not the body's origin, a fixed joint with the name of the
+body follows. A body without a name is called "body#3" by its index, a joint without one "hinge1" by
+its type and its index in the body.
+
+`home` is the configuration in the file, with each joint at its `ref`. A free joint moves in the
+world's frame. MuJoCo limits the total angle of a ball; here its tilt and its twist about z are each
+limited by that angle, which allows all that MuJoCo does, and more. Frames, nested defaults and
+includes from one folder are supported. Elements that do not affect forward kinematics, such as
+sites, keyframes and equality constraints, are ignored. Elements that generate bodies (replicate,
+attach, composite, flexcomp) are refused, except for a replicate without bodies, which is ignored
+with a warning.
+"""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import rotation
+from ..arguments import distinct_texts, frozen
+from ..quaternion import (
+    IDENTITY,
+    add,
+    cross,
+    dot,
+    exponential,
+    magnitude,
+    multiply,
+    normalised,
+    rotate,
+    scale,
+    subtract,
+)
+from . import xml
+from .robot import INFINITY, ORIGIN, Quaternion, Robot, RobotLink, Vector, assemble, upright
+from .source import warn
+from .xml import Element
+
+KINDS = ("hinge", "slide", "ball", "free")
+GENERATORS = ("replicate", "attach", "composite", "flexcomp")
+MOVING = ("body", "joint", "freejoint", *GENERATORS[1:])
+Z = (0.0, 0.0, 1.0)
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+OF_JOINTS = ("type", "pos", "axis", "range", "limited", "ref")
+ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+
+
+def read(path: str | Path, *, root: str | Path | None = None) -> Robot:
+    """Return the robot or character that a file describes.
+
+    Args:
+        path: of the file.
+        root: the folder that must contain all included files after symbolic links are resolved;
+            that of the file if None.
+
+    Raises:
+        ValueError: naming file, line and element, if it cannot be read, is not an MJCF file,
+            includes one from outside the root, or has elements that generate bodies.
+    """
+    element = xml.read(path)
+    _include_files(element, Path(path), root)
+    return _robot(element, str(path))
+
+
+def parse(text: str) -> Robot:
+    """Return the robot that a text describes, which can include no files; see `read`."""
+    root = xml.parse(text, "MJCF")
+    for element in root.walk():
+        if element.tag == "include":
+            raise element.error("expected a text without includes; they need a file to be read")
+    return _robot(root, "MJCF")
+
+
+def _include_files(root: Element, path: Path, top: str | Path | None) -> None:
+    """Replace all includes by the content of the files, each of which may be included once.
+
+    `top` is the folder that must contain all files; that of the main file at `path` if None.
+    """
+    main = path.resolve()
+    folder = main.parent
+    if top is not None:
+        top_folder = _resolved(Path(top)) if isinstance(top, str | Path) else None
+        if top_folder is None or not (top_folder.is_dir() and main.is_relative_to(top_folder)):
+            expected = f"expected a folder that holds {main.name!r:.80}"
+            raise ValueError(f"root: {expected}, got {top!r:.80}")
+        folder = top_folder
+    files = {main}
+    waiting = [(root, main)]
+    while waiting:
+        element, file = waiting.pop()
+        children = [(child, file) for child in reversed(element.children)]
+        element.children.clear()
+        while children:
+            child, file = children.pop()
+            if child.tag == "include":
+                included = _included(child, file, main.parent, folder)
+                if included in files:
+                    raise child.error("expected every file to be included once, got it again")
+                files.add(included)
+                children += [(part, included) for part in reversed(xml.read(included).children)]
+            else:
+                element.children.append(child)
+                waiting.append((child, file))
+
+
+def _included(include: Element, file: Path, main_folder: Path, top: Path) -> Path:
+    """Return the included file, relative to the main file or else to the including file."""
+    name = include.word("file")
+    paths = [path for base in (main_folder, file.parent) if (path := _resolved(base / name))]
+    inside = [path for path in paths if path.is_relative_to(top)]
+    for path in inside:
+        if path.is_file():
+            return path
+    is_outside = paths and not inside
+    fault = "outside; root= names a wider folder" if is_outside else "not there"
+    raise include.error(f"expected a file in {top.name!r:.60}, got {name!r:.80}, which is {fault}")
+
+
+def _resolved(path: Path) -> Path | None:
+    """Return a path with symbolic links resolved; None if it is not a valid path."""
+    try:
+        path.exists()  # raises for names that are too long and for cycles of links
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return None
+
+
+class _Transform(NamedTuple):
+    """A position and a rotation."""
+
+    x: Vector = ORIGIN
+    R: Quaternion = IDENTITY
+
+    def apply(self, x: Vector) -> Vector:
+        """Return the outer coordinates of a point x of this frame."""
+        return add(self.x, rotate(self.R, x))
+
+    def compose(self, inner: "_Transform") -> "_Transform":
+        """Return the product of this transform and an inner one."""
+        return _Transform(self.apply(inner.x), multiply(self.R, inner.R))
+
+
+class _CompilerSettings(NamedTuple):
+    """The compiler's settings and the default classes of a file."""
+
+    angle: float  # the file's unit of angles [rad]
+    sequence: str  # the axes of Euler angles; capitals denote fixed axes
+    autolimits: bool  # whether a range implies a limit
+    alignfree: bool  # whether the frames of free bodies are aligned with their inertia
+    classes: dict[str, dict[str, str]]  # the joint attributes of each default class
+
+    def transform(self, element: Element) -> _Transform:
+        """Return the transform of a body or a frame in its parent."""
+        return _Transform(element.numbers("pos", ORIGIN), self._orientation(element))
+
+    def class_of(self, element: Element, attribute: str, inherited: str) -> str:
+        """Return the default class that an element names or inherits."""
+        name = element.word(attribute, inherited)
+        if name not in self.classes:
+            raise element.error(f"expected a default class, got {name!r:.80}")
+        return name
+
+    def with_defaults(self, joint: Element, inherited: str) -> Element:
+        """Return a joint with missing attributes taken from its class."""
+        defaults = self.classes[self.class_of(joint, "class", inherited)]
+        return joint._replace(attributes=defaults | joint.attributes)
+
+    def _orientation(self, element: Element) -> Quaternion:
+        present = [name for name in ORIENTATIONS if name in element.attributes]
+        if len(present) > 1:
+            raise element.error(f"expected one orientation, got {' and '.join(present)}")
+        match present:
+            case ["quat"]:
+                q = element.numbers("quat", IDENTITY)
+                if not 0.0 < magnitude(q) < math.inf:
+                    got = repr(element.word("quat"))
+                    raise element.error(f"expected a quaternion in 'quat', got {got:.80}")
+                return normalised(q)
+            case ["axisangle"]:
+                x, y, z, angle = element.numbers("axisangle", (0.0, 0.0, 0.0, 0.0))
+                axis = _direction(element, "axisangle", (x, y, z))
+                return exponential(scale(angle * self.angle, axis))
+            case ["euler"]:
+                return self._from_euler(element.numbers("euler", ORIGIN))
+            case ["zaxis"]:
+                return upright(_direction(element, "zaxis", element.numbers("zaxis", ORIGIN)))
+            case ["xyaxes"]:
+                return _from_axes(element, element.numbers("xyaxes", (*ORIGIN, *ORIGIN)))
+        return IDENTITY
+
+    def _from_euler(self, angles: Sequence[float]) -> Quaternion:
+        """Return the product of rotations about moving axes, or about fixed ones for capitals."""
+        R = IDENTITY
+        for axis, angle in zip(self.sequence, angles, strict=True):
+            factor = exponential(scale(angle * self.angle, AXES[axis.lower()]))
+            R = multiply(R, factor) if axis.islower() else multiply(factor, R)
+        return R
+
+
+def _settings(root: Element) -> _CompilerSettings:
+    """Return the settings of a file."""
+    merged = Element("compiler", {}, [], root.location)
+    for compiler in root.children_named("compiler"):
+        merged = compiler._replace(attributes=merged.attributes | compiler.attributes)
+    _one_of(merged, "coordinate", ("local",), "local")
+    sequence = merged.word("eulerseq", "xyz")
+    if len(sequence) != 3 or not set(sequence.lower()) <= set(AXES):
+        raise merged.error(f"expected three axes such as xyz for eulerseq, got {sequence!r:.80}")
+    unit = _one_of(merged, "angle", ("degree", "radian"), "degree")
+    return _CompilerSettings(
+        math.radians(1.0) if unit == "degree" else 1.0,
+        sequence,
+        _one_of(merged, "autolimits", ("true", "false"), "true") == "true",
+        _one_of(merged, "alignfree", ("true", "false"), "false") == "true",
+        _classes(root),
+    )
+
+
+def _one_of(element: Element, name: str, valid: Sequence[str], default: str) -> str:
+    """Return an attribute that is one of several words."""
+    value = element.word(name, default)
+    if value not in valid:
+        raise element.error(f"expected one of {', '.join(valid)} for {name}, got {value!r:.80}")
+    return value
+
+
+def _direction(element: Element, name: str, vector: Vector) -> Vector:
+    """Return the vector scaled to unit length."""
+    length = math.hypot(*vector)
+    if length == 0.0:
+        raise element.error(f"expected a direction in {name!r}, got {element.word(name)!r:.80}")
+    return vector[0] / length, vector[1] / length, vector[2] / length
+
+
+def _from_axes(element: Element, axes: Sequence[float]) -> Quaternion:
+    """Return the rotation to the frame of x and the component of y perpendicular to x."""
+    x = _direction(element, "xyaxes", (axes[0], axes[1], axes[2]))
+    y = _direction(element, "xyaxes", (axes[3], axes[4], axes[5]))
+    y = _direction(element, "xyaxes", subtract(y, scale(dot(x, y), x)))
+    w, i, j, k = rotation.from_matrix(np.transpose([x, y, cross(x, y)]))
+    return float(w), float(i), float(j), float(k)
+
+
+def _classes(root: Element) -> dict[str, dict[str, str]]:
+    """Return the joint attributes of each default class, with those of outer classes."""
+    classes: dict[str, dict[str, str]] = {"main": {}}
+    waiting = [(element, "") for element in reversed(root.children_named("default"))]
+    while waiting:
+        element, outer = waiting.pop()
+        name = element.word("class", None if outer else "main")
+        if outer:
+            if name in classes:
+                raise element.error(f"expected a class once, got {name!r:.80} twice")
+            classes[name] = classes[outer]
+        elif name != "main":
+            raise element.error(f"expected the outermost class to be 'main', got {name!r:.80}")
+        joint = element.single("joint")
+        own = joint.attributes if joint else {}
+        classes[name] = classes[name] | {key: own[key] for key in OF_JOINTS if key in own}
+        waiting += [(inner, name) for inner in reversed(element.children_named("default"))]
+    return classes
+
+
+class _Part(NamedTuple):
+    """An element of a body, its frame in the body, and its default class."""
+
+    element: Element
+    frame: _Transform
+    inherited: str
+
+
+class _Joint(NamedTuple):
+    label: str
+    kind: str
+    anchor: Vector = ORIGIN
+    axis: Vector = Z
+    lower: float = -INFINITY
+    upper: float = INFINITY
+    cone: float = INFINITY
+    ref: float = 0.0
+
+
+def _robot(root: Element, origin: str) -> Robot:
+    """Return the robot or character that a <mujoco> element describes."""
+    if root.tag != "mujoco":
+        raise root.error("expected a <mujoco>")
+    tree = _Tree(_settings(root))
+    for world in root.children_named("worldbody"):
+        tree.add_world(world)
+    built = assemble(origin, tree.links, tree.joints)
+    home = np.array(built.home)
+    for joint, coordinates in tree.homes.items():
+        home[built.articulation.coordinates_of(joint)] = coordinates
+    return built._replace(home=frozen(home))
+
+
+class _Tree:
+    """The links read so far, the file's joints by name, and the home coordinates of each."""
+
+    def __init__(self, settings: _CompilerSettings) -> None:
+        self.settings = settings
+        self.links = [RobotLink("world", -1)]
+        self.bodies = {"world"}
+        self.joints: dict[str, int] = {}
+        self.homes: dict[int, tuple[float, ...]] = {}
+
+    def add_world(self, world: Element) -> None:
+        """Add all bodies of a <worldbody>."""
+        joints, bodies = self.parts(_Part(world, _Transform(), "main"))
+        if joints:
+            raise joints[0].element.error("expected no joint in the world, which cannot move")
+        waiting = [(body, 0) for body in reversed(bodies)]
+        while waiting:
+            body, parent = waiting.pop()
+            inner = self.add_body(body, parent)
+            waiting += [(below, len(self.links) - 1) for below in reversed(inner)]
+
+    def add_body(self, part: _Part, parent: int) -> list[_Part]:
+        """Add the links of a body; return its child bodies."""
+        body = part.element
+        name = body.word("name", f"body#{len(self.bodies)}")
+        if name in self.bodies:
+            raise body.error(f"expected a body's name once, got {name!r:.80} twice")
+        self.bodies.add(name)
+        pose = part.frame.compose(self.settings.transform(body))
+        inherited = self.settings.class_of(body, "childclass", part.inherited)
+        tags, bodies = self.parts(_Part(body, _Transform(), inherited))
+        joints = [self.joint(tag, index) for index, tag in enumerate(tags)]
+        is_free = any(joint.kind == "free" for joint in joints)
+        if is_free and (len(joints) > 1 or parent != 0):
+            raise body.error("expected a single free joint, in a body of the world")
+        for number, (joint, tag) in enumerate(zip(joints, tags, strict=True), len(self.links)):
+            self.record(tag.element, joint, f"{name}/{joint.label}", number, pose)
+        self.links += _chain(name, parent, len(self.links), pose, joints)
+        return bodies
+
+    def parts(self, body: _Part) -> tuple[list[_Part], list[_Part]]:
+        """Return the joints and the child bodies of a body, also inside frames."""
+        joints, bodies = [], []
+        waiting = [body._replace(element=child) for child in reversed(body.element.children)]
+        while waiting:
+            part = waiting.pop()
+            element, frame, inherited = part
+            if element.tag in ("joint", "freejoint"):
+                joints.append(part)
+            elif element.tag == "body":
+                bodies.append(part)
+            elif element.tag == "frame":
+                frame = frame.compose(self.settings.transform(element))
+                inherited = self.settings.class_of(element, "childclass", inherited)
+                inner = reversed(element.children)
+                waiting += [_Part(child, frame, inherited) for child in inner]
+            elif element.tag == "replicate" and all(e.tag not in MOVING for e in element.walk()):
+                warn(str(element.error("expected bodies or joints, got none: passed over")))
+            elif element.tag in GENERATORS:
+                raise element.error("expected every body to be written out, got a rule for some")
+        return joints, bodies
+
+    def joint(self, part: _Part, index: int) -> _Joint:
+        """Return a joint, the default attributes of its class included."""
+        element, frame, inherited = part
+        kind = "free"
+        if element.tag == "joint":
+            element = self.settings.with_defaults(element, inherited)
+            kind = _one_of(element, "type", KINDS, "hinge")
+        label = part.element.word("name", f"{kind}{index + 1}")
+        if kind == "free":
+            align = _one_of(element, "align", ("true", "false", "auto"), "auto")
+            if align == "true" or (align == "auto" and self.settings.alignfree):
+                raise element.error(
+                    "expected a free joint that is not aligned with the body's inertia"
+                )
+            return _Joint(label, kind)
+        anchor = frame.apply(element.numbers("pos", ORIGIN))
+        angle = 1.0 if kind == "slide" else self.settings.angle
+        lower, upper = (angle * limit for limit in self.limits(element, kind))
+        if kind == "ball":
+            return _Joint(label, kind, anchor, Z, -upper, upper, upper)
+        axis = rotate(frame.R, _direction(element, "axis", element.numbers("axis", Z)))
+        (ref,) = element.numbers("ref", (0.0,))
+        return _Joint(label, kind, anchor, axis, lower, upper, ref=angle * ref)
+
+    def limits(self, joint: Element, kind: str) -> tuple[float, float]:
+        """Return a joint's range, in the unit of the file."""
+        limited = _one_of(joint, "limited", ("true", "false", "auto"), "auto")
+        lower, upper = joint.numbers("range", (0.0, 0.0))
+        if limited == "auto" and (lower or upper) and not self.settings.autolimits:
+            raise joint.error("expected limited='true' or 'false' where autolimits is 'false'")
+        if limited == "false" or (limited == "auto" and lower >= upper):
+            return -INFINITY, INFINITY
+        if lower >= upper or (kind == "ball" and lower != 0.0):
+            lowest = "0" if kind == "ball" else "the least"
+            bounds = " to ".join(distinct_texts(lower, upper))
+            raise joint.error(f"expected a range from {lowest} up, got {bounds}")
+        return lower, upper
+
+    def record(
+        self, element: Element, joint: _Joint, path: str, number: int, pose: _Transform
+    ) -> None:
+        """Store the index and home of a joint by its name, or by its path if it has none."""
+        name = joint.label if "name" in element.attributes else path
+        if name in self.joints:
+            raise element.error(f"expected a joint's name once, got {name!r:.80} twice")
+        self.joints[name] = number
+        if joint.kind == "free":
+            self.homes[number] = (*pose.x, *pose.R)
+        elif joint.kind != "ball":
+            self.homes[number] = (joint.ref,)
+
+
+def _chain(
+    name: str, parent: int, number: int, pose: _Transform, joints: list[_Joint]
+) -> list[RobotLink]:
+    """Return the links of a body; the last has the name and the pose of the body.
+
+    The frames of the links are at the anchors of the joints. The file states the anchors in the
+    body's frame for zero coordinates, and the joints act in the order of the file.
+    """
+    if joints and joints[0].kind == "free":
+        return [RobotLink(name, 0, kind="free")]
+    links: list[RobotLink] = []
+    anchor = ORIGIN
+    for label, kind, next_anchor, axis, *limits, ref in joints:
+        if kind != "slide":
+            pose = _Transform(pose.apply(subtract(next_anchor, anchor)), pose.R)
+            anchor = next_anchor
+        shift = scale(-ref, axis)
+        x, R = pose.compose(
+            _Transform(R=exponential(shift)) if kind == "hinge" else _Transform(shift)
+        )
+        links.append(RobotLink(f"{name}/{label}", parent, x, R, kind, axis, *limits))
+        parent, pose = number + len(links) - 1, _Transform()
+    if links and anchor == ORIGIN:
+        return [*links[:-1], links[-1]._replace(name=name)]
+    return [*links, RobotLink(name, parent, pose.apply(scale(-1.0, anchor)), pose.R)]
