@@ -7,7 +7,16 @@ from typing import Any
 from ..harness.record import Record
 from ..peers import registry
 from .results import Results, settings
-from .table import NO_SUMMARY, Column, Source, Summary, Table, cells
+from .table import (
+    NO_SUMMARY,
+    Column,
+    Source,
+    Summary,
+    Table,
+    cells,
+    ranked_rows,
+    with_rows,
+)
 
 # Returns the sketch of a figure, None if its records are missing.
 Figure = Callable[[Results], Any]
@@ -45,13 +54,13 @@ class Layout:
     optional: bool = False  # whether an empty table is no omission
 
     def __call__(self, results: Results) -> Table:
-        """Return the table with a row for each subject."""
+        """Return the table with a row for each subject, the best of each group first."""
         subjects = list(self.subjects(results))
         columns = tuple(self.columns(subjects) if callable(self.columns) else self.columns)
         measured = self.measured
         if callable(measured):
             measured = measured(subjects) if subjects else NOT_MEASURED
-        return Table(
+        table = Table(
             self.name,
             self.title,
             columns,
@@ -64,6 +73,7 @@ class Layout:
             tuple(map(source, subjects)),
             provenance(list(dict.fromkeys(records_of(subjects)))),
         )
+        return with_rows(table, ranked_rows(table))
 
 
 def source(subject: Any) -> Source:

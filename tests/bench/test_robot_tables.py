@@ -236,7 +236,7 @@ def test_solvers_are_compared_over_robots_that_all_of_them_take(run):
     table = over_all(Results(records))
     assert [(row["robots"], row["solver"]) for row in rows(table)] == [
         *(("all 3 robots", "a"), ("all but the hand", "a"), ("all but the hand", "b")),
-        *(("the arm", solver) for solver in "abc"),
+        *(("the arm", solver) for solver in "cab"),
     ]
     assert table.summary.points[-1].startswith("the arm, one start: c, 120/120")
 
@@ -265,13 +265,17 @@ def test_missing_and_refused_solvers_are_listed_with_the_reason(make):
     refused = make.lacking("Mine", ONE, "not asked for this robot")
     refused.settings["version"] = "1"
     results = Results([
-        make.raced("Plumbob LM", ONE), make.raced("Plumbob LM, 100 restarts", AGAIN, robot="leg"),
+        make.raced("Plumbob LM", ONE, overhead=2.5e-7),
+        make.raced("Plumbob LM, 100 restarts", AGAIN, robot="leg"),
         make.lacking("pink", ONE, "pink is not installed"), entrant, refused,
     ])  # fmt: skip
     table = participants(results)
     versions = {"Plumbob LM": "1.2", "pink": "not installed", "Mine": "1.0"}
     assert by_solver(table, "version") == versions
     assert list(by_solver(table, "robots").values()) == ["all 2 robots", "", "the leg"]
+    assert by_solver(table, "harness overhead, median [µs]")["Plumbob LM"] == pytest.approx(0.25)
+    assert "made by the bench" in by_solver(table, "entries")["pink"]
+    assert "made by the bench" not in by_solver(table, "entries")["Plumbob LM"]
     assert by_solver(table, "remark")["Mine"] == "every robot: not asked for this robot"
     assert table.summary.sentence.startswith("2 of 3 ")
     assert "Pinoc" in table.summary.sentence

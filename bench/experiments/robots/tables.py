@@ -76,7 +76,7 @@ def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Rec
 
 def _entry(entry: PeerEntry) -> str:
     """Return the start of an entry, its note, and who makes its restarts."""
-    maker = "made by the bench, the package has none" if entry.restarts else ""
+    maker = "made by the bench" if entry.restarts else ""
     notes = "; ".join(filter(None, (entry.note, maker)))
     return f"{entry.kind} ({notes})" if notes else entry.kind
 
