@@ -139,6 +139,11 @@ def test_a_new_experiment_is_a_folder_and_a_line(tmp_path, monkeypatch):
         plumbob.bench.experiments.EXPERIMENTS.remove(line)
 
 
+def test_an_unknown_style_is_one_clear_error():
+    with pytest.raises(ValueError, match="style of 'ours': expected one of first, second"):
+        registry.style_of({"name": "ours", "style": "loud"})
+
+
 def test_every_solver_has_one_entry_and_every_style_is_its_own():
     names = [solver.name for solver in registry._solvers()]
     assert len(names) == len(set(names))
