@@ -121,10 +121,10 @@ def scale(results: Results) -> str:
 
 
 def absent(results: Results) -> list[str]:
-    """Return the peers that were asked and took no part."""
+    """Return the peers that were asked and are not installed."""
     records = results.all("ik", task=REACHABLE)
     requested = {record.solver for record in records}
-    present = {record.solver for record in records if "solved" in record.arrays}
+    present = {record.solver for record in records if record.details.version}
     peers = _recorded_names()
     solvers = [peer for peer, names in peers.items() if names & requested and not names & present]
     packages = {record.solver for record in results.all("cloth", task=MISSING)}

@@ -172,7 +172,7 @@ def test_the_most_targets_met_are_ranked_by_chance(make, ccd, fabrik, first):
         for solver, count in (("ccd", ccd), ("fabrik", fabrik))
     ]
     summary = accuracy(Results(records)).summary
-    assert summary.sentence.endswith(f"first: {first}:")
+    assert summary.sentence.endswith(f"solved by {first}.")
     assert summary.points[0].startswith(f"CCD: {40 - ccd}/40 = ")
 
 
@@ -227,8 +227,8 @@ def test_iterations_that_do_not_suffice_are_said_so(make):
 
 def test_times_are_medians_beside_ours(records):
     table = timing.kinematics(Results(records))
-    assert column(table, "median [ns]") == pytest.approx([2000.0, 1000.0])
-    assert column(table, "relative to compiled") == [None, 0.5]
+    assert column(table, "median [ns]") == pytest.approx([1000.0, 2000.0])
+    assert column(table, "relative to compiled") == [0.5, None]
 
 
 def swept(make, solver, seconds, noise=0.01):
@@ -266,7 +266,7 @@ def test_a_machine_too_noisy_for_the_precision_aimed_at_is_said_to_be_so(make, n
     table = timing.kinematics(Results([swept(make, "MuJoCo", np.ones(9), noise)]))
     assert column(table, "remark") == [mark]
     assert ("too noisy for a precision of 5 %" in table.measured) == bool(mark)
-    assert table.summary.sentence.startswith("The machine was too noisy") == bool(mark)
+    assert ("The machine was too noisy" in table.summary.sentence) == bool(mark)
 
 
 def test_a_plain_copy_stands_in_a_column_and_is_called_no_limit(make):

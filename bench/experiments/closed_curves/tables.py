@@ -71,11 +71,9 @@ def _summary(rows: Sequence[Row]) -> Summary:
     smoother = sum(row[largest] < row[f"largest rotation, {WARM}"] for row in rows)
     closed = sum(row[closing] <= (1.0 + ALIKE) * row[largest] for row in rows)
     return Summary(
-        "A coherent motion solves all frames together, so that the joints rotate as little as they "
-        "can from each frame to the next. The largest rotation of a joint is smaller than with "
-        f"warm starts in {smoother} of {len(rows)} cases, and in {closed} the step from the last "
-        "frame back to the first is no larger than others. The largest of all, and the frames "
-        "within tolerance:",
+        "Solving all frames together makes the largest rotation of a joint smaller than warm "
+        f"starts do in {smoother} of {len(rows)} cases, and in {closed} the step from the last "
+        "frame back to the first is no larger than others.",
         tuple(_points(rows)),
     )
 

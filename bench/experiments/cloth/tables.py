@@ -12,7 +12,16 @@ from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Layout
-from ...tables.results import Results, by_problem, counted, grouped, label, listed, settings
+from ...tables.results import (
+    Results,
+    by_problem,
+    counted,
+    grouped,
+    label,
+    listed,
+    most_often,
+    settings,
+)
 from ...tables.table import Summary, words
 from ..cloth_peers import DECADES, SOLVED
 from ..pictures.figures import falling_cloth
@@ -101,7 +110,12 @@ def _convergence_summary(rows: Sequence[Row]) -> Summary:
         for cloth, of_cloth in grouped(rows, lambda row: str(row["cloth"])).items()
     ]
     points += _single_iterations(rows)
-    return Summary(f"Iterations until the error of one step is {SOLVED}:", tuple(points))
+    title = f"iterations to {SOLVED}"
+    cloths = grouped((row for row in rows if row.get(title)), lambda row: str(row["cloth"]))
+    firsts = [min(of_cloth, key=lambda r: r[title])["solver"] for of_cloth in cloths.values()]
+    fewest = f"by {most_often(firsts, 'cloth')}" if firsts else "by no solver"
+    sentence = f"An error of {SOLVED} is reached in the fewest iterations {fewest}."
+    return Summary(sentence, tuple(points))
 
 
 def _count(row: Row) -> str:
@@ -145,8 +159,10 @@ def _damped_steps(results: Results) -> list[Row]:
 
 def _damper_summary(steps: Sequence[Row]) -> Summary:
     cloths = grouped(steps, lambda step: str(step["cloth"]))
+    least, greatest = (words(end(step["difference"] for step in steps)) for end in (min, max))
     return Summary(
-        "The relative difference between the forces of the two laws:",
+        f"The forces of the two laws differ by {least} to {greatest} of their size, the less the "
+        "shorter the step.",
         tuple(f"{cloth}: {_at(of[0])}, {_at(of[-1])}" for cloth, of in cloths.items()),
     )
 

@@ -19,7 +19,7 @@ from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Layout
-from ...tables.results import Results, grouped, label, listed
+from ...tables.results import Results, grouped, label, listed, most_often
 from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, MOTION_TARGETS, NEAR, ONE_STEP, SOLVED, STABILITY, TARGETS
@@ -185,7 +185,18 @@ def _summary(title: str, targets: Mapping[str, float], rows: Sequence[Row]) -> S
         f"{cloth}: {listed([f'to {target} {_fastest(group, target)}' for target in targets])}"
         for cloth, group in grouped(measured, lambda row: str(row["cloth"])).items()
     ]
-    return Summary(title, tuple(sentences)) if measured else NO_SUMMARY
+    if not measured:
+        return NO_SUMMARY
+    target = [*targets][-1]
+    arrivals = [row[target] for row in measured if target in row]
+    firsts = [
+        min(of_cloth, key=lambda point: point.seconds).solver
+        for of_cloth in grouped(arrivals, lambda point: point.cloth).values()
+    ]
+    sentence = f"No solver reaches {target}, {title}."
+    if firsts:
+        sentence = f"The fastest to {target}, {title}, is {most_often(firsts, 'cloth')}."
+    return Summary(sentence, tuple(sentences))
 
 
 def _fastest(rows: Sequence[Row], target: str) -> str:
@@ -201,7 +212,7 @@ def _fastest(rows: Sequence[Row], target: str) -> str:
 one_step = Layout(
     **CAPTIONS.of("cloth_peers_step", _rounding),
     subjects=lambda results: _rows(results, ONE_STEP, TARGETS, {}),
-    summary=partial(_summary, "The fastest solvers of one implicit step, by its error:", TARGETS),
+    summary=partial(_summary, "an error of one implicit step", TARGETS),
     figures=(step_chart,),
 )
 
@@ -240,7 +251,7 @@ def _certainty(rows: Sequence[Row]) -> dict[str, str]:
 motion = Layout(
     **CAPTIONS.of("cloth_peers_motion", _certainty),
     subjects=_motion_rows,
-    summary=partial(_summary, "The fastest solvers of a motion, by its error:", MOTION_TARGETS),
+    summary=partial(_summary, "a distance from the true motion", MOTION_TARGETS),
     figures=(truth_chart,),
 )
 
@@ -267,7 +278,10 @@ def _liu_summary(rows: Sequence[Row]) -> Summary:
         f"error of {words(row['our error'])}, published {words_in(row['published time'], 'ms')}"
         for row in rows
     )
-    return Summary(f"A frame of {_vertices(rows)['vertices']} vertices:", tuple(sentences))
+    ratios = [row["published time"] / row["our time"] for row in rows]
+    least, greatest = map(words, metrics.extent(np.array(ratios)))
+    sentence = f"On another machine, our times are {least} to {greatest} times shorter."
+    return Summary(sentence, tuple(sentences))
 
 
 liu_2013 = Layout(
