@@ -25,23 +25,12 @@ from plumbob.reference.sparse.linear_solver import factorize
 
 h = 0.05
 EPS = np.finfo(float).eps
-# At the minimisers found here rounding moves distances of 1 m by less.
-ROUNDED = 1e-10
-
-exponents = st.floats(-9.0, -2.0)
-seeds = st.integers(min_value=0, max_value=10**6)
 
 
 def step_of(system, state, **settings):
     """The objective of a step and Newton's answer to it."""
     integrator = ImplicitEuler(system, **{"h": h} | settings)
     return integrator.objective(state), integrator.step(state).state.positions
-
-
-def beside(x, exponent, seed, free):
-    """A point at a distance of 10^exponent, only free particles displaced."""
-    direction = np.random.default_rng(seed).standard_normal(x.shape) * free[:, None]
-    return x + 10.0**exponent * direction / np.linalg.norm(direction)
 
 
 def free_hessian(objective, x):
@@ -212,17 +201,6 @@ class TestDistance:
         d = kantorovich_distance(3.0, share)
         assert d == pytest.approx(3.0 + share * d * d / 6.0, rel=1e-12)
         assert 3.0 <= d <= 6.0
-
-    @given(exponents, seeds)
-    def test_newtons_answer_is_within_the_distance(self, exponent, seed):
-        system, state = scenes.random_network(particles=12, seed=seed % 5)
-        objective, exact = step_of(system, state)
-        x = beside(exact, exponent, seed, system.free)
-        known = certify(objective, x)
-        if known.covered:
-            error = np.linalg.norm(x - exact)
-            assert abs(error - known.newton_step) <= 0.5 * known.newton_step + ROUNDED
-            assert error <= known.distance + ROUNDED
 
     def test_it_is_zero_if_all_particles_are_pinned(self):
         system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])

@@ -486,21 +486,6 @@ class TestMotion:
             swung.append(np.abs(state.velocities).max())
         assert max(swung) > 0.2
 
-    def test_results_do_not_depend_on_earlier_steps_of_other_systems(
-        self, network, altered, solver
-    ):
-        system, state = network
-        stiffer = altered(system, stiffnesses=2 * system.stiffnesses)
-        cases = [(system, h), (system, 2 * h), (stiffer, h), (altered(system, pinned=[4]), h)]
-
-        def ends(cases):
-            return [stepped(model, state, solver, h=h).state.positions for model, h in cases]
-
-        there, back = ends(cases), ends(cases[::-1])[::-1]
-        np.testing.assert_array_equal(there, back)
-        for one, other in itertools.combinations(there, 2):
-            assert np.abs(one - other).max() > 1e-4
-
 
 class TestBackends:
     """Both backends give the same results."""
