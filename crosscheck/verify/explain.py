@@ -71,7 +71,7 @@ def explain(
 
 
 def _telling(matches: Sequence[Match]) -> list[Match]:
-    """Return the perfect or else all faulty matches that explain more than a part of their faults."""
+    """Return the perfect or else the faulty matches that explain more than any of their parts."""
 
     def is_needless(match: Match) -> bool:
         faults = set(match.variant.faults)
