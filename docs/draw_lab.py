@@ -1,4 +1,4 @@
-"""Draw the pictures of README.md, docs/lab.md and docs/show.md: `python docs/draw_lab.py`."""
+"""Draw the pictures of README.md and of docs: `python docs/draw_lab.py`."""
 
 import re
 import subprocess
@@ -54,11 +54,23 @@ def draw_plumb_bob(name: str) -> None:
     (DOCS / name).write_text(text, encoding="utf-8")
 
 
-def shorten(name: str) -> None:
+def draw_card(name: str) -> None:
+    """Write the card of the solver of README.md by `plumbob verify`."""
+    page = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    source = re.search(r"```python\n(# my_ik.py\n.*?)```", page, re.DOTALL)
+    assert source
+    plumbob = Path(sys.executable).with_name("plumbob")
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "my_ik.py").write_text(source[1], encoding="utf-8")
+        command = [plumbob, "verify", "my_ik.py", "--card", DOCS / name]
+        subprocess.run(command, check=True, cwd=folder)
+
+
+def shorten(path: Path) -> None:
     """Write the numbers of a picture to a hundredth of a point."""
-    text = (DOCS / name).read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
     short = re.sub(r"\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", text)
-    (DOCS / name).write_text(short, encoding="utf-8")
+    path.write_text(short, encoding="utf-8")
 
 
 def distances(stiffness: float) -> np.ndarray:
@@ -97,5 +109,7 @@ if __name__ == "__main__":
     draw_convergence("lab_convergence.svg")
     draw_heart_beside("show_with.svg")
     draw_plumb_bob("plumb_bob.svg")
-    for path in DOCS.glob("*_*.svg"):
-        shorten(path.name)
+    draw_scene("gallery", "gallery")
+    draw_card("gallery/card.svg")
+    for path in (*DOCS.glob("*_*.svg"), *DOCS.glob("gallery/c*s.svg")):
+        shorten(path)

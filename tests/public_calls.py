@@ -76,7 +76,8 @@ _INTERNAL = {
         reference.implicit_euler.certificate.Certificate crosscheck.verdict.Claim""",
     "of our own sources": """
         crosscheck.verdict.each_case reference.implicit_euler.objective.Iterate.within
-        reference.implicit_euler.objective.Iterate.is_above crosscheck.samples.generator""",
+        reference.implicit_euler.objective.Iterate.is_above crosscheck.samples.generator
+        reference.formats.bvh.euler_angles""",
     "a protocol": """
         reference.implicit_euler.StepMethod.iterates reference.sparse.linear_solver.Factor.solve
         reference.sparse.linear_solver.Factor.refactorize""",

@@ -3,19 +3,18 @@
 The catalogue of arrays is here: which hold times, which are better when smaller or larger.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from plumbob.reference.arguments import distinct_texts
 
 from ..harness.metrics import chance_of_pairs
-from ..harness.record import Record
 from ..tables.table import words
 from .rows import ChangeVerdict, Pair, RowChange, RowKey
 
 # Arrays of measured times [s], by suite; the default is for all other suites.
-_DEFAULT_TIMES = frozenset({"seconds", "setup", "overhead"})
+_DEFAULT_TIMES = frozenset({"seconds", "setup", "control", "overhead"})
 _TIMES: Mapping[str, frozenset[str]] = {
     "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"})
 }
@@ -24,7 +23,7 @@ _MEMORY = frozenset({("cloth_scale", "before"), ("cloth_scale", "memory")})
 # Arrays that are better when smaller.
 _ERRORS = frozenset({
     "residual", "error", "position", "rotation", "beyond", "excess", "drift", "difference",
-    "positions", "rotations", "jacobians", "implicit", "true", "diverged", "above",
+    "positions", "rotations", "jacobians", "above",
 })  # fmt: skip
 # In other suites the distance of a target, which is an input.
 _DISTANCES = frozenset({("cloth", "distance"), ("newton", "distance")})
@@ -32,6 +31,9 @@ _DISTANCES = frozenset({("cloth", "distance"), ("newton", "distance")})
 _MERITS = frozenset({"solved", "held", "covered", "same"})
 # Which targets were solved; records with this array have times by target too.
 SOLVED = "solved"
+# Statistics of a row, and the arrays whose smallest entry is one.
+SHARE, ERROR = "share solved", "smallest error"
+_SMALLEST = {"error", "true"}
 # The setting of a time limit per solve, which makes answers differ from run to run.
 _TIME_LIMIT = "seconds"
 SAME_BITS = "the same to the bit"
@@ -54,17 +56,6 @@ def worse_sign(suite: str, name: str) -> int:
     return -1 if name in _MERITS else 0
 
 
-def unfinished_motions(record: Record) -> np.ndarray:
-    """Return which motions the time limit ended early, (motion,); empty for other records.
-
-    A failed solver leaves a remark; records with remarks have no excuse.
-    """
-    arrays = record.arrays
-    if not {"frames", "wanted"} <= arrays.keys() or np.size(arrays.get("remark_particles", ())):
-        return np.zeros(0, dtype=bool)
-    return np.asarray(arrays["frames"] < arrays["wanted"])
-
-
 def compare_answers(key: RowKey, pair: Pair) -> RowChange:
     """Return the change of a row's answers: of the first worse array, else the first that differs.
 
@@ -84,6 +75,31 @@ def compare_answers(key: RowKey, pair: Pair) -> RowChange:
     order = (ChangeVerdict.LESS_RIGHT, ChangeVerdict.CHANGED, ChangeVerdict.MORE_RIGHT)
     by_verdict = {change.verdict: change for change in reversed(changes)}
     return next((by_verdict[v] for v in order if v in by_verdict), changes[0])
+
+
+def compare_statistics(key: RowKey, pair: Pair) -> Iterator[RowChange]:
+    """Yield the change of the share solved, in shares, and of the smallest error, by a factor - 1.
+
+    Only changes are yielded, of rows of which both runs have as much.
+    """
+    if pair.old.size != pair.new.size:
+        return
+    if all(SOLVED in record.arrays for record in pair):
+        old, new = (float(np.mean(record.arrays[SOLVED])) for record in pair)
+        why = f"from {100 * old:.1f} % to {100 * new:.1f} %"
+        yield from _statistic(key, SHARE, new - old, f"{'fell' if new < old else 'rose'} {why}")
+    for name in _SMALLEST & pair.old.arrays.keys() & pair.new.arrays.keys():
+        errors = (np.asarray(record.arrays[name], dtype=float) for record in pair)
+        old, new = (float(np.min(a[np.isfinite(a)], initial=np.inf)) for a in errors)
+        if min(old, new) > 0:
+            why = f"{'grew' if new > old else 'shrank'} from {words(old)} to {words(new)}"
+            yield from _statistic(key, ERROR, 1 - new / old if new > old else old / new - 1, why)
+
+
+def _statistic(key: RowKey, name: str, gain: float, why: str) -> Iterator[RowChange]:
+    if gain:
+        verdict = ChangeVerdict.MORE_RIGHT if gain > 0 else ChangeVerdict.LESS_RIGHT
+        yield RowChange(key, name, verdict, abs(gain), f"{name} {why}")
 
 
 def chance_by_time_limit(pair: Pair) -> float | None:
@@ -117,18 +133,9 @@ def _common_targets(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.nd
     return old, new
 
 
-def _common_motions(pair: Pair, old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two arrays without the motions that a time limit ended in either run."""
-    unfinished = [unfinished_motions(record)[: np.size(old)] for record in pair]
-    if old.ndim == 1 and all(len(flags) == len(old) == len(new) for flags in unfinished):
-        finished = ~np.any(unfinished, axis=0)
-        return old[finished], new[finished]
-    return old, new
-
-
 def _compare_array(key: RowKey, name: str, pair: Pair) -> RowChange:
     """Return the change of an array of answers."""
-    old, new = _common_motions(pair, *_common_targets(pair.old.arrays[name], pair.new.arrays[name]))
+    old, new = _common_targets(pair.old.arrays[name], pair.new.arrays[name])
     if old.shape != new.shape:
         why = f"shape {old.shape}, now {new.shape}"
         return RowChange(key, name, ChangeVerdict.CHANGED, 1.0, why)

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..peers import registry
-from ..tables.results import label
 from .sketch import Sketch, chart_sketch
 
 Floats = NDArray[np.float64]
@@ -163,11 +162,9 @@ class Chart:
 
     @property
     def caption(self) -> str:
-        """The sentence on its contents, and the names of the grey solvers."""
-        if not self.unlabelled:
-            return self.shows
-        names = "; ".join(map(label, self.unlabelled))
-        return f"{self.shows} Grey, named when pointed at: {names}."
+        """The sentence on its contents, and how the grey solvers are named."""
+        grey = " Point at a grey curve for its name."
+        return self.shows + grey * bool(self.unlabelled)
 
     def costs(self) -> dict[str, float]:
         """Return the distance of each solver's curve from the best, summed over the panels.

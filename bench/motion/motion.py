@@ -80,9 +80,18 @@ class Scene(NamedTuple):
         return self
 
     def points(self) -> Floats:
-        """Return all positions and the curve, (point, 3)."""
+        """Return all positions and the curve, (point, 3), without positions far away.
+
+        A motion that explodes would make the others too small to see. Far is more than the size of
+        the smallest motion from its middle.
+        """
         arrays = [np.asarray(motion.positions, float).reshape(-1, 3) for motion in self.motions]
-        return np.concatenate(arrays if self.curve is None else [*arrays, self.curve])
+        arrays = [array[np.isfinite(array).all(axis=-1)] for array in arrays]
+        smallest = min(arrays, key=lambda array: float(np.ptp(array, axis=0).max()))
+        low, high = smallest.min(axis=0), smallest.max(axis=0)
+        points = np.concatenate(arrays if self.curve is None else [*arrays, self.curve])
+        is_near = np.abs(points - (low + high) / 2) <= (high - low).max()
+        return np.asarray(points[is_near.all(axis=-1)])
 
 
 def environment(folder: Path) -> Environment:
@@ -129,8 +138,7 @@ def page(scene: Scene) -> str:
 def data_of(scene: Scene) -> dict[str, Any]:
     """Return a scene as the data that `SCRIPT` reads: numbers, and arrays as base64; no names."""
     points = scene.points()
-    points = np.where(np.isfinite(points), points, np.nan)
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max()) or 1.0
     ends = decades(scene)
     return {
@@ -182,6 +190,8 @@ def decades(scene: Scene) -> tuple[int, int]:
 
 def length(metres: float) -> str:
     """Return a length in words, to two digits."""
+    if metres >= 1e3:
+        return "> 1 km"
     for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9)):
         if metres >= 0.999 * size:
             digits = float(f"{metres / size:.2g}")

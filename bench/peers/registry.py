@@ -67,9 +67,9 @@ class StepSolver(Solver):
     followed: int = 200  # iterations of a step with recorded residual and error; 0 for none
     certified: int = 3000  # the maximum before an answer is certified
     # iterations of a step in a work-precision diagram
-    ladder: tuple[int, ...] = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+    ladder: tuple[int, ...] = (1, 3, 10, 30, 100, 300, 1000)
     # steps of a frame there, and iterations of each
-    motion: tuple[tuple[int, int], ...] = ((1, 10), (10, 10), (20, 10), (80, 2), (80, 10))
+    motion: tuple[tuple[int, int], ...] = ((1, 10), (10, 10), (40, 10))
 
 
 _Row = TypeVar("_Row")
@@ -77,8 +77,21 @@ _Row = TypeVar("_Row")
 
 def _rows(table: str, kind: type[_Row]) -> dict[str, _Row]:
     """Return the solvers of a table by name."""
-    rows = [{**row, "style": STYLES[row.get("style", "other")]} for row in _DATA[table]]
+    rows = [{**row, "style": style_of(row)} for row in _DATA[table]]
     return {row["name"]: msgspec.convert(row, kind) for row in rows}
+
+
+def style_of(row: Mapping[str, str]) -> Style:
+    """Return the style of a solver in `solvers.toml`.
+
+    Raises:
+        ValueError: if there is none of this name.
+    """
+    name = row.get("style", "other")
+    if name not in STYLES:
+        known = ", ".join(STYLES)
+        raise ValueError(f"style of {row['name']!r}: expected one of {known}, got {name!r}")
+    return STYLES[name]
 
 
 _IK, _STEP = _rows("ik", Solver), _rows("steps", StepSolver)
@@ -169,6 +182,11 @@ class PeerEntry:
     restarts: int = 0  # further attempts from random poses, for solvers without restarts
     note: str = ""  # tells it from another entry of the same solver and kind
 
+    @property
+    def has_time_limit(self) -> bool:
+        """Whether it takes a time limit for each target [s], so that answers depend on the load."""
+        return "seconds" in self.settings
+
 
 @dataclass(frozen=True)
 class Peer(Adapter):
@@ -177,10 +195,13 @@ class Peer(Adapter):
     license: str  # of the package
     can: str  # the robots that it takes
     entries: tuple[PeerEntry, ...]  # its settings
+    # how it is written, where that is not its title
+    label: str = field(default="", kw_only=True)
     # whether its forward kinematics is compared with ours
     kinematics: bool = field(default=False, kw_only=True)
     # how exact that is, where it is not in double precision
     precision: str = field(default="", kw_only=True)
+    built_on: str = field(default="", kw_only=True)  # the engine whose kinematics it works with
     # whether it is a Python loop of ours on the package's kinematics
     loop: bool = field(default=False, kw_only=True)
     # what one would choose it for
@@ -188,7 +209,12 @@ class Peer(Adapter):
 
     def label_of(self, entry: PeerEntry) -> str:
         """Return how an entry is written."""
-        return f"{self.title}, {entry.note}" if entry.note else self.title
+        return f"{self.shown}, {entry.note}" if entry.note else self.shown
+
+    @property
+    def shown(self) -> str:
+        """How the solver is written."""
+        return self.label or self.title
 
     def entry(self, kind: str) -> PeerEntry:
         """Return the first entry of a kind."""
@@ -312,7 +338,7 @@ def find(name: str) -> Solver:
 
 def is_ours(name: str) -> bool:
     """Return whether a solver is Plumbob's, by its name in records, or Plumbob as an engine."""
-    return PLUMBOB.casefold() in (name.casefold(), find(name).engine.casefold())
+    return engine_of(name) == PLUMBOB.casefold()
 
 
 def is_loop(name: str) -> bool:
@@ -321,8 +347,9 @@ def is_loop(name: str) -> bool:
 
 
 def engine_of(name: str) -> str:
-    """Return the engine or package of a solver, else its name."""
-    return (PLUMBOB if is_ours(name) else find(name).engine or name).casefold()
+    """Return the engine or package of a solver, whatever its settings were, else its name."""
+    title = name.partition(", ")[0]
+    return (find(name).engine or find(title).engine or name).casefold()
 
 
 @functools.cache

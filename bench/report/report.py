@@ -14,6 +14,7 @@ from ..tables.table import Table
 from ..tables.writers import comma_separated, markdown
 from ..text import shortened, visible
 from .headlines import Overview, absent, not_asked, overview
+from .page.first_screen import robot_maps
 from .page.page import Contents, render
 from .sections import MOTIONS, SECTIONS
 
@@ -41,7 +42,7 @@ def write(folder: Path) -> BenchReport:
     tables = {layout: layout(results) for section in SECTIONS for layout in section.layouts}
     drawings, not_drawn = _drawings(results, folder / "figures")
     scenes = {section: scene for section, make in MOTIONS.items() if (scene := make(results))}
-    contents = Contents(tables, drawings, overview(results), scenes)
+    contents = Contents(tables, drawings, overview(results), scenes, robot_maps(results))
     newest = max(results.every, key=lambda record: record.when)
     missing = list(filter(None, (warning, *not_drawn, *_missing(results, newest))))
     for table in tables.values():

@@ -3,7 +3,7 @@
 import importlib
 import importlib.util
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class Section(NamedTuple):
     title: str  # heading
     about: str  # introduction
     main: str = ""  # name of its unfolded table; "" if it has none
-    figure: str = ""  # name of the figure beside it
+    figures: Sequence[str] = ()  # names of its unfolded figures
 
     @property
     def experiments(self) -> list[Experiment]:

@@ -24,16 +24,15 @@ from ..motion.motion import Moving, Scene, decades, length
 # Moments of a picture.
 MOMENTS = 4
 MARGIN = 0.1
-RATE = 20
 _STYLE: dict[Any, Any] = {**STYLE, "savefig.facecolor": "white", "figure.facecolor": "white"}
 Progress = Callable[[int, int], None]
 
 
-def animate(scene: Scene, path: Path, progress: Progress) -> None:
+def animate(scene: Scene, path: Path, progress: Progress, dpi: int = 96) -> None:
     """Write a GIF: the solvers beside each other and, if there are several, a colour bar."""
     with mpl.rc_context(_STYLE):
         count = len(scene.motions)
-        figure = Figure(figsize=(4.8 * count, 4.8 if count == 1 else 5.4), dpi=96)
+        figure = Figure(figsize=(4.8 * count, 4.8 if count == 1 else 5.4), dpi=dpi)
         base, top = (0.0, 1.0) if count == 1 else (0.18, 0.94)
         lefts = [(i + 0.02) / count for i in range(count)]
         axes = [figure.add_axes((left, base, 0.96 / count, top - base)) for left in lefts]
@@ -44,7 +43,9 @@ def animate(scene: Scene, path: Path, progress: Progress) -> None:
         animation = FuncAnimation(figure, update, frames=frames, init_func=lambda: ())
         with tempfile.TemporaryDirectory() as folder:  # interrupted, Pillow writes what it has
             whole = Path(folder, "film.gif")
-            animation.save(whole, writer=PillowWriter(fps=RATE), progress_callback=progress)
+            animation.save(
+                whole, writer=PillowWriter(fps=round(1 / scene.seconds)), progress_callback=progress
+            )
             path.write_bytes(whole.read_bytes())
 
 

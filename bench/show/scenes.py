@@ -29,7 +29,7 @@ from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING
 from ..tables.results import label
 from .your_solver import ARM_TASKS, CLOTH_TASKS, H, YourSolver
 
-ARM, CLOTH = "arm", "cloth"
+ARM, CLOTH, GALLERY = "arm", "cloth", "gallery"
 SCENES = (ARM, CLOTH, *curves)
 GIF, SVG, HTML, BVH = ".gif", ".svg", ".html", ".bvh"
 SECONDS = 5
@@ -89,14 +89,13 @@ def write(
         raise ValueError("coherent: expected an arm that follows a curve, got a cloth")
     if yours:
         yours.offered("a cloth", CLOTH_TASKS) if is_cloth else yours.offered("an arm", ARM_TASKS)
-    competitor: tuple[str, FloatArray] | None = None
+    competitors: list[tuple[str, FloatArray]] = []
     if is_cloth:
         solver = choice("solver", solver or EXACT, STEP_SOLVERS)
         cloth = cloth_motion(solver)
         if yours:
-            steps = len(cloth.positions) - 1
-            competitor = yours.name, yours.step_cloth(cloth.system, cloth.start, steps, progress)
-        scene = cloth_scene(cloth, solver, competitor)
+            competitors = [(yours.name, step_like(cloth, yours, progress))]
+        scene = cloth_scene(cloth, solver, competitors)
     else:
         solver = choice("solver", solver or "fabrik", IK_SOLVERS)
         arm = arm_motion(name, solver, coherent)
@@ -104,10 +103,9 @@ def write(
             seconds = SECONDS / len(arm.curve)
             return bvh.write(path, arm.skeleton, arm.motion.local_rotations, seconds)
         if yours:
-            positions = yours.follow_curve(arm.skeleton, arm.rest, arm.curve, progress)
-            competitor = yours.name, positions
+            competitors = [(yours.name, draw_like(arm, yours, progress))]
         scene = arm_scene(
-            name, arm, f"Plumbob {label(solver)}" + ", coherent" * coherent, competitor
+            name, arm, f"Plumbob {label(solver)}" + ", coherent" * coherent, competitors
         )
     if path.suffix == HTML:
         path.write_text(motion.page(scene), encoding="utf-8")
@@ -126,16 +124,19 @@ def arm_motion(name: str, solver: str, coherent: bool) -> ArmMotion:
     return ArmMotion(skeleton, rest, even, solution)
 
 
+def draw_like(arm: ArmMotion, solver: YourSolver, progress: Progress) -> FloatArray:
+    """Return the joint positions of a solver that draws the arm's curve, (frame, joint, 3)."""
+    return solver.follow_curve(arm.skeleton, arm.rest, arm.curve, progress)
+
+
 def arm_scene(
-    name: str, arm: ArmMotion, solver: str, competitor: tuple[str, FloatArray] | None = None
+    name: str, arm: ArmMotion, solver: str, competitors: Sequence[tuple[str, FloatArray]] = ()
 ) -> Scene:
-    """Return the scene of an arm, beside a competitor's name and joint positions."""
+    """Return the scene of an arm, behind the names and joint positions of competitors."""
     points = arm.curve
     frames = np.linspace(0, len(points) - 1, min(len(points), FRAMES)).round().astype(int)
-    moves = [(solver, arm.motion.positions)]
-    moves = [competitor, *moves] if competitor else moves
     motions = []
-    for title, x in moves:
+    for title, x in [*competitors, (solver, arm.motion.positions)]:
         errors = np.linalg.norm(x[frames, -1] - points[frames], axis=-1)
         motions.append(Moving(title, x[frames], errors))
     curve = "the custom curve" if name == ARM else f"the curve “{name.replace('_', ' ')}”"
@@ -152,9 +153,9 @@ def arm_scene(
     ).checked()
 
 
-def cloth_motion(solver: str) -> ClothMotion:
-    """Return the motion of the lab's cloth from rest."""
-    system, start = scenes.lab_cloth()
+def cloth_motion(solver: str, mass: float = 1.0) -> ClothMotion:
+    """Return the motion of the lab's cloth from rest, with a mass of each particle [kg]."""
+    system, start = scenes.lab_cloth(mass=mass)
     integrator, state = ImplicitEuler(system, h=H, solver=solver), start
     positions = [state.positions]
     for _ in range(FRAMES * EVERY):
@@ -163,15 +164,18 @@ def cloth_motion(solver: str) -> ClothMotion:
     return ClothMotion(system, start, np.array(positions))
 
 
+def step_like(cloth: ClothMotion, solver: YourSolver, progress: Progress) -> FloatArray:
+    """Return the positions of a cloth after each step of a solver, (frame, particle, 3)."""
+    return solver.step_cloth(cloth.system, cloth.start, len(cloth.positions) - 1, progress)
+
+
 def cloth_scene(
-    cloth: ClothMotion, solver: str, competitor: tuple[str, FloatArray] | None = None
+    cloth: ClothMotion, solver: str, competitors: Sequence[tuple[str, FloatArray]] = ()
 ) -> Scene:
     """Return the scene of a cloth, with distances to the exact implicit motion."""
     exact = cloth.positions if solver == EXACT else cloth_motion(EXACT).positions
-    moves = [(f"Plumbob {label(solver)}", cloth.positions)]
-    moves = [competitor, *moves] if competitor else moves
     motions = []
-    for title, x in moves:
+    for title, x in [*competitors, (f"Plumbob {label(solver)}", cloth.positions)]:
         distances = np.linalg.norm(x[::EVERY] - exact[::EVERY], axis=-1)
         rms = np.sqrt(np.mean(distances**2, axis=-1))
         motions.append(Moving(title, x[::EVERY], rms, distances))
@@ -190,5 +194,5 @@ def cloth_scene(
 
 
 def _labels(motions: Sequence[Moving]) -> str:
-    """Return the names of two solvers beside each other, "" for a single solver."""
-    return f": {motions[0].label} beside {motions[1].label}" if len(motions) > 1 else ""
+    """Return the names of solvers beside each other, "" for a single solver."""
+    return f": {' beside '.join(motion.label for motion in motions)}" if motions[1:] else ""

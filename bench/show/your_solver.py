@@ -1,7 +1,7 @@
 """Ask a user's solver for the motion of a scene, by the same doors as `plumbob verify`."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -25,7 +25,7 @@ Progress = Callable[[int, int], None]
 
 
 class YourSolver:
-    """A user's solver, open until `close`.
+    """A solver that is judged by what it answers, open until `close`.
 
     Attributes:
         address: as the user gave it.
@@ -33,14 +33,13 @@ class YourSolver:
         tasks: that it offers.
     """
 
-    def __init__(self, words: Sequence[str]) -> None:
-        """Open the solver.
+    def __init__(self, address: str, contestant: Contestant) -> None:
+        """Ask a solver for its name and tasks.
 
         Raises:
-            ValueError: if there is no solver, or it does not describe itself.
+            ValueError: if it does not describe itself.
         """
-        self.address = " ".join(words)
-        self._contestant: Contestant = open_contestant(words[0] if len(words) == 1 else words)
+        self.address, self._contestant = address, contestant
         try:
             self._greeting = self._contestant.greeting
         except NoGreetingError as error:
@@ -49,6 +48,15 @@ class YourSolver:
             raise ValueError(f"with: expected a solver, got {self.address}: {reason}") from None
         self.tasks = self._greeting.tasks
         self.name = self.address if self._greeting.name == "solver" else self._greeting.name
+
+    @classmethod
+    def open(cls, words: Sequence[str]) -> Self:
+        """Open a file, a module or a program.
+
+        Raises:
+            ValueError: if there is no solver, or it does not describe itself.
+        """
+        return cls(" ".join(words), open_contestant(words[0] if len(words) == 1 else words))
 
     def close(self) -> None:
         """End the solver and its processes."""

@@ -1,6 +1,7 @@
 """The records of a report, and the words for problems, solvers and counts."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -119,6 +120,12 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun: "1 iteration", "2 iterations"."""
     return f"{words(count)} {noun}{'' if count == 1 else 's'}"
+
+
+def most_often(firsts: Sequence[str], noun: str) -> str:
+    """Return the name that is first most often: "pink on 3 of 5 robots"."""
+    name, count = Counter(firsts).most_common(1)[0]
+    return f"{name} on {count} of {counted(len(firsts), noun)}"
 
 
 def leaders(ranking: Ranking) -> str:

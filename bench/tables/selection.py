@@ -9,7 +9,7 @@ from dataclasses import replace
 from plumbob.reference.arguments import name_list
 
 from ..harness.metrics import Share
-from .table import NO_SUMMARY, Cell, Table, best_cells, words
+from .table import NO_SUMMARY, Cell, Table, best_cells, with_rows, words
 
 _COMPARE: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -41,11 +41,11 @@ def selected(
     best = best_cells(part)
     if columns:
         part = replace(part, columns=tuple(replace(c, folded=False) for c in part.columns))
+    ordered = with_rows(part, places)
     return replace(
-        part,
+        ordered,
         columns=tuple(part.columns[j] for j in numbers),
-        rows=tuple(tuple(part.rows[i][j] for j in numbers) for i in places),
-        sources=tuple(part.sources[i] for i in places) if part.sources else (),
+        rows=tuple(tuple(row[j] for j in numbers) for row in ordered.rows),
         summary=table.summary if len(part.rows) == len(table.rows) else NO_SUMMARY,
         best=frozenset((places.index(i), numbers.index(j)) for i, j in best if j in numbers),
     )
@@ -69,12 +69,7 @@ def filtered(table: Table, rows: Sequence[str]) -> Table:
     if table.rows and not places:
         values = (f"{table.columns[j].title} is {_listed(table, j)}" for j in tests)
         raise ValueError(f"--rows: no row of {table.name} passes; {'; '.join(values)}")
-    return replace(
-        table,
-        rows=tuple(table.rows[i] for i in places),
-        unranked=frozenset(new for new, i in enumerate(places) if i in table.unranked),
-        sources=tuple(table.sources[i] for i in places) if table.sources else (),
-    )
+    return with_rows(table, places)
 
 
 def _listed(table: Table, j: int) -> str:

@@ -149,7 +149,7 @@ def best_cells(table: Table) -> set[tuple[int, int]]:
     """Return row and column of each cell that is best among the rows it is compared with.
 
     Ties are all best: shares whose intervals overlap with that of the best, numbers that are
-    written alike. A cell without rivals is not best.
+    written alike. Where all rows tie, as where there is one, no cell is best.
     """
     if table.best is not None:
         return set(table.best)
@@ -169,15 +169,46 @@ def best_cells(table: Table) -> set[tuple[int, int]]:
 def _best_rows(table: Table, members: list[int], j: int) -> list[int]:
     """Return the rows of a group that are best in column j."""
     sign = 1.0 if table.columns[j].best == "least" else -1.0
-    numbers = {i: sign * _number_of(table.rows[i][j]) for i in members}
+    numbers = {i: sign * number_of(table.rows[i][j]) for i in members}
     ranked = {i: number for i, number in numbers.items() if not math.isnan(number)}
-    if len(ranked) < 2:
-        return []
-    best = table.rows[min(ranked, key=lambda i: ranked[i])][j]
-    return [i for i in ranked if _ties(table.rows[i][j], best)]
+    first = min(ranked, key=lambda i: ranked[i], default=0)
+    best = [i for i in ranked if _ties(table.rows[i][j], table.rows[first][j])]
+    return best if len(best) < len(ranked) else []
 
 
-def _number_of(cell: Cell) -> float:
+def ranked_rows(table: Table) -> list[int]:
+    """Return the numbers of the rows, in each group of compared rows the best first.
+
+    The first column that has best cells decides, then the next; unranked rows come last.
+    """
+    signs = {
+        j: -1.0 if c.best == "greatest" else 1.0 for j, c in enumerate(table.columns) if c.best
+    }
+    groups: dict[tuple[Cell, ...], int] = {}
+
+    def rank(i: int) -> tuple[int, bool, list[float]]:
+        group = groups.setdefault(table.rows[i][: table.compared], len(groups))
+        numbers = (sign * number_of(table.rows[i][j]) for j, sign in signs.items())
+        return group, i in table.unranked, [math.inf if math.isnan(x) else x for x in numbers]
+
+    return sorted(range(len(table.rows)), key=rank) if signs else [*range(len(table.rows))]
+
+
+def with_rows(table: Table, places: Sequence[int]) -> Table:
+    """Return a table with the rows of these numbers, in their order."""
+    best = table.best
+    return replace(
+        table,
+        rows=tuple(table.rows[i] for i in places),
+        unranked=frozenset(new for new, i in enumerate(places) if i in table.unranked),
+        best=best
+        and frozenset((new, j) for new, i in enumerate(places) for k, j in best if k == i),
+        sources=tuple(table.sources[i] for i in places) if table.sources else (),
+    )
+
+
+def number_of(cell: Cell) -> float:
+    """Return a cell as a number: a share as a part of one, NaN for words or without trials."""
     if isinstance(cell, Share):
         return cell.hits / cell.total if cell.total else math.nan
     return math.nan if cell is None or isinstance(cell, str) else float(cell)

@@ -9,6 +9,7 @@ settings that no other beats in both. On a quiet machine: `python docs/peers/clo
 import importlib
 import itertools
 import time
+import timeit
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from plumbob.bench.experiments.cloth_peers.truth import truth_of
 from plumbob.bench.harness import metrics
 from plumbob.bench.peers import registry
 from plumbob.bench.problems.falling_cloth import FRAME, explicit_substeps, falling_cloth
+from plumbob.reference import MassSpring, State
 
 SIZE, STIFFNESS, FRAMES, REPEATS = 16, 3e3, 3, 3
 SUBSTEPS, ITERATIONS = (1, 2, 5, 10, 20, 40, 80), (1, 2, 5, 10, 20, 50)
@@ -61,6 +63,24 @@ def result(peer, settings):
     return metrics.rms_distance(mover.positions(), truth) / path, 1e3 * float(np.median(seconds))
 
 
+def fixed_costs():
+    """Print the time of a step of two particles and a spring: what is not work on a cloth [µs]."""
+    system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 10.0, pinned=[0], gravity=(0.0, 0.0, 0.0))
+    start = State([[0.0, 0.0, 0.0], [1.01, 0.0, 0.0]], np.zeros((2, 3)))
+    print("| solver | a step [µs] |")
+    print("| --- | ---: |")
+    for peer in filter(lambda peer: peer.is_installed, registry.cloth_peers()):
+        settings = {"iterations": 1} if peer.kind == registry.ITERATED else {}
+        try:
+            adapter = importlib.import_module(peer.module)
+            mover = adapter.prepare(system, FRAME, **{**peer.settings, **settings}, substeps=100)
+        except ValueError:
+            continue  # takes square cloths only
+        mover.begin(start)
+        seconds = min(timeit.repeat(mover.advance, number=10, repeat=20)) / 1000
+        print(f"| {peer.title} | {1e6 * seconds:.2g} |", flush=True)
+
+
 def main():
     """Print the settings of each solver that no other setting beats in both time and error."""
     print("| solver | tried | within 1 % | setting | error | ms a frame |")
@@ -84,3 +104,4 @@ def main():
 
 if __name__ == "__main__":
     main()
+    fixed_costs()

@@ -23,12 +23,13 @@ EXAMPLES = block(
     "plumbob show heart --coherent --output heart.bvh",
     "plumbob show heart --with my_ik.py -o heart.html",
     "plumbob show cloth -o cloth.gif -- ./my_solver --flag",
+    "plumbob show gallery -o pictures",
 )
 
 
-Scene = Annotated[Text, argument("SCENE", "arm, cloth, or the curve that the arm draws.")]
+Scene = Annotated[Text, argument("SCENE", "arm, cloth, a curve that the arm draws, or gallery.")]
 Picture = Annotated[
-    File, option("FILE", "File ending in .gif, .svg, .html or .bvh.", "--output", "-o")
+    File, option("FILE", "File in .gif, .svg, .html or .bvh, or a folder.", "--output", "-o")
 ]
 Yours = Annotated[Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")]
 Solver = Annotated[
@@ -49,20 +50,23 @@ def show(
     """Write an animation, a picture or a page of the arm or the cloth.
 
     Your solver moves beside Plumbob's, with errors in colour. The motion of the arm can also be
-    written as BVH, which animation programs open.
+    written as BVH, which animation programs open. The gallery is a folder of pictures of good and
+    faulty solvers.
     """
-    from plumbob.bench.show.scenes import SCENES
+    from plumbob.bench.show.scenes import GALLERY, SCENES
     from plumbob.bench.show.your_solver import YourSolver
 
     program = program_of(context)
     if yours is not None and program:
         raise ValueError("with: expected one solver, got --with and a program behind --")
     words = program if yours is None else [yours]
+    if scene == GALLERY and not (words or solver or coherent):
+        return _show_gallery(file or REPORT / GALLERY)
     if scene is None and not words:
         raise ValueError(f"SCENE: expected one of {', '.join(SCENES)}, got none")
     if scene is not None:
         valid_name("scene", scene, SCENES)
-    entrant = YourSolver(words) if words else None
+    entrant = YourSolver.open(words) if words else None
     try:
         name = scene or (entrant.scene if entrant else "")
         path = file or REPORT / f"{name}.gif"
@@ -90,3 +94,15 @@ def _draw(
             bar.update(task, completed=frame, total=total)
 
         write(name, path, solver, update, coherent, entrant)
+
+
+def _show_gallery(folder: Path) -> int:
+    """Write the gallery, and print the paths of its pictures."""
+    from plumbob.bench.show.gallery import write_gallery
+
+    writable(folder)
+    with progress() as bar:
+        task = bar.add_task(folder.name, total=None)
+        paths = write_gallery(folder, lambda i, count: bar.update(task, completed=i, total=count))
+    print("\n".join(visible(str(path)) for path in paths))
+    return SUCCESS

@@ -55,7 +55,7 @@ Answers = Annotated[File, option("DIR", "Judge the answers to exported cases.")]
 TimeLimit = Annotated[float | None, option("SECONDS", "Time limit of one request.")]
 MemoryLimit = Annotated[int | None, option("MIB", "Memory limit of the solver.", min=1)]
 Folder = Annotated[
-    File, option("DIR", "Write all three formats and failing cases.", "--output", "-o")
+    File, option("DIR", "Write all four formats and failing cases.", "--output", "-o")
 ]
 Language = Annotated[Text, option("LANG", "Language: en or zh; default: the locale.")]
 SelfTest = Annotated[bool, flag("Test verify itself with all known faults.", "--self-test")]
@@ -78,6 +78,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     json: Annotated[File, option("FILE", "Write the verdict as JSON.")] = None,
     junit: Annotated[File, option("FILE", "Write the verdict as JUnit XML.")] = None,
     html: Annotated[File, option("FILE", "Write the verdict as a page.")] = None,
+    card: Annotated[File, option("FILE", "Write the verdict as an SVG for a README.")] = None,
     output: Folder = None,
     lang: Language = None,
     self_test: SelfTest = False,
@@ -108,7 +109,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         return _self_test(speaker(language))
     folder = [ANSWERS, str(answers)] if answers else []
     words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
-    files = Files(json, junit, html, output)
+    files = Files(json, junit, html, card, output)
     return _judge(words, limits(time_limit, memory_limit), question, files, language)
 
 

@@ -132,7 +132,7 @@ def _resolved(path: Path) -> Path | None:
         return None
 
 
-class Transform(NamedTuple):
+class _Transform(NamedTuple):
     """A position and a rotation."""
 
     x: Vector = ORIGIN
@@ -142,12 +142,12 @@ class Transform(NamedTuple):
         """Return the outer coordinates of a point x of this frame."""
         return add(self.x, rotate(self.R, x))
 
-    def compose(self, inner: "Transform") -> "Transform":
+    def compose(self, inner: "_Transform") -> "_Transform":
         """Return the product of this transform and an inner one."""
-        return Transform(self.apply(inner.x), multiply(self.R, inner.R))
+        return _Transform(self.apply(inner.x), multiply(self.R, inner.R))
 
 
-class CompilerSettings(NamedTuple):
+class _CompilerSettings(NamedTuple):
     """The compiler's settings and the default classes of a file."""
 
     angle: float  # the file's unit of angles [rad]
@@ -156,9 +156,9 @@ class CompilerSettings(NamedTuple):
     alignfree: bool  # whether the frames of free bodies are aligned with their inertia
     classes: dict[str, dict[str, str]]  # the joint attributes of each default class
 
-    def transform(self, element: Element) -> Transform:
+    def transform(self, element: Element) -> _Transform:
         """Return the transform of a body or a frame in its parent."""
-        return Transform(element.numbers("pos", ORIGIN), self._orientation(element))
+        return _Transform(element.numbers("pos", ORIGIN), self._orientation(element))
 
     def class_of(self, element: Element, attribute: str, inherited: str) -> str:
         """Return the default class that an element names or inherits."""
@@ -204,7 +204,7 @@ class CompilerSettings(NamedTuple):
         return R
 
 
-def _settings(root: Element) -> CompilerSettings:
+def _settings(root: Element) -> _CompilerSettings:
     """Return the settings of a file."""
     merged = Element("compiler", {}, [], root.location)
     for compiler in root.children_named("compiler"):
@@ -214,7 +214,7 @@ def _settings(root: Element) -> CompilerSettings:
     if len(sequence) != 3 or not set(sequence.lower()) <= set(AXES):
         raise merged.error(f"expected three axes such as xyz for eulerseq, got {sequence!r:.80}")
     unit = _one_of(merged, "angle", ("degree", "radian"), "degree")
-    return CompilerSettings(
+    return _CompilerSettings(
         math.radians(1.0) if unit == "degree" else 1.0,
         sequence,
         _one_of(merged, "autolimits", ("true", "false"), "true") == "true",
@@ -272,7 +272,7 @@ class _Part(NamedTuple):
     """An element of a body, its frame in the body, and its default class."""
 
     element: Element
-    frame: Transform
+    frame: _Transform
     inherited: str
 
 
@@ -304,7 +304,7 @@ def _robot(root: Element, origin: str) -> Robot:
 class _Tree:
     """The links read so far, the file's joints by name, and the home coordinates of each."""
 
-    def __init__(self, settings: CompilerSettings) -> None:
+    def __init__(self, settings: _CompilerSettings) -> None:
         self.settings = settings
         self.links = [RobotLink("world", -1)]
         self.bodies = {"world"}
@@ -313,7 +313,7 @@ class _Tree:
 
     def add_world(self, world: Element) -> None:
         """Add all bodies of a <worldbody>."""
-        joints, bodies = self.parts(_Part(world, Transform(), "main"))
+        joints, bodies = self.parts(_Part(world, _Transform(), "main"))
         if joints:
             raise joints[0].element.error("expected no joint in the world, which cannot move")
         waiting = [(body, 0) for body in reversed(bodies)]
@@ -331,7 +331,7 @@ class _Tree:
         self.bodies.add(name)
         pose = part.frame.compose(self.settings.transform(body))
         inherited = self.settings.class_of(body, "childclass", part.inherited)
-        tags, bodies = self.parts(_Part(body, Transform(), inherited))
+        tags, bodies = self.parts(_Part(body, _Transform(), inherited))
         joints = [self.joint(tag, index) for index, tag in enumerate(tags)]
         is_free = any(joint.kind == "free" for joint in joints)
         if is_free and (len(joints) > 1 or parent != 0):
@@ -402,7 +402,7 @@ class _Tree:
         return lower, upper
 
     def record(
-        self, element: Element, joint: _Joint, path: str, number: int, pose: Transform
+        self, element: Element, joint: _Joint, path: str, number: int, pose: _Transform
     ) -> None:
         """Store the index and home of a joint by its name, or by its path if it has none."""
         name = joint.label if "name" in element.attributes else path
@@ -416,7 +416,7 @@ class _Tree:
 
 
 def _chain(
-    name: str, parent: int, number: int, pose: Transform, joints: list[_Joint]
+    name: str, parent: int, number: int, pose: _Transform, joints: list[_Joint]
 ) -> list[RobotLink]:
     """Return the links of a body; the last has the name and the pose of the body.
 
@@ -429,14 +429,14 @@ def _chain(
     anchor = ORIGIN
     for label, kind, next_anchor, axis, *limits, ref in joints:
         if kind != "slide":
-            pose = Transform(pose.apply(subtract(next_anchor, anchor)), pose.R)
+            pose = _Transform(pose.apply(subtract(next_anchor, anchor)), pose.R)
             anchor = next_anchor
         shift = scale(-ref, axis)
         x, R = pose.compose(
-            Transform(R=exponential(shift)) if kind == "hinge" else Transform(shift)
+            _Transform(R=exponential(shift)) if kind == "hinge" else _Transform(shift)
         )
         links.append(RobotLink(f"{name}/{label}", parent, x, R, kind, axis, *limits))
-        parent, pose = number + len(links) - 1, Transform()
+        parent, pose = number + len(links) - 1, _Transform()
     if links and anchor == ORIGIN:
         return [*links[:-1], links[-1]._replace(name=name)]
     return [*links, RobotLink(name, parent, pose.apply(scale(-1.0, anchor)), pose.R)]

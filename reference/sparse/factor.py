@@ -105,6 +105,16 @@ class CholeskyFactor:
             x[:, part] = self.solve(padded)[:, : part.stop - first]
         return x.reshape(b.shape)
 
+    def lower(self) -> Any:
+        """Return L, sparse (n, n), with the explicit zeros of its blocks."""
+        columns, starts, rows, _ = self.pattern.blocks
+        lists = []
+        for s in range(len(columns) - 1):
+            block = np.r_[columns[s] : columns[s + 1], rows[starts[s] : starts[s + 1]]]
+            lists += [block[column:] for column in range(columns[s + 1] - columns[s])]
+        indptr = np.cumsum([0, *map(len, lists)])
+        return scipy.sparse.csc_array((self._values, np.concatenate(lists), indptr))
+
 
 def square(matrix: Any) -> Any:
     """Return a matrix that is sparse, square and real; raise a ValueError if it is not."""

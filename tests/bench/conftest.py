@@ -143,16 +143,13 @@ def certified(solver="newton", settings=(), arrays=(), notes=None):
     return sample("certified", solver=solver, **changes, notes=notes or {"coverage": "COVERED"})
 
 
-def stepping():
-    """Three steps by Newton."""
-    return sample("stepping")
-
-
 def raced(solver, kind, task="reachable", robot="arm", size=4, **changed):
     """Four targets in two strata: one solved, one missed, one claim denied, one solved."""
     facts = {"task": task, "title": f"the {robot}"}
     problem = f"{'robots' if task == 'reachable' else task}/{robot}"
     which = {"problem": problem, "solver": solver, "size": size, "settings": {"kind": kind}}
+    if "seconds" in changed:
+        changed["seconds"] = np.atleast_2d(changed["seconds"])
     return sample("raced", **which, arrays=changed, facts=facts)
 
 
@@ -268,7 +265,7 @@ def worked(
 
 
 def fell(solver, stiffness=1e3, **changed):
-    """A motion of a cloth by three settings: diverged, whole, cut short."""
+    """A motion of a cloth by three settings: diverged, and ever nearer to the truth."""
     which = {"problem": f"peers/motion/k{stiffness:g}", "solver": solver}
     return sample("fell", **which, settings={"stiffness": stiffness}, arrays=changed)
 
@@ -290,7 +287,7 @@ def as_liu(solver, seconds):
 
 MAKERS = (
     *(record, read_by_a_peer, compared, drawn, followed, drifted, beyond, claim, entered, reached),
-    *(timed, stepped, swung, two_dampers, stepping, certified, raced, solving, lacking),
+    *(timed, stepped, swung, two_dampers, certified, raced, solving, lacking),
     *(republished, worked, fell, moved, bounded, as_liu),
 )
 
@@ -353,7 +350,6 @@ def records():
         entered(worked("My cloth")),
         *(stepped(solver) for solver in ("local_global", "newton")),
         *(few(iterations) for iterations in (1, 10, 100)),
-        stepping(),
         two_dampers(),
         certified(),
         *(swung(s, c) for c in ("undamped", "damped") for s in ("RK4", "discrete")),

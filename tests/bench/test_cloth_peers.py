@@ -1,6 +1,9 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
+import contextlib
 import importlib
+import subprocess
+import sys
 from functools import partial
 
 import numpy as np
@@ -18,12 +21,10 @@ from plumbob.bench.experiments.cloth_peers import (
     truth,
 )
 from plumbob.bench.experiments.cloth_peers import measurement as peers_cloth
-from plumbob.bench.experiments.cloth_peers.job import Shape
 from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs, step_rungs
 from plumbob.bench.experiments.cloth_peers.truth import first_step, true_motion, truth_of
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import JobOutcome, WorkerProcess
-from plumbob.bench.harness.worker import Finished, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from plumbob.bench.problems.falling_cloth import (
@@ -32,14 +33,13 @@ from plumbob.bench.problems.falling_cloth import (
     FallingCloth,
     explicit_substeps,
     falling_cloth,
-    hanging_cloth,
     highest_frequency,
     highest_mode,
     level_cloth,
 )
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import best_cells
-from plumbob.reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
+from plumbob.reference import ImplicitEuler, MassSpring, State, symplectic_euler
 from plumbob.reference.mass_spring import stiffness_matrix
 
 SIZE, STIFFNESS = 5, 100.0
@@ -125,7 +125,7 @@ def test_the_highest_mode_is_one_and_none_is_higher(cloth):
 def test_the_truth_is_of_order_four_and_surer_than_any_error_measured():
     answers = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
     assert answers.order == pytest.approx(4.0, abs=0.15)
-    assert answers.unsure < 0.1 * MOTION_TARGETS[NEAR] * answers.path[-1]
+    assert answers.unsure < 0.1 * MOTION_TARGETS[NEAR]
 
 
 def test_the_truth_is_where_symplectic_euler_goes_at_order_one(cloth):
@@ -169,22 +169,15 @@ def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite
         assert peers_cloth.step_error(np.full_like(half, lost), answers) == np.inf
 
 
-def test_errors_do_not_care_how_the_world_is_turned_or_particles_are_numbered(rng):
-    x, exact, start = rng.standard_normal((3, 7, 3))
-    R, order = rotation.to_matrix(rotation.random(rng)), rng.permutation(7)
-    moved = [(points @ R.T + 5.0)[order] for points in (x, exact, start)]
-    assert metrics.relative_error(*moved) == pytest.approx(metrics.relative_error(x, exact, start))
-    assert metrics.rms_distance(*moved[:2]) == pytest.approx(metrics.rms_distance(x, exact))
-
-
-def test_a_motion_has_diverged_if_one_particle_is_ever_too_far(rng):
-    true = rng.standard_normal((4, 7, 3))
-    assert not peers_cloth.diverged(true + 1.9, true)
+def test_a_motion_has_diverged_if_one_particle_is_ever_too_far():
+    answers = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
+    assert peers_cloth.motion_error(answers.true, answers) == answers.unsure
+    start = falling_cloth(SIZE, STIFFNESS).start.positions
+    assert peers_cloth.motion_error(np.array([start, start]), answers) == pytest.approx(1.0)
     for bad in (3.0, np.nan, -np.inf):
-        positions = true.copy()
-        positions[1, 2, 0] += bad
-        assert peers_cloth.diverged(positions, true)
-    assert not peers_cloth.diverged(true[:0], true[:0])
+        positions = answers.true.copy()
+        positions[0, 2, 0] += bad
+        assert peers_cloth.motion_error(positions, answers) == np.inf
 
 
 # The adapters.
@@ -351,8 +344,6 @@ class Mover:
                 raise FloatingPointError("too large a step")
             if self.manner == "explodes":
                 self.x = self.x * 1e300 * 1e300
-        if self.manner == "slow":
-            time.sleep(0.2)
 
     def positions(self):
         return self.x
@@ -367,28 +358,6 @@ def prepare(system, frame, manner="well"):
 @pytest.fixture(scope="module", autouse=True)
 def fakes(importable):
     importable("fake_cloth_solvers", FAKES)
-
-
-def messages(cloth, manner, frames=5, repeats=1):
-    shape = Shape(frames, repeats)
-    return list(peers_cloth.job(fake_peer(manner), cloth, {"manner": manner}, shape).perform())
-
-
-@pytest.mark.parametrize(
-    ("manner", "finite", "last"),
-    [
-        ("overflows", [True, True, False], Finished()),
-        ("explodes", [True, True, False], Finished()),
-        ("raises", [True, True], Finished("ArithmeticError: in one frame")),
-        ("unable", [], Finished("ValueError: takes no cloths")),
-        ("slow", [True] * 5, Finished()),
-    ],
-)
-def test_frames_before_an_overflow_or_an_exception_are_kept(cloth, manner, finite, last):
-    sent = messages(cloth, manner)
-    frames = [message.q for message in sent if isinstance(message, Solved)]
-    assert [bool(np.isfinite(q).all()) for q in frames] == finite
-    assert sent[-1] == last
 
 
 @pytest.fixture(scope="module")
@@ -413,24 +382,24 @@ FALL = peers_cloth.Fall(peers_cloth.Level(SIZE, 5), partial(falling_cloth, SIZE,
 
 
 @pytest.mark.parametrize(
-    ("manner", "frames", "lost", "why"),
+    ("manner", "remark", "trouble"),
     [
-        ("well", 5, False, ""),
-        ("hangs", 2, False, "5 × 5, as it is: not finished: ended after 0.5 s of silence"),
-        ("crashes", 2, False, "5 × 5, as it is: its process ended with code 3"),
-        ("explodes", 3, True, ""),
+        ("well", "", ""),
+        ("hangs", "not finished: ended after 0.5 s of silence", True),
+        ("crashes", "its process ended with code 3", True),
+        ("explodes", "diverged", False),
+        ("overflows", "diverged", False),
+        ("raises", "ArithmeticError: in one frame", True),
+        ("unable", "ValueError: takes no cloths", True),
     ],
 )
-def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, lost, why):
+def test_every_manner_becomes_one_point(worker, monkeypatch, manner, remark, trouble):
     monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
     monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
-    measured = peers_cloth.motion(fake_peer(manner), [FALL])
-    arrays, facts = measured.arrays, measured.facts
-    assert arrays["frames"].tolist() == [frames]
-    assert arrays["diverged"].tolist() == [lost]
-    assert np.isfinite(arrays["true"]).all() == (not lost)
-    remarks = [why] if why else []
-    assert facts == {"rungs": ["as it is"], "remarks": remarks, "trouble": why}
+    measured = peers_cloth.work(MOTION, fake_peer(manner), [FALL])
+    assert np.isfinite(measured.arrays["error"]).tolist() == [manner == "well"]
+    assert measured.facts["remarks"] == [remark]
+    assert measured.facts["trouble"] == (remark if trouble else "")
 
 
 @pytest.fixture
@@ -448,17 +417,15 @@ def test_a_solver_that_did_not_finish_is_not_tried_again(monkeypatch):
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_unfinished", {})
-    measured = peers_cloth.motion(fake_peer("well"), [FALL, FALL])
-    arrays, facts = measured.arrays, measured.facts
+    measured = peers_cloth.work(MOTION, fake_peer("well"), [FALL, FALL])
     assert len(jobs) == 1
-    assert arrays["frames"].tolist() == [0, 0]
-    assert np.isnan(arrays["true"]).all()
-    assert all("not finished: ended" in remark for remark in facts["remarks"])
+    assert np.isinf(measured.arrays["error"]).all()
+    assert all("not finished: ended" in remark for remark in measured.facts["remarks"])
 
 
 def test_a_ladder_is_run_whole_and_says_what_single_precision_allows(here):
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    measured = peers_cloth.one_step(newton, [FALL])
+    measured = peers_cloth.work(ONE_STEP, newton, [FALL])
     errors = measured.arrays["error"]
     assert len(measured.facts["rungs"]) == len(errors) == len(newton.ladder)
     assert errors[-1] < 1e-12
@@ -479,6 +446,36 @@ def test_explicit_solvers_take_no_implicit_step_and_all_move():
     cloths = len(orders[0]) // len(set(orders[0]))
     solvers = orders[0][: len(orders[0]) // cloths]
     assert orders == [(solvers if i % 2 == 0 else solvers[::-1]) * cloths for i in range(3)]
+
+
+@pytest.fixture
+def errors_of_all(monkeypatch):
+    """Return the errors of every installed peer on a tiny cloth in a fresh process, to the bit."""
+
+    def measured():
+        worker = WorkerProcess(600.0, 120.0)
+        monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
+        with contextlib.closing(worker):
+            return {
+                (task, peer.title): peers_cloth.work(task, peer, [FALL]).arrays["error"].tobytes()
+                for task in (ONE_STEP, MOTION)
+                for peer in registry.cloth_peers()
+                if peer.is_installed and (task == MOTION or peer.kind != EXPLICIT)
+            }
+
+    return measured
+
+
+@pytest.mark.slow
+def test_a_busy_machine_changes_no_error(errors_of_all):
+    """PyBullet keeps its body in a process, and with it some rounding from run to run."""
+    quiet = errors_of_all()
+    loop = [sys.executable, "-c", "while True: pass"]
+    with contextlib.ExitStack() as stack:
+        for _ in range(2):
+            process = stack.enter_context(subprocess.Popen(loop))
+            stack.callback(process.kill)
+        assert errors_of_all() == quiet
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
@@ -532,12 +529,6 @@ def test_a_solver_that_fails_has_no_limit_and_says_why(here):
     assert "TypeError" in measured.notes["remark"]
 
 
-def test_a_hanging_cloth_is_at_rest():
-    system, rest = hanging_cloth(4, STIFFNESS)
-    state = symplectic_euler(system, State(rest, np.zeros_like(rest)), 1e-3)
-    np.testing.assert_allclose(state.velocities, 0.0, atol=1e-9)
-
-
 # Tables and figures.
 
 
@@ -558,8 +549,7 @@ def test_the_table_of_one_step_ranks_by_time_to_the_criterion_then_by_error(make
     assert column(table, "time to 1e-4 [ms]") == [10.0, 500.0, None]
     assert column(table, "setting for 1e-4") == ["10 iterations", "10 iterations", None]
     assert column(table, "smallest error") == [1e-4, 1e-4, 0.4]
-    tired = "20 × 20, 10 iterations: tired"
-    assert column(table, "remark") == [tired, tired, f"one linearised step; {tired}"]
+    assert column(table, "remark") == ["10 iterations: tired"] * 3
     (point,) = table.summary.points
     assert point.endswith("to 1e-4 Plumbob Newton, 10.0 ms (then Newton engine, VBD, 500 ms)")
     assert "already an error of 9.0e-6;" in table.measured
@@ -583,19 +573,26 @@ def test_sweeps_are_joined_and_their_differences_reported(make):
 
 
 def test_the_table_of_motions_ranks_by_time_to_the_truth(make):
-    farther = make.fell("MuJoCo RK4", true=[np.nan, 3e-2, 1e-4])
-    near = make.fell("Plumbob Newton", true=[1.0, 5e-2, 5e-3], frames=[6, 6, 6])
-    table = tables.motion(Results([make.fell("MuJoCo Euler"), farther, near]))
+    farther = make.fell("MuJoCo RK4", error=[np.inf, np.inf, 3e-2])
+    near = make.fell("Plumbob Newton", error=[np.inf, 5e-2, 5e-3])
+    table = tables.motion(Results([farther, make.fell("MuJoCo Euler"), near]))
     assert column(table, "solver") == ["Plumbob Newton", "MuJoCo Euler", "MuJoCo RK4"]
-    assert column(table, "time to 10 % [ms]") == [1.0, 1.0, 1.0]
+    assert column(table, "time to 10 % [ms]") == [1.0, 1.0, 1000.0]
     assert column(table, "time to 1 % [ms]") == [1000.0, None, None]
-    assert column(table, "smallest distance from the truth [%]") == pytest.approx([0.5, 2.0, 3.0])
-    assert column(table, "remark") == ["diverged with 1 step"] * 3
-    first, *_ = table.summary.points
-    assert first.startswith("20 × 20, 1,000 N/m: to 10 % ")
+    assert column(table, "smallest error [%]") == pytest.approx([0.5, 2.0, 3.0])
+    assert column(table, "remark") == ["1 step: diverged"] * 3
+    (point,) = table.summary.points
+    assert point.endswith("to 1 % Plumbob Newton, 1,000 ms")
     assert "order of 3.50" in table.measured
-    place = [c.title for c in table.columns].index("smallest distance from the truth")
+    place = [c.title for c in table.columns].index("smallest error")
     assert {i for i, j in best_cells(table) if j == place} == {0}
+
+
+def test_one_linear_solve_is_labelled_a_linearised_step(make):
+    facts = {"kind": LINEARISED, "rungs": ["1 step"], "remarks": [""]}
+    arrays = {"sizes": [20], "seconds": [1e-3], "error": [0.4]}
+    table = tables.one_step(Results([make.worked("MuJoCo discrete", **arrays, facts=facts)]))
+    assert column(table, "remark") == ["one linearised step"]
 
 
 def test_a_missing_engine_has_a_row_in_both_tables(make):
@@ -612,7 +609,6 @@ def test_a_limit_of_stability_stands_beside_the_motions_in_units_of_the_theory(m
     table = tables.motion(Results(records))
     assert column(table, "stable up to [2/ω]") == [pytest.approx(1.0), None]
     assert column(table, "longest stable step [ms]")[0] == 20.0
-    assert table.summary.points[-1].endswith("2 / ω: a 1.00")
 
 
 def test_the_published_times_stand_beside_ours(make):

@@ -92,7 +92,7 @@ def test_every_declared_column_has_a_cell(records, make):
     """A title in `tables.toml` that no row has would make an empty column."""
     solved = make.worked("MuJoCo Euler", error=(0.5, 1e-7))
     swing = make.swung("RK4", left=np.ones(11))
-    near = make.fell("MuJoCo Euler", true=[np.nan, 1e-3, 1e-3])
+    near = make.fell("MuJoCo Euler", error=[np.inf, 1e-3, 1e-3])
     results = Results([*records, solved, near, swing])
     for layout in (layout for section in SECTIONS for layout in section.layouts):
         rows = [row for row in layout.subjects(results) if isinstance(row, dict)]
@@ -172,7 +172,7 @@ def test_the_most_targets_met_are_ranked_by_chance(make, ccd, fabrik, first):
         for solver, count in (("ccd", ccd), ("fabrik", fabrik))
     ]
     summary = accuracy(Results(records)).summary
-    assert summary.sentence.endswith(f"first: {first}:")
+    assert summary.sentence.endswith(f"solved by {first}.")
     assert summary.points[0].startswith(f"CCD: {40 - ccd}/40 = ")
 
 
@@ -190,11 +190,8 @@ def test_jitter_is_the_largest_angle_in_degrees_beside_price_and_drift(make):
               for i in (1, 2, 3)]  # fmt: skip
     assert [round(drift) for drift in drifts] == [6, 11, 17, 0, 0, 0]
     assert "in 1 of 1 cases, and in 1 the step" in table.summary.sentence
-    cold, *_, price, drift = table.summary.points
+    cold, *_ = table.summary.points
     assert cold == "cold: 57.3° (arm, circle, CCD); 2 of 3 frames"
-    assert "7 to 7 times" in price
-    assert "17.2° to 17.2°" in drift
-    assert len(jitter(Results(records)).summary.points) == 4
     assert jitter(Results(records[:2])).rows == ()  # not followed in all modes
 
 
@@ -210,13 +207,11 @@ def test_success_is_counted_by_the_residual_not_by_the_solver(records):
     assert max(column(table, "residual, largest [m]")) == 3e-4
 
 
-def test_convergence_counts_iterations_drift_and_converged_steps(records):
+def test_convergence_counts_iterations_and_drift(records):
     table = cloth.convergence(Results(records))
-    counts, few, newton = table.summary.points
+    counts, few = table.summary.points
     assert counts == "lab cloth, stiffness × 1: local/global 2 and Newton 2"
     assert few.endswith("the cloth drifts by 0.200 m, 10.0 % of its path")
-    assert newton.startswith("Newton converged in 3 of 3")
-    assert "at most 3 iterations" in newton
     for count in ("1 iteration", "10 iterations"):
         assert column(table, f"steps of {count}, drift relative to the path [%]")[0] == 10.0
     assert SOLVED in table.summary.sentence
@@ -232,8 +227,8 @@ def test_iterations_that_do_not_suffice_are_said_so(make):
 
 def test_times_are_medians_beside_ours(records):
     table = timing.kinematics(Results(records))
-    assert column(table, "median [ns]") == pytest.approx([2000.0, 1000.0])
-    assert column(table, "relative to compiled") == [None, 0.5]
+    assert column(table, "median [ns]") == pytest.approx([1000.0, 2000.0])
+    assert column(table, "relative to compiled") == [0.5, None]
 
 
 def swept(make, solver, seconds, noise=0.01):
@@ -271,7 +266,7 @@ def test_a_machine_too_noisy_for_the_precision_aimed_at_is_said_to_be_so(make, n
     table = timing.kinematics(Results([swept(make, "MuJoCo", np.ones(9), noise)]))
     assert column(table, "remark") == [mark]
     assert ("too noisy for a precision of 5 %" in table.measured) == bool(mark)
-    assert table.summary.sentence.startswith("The machine was too noisy") == bool(mark)
+    assert ("The machine was too noisy" in table.summary.sentence) == bool(mark)
 
 
 def test_a_plain_copy_stands_in_a_column_and_is_called_no_limit(make):
@@ -303,10 +298,3 @@ def test_the_two_laws_of_dampers_are_listed_with_their_order(make):
     assert column(table, "h [ms]") == [20.0, 10.0, 5.0]
     assert column(table, "observed order") == [None, 1.0, 1.0]
     assert table.summary.points == ("stiffness × 1: 0.0400 at 20.0 ms, 0.0100 at 5.00 ms",)
-
-
-def test_steps_at_rounding_count_as_solved(make):
-    made = make.stepping()
-    ended = replace(made, arrays=made.arrays | {"outcome": np.array([0, 5, 3])})
-    (share,) = column(cloth.convergence(Results([ended])), "converged steps (95 % interval)")
-    assert share.hits == 2

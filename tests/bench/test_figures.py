@@ -15,10 +15,10 @@ from plumbob.bench.figures.drawing import pdf_of  # before its stand-in is in pl
 from plumbob.bench.figures.sketch import chart_sketch, drawn
 from plumbob.bench.report import report
 from plumbob.bench.report.page import page
-from plumbob.bench.tables.results import Results, label
+from plumbob.bench.tables.results import Results
 
 ENTRANT = "my very own solver, a name of some length"
-CHARTS = 15
+CHARTS = 14
 
 
 def with_solvers(records, count):
@@ -34,7 +34,7 @@ def with_solvers(records, count):
                 for r in records
                 if r.suite == suite and r.solver in (first, "Plumbob LM", "Plumbob Newton",
                     "Plumbob, compiled", "RK4", "ccd", "newton")
-                and r.facts.get("task") not in ("swing", "few iterations", "dampers")
+                and r.facts.get("task") not in ("few iterations", "dampers")
             ]  # fmt: skip
     return Results(list({r.key: r for r in found}.values()))
 
@@ -58,8 +58,7 @@ def test_at_most_six_curves_are_labelled_and_every_other_can_be_named(records, c
         assert len(names) <= 6
         assert set(names) | set(chart.unlabelled) == set(chart.solvers)
         assert bool(chart.unlabelled) == (len(chart.solvers) > MAX_LABELLED)
-        if chart.unlabelled:
-            assert all(label(name) in chart.caption for name in chart.unlabelled)
+        assert ("Point at a grey curve" in chart.caption) == bool(chart.unlabelled)
 
 
 OURS = ("ccd", "fabrik", "levenberg_marquardt", "newton", "lbfgs", "chebyshev", "local_global")
@@ -129,7 +128,8 @@ def test_every_curve_is_named_when_it_is_pointed_at(records):
 
 
 def test_a_figure_is_drawn_again_only_if_it_shows_something_else(tmp_path, records, monkeypatch):
-    sketch = report.all_figures()[0](Results(records))
+    sketches = (figure(Results(records)) for figure in report.all_figures())
+    sketch = next(sketch for sketch in sketches if isinstance(sketch.data, Chart))
     first = drawn(sketch)
     (tmp_path / f"{sketch.name}.svg").write_text(first.svg, encoding="utf-8")
     (tmp_path / f"{sketch.name}.pdf").write_bytes(first.pdf)

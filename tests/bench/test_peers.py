@@ -4,6 +4,7 @@ import importlib
 import itertools
 import sys
 import types
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from plumbob.bench.peers.protocol import OwnTime
 from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, RESTARTS
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
-from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, is_installed, robot
+from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, enter, is_installed, robot
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several effectors.
@@ -51,6 +52,10 @@ def answers(peer, entry, name, targets):
 def arm(peer):
     """An arm that a peer takes: some take no seven joints."""
     name = "ur5" if module(peer) in {"eaik", "ur_analytic"} else "iiwa14"
+    if module(peer) == "tinyik":  # which reaches positions only
+        name = "iiwa14, positions"
+        enter(replace(robot("iiwa14"), name=name, oriented=False))
+        return name
     if not is_installed(name):
         pytest.skip("example-robot-data is not installed")
     return name
@@ -173,6 +178,16 @@ def test_times_that_a_solver_measures_are_added_over_its_restarts(each, together
     answer = restarted(measuring(each), arm, 5)(PoseRequest(*nowhere))()
     assert answer.claim
     assert answer.time == (together and OwnTime(together))
+
+
+def test_a_robot_of_other_lengths_is_none_of_the_makers_models():
+    model_of = pytest.importorskip("plumbob.bench.peers.ik.ur_analytic").model_of
+    arm = robot("ur5")
+    assert model_of(arm).solver.__name__.endswith("ur5")
+    longer = replace(arm, text=arm.text.replace("0.425", "0.42501"))
+    assert longer.text != arm.text
+    with pytest.raises(UnableError, match="Universal Robots only"):
+        model_of(longer)
 
 
 def test_every_entry_has_a_name_of_its_own_within_its_kind():

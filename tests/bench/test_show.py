@@ -11,7 +11,7 @@ from PIL import Image
 
 from plumbob import cli
 from plumbob.bench.motion import motion
-from plumbob.bench.show import film
+from plumbob.bench.show import film, gallery
 from plumbob.bench.show import scenes as shows
 from plumbob.bench.show.your_solver import YourSolver
 from plumbob.reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
@@ -86,7 +86,7 @@ def test_your_arm_stands_beside_ours_with_its_error(capsys, tmp_path):
 
 
 def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tmp_path):
-    mine = YourSolver([file(tmp_path, "my_ik.py", IK.format(""))])
+    mine = YourSolver.open([file(tmp_path, "my_ik.py", IK.format(""))])
     found = shows.arm_motion("circle", "ccd", coherent=False)
     told = []
     positions = mine.follow_curve(*found[:3], lambda done, total: told.append((done, total)))
@@ -98,11 +98,11 @@ def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tm
 
 
 def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
-    yours = YourSolver([file(tmp_path, "tracks.py", DOT)])
+    yours = YourSolver.open([file(tmp_path, "tracks.py", DOT)])
     found = shows.arm_motion("heart", "fabrik", coherent=False)
     positions = yours.follow_curve(*found[:3], lambda *_: None)
     yours.close()
-    scene = shows.arm_scene("heart", found, "ours", ("yours", positions))
+    scene = shows.arm_scene("heart", found, "ours", [("yours", positions)])
     assert [one.label for one in scene.motions] == ["yours", "ours"]
     assert scene.motions[0].errors.max() == 0.0
 
@@ -110,11 +110,11 @@ def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
 def test_the_cloth_by_your_steps_is_as_far_off_as_it_is(tmp_path):
     system, start = scenes.lab_cloth()
     for change, least in (("", 0.0), (" + 1e-3", 1e-3)):
-        yours = YourSolver([file(tmp_path, "my_cloth.py", STEP.format(change))])
+        yours = YourSolver.open([file(tmp_path, "my_cloth.py", STEP.format(change))])
         found = shows.cloth_motion("newton")
         positions = yours.step_cloth(*found[:2], len(found.positions) - 1, lambda *_: None)
         yours.close()
-        scene = shows.cloth_scene(found, "newton", ("yours", positions))
+        scene = shows.cloth_scene(found, "newton", [("yours", positions)])
         assert scene.motions[1].errors.max() == 0.0
         assert least <= scene.motions[0].errors.max() < 1e-6 + 100 * least
     state = State(start.positions, start.velocities)
@@ -131,13 +131,13 @@ def test_a_cloth_that_blows_up_is_shown_until_it_does(tmp_path):
             return {"positions": positions * 1e200, "velocities": velocities}
         """,
     )
-    yours = YourSolver([mine])
+    yours = YourSolver.open([mine])
     found = shows.cloth_motion("newton")
     positions = yours.step_cloth(*found[:2], len(found.positions) - 1, lambda *_: None)
     yours.close()
     assert np.isfinite(positions[1]).all()
     assert np.isnan(positions[-1]).all()
-    text = motion.page(shows.cloth_scene(found, "newton", ("yours", positions)))
+    text = motion.page(shows.cloth_scene(found, "newton", [("yours", positions)]))
     assert "NaN" not in text
     assert "Infinity" not in text
 
@@ -265,3 +265,38 @@ def test_a_file_that_is_not_there_and_two_solvers_are_refused(capsys):
         2,
         "plumbob: with: expected one solver, got --with and a program behind --\n",
     )
+
+
+@pytest.mark.parametrize("fault", gallery.FAMOUS, ids=lambda fault: fault.file)
+def test_a_famous_fault_shows_beside_the_right_solver(fault, monkeypatch):
+    monkeypatch.setattr(shows, "FRAMES", 20)
+    wrong, right = gallery._beside_truth(fault).motions
+    assert wrong.label == fault.title
+    assert np.max(wrong.errors[2:]) > 1e-3
+    assert right.errors[-1] < 1e-3
+
+
+def test_the_gallery_is_a_folder_of_pictures(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(gallery, "SWEEPS", 3)
+    monkeypatch.setattr(gallery, "FAMOUS", gallery.FAMOUS[:1])
+    folder = tmp_path / "pictures"
+    with pytest.raises(SystemExit, match="0"):
+        cli.main(["show", "gallery", "-o", str(folder)])
+    names = ["curves.svg", "cloths.svg", "world_rotation.gif"]
+    assert capsys.readouterr().out.split() == [str(folder / name) for name in names]
+    with Image.open(folder / names[-1]) as film_of_sweeps:
+        assert film_of_sweeps.n_frames == 4
+    assert "Gravity twice" in (folder / "cloths.svg").read_text(encoding="utf-8")
+
+
+def test_an_exploding_motion_leaves_the_others_large_enough_to_see():
+    still = np.zeros((2, 3, 3)) + np.eye(3)
+    exploding = still.copy()
+    exploding[1] *= 1e9
+    exploding[1, 0] = np.nan
+    motions = [
+        motion.Moving(name, x, np.zeros(2))
+        for name, x in zip("ab", (still, exploding), strict=True)
+    ]
+    scene = motion.Scene("", "", "", motions, 1.0, "", (0.0, 0.0)).checked()
+    assert np.abs(scene.points()).max() == 1.0

@@ -11,7 +11,13 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.output import files, json_file, junit, page, saved, terminal
 from plumbob.crosscheck.verify.output.files import Files
 from plumbob.crosscheck.verify.output.question import Question
-from plumbob.crosscheck.verify.output.words import Presentation, speaker
+from plumbob.crosscheck.verify.output.words import (
+    VERDICTS,
+    Presentation,
+    passed,
+    speaker,
+    title,
+)
 from plumbob.crosscheck.verify.self_test import subjects
 from plumbob.crosscheck.verify.verify import verify
 
@@ -81,7 +87,7 @@ def test_a_failing_writer_costs_no_verdict(writer, language, report, monkeypatch
     names = {"json_file": "text", "junit": "text", "page": "render", "saved": "save"}
     monkeypatch.setattr(getattr(files, writer), names[writer], raises)
     context = Presentation(speaker(language), language, ["my.py"])
-    code = Files(None, None, None, Path("out")).write(report, Question(), context)
+    code = Files(None, None, None, None, Path("out")).write(report, Question(), context)
     out, err = capsys.readouterr()
     assert code == 2
     assert "mass_spring_forces" in out
@@ -90,12 +96,25 @@ def test_a_failing_writer_costs_no_verdict(writer, language, report, monkeypatch
     assert "TypeError: Encoding objects of type sphinx" in err
     wanted = {"json_file": "verdict.json", "junit": "verdict.xml", "page": "index.html"}
     lost = {wanted.get(writer)}
-    assert {one.name for one in Path("out").glob("*.*")} == set(wanted.values()) - lost
+    names = {"card.svg", *wanted.values()}
+    assert {path.name for path in Path("out").glob("*.*")} == names - lost
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_the_card_shows_each_verdict(language, report):
+    say = speaker(language)
+    card = ET.fromstring(page.card(report, Presentation(say, language, ["my.py"])))
+    texts = [element.text for element in card.iter("{http://www.w3.org/2000/svg}text")]
+    (task,) = report.tasks
+    assert title(task) in texts
+    assert say(VERDICTS[task.verdict]) in texts
+    assert any(passed(task) in text for text in texts)
+    assert float(card.get("width")) > 7 * len(title(task))
 
 
 def test_a_case_that_cannot_be_saved_costs_no_verdict(report, capsys):
     Path("plumbob_failures").write_text("a file")
-    code = Files(None, None, None, None).write(
+    code = Files(None, None, None, None, None).write(
         report, Question(), Presentation(speaker("en"), "en", ["my.py"])
     )
     out, err = capsys.readouterr()
@@ -114,10 +133,10 @@ def test_files_are_written_after_the_screen_though_nobody_reads_it(report, monke
 
     monkeypatch.setattr(terminal, "show", closed)
     monkeypatch.setattr(Path, "write_text", lambda path, *_, **__: order.append(path.name))
-    Files(None, None, None, Path("out")).write(
+    Files(None, None, None, None, Path("out")).write(
         report, Question(), Presentation(speaker("en"), "en", ["my.py"])
     )
-    assert order == ["screen", "verdict.json", "verdict.xml", "index.html"]
+    assert order == ["screen", "verdict.json", "verdict.xml", "index.html", "card.svg"]
 
 
 def test_numbers_of_numpy_are_written_like_any_other(report):

@@ -37,7 +37,7 @@ def _row(record: Record) -> Row:
         "hits": hits,
         "within tolerance": metrics.share(hits),
         **quantile_cells("residual", spread_of(record, "residual")),
-        "time, median": None if seconds is None else metrics.spread(seconds).median,
+        "time, median": None if seconds is None else float(np.median(seconds)),
     }
 
 
@@ -47,12 +47,13 @@ def _summary(rows: Sequence[Row]) -> Summary:
         for solver, members in grouped(rows, lambda row: str(row["solver"])).items()
     }
     ranking = _ranking(hits)
-    first = f"; first: {leaders(ranking)}" if ranking else ""
+    first = f"Over all problems most targets are solved by {leaders(ranking)}." if ranking else ""
     points = (
         f"{solver}: {words(metrics.share(np.concatenate([*problems.values()])))}"
         for solver, problems in hits.items()
     )
-    return Summary(f"Solved within tolerance, over all problems{first}:", tuple(points))
+    unranked = "No two solvers were given all problems, so that none is ranked."
+    return Summary(first or unranked, tuple(points))
 
 
 def _ranking(hits: dict[str, dict[tuple[str, str], np.ndarray]]) -> metrics.Ranking | None:

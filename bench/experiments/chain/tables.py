@@ -17,7 +17,7 @@ from ...tables.columns import (
     words_in,
 )
 from ...tables.layout import Layout, Row
-from ...tables.results import Results, by_problem, grouped, label
+from ...tables.results import Results, by_problem, counted, grouped, label
 from ...tables.table import Summary, words
 from .. import arm
 from . import BEYOND, CHAIN
@@ -73,9 +73,11 @@ def _beyond_summary(rows: Sequence[Row]) -> Summary:
         solver: metrics.share(np.concatenate([row["straight"] for row in members]))
         for solver, members in grouped(rows, lambda row: str(row["solver"])).items()
     }
+    straight = sum(share.hits == share.total for share in shares.values())
     return Summary(
-        "The best solution is the straight line from root to target. Solutions within "
-        f"{words_in(STRAIGHT, '%')} of the reach of that line:",
+        "The best solution is the straight line from root to target; "
+        f"{straight} of {counted(len(shares), 'solver')} always end within "
+        f"{words_in(STRAIGHT, '%')} of the reach of that line.",
         tuple(f"{solver}: {words(share)}" for solver, share in shares.items()),
     )
 

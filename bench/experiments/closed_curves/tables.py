@@ -21,8 +21,6 @@ from . import COHERENT, COLD, CURVE, DRIFT, WARM
 MODES = (COLD, WARM, COHERENT)
 # The step that closes a curve is as large as the others if it exceeds them by at most this share.
 ALIKE = 0.01
-# Repetitions of the curve that is drawn several times.
-REPETITIONS = (1, 2, 3)
 _CAPTIONS = Captions(__file__)
 
 
@@ -73,11 +71,9 @@ def _summary(rows: Sequence[Row]) -> Summary:
     smoother = sum(row[largest] < row[f"largest rotation, {WARM}"] for row in rows)
     closed = sum(row[closing] <= (1.0 + ALIKE) * row[largest] for row in rows)
     return Summary(
-        "A coherent motion solves all frames together, so that the joints rotate as little as they "
-        "can from each frame to the next. The largest rotation of a joint is smaller than with "
-        f"warm starts in {smoother} of {len(rows)} cases, and in {closed} the step from the last "
-        "frame back to the first is no larger than others. The largest of all, and the frames "
-        "within tolerance:",
+        "Solving all frames together makes the largest rotation of a joint smaller than warm "
+        f"starts do in {smoother} of {len(rows)} cases, and in {closed} the step from the last "
+        "frame back to the first is no larger than others.",
         tuple(_points(rows)),
     )
 
@@ -89,19 +85,6 @@ def _points(rows: Sequence[Row]) -> Iterator[str]:
         hits, total = np.sum([row[f"within tolerance, {mode}"][:2] for row in rows], axis=0)
         frames = f"{words(int(hits))} of {words(int(total))} frames"
         yield f"{mode}: {angle} ({worst['curve']}, {worst['solver']}); {frames}"
-    counts = [row["iterations over all frames at once"] for row in rows]
-    yield f"all frames are changed together {words(min(counts))} to {words(max(counts))} times"
-    warm = [
-        row[title] for row in rows if (title := f"drift, {WARM}, after {REPETITIONS[-1]}") in row
-    ]
-    titles = [f"drift, {COHERENT}, after {i}" for i in REPETITIONS]
-    closed = [row[title] for row in rows for title in titles if title in row]
-    if warm and closed:
-        yield (
-            f"after three repetitions warm starts leave the arm {words_in(min(warm), '°')} to "
-            f"{words_in(max(warm), '°')} from its first pose; the drift of the closed coherent "
-            f"motion is never more than {words_in(max(closed), '°')}"
-        )
 
 
 def jitter_chart(results: Results) -> Sketch | None:

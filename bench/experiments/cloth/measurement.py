@@ -16,8 +16,8 @@ from plumbob.reference.mass_spring import damper_forces, lengths, spring_forces
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
-from . import DAMPERS, FEW, ONE_STEP, SWING
-from .values import ConsecutiveSteps, DamperDifferences, IterationErrors, TruncatedSteps
+from . import DAMPERS, FEW, ONE_STEP
+from .values import DamperDifferences, IterationErrors, TruncatedSteps
 
 STIFFNESS, FACTORS = 100.0, (1, 10, 100)
 H = 1 / 60
@@ -51,14 +51,13 @@ def cloth_swing(factor: float, size: int = 11, damping: float = 0.0) -> ClothSwi
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield, for each stiffness: Newton steps, the iterations of a step, few iterations, dampers.
+    """Yield, for each stiffness: the iterations of a step, few iterations, dampers.
 
     The cloth is the same at every scale.
     """
     swing = {"h": H, "first": FALLING, "steps": STEPS}
     for factor in FACTORS:
         problem, block = cloth_swing(factor), partial(_block, factor)
-        yield block(SWING, "newton", partial(newton_steps, problem), **swing, tolerance=TOLERANCE)
         for solver in registry.followed_step_solvers():
             measure = partial(one_step, problem, solver.name, solver.followed)
             settings = {"h": H, "step": MIDDLE, "iterations": solver.followed}
@@ -75,19 +74,9 @@ def blocks(scale: Scale) -> Iterator[Block]:
 def _block(
     factor: float, task: str, solver: str, measure: Callable[[], Measured], **settings: Any
 ) -> Block:
-    problem = cloth_swing(factor).name + (f"/{task}" if task != SWING else "")
+    problem = f"{cloth_swing(factor).name}/{task}"
     facts = {"title": f"stiffness × {factor:g}", "task": task}
     return Block("cloth", problem, solver, measure, settings, facts=facts)
-
-
-def newton_steps(problem: ClothSwing) -> Measured:
-    """Take consecutive swinging steps by Newton; keep iterations and residual of each."""
-    integrator = integrator_of(problem)
-    results = [integrator.step(state) for state in converged_motion(problem)[FALLING:-1]]
-    columns = zip(
-        *((r.iterations, r.residual, r.outcome, r.at_floor) for r in results), strict=True
-    )
-    return Measured(ConsecutiveSteps(*map(np.array, columns)))
 
 
 def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:

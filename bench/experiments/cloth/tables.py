@@ -5,20 +5,27 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Outcome
-
 from ...figures.chart import Axis, Chart, Panel, series
 from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.columns import spread_of, words_in
+from ...tables.columns import words_in
 from ...tables.layout import Layout
-from ...tables.results import Results, by_problem, counted, grouped, label, listed, settings
+from ...tables.results import (
+    Results,
+    by_problem,
+    counted,
+    grouped,
+    label,
+    listed,
+    most_often,
+    settings,
+)
 from ...tables.table import Summary, words
 from ..cloth_peers import DECADES, SOLVED
 from ..pictures.figures import falling_cloth
-from . import DAMPERS, FEW, ONE_STEP, SWING
+from . import DAMPERS, FEW, ONE_STEP
 
 # Iterations after which errors are listed.
 LISTED = (1, 10, 100, 1000)
@@ -59,19 +66,15 @@ def convergence_chart(results: Results) -> Sketch | None:
 
 def _convergence_rows(results: Results) -> list[Row]:
     """Return a row for every solver on every cloth, cloth by cloth."""
-    tasks = {ONE_STEP: _one_step, FEW: _few_iterations, SWING: _swing}
+    tasks = {ONE_STEP: _one_step, FEW: _few_iterations}
     records = [record for task in tasks for record in results.all("cloth", task=task)]
     rows = []
-    for (cloth, solver), group in grouped(records, _cloth_and_solver).items():
-        row: Row = {"cloth": cloth, "solver": solver, "records": group}
+    for (title, solver), group in grouped(records, lambda r: (r.title, r.solver)).items():
+        row: Row = {"cloth": f"lab cloth, {title}", "solver": label(solver), "records": group}
         for record in group:
             row |= tasks[record.facts["task"]](record)
         rows.append(row)
     return [row for cloth in grouped(rows, lambda row: str(row["cloth"])).values() for row in cloth]
-
-
-def _cloth_and_solver(record: Record) -> tuple[str, str]:
-    return f"lab cloth, {record.title}", label(record.solver)
 
 
 def _one_step(record: Record) -> Row:
@@ -101,23 +104,18 @@ def _steps_of(count: int) -> str:
     return f"steps of {counted(count, 'iteration')}"
 
 
-def _swing(record: Record) -> Row:
-    solved = [outcome for outcome in Outcome if outcome.solved]
-    cells: Row = {"converged steps": metrics.share(np.isin(record.values.outcome, solved))}
-    for title, name in (("iterations", "iterations"), ("residual", "residual")):
-        median, _, largest = spread_of(record, name)
-        cells |= {f"{title} of converged steps, median": median}
-        cells |= {f"{title} of converged steps, largest": largest}
-    return cells | {"steps at the rounding floor": int(record.values.at_floor.sum())}
-
-
 def _convergence_summary(rows: Sequence[Row]) -> Summary:
     points = [
         f"{cloth}: {listed([_count(row) for row in of_cloth if row.get('iterations tried')])}"
         for cloth, of_cloth in grouped(rows, lambda row: str(row["cloth"])).items()
     ]
-    points += [*_single_iterations(rows), *_newton(rows)]
-    return Summary(f"Iterations until the error of one step is {SOLVED}:", tuple(points))
+    points += _single_iterations(rows)
+    title = f"iterations to {SOLVED}"
+    cloths = grouped((row for row in rows if row.get(title)), lambda row: str(row["cloth"]))
+    firsts = [min(of_cloth, key=lambda r: r[title])["solver"] for of_cloth in cloths.values()]
+    fewest = f"by {most_often(firsts, 'cloth')}" if firsts else "by no solver"
+    sentence = f"An error of {SOLVED} is reached in the fewest iterations {fewest}."
+    return Summary(sentence, tuple(points))
 
 
 def _count(row: Row) -> str:
@@ -137,21 +135,6 @@ def _single_iterations(rows: Sequence[Row]) -> Iterator[str]:
                 f"each: a median error of {words_in(row[f'{title}, median error'], '%')}; the "
                 f"cloth drifts by {words(drift)} m, {words_in(share, '%')} of its path"
             )
-
-
-def _newton(rows: Sequence[Row]) -> Iterator[str]:
-    swings = [row for row in rows if "converged steps" in row]
-    if swings:
-        shares = [row["converged steps"] for row in swings]
-        iterations, residual = (
-            max(row[f"{name} of converged steps, largest"] for row in swings)
-            for name in ("iterations", "residual")
-        )
-        yield (
-            f"Newton converged in {words(sum(share.hits for share in shares))} of "
-            f"{words(sum(share.total for share in shares))} consecutive steps, with at most "
-            f"{counted(int(iterations), 'iteration')} and a residual of at most {words(residual)}"
-        )
 
 
 convergence = Layout(
@@ -176,8 +159,10 @@ def _damped_steps(results: Results) -> list[Row]:
 
 def _damper_summary(steps: Sequence[Row]) -> Summary:
     cloths = grouped(steps, lambda step: str(step["cloth"]))
+    least, greatest = (words(end(step["difference"] for step in steps)) for end in (min, max))
     return Summary(
-        "The relative difference between the forces of the two laws:",
+        f"The forces of the two laws differ by {least} to {greatest} of their size, the less the "
+        "shorter the step.",
         tuple(f"{cloth}: {_at(of[0])}, {_at(of[-1])}" for cloth, of in cloths.items()),
     )
 

@@ -2,17 +2,8 @@
 
 import msgspec
 
-from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
-from . import DAMPERS, FEW, ONE_STEP, SWING
-
-
-class ConsecutiveSteps(Values, frozen=True):
-    """Consecutive converged steps, (step,): an outcome is the number of an `Outcome`."""
-
-    iterations: Integers1
-    residual: Floats1
-    outcome: Integers1
-    at_floor: Booleans1
+from ...harness.values import Details, Floats1, Kind, Values
+from . import DAMPERS, FEW, ONE_STEP
 
 
 class IterationErrors(Values, frozen=True):
@@ -53,7 +44,6 @@ class DamperDetails(Details, frozen=True):
 
 
 KINDS = {
-    SWING: Kind(ConsecutiveSteps, StepDetails),
     ONE_STEP: Kind(IterationErrors, StepDetails),
     FEW: Kind(TruncatedSteps, StepDetails),
     DAMPERS: Kind(DamperDifferences, DamperDetails),

@@ -76,15 +76,10 @@ class ClothJob(NamedTuple):
 
 
 def advanced(mover: Mover, nowhere: FloatArray) -> Solved:
-    """Advance by a frame; the positions are `nowhere` if the solver reports an overflow."""
-    (is_finite, own_time), seconds = time_call(lambda: _advance(mover))
-    q = mover.positions() if is_finite else nowhere
-    return solved_in(own_time or OwnTime(seconds), q, UNKNOWN)
-
-
-def _advance(mover: Mover) -> tuple[bool, OwnTime | None]:
+    """Advance by a frame, of which nothing else is timed; `nowhere` if the solver overflows."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            return True, mover.advance()
+            own_time, seconds = time_call(mover.advance)
     except FloatingPointError:
-        return False, None
+        return solved_in(OwnTime(np.nan), nowhere, UNKNOWN)
+    return solved_in(own_time or OwnTime(seconds), mover.positions(), UNKNOWN)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 
 from plumbob.reference import MassSpring, State
@@ -19,7 +18,7 @@ from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import JobOutcome, WorkerProcess
 from ...harness.measure import not_installed
-from ...harness.values import Values
+from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.registry import EXPLICIT, ITERATED, LINEARISED, UNDECLARED, ClothPeer
 from ...problems.falling_cloth import (
@@ -38,7 +37,7 @@ from ..published import problem as published
 from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
 from .truth import ClothTruth, first_step, inertial_positions, truth_of
-from .values import LiuFrame, MotionWork, StabilityLimits, StepWork
+from .values import LiuFrame, StabilityLimits, Work
 
 # Explicit steps a frame, relative to symplectic Euler's limit of stability.
 MARGINS = (1.1, 2.0, 4.0)
@@ -149,18 +148,16 @@ def _works(peer: ClothPeer, cloth: _Cloth, sweep: int) -> Iterator[Block]:
     """Yield the motion of a cloth, and its step unless the solver is explicit."""
     settings = {**cloth.settings, "version": peer.version, "sweep": sweep}
     size = sum(fall.level.size for fall in cloth.falls)
-    tasks = {MOTION: ("motion", motion)}
-    if peer.kind != EXPLICIT:
-        tasks = {ONE_STEP: ("one step", one_step), **tasks}
-    for task, (name, measure) in tasks.items():
-        work, facts = partial(measure, peer, cloth.falls), {"kind": peer.kind}
-        facts["arbiter"] = _ARBITERS[task]
-        if cloth.own is not None:
-            facts["cloth"] = cloth.own.name
-        block = _block(
-            task, f"{name}/{cloth.name}", peer.title, work, settings, size=size, facts=facts
-        ).of(peer.entrant)
-        yield block if cloth.own is None else block.on(cloth.own)
+    names = (
+        {MOTION: "motion"} if peer.kind == EXPLICIT else {ONE_STEP: "one step", MOTION: "motion"}
+    )
+    for task, name in names.items():
+        measure = partial(work, task, peer, cloth.falls)
+        facts = {"kind": peer.kind, "arbiter": _ARBITERS[task]}
+        facts |= {"cloth": cloth.name} if cloth.own else {}
+        name, more = f"{name}/{cloth.name}", {"size": size, "facts": facts}
+        block = _block(task, name, peer.title, measure, settings, **more).of(peer.entrant)
+        yield block.on(cloth.own) if cloth.own else block
 
 
 def _stability_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
@@ -214,91 +211,54 @@ def _counted(count: int, name: str) -> str:
 _unfinished: dict[tuple[str, int], str] = {}
 
 
-class RungResults:
-    """The results of a solver: the numbers and label of each rung, and remarks."""
-
-    def __init__(self, peer: ClothPeer) -> None:
-        self.rows: list[dict[str, Any]] = []
-        self._peer = peer
-        self._remarks: list[tuple[int, str, bool]] = []  # particles, sentence, whether it failed
-
-    def run(self, cloth: FallingCloth, rung: Rung, shape: Shape) -> JobOutcome:
-        """Return the outcome of a rung; a solver that did not finish is not tried again."""
-        task = self._peer.title, len(cloth.start.positions)
-        if task in _unfinished:
-            outcome = JobOutcome(0.0, [], _unfinished[task])
-        else:
-            outcome = worker_process().perform(job(self._peer, cloth, rung.settings, shape))
-        if outcome.is_silent:
-            outcome = outcome._replace(trouble=f"not finished: {outcome.trouble}")
-            _unfinished[task] = outcome.trouble
-        if outcome.note:
-            sentence = f"{cloth.size} × {cloth.size}, {rung.label}: {outcome.note}"
-            self._remarks.append((cloth.size, sentence, bool(outcome.trouble)))
-        return outcome
-
-    def measured(self, kind: type[Values], **more: Any) -> Measured:
-        """Return the rows as arrays, and their labels and remarks as facts."""
-        names = {field.name for field in msgspec.structs.fields(kind)} - {"remark_particles", *more}
-        arrays = {name: np.array([row[name] for row in self.rows]) for name in names}
-        sizes, sentences = ([remark[i] for remark in self._remarks] for i in (0, 1))
-        troubles = [sentence for _, sentence, failed in self._remarks if failed]
-        trouble = next(iter(troubles), "")
-        rungs = [row["rung"] for row in self.rows]
-        facts = {"rungs": rungs, "remarks": sentences, "trouble": trouble}
-        return Measured(kind(**arrays, remark_particles=np.array(sizes), **more), facts=facts)
+def _performed(peer: ClothPeer, cloth: FallingCloth, rung: Rung, shape: Shape) -> JobOutcome:
+    """Return the outcome of a rung; a solver that did not finish is not tried again."""
+    task = peer.title, len(cloth.start.positions)
+    if task in _unfinished:
+        return JobOutcome(0.0, [], _unfinished[task])
+    outcome = worker_process().perform(job(peer, cloth, rung.settings, shape))
+    if outcome.is_silent:
+        _unfinished[task] = f"not finished: {outcome.trouble}"
+        return outcome._replace(trouble=_unfinished[task])
+    return outcome
 
 
-def one_step(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
-    """Take the same step at increasing cost; keep time and error."""
-    results = RungResults(peer)
+def work(task: str, peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
+    """Take the same step, or move on for the same frames, at increasing cost.
+
+    Keep the time for a frame and the error of the last, which is infinite if it was not reached.
+    """
+    rows, labels, remarks, troubles = [], [], [], []
     for fall in falls:
-        cloth, truth = fall.make(), fall.truth
-        for rung in step_rungs(peer, cloth.beat):
-            outcome = results.run(cloth, rung, Shape(1, REPEATS, cloth.frame))
-            if not outcome.solved:
-                break
-            last = outcome.solved[-1]
-            row = {"particles": fall.level.size, "error": step_error(last.q, truth)}
-            results.rows.append({**row, "seconds": last.seconds, "rung": rung.label})
-    return results.measured(StepWork, rounding=[rounding(fall.truth) for fall in falls])
+        cloth, (rungs, frames, repeats) = fall.make(), (step_rungs, 1, REPEATS)
+        if task == MOTION:
+            rungs, frames, repeats = motion_rungs, fall.level.frames, 1
+        for rung in rungs(peer, cloth.beat):
+            outcome = _performed(peer, cloth, rung, Shape(frames, repeats, cloth.frame))
+            last = outcome.solved[-frames:]
+            error = _error(task, last, fall) if len(last) == frames else np.inf
+            seconds = metrics.spread(np.array([frame.seconds for frame in last])).median
+            rows.append((fall.level.size, seconds, outcome.setup, error))
+            labels.append(rung.label)
+            remarks.append(outcome.note or ("diverged" if np.isinf(error) else ""))
+            troubles.append(outcome.trouble)
+    facts = {"rungs": labels, "remarks": remarks, "trouble": next(filter(None, troubles), "")}
+    return Measured(Work(*map(np.array, zip(*rows, strict=True)), **_certainty(falls)), facts=facts)
 
 
-def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
-    """Move on frame after frame; keep time and distance from the truth."""
-    results = RungResults(peer)
-    for fall in falls:
-        level, cloth, truth = fall.level, fall.make(), fall.truth
-        for rung in motion_rungs(peer, cloth.beat):
-            outcome = results.run(cloth, rung, Shape(level.frames, 1, cloth.frame))
-            row = {"particles": level.size, "target_frames": level.frames, "rung": rung.label}
-            results.rows.append(row | _distances(outcome, truth, cloth.extent))
-            if not outcome.solved:
-                break
+def _error(task: str, frames: Sequence[Solved], fall: Fall) -> float:
+    """Return the error of a step, or of the frames of a motion."""
+    positions = np.array([frame.q for frame in frames]).reshape(-1, *fall.truth.inertial.shape)
+    if task == MOTION:
+        return motion_error(positions, fall.truth, fall.make().extent)
+    return step_error(positions[-1], fall.truth)
+
+
+def _certainty(falls: Sequence[Fall]) -> dict[str, np.ndarray]:
+    """Return how sure the arbiters are at each size."""
     truths = [fall.truth for fall in falls]
-    certainty = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
-    return results.measured(MotionWork, **certainty)
-
-
-def _distances(outcome: JobOutcome, truth: ClothTruth, extent: float) -> dict[str, Any]:
-    """Return times, and the distance from the truth after the last frame that was reached."""
-    frames = len(outcome.solved)
-    seconds = np.array([frame.seconds for frame in outcome.solved])
-    positions = np.array([frame.q for frame in outcome.solved])
-    positions = positions.reshape(frames, *truth.inertial.shape)
-    is_diverged = diverged(positions, truth.true[:frames], extent)
-    distance = np.nan
-    if frames and not is_diverged:
-        error = metrics.rms_distance(positions[-1], truth.true[frames - 1])
-        distance = max(error, truth.unsure)  # nobody is nearer than the truth is known
-    return {
-        "frames": frames,
-        "seconds": metrics.spread(seconds).median,
-        "setup": outcome.setup,
-        "diverged": is_diverged,
-        "true": distance,
-        "path": truth.path[frames - 1] if frames else np.nan,
-    }
+    columns = zip(*((rounding(t), t.order, t.unsure) for t in truths), strict=True)
+    return dict(zip(("rounding", "order", "unsure"), map(np.array, columns), strict=True))
 
 
 def rounding(truth: ClothTruth) -> float:
@@ -316,11 +276,16 @@ def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
     return truth.first.error(positions, truth.inertial)
 
 
-def diverged(positions: np.ndarray, true: np.ndarray, extent: float = SIDE) -> bool:
-    """Return whether a particle is ever farther from its true position than the cloth is wide."""
-    if not np.isfinite(positions).all():
-        return True
-    return bool((np.abs(positions - true) > extent).any())
+def motion_error(positions: np.ndarray, truth: ClothTruth, extent: float = SIDE) -> float:
+    """Return the final distance from the truth over the distance moved; inf if it diverged.
+
+    A motion diverged if a particle is ever farther from its true position than the cloth is wide.
+    Nobody is nearer to the truth than that is known.
+    """
+    is_near = np.abs(positions - truth.true) <= extent
+    if not is_near.all():
+        return np.inf
+    return max(metrics.rms_distance(positions[-1], truth.true[-1]) / truth.path, truth.unsure)
 
 
 def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:

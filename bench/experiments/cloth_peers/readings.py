@@ -47,21 +47,20 @@ class Point(NamedTuple):
         return self.values["seconds"]
 
     @property
-    def is_whole(self) -> bool:
-        """Whether a motion reached its end."""
-        return not self.values["diverged"] and self.values["frames"] == self.values["wanted"]
+    def error(self) -> float:
+        """The error of a step or a motion; infinite if it was not reached."""
+        return self.values["error"]
 
     @property
-    def motion_error(self) -> float:
-        """The distance of a motion from the truth, relative to the distance moved; inf if lost."""
-        return self.values["true"] / self.values["path"] if self.is_whole else np.inf
+    def is_whole(self) -> bool:
+        """Whether the setting reached the end."""
+        return bool(np.isfinite(self.error))
 
     @property
     def remark(self) -> str:
-        """The remarks of its record on its cloth."""
-        counts, sentences = self.record.values.remark_particles, self.record.details.remarks
-        remarks = zip(counts, sentences, strict=True)
-        return "; ".join(sentence for count, sentence in remarks if count == self.particles)
+        """The remark on this setting, else ""."""
+        remarks = dict(zip(self.record.details.rungs, self.record.details.remarks, strict=False))
+        return remarks.get(self.rung, "")
 
 
 def points(results: Results, task: str) -> list[Point]:
@@ -80,7 +79,7 @@ def _points_of(sweeps: Sequence[Record]) -> Iterator[Point]:
     for (particles, rung), values in by_sweep[0].items():
         same = [rungs[particles, rung] for rungs in by_sweep if (particles, rung) in rungs]
         seconds = np.array([other["seconds"] for other in same])
-        errors = np.array([other.get("error", other.get("true")) for other in same])
+        errors = np.array([other["error"] for other in same])
         spread = float(np.ptp(errors)) if np.isfinite(errors).all() else 0.0
         drift = float(seconds.max() / seconds.min()) if seconds.min() > 0.0 else 1.0
         values["seconds"] = float(np.median(seconds))

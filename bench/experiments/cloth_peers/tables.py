@@ -4,7 +4,7 @@ They are two problems with a table each: solvers that minimise the objective of 
 stand in both, all others only in the table of motions.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -19,7 +19,7 @@ from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Layout
-from ...tables.results import Results, grouped, label, listed
+from ...tables.results import Results, grouped, label, listed, most_often
 from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, MOTION_TARGETS, NEAR, ONE_STEP, SOLVED, STABILITY, TARGETS
@@ -49,54 +49,53 @@ CAPTIONS = Captions(
 )
 # Larger errors are those of motions that diverged, and are not drawn.
 MAX_ERROR = 10.0
-ERRORS = {"error": "error |x − x*| / |y − x*|", "true": "rms distance from the truth [m]"}
+ERRORS = {ONE_STEP: "error |x − x*| / |y − x*|", MOTION: "distance from the truth / distance moved"}
 
 
-def work_precision(name: str, task: str, error: str, results: Results) -> Sketch | None:
+def work_precision(name: str, task: str, results: Results) -> Sketch | None:
     """Show an error against the time for a frame: a curve for each solver.
 
     Each stiffness has a column, each size a row.
     """
-    visible = [point for point in points(results, task) if _is_visible(point, error)]
+    visible = [point for point in points(results, task) if _is_visible(point)]
     cloths = [point for point in visible if not point.own]
     stiffnesses = sorted({point.stiffness for point in cloths})
     panels = [
         Panel(
             f"{size} × {size}, {stiffness:,.0f} N/m",
-            _curves([p for p in cloths if (p.particles, p.stiffness) == (size, stiffness)], error),
+            _curves([p for p in cloths if (p.particles, p.stiffness) == (size, stiffness)]),
         )
         for size in sorted({point.particles for point in cloths})
         for stiffness in stiffnesses
     ]
     own = grouped((point for point in visible if point.own), lambda point: point.own)
-    panels += [Panel(cloth, _curves(group, error)) for cloth, group in own.items()]
+    panels += [Panel(cloth, _curves(group)) for cloth, group in own.items()]
     return chart_sketch(
         Chart(
             **CAPTIONS.figure(name),
             panels=tuple(panels),
             x=Axis("time for a frame [ms]", log=True),
-            y=Axis(ERRORS[error], log=True),
+            y=Axis(ERRORS[task], log=True),
             columns=len(stiffnesses) or len(panels),
             entrants=results.entrants,
         )
     )
 
 
-def _curves(visible: Sequence[Point], error: str) -> tuple[Series, ...]:
+def _curves(visible: Sequence[Point]) -> tuple[Series, ...]:
     return tuple(
-        series(solver, [1e3 * p.seconds for p in group], [p.values[error] for p in group])
+        series(solver, [1e3 * p.seconds for p in group], [p.error for p in group])
         for solver, group in grouped(visible, lambda point: point.solver).items()
     )
 
 
-def _is_visible(point: Point, error: str) -> bool:
-    """Return whether a point reached its end, with an error that can be drawn."""
-    is_whole = "wanted" not in point.values or point.is_whole
-    return is_whole and point.seconds > 0 and 0 < point.values[error] < MAX_ERROR
+def _is_visible(point: Point) -> bool:
+    """Return whether a point has a time, and an error that can be drawn."""
+    return point.seconds > 0 and 0 < point.error < MAX_ERROR
 
 
-step_chart = partial(work_precision, "work_precision_step", ONE_STEP, "error")
-truth_chart = partial(work_precision, "work_precision_truth", MOTION, "true")
+step_chart = partial(work_precision, "work_precision_step", ONE_STEP)
+truth_chart = partial(work_precision, "work_precision_truth", MOTION)
 
 
 def _missing(results: Results) -> list[Row]:
@@ -105,60 +104,68 @@ def _missing(results: Results) -> list[Row]:
     return [{"cloth": "every cloth", "solver": r.solver, **r.notes} for r in records]
 
 
-def _ranked(rows: Iterable[Row], best: str, target: str) -> list[Row]:
-    """Return rows cloth by cloth, those that reach the target first by time, others by error."""
+def _rows(
+    results: Results, task: str, targets: Mapping[str, float], limits: Mapping[Any, Row]
+) -> list[Row]:
+    """Return a row for each solver and cloth, those that come nearest to the goal first.
 
-    def rank(row: Row) -> tuple[float, float]:
-        smallest = row[best]
-        error = np.inf if smallest is None or isinstance(smallest, str) else smallest
-        return row.get(f"time to {target}", np.inf), error
+    Solvers that reach the last target are ranked by its time, others by their smallest error.
+    """
+    *_, last = targets
+    solvers = grouped(points(results, task), lambda point: (point.cloth, point.solver))
+    rows = [_row(settings, targets, limits) for settings in solvers.values()]
+    cloths = grouped(rows, lambda row: str(row["cloth"])).values()
+    ranked = [sorted(cloth, key=lambda row: _rank(row, last)) for cloth in cloths]
+    return [*(row for cloth in ranked for row in cloth), *_missing(results)]
 
-    groups = grouped(rows, lambda row: str(row["cloth"]))
-    return [row for group in groups.values() for row in sorted(group, key=rank)]
+
+def _rank(row: Row, target: str) -> tuple[float, float]:
+    return row.get(f"time to {target}", np.inf), row["best"].error
 
 
-def _row(settings: Sequence[Point], errors: Sequence[float], targets: Mapping[str, float]) -> Row:
+def _row(settings: Sequence[Point], targets: Mapping[str, float], limits: Mapping[Any, Row]) -> Row:
     """Return the cells of a solver on a cloth: the cheapest setting for each target."""
-    best, first = settings[int(np.argmin(errors))], settings[0]
+    best, first = min(settings, key=lambda point: point.error), settings[0]
     row: Row = {
         "points": settings,
         "best": best,
         "cloth": first.cloth,
         "solver": first.solver,
+        "smallest error": best.error if best.is_whole else "diverged",
         "setting for the smallest error": best.rung,
         "difference between sweeps": max(point.spread for point in settings),
         "slowest over fastest sweep": max(point.drift for point in settings),
+        **({} if first.own else limits.get((first.solver, first.stiffness), {})),
     }
     for target, limit in targets.items():
-        near = [point for point, error in zip(settings, errors, strict=True) if error <= limit]
+        near = [point for point in settings if point.error <= limit]
         if near:
             cheapest = min(near, key=lambda point: point.seconds)
             row |= {f"time to {target}": cheapest.seconds, f"setting for {target}": cheapest.rung}
             row |= {target: cheapest}
-    return row
+    return row | {"remark": "; ".join(_remarks(row))}
 
 
-def _step_rows(results: Results) -> list[Row]:
-    groups = grouped(points(results, ONE_STEP), lambda point: (point.cloth, point.solver))
-    rows = _ranked(map(_step_row, groups.values()), "smallest error", SOLVED)
-    return rows + _missing(results)
-
-
-def _step_row(settings: Sequence[Point]) -> Row:
-    row = _row(settings, [point.values["error"] for point in settings], TARGETS)
-    error = row["best"].values["error"]
-    smallest = "diverged" if np.isinf(error) else error
-    kind = settings[0].record.details.kind
-    linear = "one linearised step" if kind == LINEARISED else ""
-    remark = "; ".join(filter(None, (linear, settings[0].remark)))
-    return {**row, "smallest error": smallest, "remark": remark}
+def _remarks(row: Row) -> Iterator[str]:
+    """Yield the remarks on a solver, with the settings to which they apply."""
+    settings: list[Point] = row["points"]
+    if settings[0].record.details.kind == LINEARISED and len(settings) == 1:
+        yield "one linearised step"
+    for remark, group in grouped(settings, lambda point: point.remark).items():
+        if remark:
+            rungs = f"{listed([point.rung for point in group])}: "
+            yield (rungs if len(group) < len(settings) else "") + remark
+    if "stability" in row and row["stability"].details.remark:
+        yield row["stability"].details.remark
 
 
 def _rounding(rows: Sequence[Row]) -> dict[str, str]:
     """Return the range of the errors of minimisers rounded to single precision."""
     records = [row["points"][0].record for row in rows if "points" in row]
-    errors = [r.values.rounding for r in records if r.values.rounding is not None]
-    ends = dict.fromkeys(map(words, metrics.extent(np.concatenate(errors)))) if errors else "–"
+    if not records:
+        return dict.fromkeys(("rounding", "agreement"), "–")
+    low, high = metrics.extent(np.concatenate([record.values.rounding for record in records]))
+    ends = dict.fromkeys((words(low), words(high)))
     return {"rounding": " to ".join(ends), **_agreement(rows)}
 
 
@@ -172,17 +179,24 @@ def _agreement(rows: Sequence[Row]) -> dict[str, str]:
     return {"agreement": f"{sentence} {errors}."}
 
 
-def _step_summary(rows: Sequence[Row]) -> Summary:
-    return _summary(rows, TARGETS, "The fastest solvers of one implicit step, by its error:")
-
-
-def _summary(rows: Sequence[Row], targets: Mapping[str, float], title: str) -> Summary:
+def _summary(title: str, targets: Mapping[str, float], rows: Sequence[Row]) -> Summary:
     measured = [row for row in rows if "points" in row]
     sentences = [
         f"{cloth}: {listed([f'to {target} {_fastest(group, target)}' for target in targets])}"
         for cloth, group in grouped(measured, lambda row: str(row["cloth"])).items()
     ]
-    return Summary(title, tuple(sentences)) if measured else NO_SUMMARY
+    if not measured:
+        return NO_SUMMARY
+    target = [*targets][-1]
+    arrivals = [row[target] for row in measured if target in row]
+    firsts = [
+        min(of_cloth, key=lambda point: point.seconds).solver
+        for of_cloth in grouped(arrivals, lambda point: point.cloth).values()
+    ]
+    sentence = f"No solver reaches {target}, {title}."
+    if firsts:
+        sentence = f"The fastest to {target}, {title}, is {most_often(firsts, 'cloth')}."
+    return Summary(sentence, tuple(sentences))
 
 
 def _fastest(rows: Sequence[Row], target: str) -> str:
@@ -197,8 +211,8 @@ def _fastest(rows: Sequence[Row], target: str) -> str:
 
 one_step = Layout(
     **CAPTIONS.of("cloth_peers_step", _rounding),
-    subjects=_step_rows,
-    summary=_step_summary,
+    subjects=lambda results: _rows(results, ONE_STEP, TARGETS, {}),
+    summary=partial(_summary, "an error of one implicit step", TARGETS),
     figures=(step_chart,),
 )
 
@@ -209,13 +223,7 @@ def _motion_rows(results: Results) -> list[Row]:
         for record in results.all("cloth", task=STABILITY)
         for stiffness, cells in _limits(record)
     }
-    groups = grouped(points(results, MOTION), lambda point: (point.cloth, point.solver))
-    rows = [
-        _motion_row(group, {} if own else limits.get((solver, group[0].stiffness), {}))
-        for (_, solver), group in groups.items()
-        for own in [group[0].own]
-    ]
-    return _ranked(rows, "smallest distance from the truth", NEAR) + _missing(results)
+    return _rows(results, MOTION, MOTION_TARGETS, limits)
 
 
 def _limits(record: Record) -> Iterator[tuple[float, Row]]:
@@ -228,57 +236,22 @@ def _limits(record: Record) -> Iterator[tuple[float, Row]]:
         yield stiffness, cells
 
 
-def _motion_row(settings: Sequence[Point], limit: Row) -> Row:
-    errors = [point.motion_error for point in settings]
-    row = _row(settings, errors, MOTION_TARGETS)
-    stability = limit["stability"].details.remark if limit else ""
-    is_whole = np.isfinite(min(errors))
-    return {
-        **row,
-        "smallest distance from the truth": min(errors) if is_whole else None,
-        "smallest distance": row["best"].values["true"] if is_whole else None,
-        "remark": "; ".join(filter(None, (*_fates(settings), stability))),
-        **limit,
-    }
-
-
-def _fates(settings: Sequence[Point]) -> Iterator[str]:
-    """Yield which settings did not reach the end of the motion, and why."""
-    if diverged := [point.rung for point in settings if point.values["diverged"]]:
-        yield f"diverged with {listed(diverged)}"
-    if settings[0].remark:
-        yield settings[0].remark
-
-
-def _motion_summary(rows: Sequence[Row]) -> Summary:
-    title = "The fastest solvers of a motion, by its distance from the truth:"
-    summary = _summary(rows, MOTION_TARGETS, title)
-    return summary._replace(points=(*summary.points, *_stable(rows)))
-
-
-def _stable(rows: Sequence[Row]) -> Iterable[str]:
-    shares = {row["solver"]: row["stable up to"] for row in rows if "stable up to" in row}
-    if shares:
-        names = [f"{solver} {words(share)}" for solver, share in shares.items()]
-        yield f"longest stable step in units of 2 / ω: {listed(names)}"
-
-
 def _certainty(rows: Sequence[Row]) -> dict[str, str]:
-    """Return the change of the true motions by halved steps [m], and the range of their order."""
+    """Return the change of the true motions by halved steps, and the range of their order."""
     records = [row["points"][0].record for row in rows if "points" in row]
     if not records:
         return dict.fromkeys(("unsure", "low", "high", "agreement"), "–")
     orders = np.concatenate([record.values.order for record in records])
-    unsure = max(float(record.values.unsure.max()) for record in records)
+    unsure = words_in(max(float(record.values.unsure.max()) for record in records), "%")
     low, high = metrics.extent(orders)
-    numbers = {"unsure": words(unsure), "low": words(low), "high": words(high)}
+    numbers = {"unsure": unsure, "low": words(low), "high": words(high)}
     return {**numbers, **_agreement(rows)}
 
 
 motion = Layout(
     **CAPTIONS.of("cloth_peers_motion", _certainty),
     subjects=_motion_rows,
-    summary=_motion_summary,
+    summary=partial(_summary, "a distance from the true motion", MOTION_TARGETS),
     figures=(truth_chart,),
 )
 
@@ -305,7 +278,10 @@ def _liu_summary(rows: Sequence[Row]) -> Summary:
         f"error of {words(row['our error'])}, published {words_in(row['published time'], 'ms')}"
         for row in rows
     )
-    return Summary(f"A frame of {_vertices(rows)['vertices']} vertices:", tuple(sentences))
+    ratios = [row["published time"] / row["our time"] for row in rows]
+    least, greatest = map(words, metrics.extent(np.array(ratios)))
+    sentence = f"On another machine, our times are {least} to {greatest} times shorter."
+    return Summary(sentence, tuple(sentences))
 
 
 liu_2013 = Layout(

@@ -31,9 +31,10 @@ class ClothTruth(NamedTuple):
     inertial: FloatArray  # y of the first step, the positions without forces
     first: ExactStep  # the end of the first step of implicit Euler, to 25 digits
     true: FloatArray  # of the true motion, (frame, particle, 3)
-    path: FloatArray  # the rms distance that it moved until each frame [m], (frame,)
+    path: float  # the rms distance that it moved [m]
     order: float  # observed order of convergence of the true motion
-    unsure: float  # rms distance between the two finest motions at the end [m]
+    # rms distance between the two finest motions at the end, over the distance moved
+    unsure: float
 
 
 @functools.cache
@@ -41,11 +42,12 @@ def truth_of(cloth: FallingCloth, frames: int) -> ClothTruth:
     """Return the reference solutions for a cloth."""
     substeps = explicit_substeps(cloth.beat, _COARSE)
     coarse, middle, fine = (true_motion(cloth, frames, n * substeps) for n in (1, 2, 4))
-    unsure = metrics.rms_distance(middle[-1], fine[-1])
-    order = math.log2(metrics.rms_distance(coarse[-1], middle[-1]) / unsure)
+    distance = metrics.rms_distance(middle[-1], fine[-1])
+    order = math.log2(metrics.rms_distance(coarse[-1], middle[-1]) / distance)
     inertial = inertial_positions(cloth, cloth.frame)
-    path = np.array([metrics.rms_distance(x, cloth.start.positions) for x in fine])
-    return ClothTruth(inertial, first_step(cloth, cloth.frame), fine, path, order, unsure)
+    path = metrics.rms_distance(fine[-1], cloth.start.positions)
+    first = first_step(cloth, cloth.frame)
+    return ClothTruth(inertial, first, fine, path, order, distance / path)
 
 
 def first_step(cloth: FallingCloth, frame: float = FRAME) -> ExactStep:

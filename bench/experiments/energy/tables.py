@@ -55,9 +55,10 @@ def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
     for row in undamped:
         last, low, high = (words_in(float(row[x]), "%") for x in ("last", "minimum", "maximum"))
         points.append(f"{row['integrator']}: {last} (minimum {low}, maximum {high})")
+    changes = {abs(float(row["last"]) - 1.0): row["integrator"] for row in undamped}
     return Summary(
-        "Without dampers the energy should stay constant. Energy left after "
-        f"{steps} steps, and its range:",
+        f"Without dampers the energy should stay constant; after {steps} steps "
+        f"{changes[min(changes)]} is nearest to that, and {changes[max(changes)]} farthest.",
         tuple(points),
     )
 

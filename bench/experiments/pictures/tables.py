@@ -38,7 +38,11 @@ def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
         f"{words_in(row['rotation of a joint, largest'], '°')} between frames"
         for row in rows
     )
-    return Summary("Spacing of the points, and smoothness of the arm’s motion:", tuple(points))
+    angles = [words_in(row["rotation of a joint, largest"], "°") for row in rows]
+    angle = " when the curve is as drawn, and by up to ".join(angles[:2])
+    resampled = " when it is resampled" * (len(rows) > 1)
+    sentence = f"Between frames a joint rotates by up to {angle}{resampled}."
+    return Summary(sentence, tuple(points))
 
 
 def _solvers(rows: Sequence[dict[str, Any]]) -> dict[str, str]:

@@ -92,7 +92,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
     positions, rotations, jacobians = (words(_largest(q, valid)) for q in QUANTITIES)
     sentence = (
         f"Over {counted(len(files), 'file')} positions differ by at most "
-        f"{positions} of the extent, rotations by {rotations}, Jacobians by {jacobians}:"
+        f"{positions} of the extent, rotations by {rotations}, Jacobians by {jacobians}."
     )
     return Summary(sentence * bool(valid), tuple(_points(*_records(rows))))
 

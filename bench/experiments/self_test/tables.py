@@ -31,7 +31,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
         if not row["record"].values.passed
     ]
     points = (f"{family}: {_counts(members)}" for family, members in families.items())
-    return Summary(f"{_counts(rows)}:", (*failures, *points))
+    return Summary(f"{_counts(rows)}.", (*failures, *points))
 
 
 def _counts(rows: Sequence[Row]) -> str:
@@ -40,8 +40,8 @@ def _counts(rows: Sequence[Row]) -> str:
     caught, correct, accused = (
         sum(bool(row[title]) for row in rows) for title in ("caught", "named", "accused")
     )
-    planted = f"{caught} of {len(faults)} planted faults caught, {correct} named"
-    honest = f"{accused} of {len(rows) - len(faults)} honest solvers accused"
+    planted = f"{caught} of {len(faults)} planted faults are caught and {correct} are named"
+    honest = f"{accused} of {len(rows) - len(faults)} honest solvers are accused"
     return "; ".join([planted] * bool(faults) + [honest] * (len(faults) < len(rows)))
 
 

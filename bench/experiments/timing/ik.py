@@ -22,7 +22,7 @@ LIMITS: dict[str, Any] = {"tolerance": TOLERANCE, "max_iterations": MAX_ITERATIO
 LOOP = "levenberg_marquardt"
 KINEMATICS: dict[str, type[SkeletonEngine] | type[ReferenceKinematics]] = {
     registry.OUR_KINEMATICS.name: ReferenceKinematics,
-    **SKELETON_ENGINES,
+    **{loop.name: SKELETON_ENGINES[loop.engine] for loop in registry.LOOPS},
 }
 
 

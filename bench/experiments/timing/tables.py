@@ -21,6 +21,7 @@ from ...tables.results import (
     by_problem,
     grouped,
     leaders,
+    most_often,
     solvers,
     steadiness,
 )
@@ -147,10 +148,16 @@ def _summary(unit: str, rows: Sequence[Row]) -> Summary:
         works = grouped(group, lambda row: str(row["record"].details.work)).items()
         sentences = [f"{work}: {_times(unit, members)}" for work, members in works]
         points.append(f"{name} – {'; '.join(sentences)}")
+    rivals = [row for row in rows if row["implementation"] != PLAIN]
+    by_work = grouped(rivals, lambda row: str(row["work"])).values()
+    rankings = [ranked_by_time([row["record"] for row in members]) for members in by_work]
+    firsts = [ranking.order[0] for ranking in rankings if ranking]
+    fastest = "No two implementations were timed together."
+    if firsts:
+        fastest = f"The fastest implementation is {most_often(firsts, 'comparison')}."
     noise = _noise(rows)
-    warning = f"{steadiness(noise)} " if noise > PRECISION else ""
-    sentence = "Medians with their 95 % interval, without plain Python:"
-    return Summary(warning + sentence, tuple(points))
+    warning = f" {steadiness(noise)}" if noise > PRECISION else ""
+    return Summary(fastest + warning, tuple(points))
 
 
 def _times(unit: str, rows: Sequence[Row]) -> str:

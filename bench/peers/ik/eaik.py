@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from eaik.pybindings import EAIK
 
-from ...problems.robots import UnableError, links
+from ...problems.robots import UnableError
+from .axes import axes_at_zero, first_within
 from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
-from .solutions import first_within
 
 MAXIMUM_HINGES = 6
 
@@ -39,18 +39,3 @@ def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
         return Solve(partial(engine.calculate_IK, request.matrix), read)
 
     return ask
-
-
-def axes_at_zero(robot: BenchRobot) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return axes (joint, 3), offsets between them (joint + 1, 3), and the effector's rotation.
-
-    All are in the frame of the root, with every joint at zero.
-    """
-    T, axes, places = np.eye(4), [], [np.zeros(3)]
-    for transform, axis in links(robot):
-        T = T @ transform
-        if axis is not None:
-            axes.append(T[:3, :3] @ axis)
-            places.append(T[:3, 3])
-    places.append(T[:3, 3])
-    return np.array(axes), np.diff(places, axis=0), T[:3, :3]

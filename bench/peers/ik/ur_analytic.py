@@ -14,8 +14,8 @@ import ur_analytic_ik
 
 from ...problems.evaluate import Evaluator
 from ...problems.robots import UnableError
+from .axes import first_within
 from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
-from .solutions import first_within
 
 HINGES, SAMPLES = 6, 20
 # Of positions [m] and of rotation matrices: a model whose lengths are rounded otherwise is another.

@@ -1,6 +1,7 @@
 "use strict";
 // Tables that sort, filter, choose their columns, link to a row and copy what is shown. Controls are
 // made when a table is first seen. The address keeps the view: #table:row?sort=2-&columns=0.1&by1=X
+// A switch for the whole page chooses the solvers with one start or with restarts.
 (() => {
   const make = (tag, attributes, ...children) => {
     const element = Object.assign(document.createElement(tag), attributes);
@@ -22,6 +23,8 @@
     if (isNaN(x) && isNaN(y)) return sign * plain(a).localeCompare(plain(b), undefined, { numeric: true });
     return isNaN(x) ? 1 : isNaN(y) ? -1 : sign * (x - y);
   };
+  const starts = document.querySelectorAll("[name^=starts]");
+  const start = () => [...starts].find(input => input.checked)?.value;
   const listed = flags => flags.flatMap((on, j) => on ? j : []).join(".");
 
   class View {
@@ -30,11 +33,12 @@
       this.table = box.querySelector("table");
       this.body = this.table.tBodies[0];
       this.rows = [...this.body.rows];
-      this.groups = [...this.table.querySelectorAll("th.group")];
+      this.groups = [...this.table.querySelectorAll(".group")];
       this.heads = [...[...this.table.tHead.rows].at(-1).cells];
       this.titles = this.heads.map(plain);
       this.usual = this.heads.map(head => !head.classList.contains("folded"));
       this.menus = [];
+      this.limit = +box.dataset.limit || Infinity;
       this.reset();
       this.controls();
       this.show();
@@ -48,7 +52,9 @@
     controls() {
       this.status = make("span", { className: "status", role: "status" });
       this.chosen = make("p", { className: "chosen", hidden: true });
-      const bar = make("div", { className: "bar", role: "group", ariaLabel: this.table.caption.textContent });
+      this.more = button(() => { this.limit = Infinity; this.show(); });
+      this.more.className = "more";
+      const bar = make("details", { className: "bar" }, make("summary", {}, "Filter and copy"));
       this.heads.forEach((head, j) => {
         head.append(button(() => this.change(() => this.sortBy(j)), ...head.childNodes));
         const values = [...new Set(this.rows.map(row => plain(row.cells[j])))];
@@ -62,7 +68,7 @@
         bar.append(button(() => this.copy(this[form](), form), "Copy " + form));
       bar.append(button(() => this.change(() => this.reset()), "Reset"), this.status);
       this.box.prepend(bar);
-      this.box.append(this.chosen);
+      this.box.append(this.more, this.chosen);
       this.rows.forEach((row, i) => row.cells[0].append(make("a", {
         className: "link", href: "#" + row.id, tabIndex: i ? -1 : 0, ariaLabel: "Link and command of this row",
         onclick: event => { event.preventDefault(); this.pick(row); } })));
@@ -108,10 +114,15 @@
       const [by, sign] = this.sort, order = [...this.rows];
       if (sign) order.sort((a, b) => compare(a.cells[by], b.cells[by], sign));
       this.body.append(...order);
-      for (const row of order) row.hidden = this.only.some((values, j) =>
-        values.size && !values.has(plain(row.cells[j])));
+      for (const row of order) row.hidden = start() && ![start(), undefined].includes(row.dataset.start)
+        || this.only.some((values, j) => values.size && !values.has(plain(row.cells[j])));
       const shown = this.shownRows(), said = shown.map(row => plain(row.cells[0]));
-      shown.forEach((row, i) => row.cells[0].classList.toggle("same", i && said[i] === said[i - 1]));
+      shown.forEach((row, i) => {
+        row.cells[0].classList.toggle("same", i && said[i] === said[i - 1]);
+        row.classList.toggle("cut", i >= this.limit);
+      });
+      this.more.hidden = shown.length <= this.limit;
+      this.more.textContent = `Show all ${shown.length} rows`;
       for (const cells of [this.heads, ...this.rows.map(row => [...row.cells])])
         cells.forEach((cell, j) => cell.classList.toggle("folded", !this.columns[j]));
       let at = 0;
@@ -133,6 +144,7 @@
       this.remember();
     }
     choose(row) {
+      if (row) this.limit = Infinity;
       this.row?.removeAttribute("aria-current");
       this.row = row;
       this.chosen.hidden = !row;
@@ -157,8 +169,8 @@
       const columns = kept.get("columns")?.split(".");
       if (columns) this.columns = this.columns.map((_, j) => columns.includes(String(j)));
       for (const [key, value] of kept) if (/^by/.test(key)) this.only[key.slice(2)]?.add(value);
-      this.show();
       this.choose(row);
+      this.show();
     }
 
     // Heading and rows as they are seen, each cell written by a function.
@@ -207,12 +219,18 @@
   const views = new Map();
   const viewOf = box => views.get(box) ?? views.set(box, new View(box)).get(box);
   const prepare = part => part.querySelectorAll(".data").forEach(viewOf);
+  const turn = value => {
+    for (const input of starts) input.checked = input.value === value;
+    views.forEach(view => view.show());
+  };
+  for (const input of starts) input.onchange = () => turn(input.value);
   const follow = () => {
     const [, id, kept] = /^#([^?]*)\??(.*)$/s.exec(location.hash) ?? [];
     const found = document.getElementById(id), box = found?.closest(".data");
     if (!box) return;
     for (let fold = box; (fold = fold.parentElement.closest("details"));) fold.open = true;
     const row = found === box ? null : found.closest("tr");
+    if (row?.dataset.start) turn(row.dataset.start);
     viewOf(box).restore(new URLSearchParams(kept), row);
     found.scrollIntoView({ block: row ? "center" : "start", behavior: "instant" });
   };

@@ -23,12 +23,15 @@ from ...tables.table import Table
 from ..headlines import Overview
 from ..sections import SECTIONS, Section, offered
 from ..standings import Headline
+from .first_screen import DECADES, ClaimDot, RobotMap, claim_dots
 from .page_tables import PageTable, page_table, rich
 
 _FOLDER = Path(__file__).parent
 SCRIPT = motion.squeezed((_FOLDER / "page.js").read_text(encoding="utf-8"))
-# Unfolded columns of a chapter's main table; absent peers that the first screen names.
-MAX_COLUMNS, MAX_NAMED = 7, 5
+# Unfolded columns of a chapter's main table, and its rows until a reader asks for more.
+MAX_COLUMNS, MAX_ROWS = 7, 8
+# Sentences on the first screen: of chapters, your solver's ranks, wins of others, absent peers.
+MAX_SENTENCES = {"kinematics": 4, "cloth": 1, "speed": 1, "yours": 3, "wins": 2, "absent": 5}
 
 
 class Contents(NamedTuple):
@@ -38,18 +41,18 @@ class Contents(NamedTuple):
     drawings: Mapping[Figure, Drawing]
     answers: Overview
     scenes: Mapping[str, motion.Scene]
+    maps: Sequence[RobotMap]
 
 
 class Chapter(NamedTuple):
     """A chapter on the page."""
 
     section: Section  # name, title and introduction
-    headlines: list[Headline]  # on the first screen
-    figure: Drawing | None  # unfolded; None if it has none
+    headlines: list[Headline]  # its answers
+    figures: list[Drawing]  # unfolded
+    dots: list[ClaimDot]  # claims against their tolerances
     main: PageTable | None  # the unfolded table; None if it has none
     folds: list[PageTable]  # the other tables
-    scene: motion.Scene | None  # the motion that can be played; None if it has none
-    player: Markup  # of the motion, as markup
     unmeasured: list[str]  # questions of tables without records
     command: str  # that measures them
 
@@ -59,8 +62,7 @@ def render(contents: Contents, newest: Record, missing: Sequence[str]) -> str:
     scripts = [SCRIPT, *([motion.SCRIPT] if contents.scenes else [])]
     environment = motion.environment(_FOLDER)
     environment.filters |= {"rich": rich, "coded": coded, "inline": svg.inline}
-    environment.filters |= {"quoted": _quoted, "bare": _bare}
-    environment.filters["percent"] = partial(words_in, unit="%")
+    environment.filters |= {"percent": partial(words_in, unit="%"), "player": motion.fragment}
     return environment.get_template("page.html").render(
         style=Markup(BASE_STYLE + (_FOLDER / "page.css").read_text(encoding="utf-8")),
         motion_style=Markup(motion.STYLE if contents.scenes else ""),
@@ -71,9 +73,13 @@ def render(contents: Contents, newest: Record, missing: Sequence[str]) -> str:
         machine=_machine(newest),
         versions=newest.stamp.get("versions", {}),
         answers=contents.answers,
+        maps=contents.maps,
+        scenes=contents.scenes,
         chapters=[_chapter(section, contents) for section in SECTIONS],
         missing=missing,
-        max_named=MAX_NAMED,
+        max=MAX_SENTENCES,
+        max_rows=MAX_ROWS,
+        decades=DECADES,
         suffixes=("csv", "tex", "md"),
     )
 
@@ -86,16 +92,6 @@ def policy(scripts: Iterable[str]) -> str:
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; "
         "base-uri 'none'; form-action 'none'"
     )
-
-
-def _quoted(text: str) -> Markup:
-    """Return a text for an attribute in double quotes, where an apostrophe needs no escape."""
-    return Markup(str(Markup.escape(text)).replace("&#39;", "'"))
-
-
-def _bare(classes: str) -> Markup:
-    """Return classes as the value of an attribute, in quotes only if there are several."""
-    return Markup(f'"{classes}"' if " " in classes else classes)
 
 
 def coded(text: str) -> Markup:
@@ -119,31 +115,24 @@ def _chapter(section: Section, contents: Contents) -> Chapter:
     layouts = [layout for layout in section.layouts if contents.tables[layout].rows]
     drawings = {layout: [contents.drawings[f] for f in layout.figures if f in contents.drawings]
                 for layout in layouts}  # fmt: skip
-    every = [drawing for layout in layouts for drawing in drawings[layout]]
-    figure = next((drawing for drawing in every if drawing.name == section.figure), None)
-    main, folds = None, []
-    for layout in layouts:
-        figures = [drawing for drawing in drawings[layout] if drawing is not figure]
-        table = contents.tables[layout]
-        if layout.name == section.main:
-            main = page_table(layout.question, table, figures, MAX_COLUMNS)
-        else:
-            folds.append(page_table(layout.question, table, figures))
-    unmeasured, suites = [], []
-    for experiment in section.experiments:
-        for layout in offered(experiment):
-            if not layout.optional and not contents.tables[layout].rows:
-                unmeasured.append(layout.question)
-                suites.append(experiment.suite)
-    scene = contents.scenes.get(section.name)
+    shown = {layout.name: _page_table(layout, section, contents, drawings) for layout in layouts}
+    empty = [layout for layout in section.layouts if layout not in layouts and not layout.optional]
+    suites = [e.suite for e in section.experiments if {*offered(e)} & {*empty}]
     return Chapter(
         section,
         [headline for headline in contents.answers.headlines if headline.chapter == section.name],
-        figure,
-        main,
-        folds,
-        scene,
-        motion.fragment(scene) if scene else Markup(""),
-        unmeasured,
+        [d for layout in layouts for d in drawings[layout] if d.name in section.figures],
+        claim_dots(shown["check"]) if "check" in shown else [],
+        shown.pop(section.main, None),
+        list(shown.values()),
+        [layout.question for layout in empty],
         shlex.join(["plumbob", "bench", *dict.fromkeys(suites)]),
     )
+
+
+def _page_table(
+    layout: Layout, section: Section, contents: Contents, drawings: Mapping[Layout, list[Drawing]]
+) -> PageTable:
+    figures = [drawing for drawing in drawings[layout] if drawing.name not in section.figures]
+    columns = MAX_COLUMNS if layout.name == section.main else None
+    return page_table(layout.question, contents.tables[layout], figures, columns)

@@ -1,6 +1,7 @@
-"""A table on the page: cells as markup, an address for each row, folded columns."""
+"""A table on the page: aligned numbers, bars, an address for each row, folded columns."""
 
 import itertools
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -11,39 +12,54 @@ from markupsafe import Markup
 from ...figures.sketch import Drawing
 from ...harness.metrics import Share
 from ...tables.results import label
-from ...tables.table import Cell, Column, Source, Summary, Table, best_cells, words
+from ...tables.table import (
+    Cell,
+    Source,
+    Summary,
+    Table,
+    best_cells,
+    number_of,
+    words,
+)
 from ...tables.writers import POWER
+
+# The column that the page's switch between one start and restarts replaces.
+STARTS = "starts"
+# Spaces as wide as a digit and as a decimal point.
+_DIGIT, _POINT = "\u2007", "\u2008"
 
 
 class PageHead(NamedTuple):
     """A heading: its classes, the best of the column, and whether it filters rows.
 
-    `lead` is the part of the title that the heading of its group repeats, and is hidden.
+    `lead` is the part of the title that the heading of its group repeats, and is hidden; `unit` is
+    the unit of numbers, or the number of trials behind shares.
     """
 
-    column: Column
     classes: str
     best: str
     filter: bool
     lead: str
     rest: str
+    unit: str
 
 
 class PageCell(NamedTuple):
-    """A cell as markup; numbers and shares also as digits, for sorting."""
+    """A cell as markup; numbers and shares also as digits for sorting, and as a bar [%]."""
 
     tag: str
     text: Markup
     classes: str
     digits: str
-    ties: bool
+    bar: str
 
 
 class PageRow(NamedTuple):
-    """A row: its address within the page, its cells, and the command that measures it again."""
+    """A row: its address within the page, its cells, its start, and the command that repeats it."""
 
     address: str
     cells: list[PageCell]
+    start: str
     command: str
 
 
@@ -52,13 +68,13 @@ class PageTable(NamedTuple):
 
     name: str  # its address within the page
     question: str  # that it answers
+    answer: str  # to the question, in a sentence
     table: Table  # whose cells it shows
     # name and span of headings above several columns; empty if there are none
     groups: list[tuple[str, int]]
     heads: list[PageHead]  # headings of the columns
     rows: list[PageRow]  # its rows
-    best: str  # "best" if some cells are best, "ties" if some of them tie, else ""
-    gist: str  # its message in a line
+    marks: set[str]  # the classes of its cells, such as "best" and "tie"
     drawings: list[Drawing]  # figures beside it
 
 
@@ -66,32 +82,19 @@ def page_table(
     question: str, table: Table, drawings: Sequence[Drawing], unfolded: int | None = None
 ) -> PageTable:
     """Return a table for the page, with at most so many unfolded columns."""
-    solver, best = _solver_column(table), best_cells(table)
-    open_columns = [j for j, column in enumerate(table.columns) if not column.folded][:unfolded]
-    heads = []
-    for j, column in enumerate(table.columns):
-        marks = ("words" * column.words, "folded" * (j not in open_columns), "who" * (j == solver))
-        lead = column.title.removesuffix(column.below) if column.group else ""
-        heads.append(
-            PageHead(
-                column,
-                " ".join(filter(None, marks)),
-                column.best,
-                j < table.compared or j in (0, solver),
-                lead,
-                column.titled.removeprefix(lead),
-            )
-        )
-    rows = _rows(table, heads, best)
+    solver = _solver_column(table)
+    is_folded = [column.folded or column.title == STARTS for column in table.columns]
+    visible = [j for j, folded in enumerate(is_folded) if not folded][:unfolded]
+    heads = [_head(table, j, j not in visible, j == solver) for j in range(len(table.columns))]
+    rows = _rows(table, heads)
     groups: list[tuple[str, int]] = []
     if any(column.group for column in table.columns):
         runs = itertools.groupby(table.columns, key=lambda column: column.group)
         groups = [(name, len(list(columns))) for name, columns in runs]
-    has_ties = any(cell.ties for row in rows for cell in row.cells)
-    mark = "ties" if has_ties else "best" * bool(best)
-    message = gist(table.summary)
+    marks = {mark for row in rows for cell in row.cells for mark in cell.classes.split()}
+    answer = gist(table.summary)
     return PageTable(
-        table.name, question, table, groups, heads, rows, mark, message, list(drawings)
+        table.name, question, answer, table, groups, heads, rows, marks, list(drawings)
     )
 
 
@@ -100,6 +103,19 @@ def gist(summary: Summary) -> str:
     if not summary.sentence.endswith(":") or not summary.points:
         return summary.sentence
     return f"{summary.sentence} {summary.points[0]}" + ("; …" if len(summary.points) > 1 else "")
+
+
+def _head(table: Table, j: int, folded: bool, names_solver: bool) -> PageHead:
+    """Return the heading of a column."""
+    column = table.columns[j]
+    marks = ("words" * column.words, "folded" * folded, "who" * names_solver)
+    lead = column.title.removesuffix(column.below) if column.group else ""
+    has_filter = (j < table.compared or j == 0 or names_solver) and column.title != STARTS
+    totals = sorted(cell.total for row in table.rows if isinstance(cell := row[j], Share))
+    sizes = dict.fromkeys(words(total) for total in (*totals[:1], *totals[-1:]))
+    unit = f"n = {' to '.join(sizes)}" if sizes else column.unit and f"[{column.unit}]"
+    title = column.titled.removeprefix(lead)
+    return PageHead(" ".join(filter(None, marks)), column.best, has_filter, lead, title, unit)
 
 
 def _solver_column(table: Table) -> int | None:
@@ -118,30 +134,80 @@ def _names_solvers(table: Table, j: int) -> bool:
     )
 
 
-def _rows(table: Table, heads: Sequence[PageHead], best: set[tuple[int, int]]) -> list[PageRow]:
+def _rows(table: Table, heads: Sequence[PageHead]) -> list[PageRow]:
     """Return the rows; a first cell that repeats the cell above it is marked."""
+    best = best_cells(table)
     ties = Counter((table.rows[i][: table.compared], j) for i, j in best)
+    columns = range(len(table.columns))
+    texts, bars = [_texts(table, j) for j in columns], [_bars(table, j) for j in columns]
     rows: list[PageRow] = []
     addresses = Counter[str]()
     for i, row in enumerate(table.rows):
         cells = []
-        for j, (cell, head) in enumerate(zip(row, heads, strict=True)):
-            marks = [head.classes]
-            if head.column.title == "verdict":
-                marks.append("held" if cell == "held" else "missed")
+        for j, cell in enumerate(row):
             is_tie = (i, j) in best and ties[row[: table.compared], j] > 1
-            marks += ["best" * ((i, j) in best), "tie" * is_tie]
-            if j == 0 and i and cell == table.rows[i - 1][0]:
-                marks.append("same")
-            classes = " ".join(filter(None, marks))
-            tag = "td" if j else "th"
-            cells.append(PageCell(tag, rich(words(cell)), classes, _digits(cell), is_tie))
+            is_same = j == 0 and i > 0 and cell == table.rows[i - 1][0]
+            marks = [heads[j].classes, "best" * ((i, j) in best), "tie" * is_tie, "same" * is_same]
+            if table.columns[j].title == "verdict":
+                marks.append("held" if cell == "held" else "missed")
+            tag, classes = "td" if j else "th", " ".join(filter(None, marks))
+            cells.append(PageCell(tag, texts[j][i], classes, _digits(cell), bars[j][i]))
         address = _address(table, row)
         addresses[address] += 1
         number = f":{addresses[address]}" if addresses[address] > 1 else ""
+        start = next((words(c) for c, k in zip(row, table.columns, strict=True)
+                      if k.title == STARTS), "")  # fmt: skip
         source = table.sources[i] if table.sources else Source()
-        rows.append(PageRow(f"{address}{number}", cells, source.command))
+        rows.append(PageRow(f"{address}{number}", cells, start, source.command))
     return rows
+
+
+def _texts(table: Table, j: int) -> list[Markup]:
+    """Return the cells of a column, their decimal points below each other."""
+    texts = [words(row[j]) for row in table.rows]
+    plain = [not isinstance(row[j], str | Share) and "e" not in words(row[j]) for row in table.rows]
+    decimals = [len(text.partition(".")[2]) for text in texts]
+    most = max(itertools.compress(decimals, plain), default=0)
+    markups = []
+    for row, text, is_plain, count in zip(table.rows, texts, plain, decimals, strict=True):
+        padding = _POINT * (count == 0 < most) + _DIGIT * (most - count) if is_plain else ""
+        markup = _share(cell) if isinstance(cell := row[j], Share) else rich(text)
+        markups.append(markup + padding)
+    return markups
+
+
+def _share(share: Share) -> Markup:
+    """Return a share to a tenth of a percent with its interval; 100.0 % only without a miss."""
+    if not share.total:
+        return Markup("–")
+    rate = 100 * share.hits / share.total
+    rate = min(rate, 99.9) if share.hits < share.total else rate
+    rate = max(rate, 0.1) if share.hits else rate
+    low, high = (f"{100 * bound:.1f}" for bound in (share.low, share.high))
+    title = f"{words(share.hits)} of {words(share.total)}"
+    return Markup(f'<span title="{title}">{rate:.1f} %</span> <small>({low}–{high})</small>')
+
+
+def _bars(table: Table, j: int) -> list[str]:
+    """Return shares, and results relative to the best of their group, as lengths of bars [%]."""
+    column, numbers = table.columns[j], [number_of(row[j]) for row in table.rows]
+    groups = [row[: table.compared] for row in table.rows]
+    firsts: dict[tuple[Cell, ...], float] = {}
+    for group, number in zip(groups, numbers, strict=True):
+        if not math.isnan(number):
+            pick = max if column.best == "greatest" else min
+            firsts[group] = pick(number, firsts.get(group, number))
+    bars = []
+    for row, group, number in zip(table.rows, groups, numbers, strict=True):
+        if isinstance(row[j], Share):
+            length = number
+        elif column.best and number > 0:
+            first = firsts[group]
+            length = number / first if column.best == "greatest" else first / number
+        else:
+            length = math.nan
+        bars.append("" if math.isnan(length) else f"{100 * length:.3g}")
+    return bars
 
 
 def _address(table: Table, row: Sequence[Cell]) -> str:

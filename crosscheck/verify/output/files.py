@@ -19,22 +19,21 @@ RIGHT, WRONG, FAILED = 0, 1, 2
 
 
 class Files(NamedTuple):
-    """The files to write, None for none; a folder gets all three and the failing cases."""
+    """The files to write, None for none; a folder gets all of them and the failing cases."""
 
     json: Path | None
     junit: Path | None
     html: Path | None
+    card: Path | None
     folder: Path | None
 
-    def paths(self) -> tuple[Path | None, Path | None, Path | None]:
-        """Return the paths of JSON, JUnit XML and the page."""
+    def paths(self) -> tuple[Path | None, ...]:
+        """Return the paths of JSON, JUnit XML, the page and the card."""
+        paths = self.json, self.junit, self.html, self.card
         if self.folder is None:
-            return self.json, self.junit, self.html
-        return (
-            self.json or self.folder / "verdict.json",
-            self.junit or self.folder / "verdict.xml",
-            self.html or self.folder / "index.html",
-        )
+            return paths
+        names = "verdict.json", "verdict.xml", "index.html", "card.svg"
+        return tuple(path or self.folder / name for path, name in zip(paths, names, strict=True))
 
     def write(self, report: Report, question: Question, context: Presentation) -> int:
         """Print the screen, write the files, and return the exit code: 2 if writing fails."""
@@ -52,6 +51,7 @@ class Files(NamedTuple):
             lambda: json_file.text(report, context.say),
             lambda: junit.text(report, context.say),
             lambda: page.render(report, context),
+            lambda: page.card(report, context),
         )
         finished = [
             _attempt(path, partial(_write, path, make), failures)

@@ -1,10 +1,12 @@
-"""The result of `verify` as a self-contained page, with the failing cases drawn."""
+"""The result of `verify` as a self-contained page, with the failing cases drawn, and as a card."""
 
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
+from rich.cells import cell_len
 
 from ..judgement import Report, TaskReport
 from ..sentence import Sentence, sentence
@@ -32,20 +34,36 @@ WORDS = {
 }
 
 
-def render(report: Report, context: Presentation) -> str:
-    """Return the page, all texts of the solver escaped."""
+def _template(name: str, context: Presentation) -> Template:
+    """Return a template, which escapes all texts of the solver."""
     environment = Environment(
         loader=FileSystemLoader(_FOLDER), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
+    environment.globals |= {"words": WORDS, "verdicts": words.VERDICTS}
     environment.filters |= {
         "say": context.say, "numbers": comparison.texts, "digits": words.digits,
+        "title": words.title, "passed": words.passed,
     }  # fmt: skip
-    return environment.get_template("page.html").render(
+    return environment.get_template(name)
+
+
+def card(report: Report, context: Presentation) -> str:
+    """Return the verdicts as a small SVG, for the README of a solver."""
+    introduction = words.introduction(report)
+    source = sentence("Judged by Plumbob {version}", version=version("plumbob"))
+    names = [words.title(task) for task in report.tasks]
+    widest = max(map(cell_len, [*names, context.say(introduction)]))
+    return _template("card.svg", context).render(
+        report=report, introduction=introduction, source=source, width=max(20, widest)
+    )
+
+
+def render(report: Report, context: Presentation) -> str:
+    """Return the page."""
+    return _template("page.html", context).render(
         style=Markup(BASE_STYLE + (_FOLDER / "page.css").read_text(encoding="utf-8")),
         language={"zh": "zh-CN"}.get(context.language, context.language),
-        words=WORDS,
-        verdicts=words.VERDICTS,
         introduction=words.introduction(report),
         advice=words.advice(report.tasks),
         remarks=list(words.remarks(report)),

@@ -1,6 +1,5 @@
 """Laws of the sparse Cholesky factor and of each step towards it."""
 
-import itertools
 from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
@@ -93,17 +92,6 @@ def filled(dense):
     return np.tril(pattern)
 
 
-def lower(factor):
-    """Return L, sparse, with the explicit zeros of its blocks."""
-    columns, starts, rows, _ = factor.pattern.blocks
-    lists = []
-    for s, (first, last) in enumerate(itertools.pairwise(columns)):
-        block = np.r_[first:last, rows[starts[s] : starts[s + 1]]]
-        lists += [block[column:] for column in range(last - first)]
-    indptr = np.cumsum([0, *map(len, lists)])
-    return scipy.sparse.csc_array((factor._values, np.concatenate(lists), indptr))
-
-
 def rounding(matrix):
     """Return how far n roundings can move L L' or A x: a bound far above what they do."""
     return 2 * matrix.shape[0] * EPS * abs(matrix).max()
@@ -111,7 +99,7 @@ def rounding(matrix):
 
 def check_factor(matrix):
     factor = CholeskyFactor(matrix)
-    order, L = factor.pattern.order, lower(factor)
+    order, L = factor.pattern.order, factor.lower()
     np.testing.assert_array_equal(np.sort(order), np.arange(matrix.shape[0]))
     product = (L @ L.T).toarray()
     permuted = matrix.toarray()[np.ix_(order, order)]
@@ -135,7 +123,7 @@ def test_the_stored_pattern_is_that_of_elimination_and_a_few_zeros(backend, matr
     factor = CholeskyFactor(matrix)
     order = factor.pattern.order
     needed = filled(matrix.toarray()[np.ix_(order, order)])
-    stored = lower(factor)
+    stored = factor.lower()
     stored.data[:] = 1.0
     stored = stored.toarray() != 0
     assert (stored | ~needed).all()
