@@ -14,7 +14,7 @@ from ..tables.table import words
 from .rows import ChangeVerdict, Pair, RowChange, RowKey
 
 # Arrays of measured times [s], by suite; the default is for all other suites.
-_DEFAULT_TIMES = frozenset({"seconds", "setup", "overhead"})
+_DEFAULT_TIMES = frozenset({"seconds", "setup", "control", "overhead"})
 _TIMES: Mapping[str, frozenset[str]] = {
     "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"})
 }
