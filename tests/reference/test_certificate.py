@@ -220,49 +220,6 @@ class TestDistance:
         assert integrator.certify(state, result).coverage == Coverage.PINS_ASTRAY
 
 
-class TestMinimisers:
-    """Whether two answers stand for one and the same minimiser."""
-
-    @pytest.fixture
-    def buckled(self):
-        """A compressed mass between two pins, with minima above and below the line."""
-        pins = [[-0.5, 0, 0], [0.5, 0, 0], [0, 0, -2], [0, 0, 2]]
-        system = MassSpring(
-            np.ones(5), [[0, 1], [0, 2], [0, 3], [0, 4]], [1, 1, 0.5, 0.5], [100, 100, 60, 60],
-            pinned=[1, 2, 3, 4], gravity=(0, 0, 0),
-        )  # fmt: skip
-        objective = ImplicitEuler(system, h=1.0).objective(
-            State([[0, 0, 0], *pins], np.zeros((5, 3)))
-        )
-        up = objective.y.copy()
-        up[0, 1] = 0.7
-        for _ in range(20):
-            step = np.linalg.solve(free_hessian(objective, up), objective.gradient(up)[0])
-            up[0] -= step
-        return objective, up, up * [1, -1, 1]
-
-    def test_two_minima_are_distinguished(self, buckled):
-        objective, up, down = buckled
-        one, other = certify(objective, up), certify(objective, down)
-        assert objective.value(up) == pytest.approx(objective.value(down), rel=1e-12)
-        assert one.covered
-        assert one.shares_minimiser(other, np.linalg.norm(up - down)) is False
-        assert one.shares_minimiser(one, 0.0) is True
-
-    def test_without_a_bound_nothing_is_proven(self, buckled):
-        objective, up, _ = buckled
-        flat = certify(objective, objective.y)
-        assert not flat.covered
-        assert certify(objective, up).shares_minimiser(flat, 0.0) is None
-        assert flat.shares_minimiser(flat, 0.0) is None
-
-    def test_a_gap_between_two_balls_is_proof_but_an_overlap_is_not(self):
-        one = certificate.Certificate(0.0, Coverage.COVERED, 1.0, 1.5, 1.0, 1.0, 0.4)
-        assert one.shares_minimiser(one, 0.4) is True
-        assert one.shares_minimiser(one, 1.0) is None
-        assert one.shares_minimiser(one, 2.1) is False
-
-
 class TestReasons:
     """Each reason for no bound has its case."""
 
