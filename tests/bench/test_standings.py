@@ -175,14 +175,12 @@ def test_the_first_screen_of_the_page_begins_with_the_solver_of_the_user(make, t
     assert any(line.startswith("Right? ") for line in lines)
     page = made.page.read_text("utf-8")
     screen = page[page.index('<section id="answers"') : page.index("</section>")]
-    (heading,) = re.findall("<h1[^>]*>(.*?)</h1>", screen)
-    assert heading.startswith("Mine ranks 3 of 3: ")
-    for standing in standings(Results(RecordFile(tmp_path).read().records)):
+    assert screen.index("</h1>") < screen.index("Mine ranks 3 of 3: ") < screen.index("not checked")
+    for standing in standings(Results(RecordFile(tmp_path).read().records))[:3]:
         assert f'href="#{standing.table}"' in screen
         assert standing.sentence in screen
         assert standing.question in screen
-    assert screen.index("Your solver") < screen.index("Not checked yet")
-    assert RAISED in screen
+    assert screen.index("Your solver") < screen.index("not checked")
 
 
 @pytest.mark.parametrize("width", [80, 120])
@@ -195,7 +193,7 @@ def test_a_bench_ends_with_the_solver_of_the_user_and_who_leads(
     assert len(lines) <= {80: 20, 120: 14}[width]  # nine sentences, of which most take two lines
     assert max(map(len, lines)) <= width
     said = " ".join(lines)
-    for standing in standings(Results(RecordFile(tmp_path).read().records)):
+    for standing in standings(Results(RecordFile(tmp_path).read().records))[:3]:
         assert f"Yours: {standing.sentence}" in said
     assert lines[0].startswith("Yours: Mine ranks 3 of 3: ")
     assert said.index("trouble on 1 of 2 problems") < said.index("Best: On the arm from one start")

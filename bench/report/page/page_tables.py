@@ -47,7 +47,6 @@ class PageHead(NamedTuple):
 class PageCell(NamedTuple):
     """A cell as markup; numbers and shares also as digits for sorting, and as a bar [%]."""
 
-    tag: str
     text: Markup
     classes: str
     digits: str
@@ -86,7 +85,7 @@ def page_table(
     is_folded = [column.folded or column.title == STARTS for column in table.columns]
     visible = [j for j, folded in enumerate(is_folded) if not folded][:unfolded]
     heads = [_head(table, j, j not in visible, j == solver) for j in range(len(table.columns))]
-    rows = _rows(table, heads)
+    rows = _rows(table)
     groups: list[tuple[str, int]] = []
     if any(column.group for column in table.columns):
         runs = itertools.groupby(table.columns, key=lambda column: column.group)
@@ -134,11 +133,11 @@ def _names_solvers(table: Table, j: int) -> bool:
     )
 
 
-def _rows(table: Table, heads: Sequence[PageHead]) -> list[PageRow]:
+def _rows(table: Table) -> list[PageRow]:
     """Return the rows; a first cell that repeats the cell above it is marked."""
     best = best_cells(table)
     ties = Counter((table.rows[i][: table.compared], j) for i, j in best)
-    columns = range(len(table.columns))
+    columns, titles = range(len(table.columns)), [column.title for column in table.columns]
     texts, bars = [_texts(table, j) for j in columns], [_bars(table, j) for j in columns]
     rows: list[PageRow] = []
     addresses = Counter[str]()
@@ -147,16 +146,15 @@ def _rows(table: Table, heads: Sequence[PageHead]) -> list[PageRow]:
         for j, cell in enumerate(row):
             is_tie = (i, j) in best and ties[row[: table.compared], j] > 1
             is_same = j == 0 and i > 0 and cell == table.rows[i - 1][0]
-            marks = [heads[j].classes, "best" * ((i, j) in best), "tie" * is_tie, "same" * is_same]
-            if table.columns[j].title == "verdict":
+            marks = ["best" * ((i, j) in best), "tie" * is_tie, "same" * is_same]
+            if titles[j] == "verdict":
                 marks.append("held" if cell == "held" else "missed")
-            tag, classes = "td" if j else "th", " ".join(filter(None, marks))
-            cells.append(PageCell(tag, texts[j][i], classes, _digits(cell), bars[j][i]))
+            classes = " ".join(filter(None, marks))
+            cells.append(PageCell(texts[j][i], classes, _digits(cell), bars[j][i]))
         address = _address(table, row)
         addresses[address] += 1
         number = f":{addresses[address]}" if addresses[address] > 1 else ""
-        start = next((words(c) for c, k in zip(row, table.columns, strict=True)
-                      if k.title == STARTS), "")  # fmt: skip
+        start = words(row[titles.index(STARTS)]) if STARTS in titles else ""
         source = table.sources[i] if table.sources else Source()
         rows.append(PageRow(f"{address}{number}", cells, start, source.command))
     return rows
