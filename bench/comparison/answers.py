@@ -3,7 +3,7 @@
 The catalogue of arrays is here: which hold times, which are better when smaller or larger.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..tables.table import words
 from .rows import ChangeVerdict, Pair, RowChange, RowKey
 
 # Arrays of measured times [s], by suite; the default is for all other suites.
-_DEFAULT_TIMES = frozenset({"seconds", "setup", "overhead"})
+_DEFAULT_TIMES = frozenset({"seconds", "setup", "control", "overhead"})
 _TIMES: Mapping[str, frozenset[str]] = {
     "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"})
 }
@@ -31,6 +31,9 @@ _DISTANCES = frozenset({("cloth", "distance"), ("newton", "distance")})
 _MERITS = frozenset({"solved", "held", "covered", "same"})
 # Which targets were solved; records with this array have times by target too.
 SOLVED = "solved"
+# Statistics of a row, and the arrays whose smallest entry is one.
+SHARE, ERROR = "share solved", "smallest error"
+_SMALLEST = {"error", "true"}
 # The setting of a time limit per solve, which makes answers differ from run to run.
 _TIME_LIMIT = "seconds"
 SAME_BITS = "the same to the bit"
@@ -72,6 +75,31 @@ def compare_answers(key: RowKey, pair: Pair) -> RowChange:
     order = (ChangeVerdict.LESS_RIGHT, ChangeVerdict.CHANGED, ChangeVerdict.MORE_RIGHT)
     by_verdict = {change.verdict: change for change in reversed(changes)}
     return next((by_verdict[v] for v in order if v in by_verdict), changes[0])
+
+
+def compare_statistics(key: RowKey, pair: Pair) -> Iterator[RowChange]:
+    """Yield the change of the share solved, in shares, and of the smallest error, by a factor - 1.
+
+    Only changes are yielded, of rows of which both runs have as much.
+    """
+    if pair.old.size != pair.new.size:
+        return
+    if all(SOLVED in record.arrays for record in pair):
+        old, new = (float(np.mean(record.arrays[SOLVED])) for record in pair)
+        why = f"from {100 * old:.1f} % to {100 * new:.1f} %"
+        yield from _statistic(key, SHARE, new - old, f"{'fell' if new < old else 'rose'} {why}")
+    for name in _SMALLEST & pair.old.arrays.keys() & pair.new.arrays.keys():
+        errors = (np.asarray(record.arrays[name], dtype=float) for record in pair)
+        old, new = (float(np.min(a[np.isfinite(a)], initial=np.inf)) for a in errors)
+        if min(old, new) > 0:
+            why = f"{'grew' if new > old else 'shrank'} from {words(old)} to {words(new)}"
+            yield from _statistic(key, ERROR, 1 - new / old if new > old else old / new - 1, why)
+
+
+def _statistic(key: RowKey, name: str, gain: float, why: str) -> Iterator[RowChange]:
+    if gain:
+        verdict = ChangeVerdict.MORE_RIGHT if gain > 0 else ChangeVerdict.LESS_RIGHT
+        yield RowChange(key, name, verdict, abs(gain), f"{name} {why}")
 
 
 def chance_by_time_limit(pair: Pair) -> float | None:

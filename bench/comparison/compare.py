@@ -4,6 +4,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from textwrap import wrap
 from typing import NamedTuple
 
@@ -13,7 +14,14 @@ from ..tables.columns import text
 from ..tables.results import counted
 from ..tables.table import Summary, Table, cells
 from ..text import visible
-from .answers import chance_by_time_limit, compare_answers, compare_limited_answers
+from .answers import (
+    ERROR,
+    SHARE,
+    chance_by_time_limit,
+    compare_answers,
+    compare_limited_answers,
+    compare_statistics,
+)
 from .rows import (
     ORDER,
     ChangeVerdict,
@@ -37,6 +45,15 @@ from .times import (
     time_ratios,
 )
 
+# What --fail takes, by the first word; and what a gate of the user's solvers takes by default.
+LIMITS = {
+    "accuracy": "accuracy or accuracy:SHARE",
+    "time": "time:SHARE",
+    "solved": "solved:POINTS",
+    "error": "error:SHARE",
+    "gone": "gone",
+}
+OF_SOLVERS = "solved:1,error:100%,time:25%,gone"
 # Lines of the summary on a terminal; rows of the table in a pull request.
 MAX_LINES, MAX_ROWS = 10, 50
 # Indentation of the second line of a row on a terminal, as wide as its verdict.
@@ -58,20 +75,24 @@ class RunComparison(NamedTuple):
     short: int = 0  # number of times with too few rounds to be compared
 
 
-def compare(old: Iterable[Record], new: Iterable[Record]) -> RunComparison:
-    """Return the differences between the records of two runs."""
+def compare(
+    old: Iterable[Record], new: Iterable[Record], statistics: bool = False
+) -> RunComparison:
+    """Return the differences between the records of two runs, also of statistics if asked for."""
     before, after = by_row(old), by_row(new)
     pairs, changes = match_rows(before, after)
     drift = machine_drift(pairs)
-    rows = [*changes, *row_changes(pairs, time_ratios(pairs, drift))]
+    rows = [*changes, *row_changes(pairs, time_ratios(pairs, drift), statistics)]
     short = sum(not has_rounds(p, name) for p in pairs.values() for name in common_times(p))
     return RunComparison(worst_first(rows), drift, METHOD, short=short)
 
 
 def row_changes(
-    pairs: Mapping[RowKey, Pair], ratios: Mapping[tuple[RowKey, str], TimeRatio | str]
+    pairs: Mapping[RowKey, Pair],
+    ratios: Mapping[tuple[RowKey, str], TimeRatio | str],
+    statistics: bool,
 ) -> list[RowChange]:
-    """Return the change of the answers of each pair, and of each of its times."""
+    """Return the change of the answers of each pair, of each of its times, and of statistics."""
     limited = {
         key: chance for key, pair in pairs.items()
         if (chance := chance_by_time_limit(pair)) is not None
@@ -81,6 +102,9 @@ def row_changes(
     chances = iter(adjusted(raw).tolist())
     rows = [compare_limited_answers(k, pairs[k], next(chances), ERROR_RATE) for k in limited]
     rows += [compare_answers(key, pair) for key, pair in pairs.items() if key not in limited]
+    if statistics:
+        decided = ((key, pairs[key]) for key in pairs if key not in limited)
+        rows += [change for key, pair in decided for change in compare_statistics(key, pair)]
     for (key, name), ratio in ratios.items():
         if isinstance(ratio, str):
             rows.append(RowChange(key, name, ChangeVerdict.UNDECIDED, why=ratio))
@@ -90,43 +114,54 @@ def row_changes(
 
 
 def gate_limits(request: str) -> dict[str, float]:
-    """Return the least relative changes that fail a gate, from a text such as "accuracy,time:10%".
+    """Return the least changes that fail a gate, from a text such as "solved:1,time:25%".
 
     Raises:
         ValueError: if a part of it is no limit.
     """
     limits: dict[str, float] = {}
     for part in filter(None, (part.strip() for part in request.split(","))):
-        name, _, share = part.partition(":")
-        if name not in ("accuracy", "time", "gone") or (name == "gone" and share):
-            raise ValueError(
-                f"--fail: expected accuracy, accuracy:SHARE, time:SHARE or gone, got {part!r}"
-            )
+        name, _, text = part.partition(":")
+        if name not in LIMITS or (name == "gone" and text):
+            raise ValueError(f"--fail: expected {', '.join(LIMITS.values())}, got {part!r}")
         try:
-            limits[name] = float(share.removesuffix("%") or 0) / (100 if "%" in share else 1)
+            number = float(text.removesuffix("%") or 0)
         except ValueError:
-            limits[name] = math.nan
+            number = math.nan
+        limits[name] = number / 100 if "%" in text or name == "solved" else number
         if not 0 <= limits[name] < math.inf:
-            raise ValueError(f"--fail: expected a share such as 10% or 0.1, got {part!r}")
+            raise ValueError(f"--fail: expected a number such as 10% or 0.1, got {part!r}")
     return limits
 
 
 def failing(rows: Iterable[RowChange], limits: Mapping[str, float]) -> list[RowChange]:
-    """Return the rows that fail a gate."""
-    accuracy, time = (limits.get(name, math.inf) for name in ("accuracy", "time"))
-    return [
-        row for row in rows
-        if (row.verdict in (ChangeVerdict.LESS_RIGHT, ChangeVerdict.CHANGED)
-            and row.change >= accuracy)
-        or (row.verdict == ChangeVerdict.SLOWER and row.ratio and row.ratio.ratio >= 1 + time)
-        or (row.verdict == ChangeVerdict.GONE and "gone" in limits)
-    ]  # fmt: skip
+    """Return the rows that fail a gate, with the limit at the end of their sentence."""
+    exceeded = ((row, _exceeded_limit(row, limits)) for row in rows)
+    return [replace(row, why=f"{row.why} ({limit})") for row, limit in exceeded if limit]
+
+
+def _exceeded_limit(row: RowChange, limits: Mapping[str, float]) -> str:
+    """Return the limit that a row exceeds as words, "" if there is none."""
+    names = {SHARE: "solved", ERROR: "error"}
+    name = names.get(row.quantity, "accuracy")
+    limit = limits.get(name, math.inf)
+    if row.verdict == ChangeVerdict.GONE and "gone" in limits:
+        return "no row may be gone"
+    if row.verdict == ChangeVerdict.SLOWER and row.ratio:
+        limit = 1 + limits.get("time", math.inf)
+        return f"limit {limit:.4g}" if row.ratio.ratio >= limit else ""
+    if row.verdict == ChangeVerdict.LESS_RIGHT and name == "solved" and row.change > limit + 1e-9:
+        return f"limit {100 * limit:.3g} point{'' if limit == 0.01 else 's'}"
+    if row.verdict == ChangeVerdict.LESS_RIGHT and name == "error" and row.change > limit:
+        return f"limit {1 + limit:.4g} times"
+    is_changed = row.verdict in (ChangeVerdict.LESS_RIGHT, ChangeVerdict.CHANGED)
+    return f"limit {limit:g}" * (name == "accuracy" and is_changed and row.change >= limit)
 
 
 def headline(comparison: RunComparison, failed: Sequence[RowChange]) -> str:
     """Return the result in a sentence."""
     if failed:
-        return f"STOP: {counted(len(failed), 'row')} beyond the limits of --fail"
+        return f"STOP: {counted(len(failed), 'row')} beyond the limits"
     bad = (ChangeVerdict.LESS_RIGHT, ChangeVerdict.SLOWER)
     worse = sum(row.verdict in bad for row in comparison.rows)
     return f"{counted(worse, 'row')} worse" if worse else "No row is less accurate or slower"
@@ -141,7 +176,7 @@ def verdict_counts(comparison: RunComparison) -> str:
 
 def summary(comparison: RunComparison, failed: Sequence[RowChange], width: int) -> list[str]:
     """Return at most ten lines of at most this width, with as many rows as fit, the worst first."""
-    rows = [row for row in comparison.rows if row.verdict != ChangeVerdict.SAME]
+    rows = _changes(comparison, failed)
     settings = distinguishing(row.key for row in comparison.rows)
     first = [headline(comparison, failed), verdict_counts(comparison)]
     last = [f"Drift of the machine: {comparison.drift.sentence}"]
@@ -159,8 +194,18 @@ def summary(comparison: RunComparison, failed: Sequence[RowChange], width: int) 
     return lines
 
 
+def _changes(comparison: RunComparison, failed: Sequence[RowChange]) -> list[RowChange]:
+    """Return the rows that differ or are undecided, those that fail the gate first."""
+    names = {(row.key, row.quantity) for row in failed}
+    rows = [row for row in comparison.rows if row.verdict != ChangeVerdict.SAME]
+    return [*failed, *(row for row in rows if (row.key, row.quantity) not in names)]
+
+
 def _line(row: RowChange, settings: str) -> str:
-    name = f"{row.title} ({settings})" if settings else row.title
+    title = row.title
+    if row.why.startswith(row.quantity):
+        title = title.removesuffix(f", {row.quantity}")
+    name = f"{title} ({settings})" if settings else title
     return f"  {row.verdict:<{len(_INDENT) - 2}}" + visible(f"{name}: {row.why}")
 
 
@@ -173,7 +218,7 @@ def _not_compared(comparison: RunComparison) -> str:
 
 def table(comparison: RunComparison, failed: Sequence[RowChange], old: str, new: str) -> Table:
     """Return the rows that differ or are undecided, with the reasons."""
-    rows = [row for row in comparison.rows if row.verdict != ChangeVerdict.SAME]
+    rows = _changes(comparison, failed)
     settings = distinguishing(row.key for row in comparison.rows)
     points = [f"{counted(len(rows) - MAX_ROWS, 'more row')} in the JSON"] * (len(rows) > MAX_ROWS)
     points += [_not_compared(comparison)] if comparison.short else []
@@ -198,6 +243,7 @@ def table(comparison: RunComparison, failed: Sequence[RowChange], old: str, new:
 
 def as_json(comparison: RunComparison, failed: Sequence[RowChange], old: str, new: str) -> str:
     """Return all rows as standard JSON."""
+    stops = {(row.key, row.quantity): row for row in failed}
     content = {
         "format": 1,
         "old": old,
@@ -208,7 +254,10 @@ def as_json(comparison: RunComparison, failed: Sequence[RowChange], old: str, ne
         "how": comparison.method,
         "short": comparison.short,
         "counts": Counter(str(row.verdict) for row in comparison.rows),
-        "rows": [_row_as_json(row, row in failed) for row in comparison.rows],
+        "rows": [
+            _row_as_json(stops.get((row.key, row.quantity), row), (row.key, row.quantity) in stops)
+            for row in comparison.rows
+        ],
     }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 

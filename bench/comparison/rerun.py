@@ -52,38 +52,62 @@ class Plan(NamedTuple):
     pairs: int = 0  # number of pairs; 0 for as many as the number of rows needs
     scale: str = "quick"  # of each measurement
     seed: int = SEED  # of the order
+    solvers: tuple[str, ...] = ()  # addresses of the user's solvers; the bench's own if none
 
 
-def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) -> RunComparison:
-    """Return the differences between the working copy at a root and another revision of it.
+def rerun(plan: Plan, place: Path, tell: Callable[[str], None] = lambda _: None) -> RunComparison:
+    """Return the differences between the working copy that contains a folder and a revision of it.
+
+    Solvers of the user's are addressed from that folder; else the repository is Plumbob's.
 
     Raises:
-        ValueError: if there is no such revision, nothing to measure in both, or a process ends
-            before it has measured all.
+        ValueError: if the folder is in no such repository, there is no such revision, nothing to
+            measure in both, or a process ends before it has measured all.
     """
+    root = _repository(place, plan)
     with _temporary_folder() as folder:
         old, new = folder / "old", folder / "new"
         _check_out(root, plan.revision, old)
         new.symlink_to(root, target_is_directory=True)  # so that both paths are as long
-        return _measure(_Bench((old, new), plan, tell))
+        sources = tuple(_Sources(path, place.resolve().relative_to(root)) for path in (old, new))
+        return _measure(_Bench(sources, plan, tell))
 
 
-def clone_root(folder: Path) -> Path:
-    """Return the root of the clone of Plumbob that contains a folder.
-
-    Raises:
-        ValueError: if the folder is in no clone of Plumbob.
-    """
+def _repository(folder: Path, plan: Plan) -> Path:
+    """Return the root of the repository that contains a folder."""
     command = ["git", "-C", str(folder), "rev-parse", "--show-toplevel"]
     git = subprocess.run(command, capture_output=True, check=False)
     root = folder / os.fsdecode(git.stdout.removesuffix(b"\n"))
     project = root / "pyproject.toml"
-    if project.is_file() and b'\nname = "plumbob"\n' in project.read_bytes():
-        return root
+    is_own = project.is_file() and b'\nname = "plumbob"\n' in project.read_bytes()
+    if git.returncode == 0 and (plan.solvers or is_own):
+        return root.resolve()
+    if plan.solvers:
+        raise ValueError(f"--rerun: expected to be run in a git repository, got {folder}")
     raise ValueError(
-        "--rerun: expected to be run in a clone of Plumbob, whose revisions it measures, "
-        f"got {folder}: change to a clone, or compare two folders of records"
+        "--rerun: expected --with and a solver of yours, or to be run in a clone of Plumbob, got "
+        f"{folder}"
     )
+
+
+class _Sources(NamedTuple):
+    """The sources of a revision."""
+
+    root: Path
+    place: Path  # of the solvers below the root
+
+    def command(self, plan: Plan) -> list[str]:
+        """Return the arguments of the process that measures them."""
+        folder = self.root / self.place if plan.solvers else self.root
+        suites, solvers = json.dumps(plan.suites), json.dumps(plan.solvers) if plan.solvers else ""
+        return [str(folder), plan.scale, suites, solvers]
+
+    def path(self, plan: Plan) -> str:
+        """Return where Python looks for modules: first in the revision, also in its folder src."""
+        if not plan.solvers:
+            return str(self.root)
+        folders = [self.root / self.place, self.root / "src", self.root]
+        return os.pathsep.join([*map(str, folders), os.environ.get("PYTHONPATH", "")])
 
 
 @contextlib.contextmanager
@@ -119,13 +143,14 @@ def _check_out(root: Path, revision: str, folder: Path) -> None:
 
 
 class Revision:
-    """A process that measures blocks of a revision, by the sources in a folder."""
+    """A process that measures blocks of a revision, by its sources."""
 
-    def __init__(self, folder: Path, plan: Plan) -> None:
-        program = [sys.executable, "-P", revision_process.__file__]
-        command = [*program, str(folder), plan.scale, *plan.suites]
-        environment = {**one_thread(), "PYTHONPATH": str(folder)}
-        self._process = ChildProcess(command, folder=folder.parent, environment=environment)
+    def __init__(self, sources: _Sources, plan: Plan) -> None:
+        self._name = plan.revision if sources.root.name == "old" else "the working copy"
+        command = [sys.executable, "-P", revision_process.__file__, *sources.command(plan)]
+        environment = {**one_thread(), "PYTHONPATH": sources.path(plan)}
+        folder = sources.root.parent
+        self._process = ChildProcess(command, folder=folder, environment=environment)
 
     def blocks(self) -> list[list[str]]:
         """Return the keys of all blocks: suite, problem, solver, settings."""
@@ -142,7 +167,7 @@ class Revision:
         except LostError:
             last = self._process.last_words.decode(errors="replace").strip().splitlines()[-1:]
             reason = " ".join(last) or "without a word"
-            raise ValueError(f"a process of the rerun ended: {reason}") from None
+            raise ValueError(f"--rerun: {self._name} cannot be measured: {reason}") from None
 
     def close(self) -> None:
         """End the process and its children."""
@@ -150,9 +175,9 @@ class Revision:
 
 
 class _Bench(NamedTuple):
-    """The folders of both revisions, the plan, and a function that shows progress."""
+    """The sources of both revisions, the plan, and a function that shows progress."""
 
-    folders: tuple[Path, Path]
+    sources: tuple[_Sources, ...]
     plan: Plan
     tell: Callable[[str], None]
 
@@ -162,7 +187,7 @@ class _Bench(NamedTuple):
         with contextlib.ExitStack() as stack:
             revisions = {}
             for i in order:
-                revisions[i] = Revision(self.folders[i], self.plan)
+                revisions[i] = Revision(self.sources[i], self.plan)
                 stack.callback(revisions[i].close)
             yield revisions[0], revisions[1]
 
@@ -178,7 +203,7 @@ def _measure(bench: _Bench) -> RunComparison:
         second = bench._replace(plan=bench.plan._replace(seed=bench.plan.seed + 1, pairs=count))
         repeated = _measure_times(second, {key: pairs[key] for key, _ in decided})
         ratios |= _confirmed(decided, _ratios(repeated))
-    rows = worst_first([*changes, *row_changes(pairs, ratios)])
+    rows = worst_first([*changes, *row_changes(pairs, ratios, bool(bench.plan.solvers))])
     return RunComparison(rows, _drift(times, count), METHOD.format(pairs=count), is_rerun=True)
 
 

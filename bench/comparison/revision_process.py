@@ -1,7 +1,7 @@
-"""Measure blocks of the revision in a folder, for each line of standard input.
+"""Measure blocks of a revision, for each line of standard input.
 
-A program of its own, run by path: it imports the bench of any revision, and uses only what the
-bench has had since its first records.
+A program of its own, run by path. Of a revision of Plumbob it imports the bench, and uses only what
+the bench has had since its first records; of the user's project it measures the solvers.
 """
 
 import importlib
@@ -9,27 +9,50 @@ import json
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 
-def main(folder: str, scale: str, *suites: str) -> None:
-    """Write the keys of all blocks, and then a record for each key that is read."""
+def main(folder: str, scale: str, suites: str, solvers: str = "") -> None:
+    """Write the keys of all blocks, and then a record for each key that is read.
+
+    `folder` holds the sources of the revision, or is where the addresses of the user's solvers are
+    from; these and the suites are lists in JSON.
+    """
     output = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what an engine prints is no record
-    bench = "plumbob.bench" if Path(folder, "plumbob", "bench").exists() else "bench"
+    is_own = not solvers
+    bench = "bench" if is_own and not Path(folder, "plumbob", "bench").exists() else "plumbob.bench"
     experiments = importlib.import_module(f"{bench}.experiments")
     record = importlib.import_module(f"{bench}.harness.record")
     run = importlib.import_module(f"{bench}.harness.run")
-    if not Path(str(run.__file__)).resolve().is_relative_to(Path(folder).resolve()):
+    if is_own and not Path(str(run.__file__)).resolve().is_relative_to(Path(folder).resolve()):
         sys.exit(f"expected the bench of {folder}, got {run.__file__}")
+    size = experiments.SCALES[scale]
+    if solvers:
+        os.chdir(folder)
+        size = _with_solvers(size, json.loads(solvers), json.loads(suites))
     blocks = {
         run.block_key(block): block
-        for suite in suites if suite in experiments.SUITES
-        for block in experiments.blocks(suite, experiments.SCALES[scale])
+        for suite in json.loads(suites) if suite in experiments.SUITES
+        for block in experiments.blocks(suite, size)
+        if is_own or block.facts.get("entrant")
     }  # fmt: skip
     print(json.dumps(list(blocks)), file=output, flush=True)
     for line in sys.stdin:
         block = blocks[tuple(json.loads(line))]
         print(record.encode(run.measure(block)), file=output, flush=True)
+
+
+def _with_solvers(scale: Any, solvers: list[str], suites: list[str]) -> Any:
+    """Return a scale with solvers of the user's."""
+    from dataclasses import replace
+
+    from plumbob.bench.peers import opening
+
+    try:
+        return replace(scale, entrants=tuple(opening.opened(opening.addresses(solvers), suites)))
+    except ValueError as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

@@ -184,7 +184,11 @@ def has_rounds(pair: Pair, name: str) -> bool:
 
 def time_change(key: RowKey, name: str, ratio: TimeRatio, chance: float) -> RowChange:
     """Return the change of a time, by its probability adjusted for all rows."""
-    why = f"{ratio.ratio:.3f} times as long ({ratio.low:.3f} to {ratio.high:.3f})"
+    bounds = (ratio.ratio, ratio.low, ratio.high)
+    if ratio.ratio < 1:
+        bounds = (1 / ratio.ratio, 1 / ratio.high, 1 / ratio.low if ratio.low else math.inf)
+    times, low, high = (f"{bound:.3g}" for bound in bounds)
+    why = f"{times} times {'slower' if ratio.ratio >= 1 else 'faster'} ({low} to {high})"
     verdict = ChangeVerdict.UNDECIDED
     if chance <= ERROR_RATE:
         verdict = ChangeVerdict.SLOWER if ratio.ratio > 1 else ChangeVerdict.FASTER

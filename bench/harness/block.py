@@ -1,6 +1,6 @@
 """A block: one problem for one solver, and the choice of blocks of a run."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -8,6 +8,18 @@ from ..peers.entrant import Entrant
 
 if TYPE_CHECKING:
     from ..problems.own import OwnProblem
+
+
+# Of random targets, unless the user asks for others.
+SEED = 1986
+
+
+class Group(NamedTuple):
+    """Blocks that are measured together, so that their times are taken in turns."""
+
+    name: str  # equal for all blocks of the group, which follow each other
+    measure: Callable[[Sequence[Any]], "Sequence[Measured]"]  # the results of jobs
+    job: Any  # what this block asks for
 
 
 class Measured(NamedTuple):
@@ -37,6 +49,7 @@ class Scale:
 
     targets: int  # random targets a problem
     seconds: float  # of a benchmark
+    seed: int = SEED  # of random targets
     entrants: tuple[Entrant, ...] = ()  # the user's solvers, beside the registered ones
     problems: "tuple[OwnProblem, ...]" = ()  # the user's problems, likewise
 
@@ -69,6 +82,7 @@ class Block:
     # of its solver, beside the conditions of every record
     conditions: Mapping[str, Any] = field(default_factory=dict)
     budget: float = 0.0  # the time that bounds the work [s]; 0 if none does
+    group: Group | None = None  # the blocks that it is best measured with
 
     def of(self, entrant: Entrant | None) -> "Block":
         """Return the block of a user's solver, with its version, facts and conditions."""

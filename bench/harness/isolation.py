@@ -3,7 +3,7 @@
 import contextlib
 import math
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from plumbob.crosscheck.child_process import (
@@ -16,11 +16,11 @@ from plumbob.crosscheck.child_process import (
 )
 
 from .progress import Progress, announce
-from .worker import Calculation, Finished, Message, Numbers, Ready, Solved, Started
+from .worker import Calculation, Finished, Lap, Message, Numbers, Ready, Solved, Started
 
 # A worker that is silent for so long [s] is ended; before it is ready it may compile.
 START_PATIENCE = 180.0
-TARGET_PATIENCE = 10.0
+TARGET_PATIENCE = 60.0
 Calculate = Callable[..., Mapping[str, Any]]
 _START = "import plumbob.bench.harness.worker as w; w.main()"
 
@@ -35,6 +35,7 @@ class JobOutcome(NamedTuple):
     numbers: Mapping[str, Any] | None = None  # the result of a calculation
     is_silent: bool = False  # whether the worker was ended for its silence
     remark: str = ""  # the remark of the solver's adapter, else ""
+    laps: Sequence[Lap] = ()  # the times of solvers in turns
     overhead: float = math.nan  # of a solve's time, what the solver does not use [s]
 
     @property
@@ -68,6 +69,8 @@ class WorkerProcess:
                         announce(*message)
                     case Solved():
                         outcome.solved.append(message)
+                    case Lap():
+                        outcome = outcome._replace(laps=[*outcome.laps, message])
                     case Numbers(by_name):
                         outcome = outcome._replace(numbers=by_name)
                     case Finished(trouble, is_lost, is_silent):

@@ -6,7 +6,7 @@ import functools
 import importlib
 import math
 import random
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -17,13 +17,16 @@ from ..peers.ik.protocol import SolverOutput, attempt
 from ..peers.ik.restarts import digest_of, restarted
 from ..peers.protocol import NoAnswerError, OwnTime, describe, remark_of
 from ..problems.robots import UnableError
-from .isolation import WorkerProcess
+from .isolation import JobOutcome, WorkerProcess, raised
+from .machine import pace
 from .progress import TROUBLE, Progress
-from .stopwatch import Budget, time_call
-from .worker import Finished, Message, Ready, Solved
+from .stopwatch import time_call
+from .worker import Finished, Lap, Message, Ready, Solved
 
-# A solve that took less [s] is repeated so often, uncounted, right before the next.
-QUICK, REPEATS = 1e-3, 4
+# Times of slow solves are sent whenever they add up to this [s], so that the worker is not silent.
+_SENT = 0.5
+# A solver that hangs on so many targets does not finish.
+MAXIMUM_SILENCES = 3
 
 
 class Job(NamedTuple):
@@ -36,55 +39,47 @@ class Job(NamedTuple):
     targets: Any
     tolerance: Any  # when a target counts as reached
     settings: Mapping[str, Any]  # of the adapter
-    restarts: int  # further attempts from random poses, made here for solvers without restarts
-    budget: float  # no further target is begun after so long [s]
+    restarts: int = 0  # further attempts from random poses, made here for solvers without restarts
     entrant: str = ""  # the name of a user's solver, to announce its first trouble; else ""
-    # whether the first target is solved, and quick solves are repeated, uncounted
-    warms_up: bool = True
+    warms_up: bool = True  # whether the first target is solved once before, uncounted
 
     def perform(self) -> Iterator[Message]:
         """Yield the messages of the job, each as soon as it is there."""
         try:
             adapter = importlib.import_module(self.module)
-            prepare = partial(adapter.prepare, self.model, self.tolerance, **self.settings)
-            ask, setup = time_call(prepare)
-            if self.restarts:
-                ask = restarted(ask, self.model, self.restarts)
+            ask, setup = time_call(self.prepared)
             first = self._solved(ask(self.targets.request(0))) if self.warms_up else None
             if self.restarts and first is not None and first.claim < 0:
                 raise UnableError("not started again, for it claims nothing of its answers")
         except Exception as error:  # an exception of an engine is its result
             yield from unfit(error, self.entrant)
         else:
-            yield Ready(setup, remark_of(adapter), self._overhead(adapter, prepare))
+            yield Ready(setup, remark_of(adapter), self._overhead(adapter))
             yield from announced(self._answers(ask), self.entrant)
             yield Finished()
 
-    def _overhead(self, adapter: Any, prepare: Callable[[], Any]) -> float:
+    def prepared(self) -> Any:
+        """Return the function of the adapter that takes requests."""
+        ask = self._prepare()
+        return restarted(ask, self.model, self.restarts) if self.restarts else ask
+
+    def _prepare(self) -> Any:
+        adapter = importlib.import_module(self.module)
+        return adapter.prepare(self.model, self.tolerance, **self.settings)
+
+    def _overhead(self, adapter: Any) -> float:
         """Return the time of a solve that the solver does not use [s], NaN of users' solvers."""
         if self.entrant or not self.warms_up:
             return math.nan
-        return overhead(adapter, prepare, self.targets.request(0))
+        return overhead(adapter, self._prepare, self.targets.request(0))
 
     def _answers(self, ask: Any) -> Iterator[Solved]:
-        """Solve the targets in order within the budget."""
-        budget, previous = Budget(self.budget), None
+        """Solve the targets in order."""
         for i in range(self.targets.shape[0]):
-            if budget.is_spent:
-                return
             request = self.targets.request(i)
             solve = ask(request)
-            # So that caches are as in a loop of solves and nothing else.
-            for _ in range(REPEATS if self.warms_up else 0):
-                if previous is None:
-                    break
-                repeated = attempt(previous)
-                budget.excuse(repeated.time.overhead if repeated.time else 0.0)
             seed_shared_generators(digest_of(*request))
-            solved = self._solved(solve)
-            budget.excuse(solved.overhead)
-            previous = solve if solved.seconds < QUICK else None
-            yield solved
+            yield self._solved(solve)
 
     def _solved(self, solve: Callable[[], SolverOutput]) -> Solved:
         output, seconds = time_call(lambda: attempt(solve))
@@ -97,6 +92,97 @@ class Job(NamedTuple):
                 trouble = f"returned {answer.shape} numbers, not {q.shape}"
         claim = -1 if output.claim is None else int(output.claim)
         return solved_in(output.time or OwnTime(seconds), q, claim, trouble)
+
+    def times(self, ask: Any, count: int) -> Iterator[OwnTime]:
+        """Yield the times of the first targets, all converted before the first is solved.
+
+        The first is solved once before, so that caches are as in a loop of solves.
+        """
+        requests = [self.targets.request(i) for i in range(count)]
+        solves = [(digest_of(*request), ask(request)) for request in requests]
+        for number, (digest, solve) in enumerate([solves[0], *solves]):
+            seed_shared_generators(digest)
+            output, seconds = time_call(partial(attempt, solve))
+            if number:
+                yield output.time or OwnTime(seconds)
+
+
+def answers(job: Job) -> JobOutcome:
+    """Return the answers of a job; continue in a new process behind a target that loses the old.
+
+    A solver that hangs on `MAXIMUM_SILENCES` targets does not finish.
+    """
+    count, size = job.targets.shape
+    outcome = last = worker_process().perform(job)
+    solved, silences = [*outcome.solved], 0
+    while last.is_lost and len(solved) < count and silences < MAXIMUM_SILENCES:
+        silences += last.is_silent
+        solved.append(Solved(np.full(size, np.nan), 0, 0.0, last.trouble))
+        if len(solved) < count and silences < MAXIMUM_SILENCES:
+            last = worker_process().perform(job._replace(targets=job.targets.after(len(solved))))
+            solved += last.solved
+    if not outcome.is_lost:
+        return outcome
+    return outcome._replace(solved=solved, trouble=raised(solved), is_lost=len(solved) < count)
+
+
+class TimedTurns(NamedTuple):
+    """Solvers of the same targets that take turns, round after round, while they are timed."""
+
+    jobs: tuple[Job, ...]  # the solvers
+    timed: int  # the first targets are timed, so many
+    rounds: int
+
+    def perform(self) -> Iterator[Message]:
+        """Yield the times of each solver in each round; the order of a round is drawn."""
+        yield Ready(0.0)
+        asks, generator = {}, np.random.default_rng(len(self.jobs))
+        for number, job in enumerate(self.jobs):
+            yield Lap(number)
+            with contextlib.suppress(Exception):  # it has said so when it was asked for answers
+                asks[number] = job.prepared()
+        for _ in range(self.rounds):
+            for number in generator.permutation(list(asks)).tolist():
+                yield Lap(number, control=pace())
+                yield from self._laps(number, asks[number])
+        yield Finished()
+
+    def _laps(self, number: int, ask: Any) -> Iterator[Lap]:
+        times: list[OwnTime] = []
+        for time in self.jobs[number].times(ask, self.timed):
+            times.append(time)
+            if sum(max(t.seconds, t.round_trip) for t in times) > _SENT:
+                yield Lap(number, tuple(times))
+                times = []
+        yield Lap(number, tuple(times))
+
+
+class Times(NamedTuple):
+    """The times of a solver's targets, and of a fixed loop before each round [s]."""
+
+    seconds: np.ndarray  # (round, target)
+    control: np.ndarray  # (round,)
+
+
+def times_in_turns(jobs: Sequence[Job], count: int, rounds: int) -> list[Times | None]:
+    """Return the times of solvers that take turns; None of those that are lost or do not start."""
+    remaining = list(range(len(jobs)))
+    while remaining:
+        turns = TimedTurns(tuple(jobs[i] for i in remaining), count, rounds)
+        outcome = worker_process().perform(turns)
+        if not (outcome.is_lost and outcome.laps):
+            break
+        del remaining[outcome.laps[-1].number]
+    times: list[Times | None] = [None] * len(jobs)
+    for number, i in enumerate(remaining):
+        laps = [lap for lap in outcome.laps if lap.number == number]
+        own = [time for lap in laps for time in lap.times]
+        if len(own) == rounds * count:
+            doubted = any(time.doubt for time in own)  # then all times are round trips
+            seconds = [max(t.seconds, t.round_trip * doubted) for t in own]
+            control = np.array([lap.control for lap in laps if lap.control])
+            times[i] = Times(np.reshape(seconds, (rounds, count)), control)
+    return times
 
 
 def solved_in(time: OwnTime, q: np.ndarray, claim: int, trouble: str = "") -> Solved:
@@ -124,7 +210,7 @@ def announced(targets: Iterator[Solved], entrant: str) -> Iterator[Message]:
 def seed_shared_generators(seed: int) -> None:
     """Seed the generators of the process, from which an engine may draw.
 
-    Without it, an answer would depend on how often earlier solves were repeated.
+    Without it, an answer would depend on the solves before it.
     """
     random.seed(seed)
     np.random.seed(seed)  # noqa: NPY002 (the shared generator)

@@ -1,6 +1,7 @@
 """Measure a block and make a record of its result, or of its failure."""
 
 import time
+from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import numpy as np
@@ -33,6 +34,20 @@ def measure(block: Block) -> Record:
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
             raise KeyboardInterrupt from None
         return record_of(block, failure(describe(error)), time.perf_counter() - begin)
+
+
+def measure_together(blocks: Sequence[Block]) -> list[Record]:
+    """Measure the blocks of a group; an exception becomes the record of each."""
+    begin, groups = time.perf_counter(), [block.group for block in blocks if block.group]
+    try:
+        results = groups[0].measure([group.job for group in groups])
+    except Exception as error:
+        results = [failure(describe(error))] * len(blocks)
+    seconds = (time.perf_counter() - begin) / len(blocks)
+    records = [record_of(*pair, seconds) for pair in zip(blocks, results, strict=True)]
+    for record in records:
+        record.check()
+    return records
 
 
 def failure(why: str) -> Measured:

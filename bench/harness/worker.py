@@ -11,7 +11,7 @@ import numpy as np
 
 from plumbob.crosscheck.child_process import connect
 
-from ..peers.protocol import describe
+from ..peers.protocol import OwnTime, describe
 from .progress import Progress, listening
 
 
@@ -43,6 +43,14 @@ class Solved(NamedTuple):
         return max(0.0, self.round_trip - self.seconds)
 
 
+class Lap(NamedTuple):
+    """A part of the times of a solver in a round: it begins, unless there are times."""
+
+    number: int  # of the solver
+    times: tuple[OwnTime, ...] = ()  # of successive targets
+    control: float = 0.0  # how long a fixed loop took right before, where the round begins [s]
+
+
 class Numbers(NamedTuple):
     """The result of a calculation, by name."""
 
@@ -57,7 +65,7 @@ class Finished(NamedTuple):
     is_silent: bool = False  # whether it was ended for its silence
 
 
-Message = Started | Ready | Progress | Solved | Numbers | Finished
+Message = Started | Ready | Progress | Solved | Lap | Numbers | Finished
 
 
 class Calculation(NamedTuple):

@@ -56,14 +56,12 @@ _open: dict[Spec, EntrantSolver] = {}
 
 
 def opened(spec: Spec) -> EntrantSolver:
-    """Return an open solver; any other is ended."""
-    if spec not in _open:
-        while _open:
-            _open.popitem()[1].close()
-        _open[spec] = EntrantSolver(spec)
-    return _open[spec]
+    """Return an open solver; others stay open, for solvers take turns, and end with the process."""
+    solver = _open.pop(spec) if spec in _open else EntrantSolver(spec)
+    _open[spec] = solver
+    return solver
 
 
 def remark() -> str:
-    """Return how the open solver's times are taken, where that is not by its own clock."""
-    return next(iter(_open.values())).remark if _open else ""
+    """Return how the times of the last solver are taken, where that is not by its own clock."""
+    return list(_open.values())[-1].remark if _open else ""

@@ -182,6 +182,11 @@ class PeerEntry:
     restarts: int = 0  # further attempts from random poses, for solvers without restarts
     note: str = ""  # tells it from another entry of the same solver and kind
 
+    @property
+    def has_time_limit(self) -> bool:
+        """Whether it takes a time limit for each target [s], so that answers depend on the load."""
+        return "seconds" in self.settings
+
 
 @dataclass(frozen=True)
 class Peer(Adapter):
@@ -196,6 +201,7 @@ class Peer(Adapter):
     kinematics: bool = field(default=False, kw_only=True)
     # how exact that is, where it is not in double precision
     precision: str = field(default="", kw_only=True)
+    built_on: str = field(default="", kw_only=True)  # the engine whose kinematics it works with
     # whether it is a Python loop of ours on the package's kinematics
     loop: bool = field(default=False, kw_only=True)
     # what one would choose it for

@@ -1,6 +1,6 @@
 """Position targets for a chain of ten ball joints, from seeded random poses."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ BEYOND = "beyond"
 
 # How far targets lie from the root, as shares of the reach; uniform within the shell.
 STRATA = {"near": (0.05, 0.4), "far": (0.6, 0.95), "edge": (0.99, 0.9999), BEYOND: (1.01, 2.0)}
-_SEED = 1986
+SEED = 1986
 
 
 @dataclass(frozen=True)
@@ -52,20 +52,26 @@ class ChainRequests(NamedTuple):
         """The number of targets, and of numbers of an answer: iterations, then positions."""
         return len(self.iterations), 1 + 3 * self.problem.skeleton.joint_count
 
+    def after(self, count: int) -> "ChainRequests":
+        """Return the requests after the first `count`."""
+        problem, starts = self.problem, self.problem.every_start[count:]
+        problem = replace(problem, starts=starts, targets=problem.targets[count:])
+        return ChainRequests(problem, self.iterations[count:])
+
     def request(self, i: int) -> ChainRequest:
         """Return a target."""
         targets, starts = self.problem.targets, self.problem.every_start
         return ChainRequest(targets[i], starts[i], int(self.iterations[i]))
 
 
-def chain_targets(stratum: str, count: int) -> TargetsForSkeleton:
+def chain_targets(stratum: str, count: int, seed: int = SEED) -> TargetsForSkeleton:
     """Return targets in a stratum of distance; directions and starts are uniform at random.
 
     Raises:
         ValueError: if there is no stratum of this name.
     """
     low, high = STRATA[choice("stratum", stratum, STRATA)]
-    rng = np.random.default_rng([_SEED, list(STRATA).index(stratum)])
+    rng = np.random.default_rng([seed, list(STRATA).index(stratum)])
     skeleton, _ = scenes.ball_chain(links=BALLS)
     distances = skeleton.reach() * rng.uniform(low, high, count)
     return TargetsForSkeleton(

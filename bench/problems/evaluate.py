@@ -1,7 +1,9 @@
-"""Evaluate solutions of inverse kinematics by MuJoCo's kinematics of the robot's own text.
+"""Evaluate solutions of inverse kinematics by engines that share no code with the solver.
 
-It shares no code with the reference, and measures the same for every solver: the distance and the
-angle of each effector from its target, and by how much a joint is beyond its limits.
+MuJoCo is the arbiter of solvers that are built on Pinocchio, Pinocchio that of all others; both
+place every answer, so that answers on which they differ are known. The same is measured for every
+solver: the distance and the angle of each effector from its target, and by how much a joint is
+beyond its limits.
 """
 
 import functools
@@ -11,11 +13,16 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+import pinocchio
 from scipy.spatial.transform import Rotation
 
 from plumbob.reference.arguments import FloatArray
 
 from .robots import LIMIT_TOLERANCE, BenchRobot, robot
+
+MUJOCO, PINOCCHIO = "MuJoCo", "Pinocchio"
+# The engines place an effector alike to this [m], [rad]: some hundred roundings of a metre.
+AGREEMENT = 1e-12
 
 
 class Tolerance(NamedTuple):
@@ -63,6 +70,10 @@ class Targets(NamedTuple):
         """The number of targets, and of coordinates."""
         return len(self.starts), self.starts.shape[-1]
 
+    def poses_of_first(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return the positions and rotations of the first `count` targets."""
+        return self.positions[:count], self.rotations[:count]
+
     def request(self, i: int) -> PoseRequest:
         """Return a target."""
         return PoseRequest(self.positions[i], self.rotations[i], self.starts[i].copy())
@@ -81,6 +92,8 @@ class Evaluation(NamedTuple):
     rotation: FloatArray
     beyond: FloatArray  # by how much the worst joint is beyond its limit [rad]
     solved: np.ndarray  # whether all three are within tolerance
+    # by how much the two engines place an effector differently [m] or [rad]; zero without an answer
+    difference: FloatArray
 
 
 def mujoco_model(robot: BenchRobot) -> Any:
@@ -92,8 +105,36 @@ def mujoco_model(robot: BenchRobot) -> Any:
     return mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
 
 
+def arbiter_of(engine: str) -> str:
+    """Return the engine that evaluates the answers of a solver built on an engine."""
+    return MUJOCO if engine == PINOCCHIO else PINOCCHIO
+
+
+def pinocchio_model(robot: BenchRobot) -> Any:
+    """Return the robot in Pinocchio.
+
+    Raises:
+        ValueError: if Pinocchio orders its joints otherwise.
+    """
+    if robot.is_chain:
+        model = pinocchio.buildModelFromXML(robot.text)
+    else:
+        with robot.file() as file:
+            model = pinocchio.buildModelFromMJCF(file)
+    robot.check_order(PINOCCHIO, list(model.names)[1:])
+    return model
+
+
+def to_pinocchio(robot: BenchRobot, q: FloatArray) -> FloatArray:
+    """Return coordinates, (coordinate,), with w at the end of quaternions."""
+    permuted = q.copy()
+    for i in robot.balls:
+        permuted[i : i + 4] = q[[i + 1, i + 2, i + 3, i]]
+    return permuted
+
+
 class Evaluator:
-    """The kinematics of a robot."""
+    """The kinematics of a robot in both engines."""
 
     def __init__(self, robot: BenchRobot) -> None:
         self.robot = robot
@@ -113,6 +154,21 @@ class Evaluator:
             rotations[i] = self._data.xmat[self._effectors]
         return positions, rotations.reshape(*shape, 3, 3)
 
+    def forward_by_pinocchio(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what `forward` returns, by Pinocchio, of coordinates (row, coordinate)."""
+        model, data, frames = self._pinocchio
+        placements = []
+        for row in q:
+            pinocchio.framesForwardKinematics(model, data, to_pinocchio(self.robot, row))
+            placements.append([data.oMf[frame].homogeneous for frame in frames])
+        poses = np.reshape(placements, (len(q), len(frames), 4, 4))
+        return poses[..., :3, 3], poses[..., :3, :3]
+
+    @functools.cached_property
+    def _pinocchio(self) -> tuple[Any, Any, list[int]]:
+        model = pinocchio_model(self.robot)
+        return model, model.createData(), [model.getFrameId(e) for e in self.robot.effectors]
+
     def jacobians(self, q: FloatArray) -> FloatArray:
         """Return the Jacobians of positions and rotations, (row, effector, 2, 3, freedom)."""
         J = np.empty((len(q), len(self._effectors), 2, 3, self.model.nv))
@@ -123,24 +179,34 @@ class Evaluator:
                 mujoco.mj_jacBody(self.model, self._data, *J[i, k], effector)
         return J
 
-    def evaluate(self, targets: Targets, q: FloatArray, tolerance: Tolerance) -> Evaluation:
+    def evaluate(
+        self, targets: Targets, q: FloatArray, tolerance: Tolerance, arbiter: str = PINOCCHIO
+    ) -> Evaluation:
         """Return the errors of answers (target, coordinate) to the first targets; NaN is none."""
         is_answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
         poses = np.where(is_answered[:, None], q, targets.starts[:count])
-        positions, rotations = self.forward(poses)
-        distance = np.linalg.norm(positions - targets.positions[:count], axis=-1).max(axis=-1)
-        angle = angle_between(rotations, targets.rotations[:count]).max(axis=-1)
+        by_engine = {MUJOCO: self.forward(poses), PINOCCHIO: self.forward_by_pinocchio(poses)}
+        distance, angle = _distances(by_engine[arbiter], targets.poses_of_first(count))
+        difference = np.maximum(*_distances(by_engine[MUJOCO], by_engine[PINOCCHIO]))
         excess = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
         errors = np.stack([distance, angle * self.robot.oriented, excess])
         errors[:, ~is_answered] = np.nan
         limits = np.array([*tolerance, LIMIT_TOLERANCE])[:, None]
         position, rotation, beyond = errors
         solved = np.asarray((errors <= limits).all(axis=0))
-        return Evaluation(position, rotation, beyond, solved)
+        return Evaluation(position, rotation, beyond, solved, difference * is_answered)
 
     def _update_kinematics(self, q: FloatArray) -> None:
         self._data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self._data)
+
+
+def _distances(
+    poses: tuple[FloatArray, FloatArray], others: tuple[FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the largest distance [m] and angle [rad] between the effectors' poses, (row,)."""
+    distance = np.linalg.norm(poses[0] - others[0], axis=-1).max(axis=-1)
+    return distance, angle_between(poses[1], others[1]).max(axis=-1)
 
 
 def angle_between(A: FloatArray, B: FloatArray) -> FloatArray:

@@ -28,14 +28,14 @@ _POOL = 40
 _EXTREME = 0.05
 # Cells a side of the grid by which effectors are spread evenly over space.
 _CELLS = 12
-_SEED = 1986
+SEED = 1986
 
 
 @functools.lru_cache(maxsize=16)
-def robot_targets(name: str, count: int) -> Targets:
+def robot_targets(name: str, count: int, seed: int = SEED) -> Targets:
     """Return `count` targets in each stratum, the strata alternating, and random starts."""
     evaluator = evaluator_of(name)
-    rng = np.random.default_rng([_SEED, seed_of(name)])
+    rng = np.random.default_rng([seed, seed_of(name)])
     poses = np.stack(list(stratum_poses(evaluator, rng, count).values()), axis=1)
     positions, rotations = evaluator.forward(poses.reshape(-1, poses.shape[-1]))
     strata = np.tile(np.arange(len(STRATA)), count)
@@ -61,9 +61,9 @@ def stratum_poses(
 
 
 @functools.lru_cache(maxsize=16)
-def unreachable_targets(name: str, count: int) -> Targets:
+def unreachable_targets(name: str, count: int, seed: int = SEED) -> Targets:
     """Return targets 1.05 to 1.5 times as far from the first joint as any pose reaches."""
-    evaluator, rng = evaluator_of(name), np.random.default_rng([_SEED, seed_of(name), 1])
+    evaluator, rng = evaluator_of(name), np.random.default_rng([seed, seed_of(name), 1])
     shape = (count, len(evaluator.robot.effectors))
     distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (*shape, 1))
     positions = evaluator.first_joint + distance * unit(rng.standard_normal((*shape, 3)))
@@ -92,7 +92,7 @@ def least_distances(name: str, targets: Targets) -> FloatArray:
 def uniform_targets(name: str, count: int, middle: bool) -> Targets:
     """Return targets uniform in joint space, from random starts or the middle of the limits."""
     evaluator = evaluator_of(name)
-    rng = np.random.default_rng([_SEED, seed_of(name), count])
+    rng = np.random.default_rng([SEED, seed_of(name), count])
     positions, rotations = evaluator.forward(evaluator.robot.draw(rng, count))
     starts = evaluator.robot.draw(rng, count)
     if middle:

@@ -11,7 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..experiments.cloth_peers import MISSING, ONE_STEP, SOLVED
+from ..experiments.cloth_peers import (
+    MISSING,
+    MOTION,
+    MOTION_TARGETS,
+    NEAR,
+    ONE_STEP,
+    SOLVED,
+    TARGETS,
+)
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.readings import (
@@ -35,6 +43,11 @@ MAX_NAMED = 3
 _FROM = dict(zip(STARTS, ("from one start", "with restarts"), strict=True))
 # What is timed of other engines' own code; loops of ours on engines are no rivals.
 _SUBJECTS = {"kinematics": "forward kinematics", "cloth": "a step of a cloth"}
+# The goals of cloths: what is solved, to which error, and the table that ranks it.
+_CLOTH_GOALS = {
+    ONE_STEP: (f"a step solved to {SOLVED}", TARGETS[SOLVED], "cloth_peers_step"),
+    MOTION: (f"a motion within {NEAR} of the truth", MOTION_TARGETS[NEAR], "cloth_peers_motion"),
+}
 # The groups of robots: those that no setting has seen come first.
 _GROUPS = ["held out", "tuning", CHARACTER, "yours"]
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
@@ -108,10 +121,10 @@ def scale(results: Results) -> str:
 
 
 def absent(results: Results) -> list[str]:
-    """Return the peers that were asked and took no part."""
+    """Return the peers that were asked and are not installed."""
     records = results.all("ik", task=REACHABLE)
     requested = {record.solver for record in records}
-    present = {record.solver for record in records if "solved" in record.arrays}
+    present = {record.solver for record in records if record.details.version}
     peers = _recorded_names()
     solvers = [peer for peer, names in peers.items() if names & requested and not names & present]
     packages = {record.solver for record in results.all("cloth", task=MISSING)}
@@ -227,13 +240,14 @@ class Race(NamedTuple):
 
 def _races(results: Results) -> Iterator[Race]:
     """Yield the times of each task in which engines run code of their own."""
-    cloths: dict[str, dict[str, float]] = {}
-    for point in points(results, ONE_STEP):
-        best = cloths.setdefault(point.cloth, {})
-        if point.values["error"] <= float(SOLVED):
-            engine = point.engine or point.solver
-            best[engine] = min(point.seconds, best.get(engine, np.inf))
-    yield Race("cloth", f"a step solved to {SOLVED}", "cloth", "cloth_peers_step", cloths, set())
+    for task, (goal, limit, table) in _CLOTH_GOALS.items():
+        cloths: dict[str, dict[str, float]] = {}
+        for point in points(results, task):
+            best = cloths.setdefault(point.cloth, {})
+            if point.error <= limit:
+                engine = point.engine or point.solver
+                best[engine] = min(point.seconds, best.get(engine, np.inf))
+        yield Race("cloth", goal, "cloth", table, cloths, set())
     for subject, task in _SUBJECTS.items():
         records = [r for r in results.all("timing", subject=subject) if r.solver not in _NOT_RIVALS]
         cases = {g[0].title: g for g in by_problem(records).values() if len(g) > 1}

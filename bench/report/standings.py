@@ -13,6 +13,7 @@ from ..experiments.robots.readings import (
     Score,
     by_robot,
     fields_of,
+    in_groups,
     ratio_of_times,
     together,
 )
@@ -46,7 +47,10 @@ def standings(results: Results) -> list[Headline]:
     chains = [r for r in results.all("ik", task=chain.CHAIN) if r.facts["stratum"] != chain.BEYOND]
     ranks = [*_target_ranks("chain of balls", "accuracy", by_robot(chains))]
     for start in STARTS:
-        ranks += _target_ranks(f"robots, {start}", "robots_overall", fields_of(results, start))
+        groups = in_groups(fields_of(results, start))
+        for group, fields in groups.items():
+            robots = f"robots ({group})" if len(groups) > 1 else "robots"
+            ranks += _target_ranks(f"{robots}, {start}", "robots_overall", fields)
     steps = points(results, cloth_peers.ONE_STEP)
     motions = [point for point in points(results, cloth_peers.MOTION) if point.is_whole]
     ranks += _cloth_ranks("step", "error", "error {}", steps)
@@ -84,7 +88,7 @@ def _rank(row: Score, rows: Mapping[str, Score]) -> str:
     order, first = row.success
     share = f"it solves {percent(row.share)} of {counted(row.share.total, 'target')}"
     if not row.is_ranked or not row.share.hits:
-        why = f"it was {row.limits}, and {share}" if row.limits else "it solves no target"
+        why = f"it is marked “{row.limits}”" if row.limits else "it solves no target"
         return f"{row.solver} is not ranked: {why}."
     if row.solver not in first:
         share += f", the best solver, {named(order[0])}, {percent(rows[order[0]].share)}"

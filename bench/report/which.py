@@ -60,7 +60,7 @@ def advice(entries: Sequence[Score]) -> str:
 
 
 def _effort(score: Score) -> metrics.Effort:
-    return metrics.effort(score.attempted("seconds"))
+    return metrics.effort(score.seconds)
 
 
 def _median(score: Score) -> float:

@@ -2,7 +2,8 @@
 
 The size is the largest of 10, 9 and 8 points in which the table fits the width, by the number of
 letters; columns of long words share the remaining space. A table that is too wide in 8 points loses
-its folded columns, and is then split into several parts of the same rows. Nothing is scaled.
+its folded columns, and is then split into several parts of the same rows; one that is too long for
+a page becomes several tables. Rows without a number, as of absent solvers, are left out.
 """
 
 import itertools
@@ -10,6 +11,7 @@ import math
 import re
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ..harness.metrics import Share
 from ..text import shortened
@@ -21,8 +23,8 @@ WIDTHS = {"column": 240.0, "page": 504.0}
 _UNITS = {"pt": 1.0, "mm": 72.27 / 25.4, "cm": 72.27 / 2.54, "in": 72.27}
 NARROWEST, WIDEST = 160.0, 2000.0
 SIZES = (10, 9, 8)
-# Longer tables, by rows or by lines with those of the caption, break over pages.
-MAX_ROWS, MAX_LINES = 40, 50
+# Lines of a page without caption, head and rules; more rows stand in another table.
+MAX_LINES = 44
 # The most letters of a name.
 _LONGEST = 200
 # Words are broken into parts of at most so many letters where columns do not fit otherwise.
@@ -31,7 +33,7 @@ _WORD_PARTS = (12, 6)
 _LETTER, _BOLD = 0.56, 0.62
 # Between two columns [pt].
 _GAP = 8.0
-_PACKAGES = r"% needs \usepackage{booktabs,xltabular} and siunitx of 2021 or newer (version 3)"
+_PACKAGES = r"% needs \usepackage{booktabs,tabularx} and siunitx of 2021 or newer (version 3)"
 # Space below a caption, which the classes of LaTeX do not leave.
 _SKIP = r"\setlength{\belowcaptionskip}{5pt}"
 _NUMBERS = (
@@ -63,23 +65,31 @@ def paper(width: str) -> tuple[float, bool]:
 
 def latex(table: Table, width: str = "page") -> str:
     """Return the table as LaTeX for a column, a page, or another width."""
-    (points, is_page), table = paper(width), without_empty(table)
+    (points, is_page), count = paper(width), len(table.rows)
+    table = without_empty(_measured(table))
     best = best_cells(table)
     columns = [_TexColumn(table, j, best) for j in range(len(table.columns))]
     size = next((size for size in SIZES if _fits(columns, points, size)), SIZES[-1])
     if not _fits(columns, points, size):
         columns = [column for column in columns if not column.column.folded]
     parts = [_TexPart(table, part, points, size) for part in _split(table, columns, points, size)]
-    caption_lines = _LETTER * SIZES[0] * len(_sentences(table)) / points
-    lines = sum(part.lines for part in parts) + caption_lines
     comments = [f"% {' '.join(table.shows.split())}"] if table.shows else []
+    if left_out := count - len(table.rows):
+        comments.append(f"% {left_out} of {count} rows left out: they hold no number")
     if left_out := len(table.columns) - len(columns):
         comments.append(f"% {left_out} of {len(table.columns)} columns left out: no space for them")
-    if len(table.rows) > MAX_ROWS or lines > MAX_LINES:
-        body = _long(table, parts, points)
-    else:
-        body = _float(table, parts, "table*" if is_page else "table")
+    body = _floats(table, parts, "table*" if is_page else "table", points)
     return "\n".join([_PACKAGES, *comments, *body, ""])
+
+
+def _measured(table: Table) -> Table:
+    """Return a table without the rows that hold no number, unless it holds none at all."""
+    numbers = [j for j, column in enumerate(table.columns) if not column.words]
+    rows = [i for i, row in enumerate(table.rows) if any(row[j] is not None for j in numbers)]
+    if not rows:
+        return table
+    best = frozenset((rows.index(i), j) for i, j in best_cells(table) if i in rows)
+    return replace(table, rows=tuple(table.rows[i] for i in rows), best=best, sources=())
 
 
 class _TexColumn:
@@ -211,14 +221,11 @@ class _TexPart:
         width_argument = f"{{{width:.1f}pt}}" if self.flexible else ""
         self.preamble = f"{width_argument}{{@{{}}{' '.join(kinds)}@{{}}}}"
 
-    @property
-    def lines(self) -> int:
-        """The approximate number of lines, four of them in the head."""
+    def height(self, i: int) -> int:
+        """Return the approximate number of lines of a row."""
         broken = [(self.columns[j], self.widths[j]) for j in self.flexible]
-        return 4 + sum(
-            max((math.ceil(1.2 * c.letter * len(c.texts[i]) / w) for c, w in broken), default=1)
-            for i in range(len(self.table.rows))
-        )
+        lines = (math.ceil(1.2 * c.letter * len(c.texts[i]) / width) for c, width in broken)
+        return max(lines, default=1)
 
     def head(self) -> list[str]:
         """Return the head: the groups if there are any, and the titles."""
@@ -242,53 +249,62 @@ class _TexPart:
         lines = [" & ".join(cells) + r" \\", " ".join(rules)] if rules else []
         return [*lines, " & ".join(titles) + r" \\"]
 
-    def rows(self) -> list[str]:
-        """Return the rows; a first cell that repeats the cell above it is left empty."""
+    def rows(self, chosen: range) -> list[str]:
+        """Return some rows; a first cell that repeats the cell above it is left empty."""
         lines: list[str] = []
         firsts = [row[0] for row in self.table.rows]
         is_grouped = len(set(firsts)) < len(firsts)
-        for i, first in enumerate(firsts):
-            repeats = i > 0 and first == firsts[i - 1]
-            if is_grouped and i and not repeats:
+        for i in chosen:
+            repeats = i > chosen.start and firsts[i] == firsts[i - 1]
+            if is_grouped and i > chosen.start and not repeats:
                 lines.append(r"\addlinespace")
             cells = [column.cell(i) for column in self.columns]
             lines.append(" & ".join(["" if repeats else cells[0], *cells[1:]]) + r" \\")
         return lines or [rf"\multicolumn{{{len(self.columns)}}}{{c}}{{not measured}} \\"]
 
 
-def _float(table: Table, parts: Sequence[_TexPart], name: str) -> list[str]:
-    """Return a table that stands on a single page, its parts below one another."""
-    body = [rf"\begin{{{name}}}", r"\centering", _SKIP, _NUMBERS, _caption(table)]
-    body += _setting(parts[0].size)
-    for i, part in enumerate(parts):
-        environment = "tabularx" if part.flexible else "tabular"
-        body += [
-            *([r"\par\medskip"] if i else []),
-            rf"\begin{{{environment}}}{part.preamble}",
-            *(r"\toprule", *part.head(), r"\midrule", *part.rows(), r"\bottomrule"),
-            rf"\end{{{environment}}}",
-        ]
-    return [*body, rf"\end{{{name}}}"]
+def _floats(table: Table, parts: Sequence[_TexPart], name: str, width: float) -> list[str]:
+    """Return tables that fit a page each, the note below the last."""
+    note, body = breakable(_note(table)), []
+    pieces = _pieces(table, parts, math.ceil(_LETTER * SIZES[-1] * len(note) / width))
+    for k, piece in enumerate(pieces):
+        ordinal = f" (part {k + 1} of {len(pieces)})" if pieces[1:] else ""
+        body += [rf"\begin{{{name}}}", r"\centering", _SKIP, _NUMBERS, _caption(table, ordinal, k)]
+        body += _setting(parts[0].size)
+        for part, rows in piece:
+            body += [*([r"\par\medskip"] if part is not piece[0][0] else []), *_tabular(part, rows)]
+        if note and piece is pieces[-1]:
+            body += [r"\par\smallskip", rf"\begin{{minipage}}{{{width:.1f}pt}}\raggedright"]
+            body += [*_setting(SIZES[-1])[:1], note, r"\end{minipage}"]
+        body.append(rf"\end{{{name}}}")
+    return body
 
 
-def _long(table: Table, parts: Sequence[_TexPart], width: float) -> list[str]:
-    """Return a table that breaks over pages, which needs a single-column document."""
-    body = ["% breaks over pages: stands where there is one column of text", "{", _NUMBERS]
-    body += [*_setting(parts[0].size), rf"\setlength{{\LTcapwidth}}{{{width:.1f}pt}}"]
-    for i, part in enumerate(parts):
-        environment = "xltabular" if part.flexible else "longtable"
-        head = [r"\toprule", *part.head(), r"\midrule"]
-        ordinal = f" (part {i + 1} of {len(parts)})" if parts[1:] else ""
-        title = breakable(shortened(table.title, _LONGEST))
-        caption = rf"\caption[]{{{title}{ordinal}}}" if i else _caption(table, ordinal)
-        body += [
-            *([r"\addtocounter{table}{-1}"] if i else []),
-            rf"\begin{{{environment}}}{part.preamble}",
-            *(rf"{caption}\\", *head, r"\endfirsthead"),
-            *(*head, r"\endhead", r"\bottomrule", r"\endfoot"),
-            *(*part.rows(), rf"\end{{{environment}}}"),
-        ]
-    return [*body, "}"]
+def _pieces(
+    table: Table, parts: Sequence[_TexPart], note: int
+) -> list[list[tuple[_TexPart, range]]]:
+    """Return parts and rows of each table; the last has a note of so many lines."""
+    rows = range(len(table.rows))
+    heights = sum(4 + sum(map(part.height, rows)) for part in parts)
+    if heights + note <= MAX_LINES:
+        return [[(part, rows) for part in parts]]
+    pieces = []
+    for part in parts:
+        ends, space = [len(rows)], MAX_LINES - note * (part is parts[-1])
+        for i in reversed(rows):
+            space -= part.height(i)
+            if space < 0 and i + 1 < ends[-1]:
+                ends.append(i + 1)
+                space = MAX_LINES - part.height(i)
+        limits = itertools.pairwise([0, *reversed(ends)])
+        pieces += [[(part, range(*limit))] for limit in limits]
+    return pieces
+
+
+def _tabular(part: _TexPart, rows: range) -> list[str]:
+    environment = "tabularx" if part.flexible else "tabular"
+    begin, end = rf"\begin{{{environment}}}{part.preamble}", rf"\end{{{environment}}}"
+    return [begin, r"\toprule", *part.head(), r"\midrule", *part.rows(rows), r"\bottomrule", end]
 
 
 def _setting(size: int) -> list[str]:
@@ -298,10 +314,9 @@ def _setting(size: int) -> list[str]:
     ]
 
 
-def _sentences(table: Table, ordinal: str = "") -> str:
-    """Return the sentences of the caption: set-up, samples, machine and versions."""
+def _note(table: Table) -> str:
+    """Return the note below a table: set-up, samples, machine and versions."""
     sentences = [
-        f"{shortened(table.title, _LONGEST)}{ordinal}.",
         shortened(table.measured, 6 * _LONGEST),
         "Best in bold, ties too." if best_cells(table) else "",
         f"{shortened(table.provenance, 3 * _LONGEST)}." if table.provenance else "",
@@ -309,8 +324,9 @@ def _sentences(table: Table, ordinal: str = "") -> str:
     return " ".join(filter(None, sentences))
 
 
-def _caption(table: Table, ordinal: str = "") -> str:
-    """Return caption and label."""
-    title, text = shortened(table.title, _LONGEST), breakable(_sentences(table, ordinal))
+def _caption(table: Table, ordinal: str, number: int) -> str:
+    """Return caption and, of the first part, label."""
+    title = shortened(table.title, _LONGEST)
     label = re.sub(r"[^\w:.-]", "-", table.name, flags=re.ASCII)
-    return rf"\caption[{{{escaped(title)}}}]{{{text}}}\label{{tab:{label}}}"
+    caption = rf"\caption[{{{escaped(title)}}}]{{{breakable(f'{title}{ordinal}.')}}}"
+    return caption + ("" if number else rf"\label{{tab:{label}}}")

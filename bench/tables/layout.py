@@ -1,7 +1,7 @@
 """The layout of a table: its question, subjects, columns and figures; and its provenance."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..harness.record import Record
@@ -13,6 +13,7 @@ from .table import (
     Source,
     Summary,
     Table,
+    best_cells,
     cells,
     ranked_rows,
     with_rows,
@@ -52,6 +53,8 @@ class Layout:
     # whether a subject may be best in its group
     ranked: Callable[[Any], bool] = lambda subject: True
     optional: bool = False  # whether an empty table is no omission
+    # for a subject, whether it is best by titles of columns, where a test of its own decides
+    leads: Callable[[Any], Mapping[str, bool]] = lambda subject: {}
 
     def __call__(self, results: Results) -> Table:
         """Return the table with a row for each subject, the best of each group first."""
@@ -73,7 +76,21 @@ class Layout:
             tuple(map(source, subjects)),
             provenance(list(dict.fromkeys(records_of(subjects)))),
         )
-        return with_rows(table, ranked_rows(table))
+        return with_rows(self._with_leaders(table, subjects), ranked_rows(table))
+
+    def _with_leaders(self, table: Table, subjects: Sequence[Any]) -> Table:
+        """Return a table whose best cells are those of the tests that decide, where there are."""
+        titles = [column.title for column in table.columns]
+        decided = {
+            (i, titles.index(title)): is_best
+            for i, subject in enumerate(subjects)
+            for title, is_best in self.leads(subject).items()
+            if title in titles
+        }
+        if not decided:
+            return table
+        best = {*best_cells(table), *decided}
+        return replace(table, best=frozenset(cell for cell in best if decided.get(cell, True)))
 
 
 def source(subject: Any) -> Source:

@@ -196,10 +196,13 @@ def ranked_rows(table: Table) -> list[int]:
 
 def with_rows(table: Table, places: Sequence[int]) -> Table:
     """Return a table with the rows of these numbers, in their order."""
+    best = table.best
     return replace(
         table,
         rows=tuple(table.rows[i] for i in places),
         unranked=frozenset(new for new, i in enumerate(places) if i in table.unranked),
+        best=best
+        and frozenset((new, j) for new, i in enumerate(places) for k, j in best if k == i),
         sources=tuple(table.sources[i] for i in places) if table.sources else (),
     )
 

@@ -82,7 +82,8 @@ Quick = Annotated[bool, flag("Measure fewer targets and rounds.", "--quick")]
 Solvers = Annotated[Texts, option("NAME", "Measure only this solver; repeatable.")]
 Problems = Annotated[Texts, option("NAME", "Only this problem, or your .py, model or folder.")]
 Robots = Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")]
-Targets = Annotated[int | None, option("N", "Random targets per problem; for robots a tenth.")]
+Targets = Annotated[int | None, option("N", "Targets per problem; for robots 1/20 a stratum.")]
+Seed = Annotated[int | None, option("N", "Seed of other random targets in suite ik.")]
 Effector = Annotated[Text, option("NAME", "Link of your models that must reach the target.")]
 Pins = Annotated[Text, option("RULE", "Pinned vertices of your OBJ: far, top or 0,10.")]
 Listing = Annotated[bool, flag("List problems and solvers, and stop.", "--list")]
@@ -106,6 +107,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     problem: Problems = None,
     robot: Robots = None,
     targets: Targets = None,
+    seed: Seed = None,
     effector: Effector = None,
     pins: Pins = None,
     listing: Listing = False,
@@ -124,7 +126,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
     request = MeasurementRequest(
-        entrants or (), program_of(context), *parts, targets, effector, pins
+        entrants or (), program_of(context), *parts, targets, seed, effector, pins
     )
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:

@@ -5,18 +5,37 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from plumbob.bench.text import visible
+
 from ..help_text import block
 from ..terminal import print_aligned, width
-from .options import FAILED, SUCCESS, File, Texts, argument, option, valid_name, write_text
+from .options import (
+    FAILED,
+    REPORT,
+    SUCCESS,
+    Entrants,
+    File,
+    Text,
+    Texts,
+    argument,
+    option,
+    valid_name,
+    writable,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import RunComparison
+    from plumbob.bench.harness.record import Record
 
 COMPARE_EXAMPLES = block(
     "Examples",
     ("plumbob compare before after", "two folders of records"),
     "plumbob compare before after --fail accuracy,time:10% --markdown comment.md",
-    ("plumbob compare --rerun main --only ccd", "two revisions side by side"),
+    ("plumbob compare report --save v1", "keep a run as a baseline,"),
+    ("plumbob compare v1 report", "and compare with it"),
+    ("plumbob compare --rerun v1.0 --with my_ik.py", "your solver then and now"),
+    ("plumbob compare --rerun main --only ccd", "two revisions of Plumbob"),
 )
 HISTORY_EXAMPLES = block(
     "Examples",
@@ -25,42 +44,55 @@ HISTORY_EXAMPLES = block(
 )
 
 
-def compare(
-    folders: Annotated[list[Path] | None, argument("[OLD NEW]", "Two folders of records.")] = None,
+# What is measured of the user's solvers: two robots, targets of a chain, steps of a cloth.
+OF_SOLVERS = ["robots/ur5", "robots/panda", "chain/", "one step/k1000"]
+# Where `--save` keeps runs, below the working directory.
+BASELINES = Path("plumbob_baselines")
+Folders = Annotated[
+    list[Path] | None, argument("[OLD NEW]", "Two folders of records, or baselines.")
+]
+Limits = Annotated[str, option("LIMITS", "Exit 1 beyond limits, such as solved:1,time:10%,gone.")]
+Revision = Annotated[str, option("REV", "Measure a revision in git, and the working copy.")]
+Measured = Annotated[Texts, option("NAME", "With --rerun: measure this suite.", "--suite")]
+Only = Annotated[Texts, option("TEXT", "Problems or solvers with this text; repeatable.")]
+Pairs = Annotated[int, option("", "With --rerun: number of pairs; 0 for as many as needed.", min=0)]
+Saved = Annotated[Text, option("NAME", "Keep the records of a folder under a name, and stop.")]
+Markdown = Annotated[File, option("FILE", "Write a comment for a pull request.")]
+Json = Annotated[File, option("FILE", "Write all rows as JSON.")]
+
+
+def compare(  # noqa: PLR0913 -- one parameter an option
+    folders: Folders = None,
     *,
-    fail: Annotated[
-        str,
-        option("LIMITS", "Exit 1 beyond limits, such as accuracy,time:10%,gone."),
-    ] = "",
-    rerun: Annotated[
-        str, option("REV", "Measure a revision, in a clone, and the working copy.")
-    ] = "",
-    suites: Annotated[Texts, option("NAME", "With --rerun: measure this suite.", "--suite")] = None,
-    only: Annotated[
-        Texts, option("TEXT", "With --rerun: problems or solvers with this text.")
-    ] = None,
-    pairs: Annotated[
-        int, option("", "With --rerun: number of pairs; 0 for as many as needed.", min=0)
-    ] = 0,
-    markdown: Annotated[File, option("FILE", "Write a comment for a pull request.")] = None,
-    json: Annotated[File, option("FILE", "Write all rows as JSON.")] = None,
+    fail: Limits = "",
+    rerun: Revision = "",
+    entrants: Entrants = None,
+    suites: Measured = None,
+    only: Only = None,
+    pairs: Pairs = 0,
+    save: Saved = None,
+    markdown: Markdown = None,
+    json: Json = None,
 ) -> int:
     """Compare two runs or revisions: faster, slower, more or less accurate.
 
     Answers are compared bit by bit, times by confidence intervals. Differences within the drift of
-    the machine are undecided; --rerun REV decides them. Exit code 1 if a row fails --fail.
+    the machine are undecided; --rerun REV decides them. Exit code 1 if a row fails --fail. With
+    --with, the solver is yours, and so is the repository; limits are set unless --fail sets others.
     """
     from plumbob.bench.comparison import compare as comparison
-    from plumbob.bench.harness.record import on_record
     from plumbob.bench.tables.writers import markdown as as_markdown
 
-    limits = comparison.gate_limits(fail)
     paths = list(folders or [])
+    if save is not None:
+        return _save(save, paths)
+    limits = comparison.gate_limits(fail or comparison.OF_SOLVERS * bool(entrants))
     if rerun and not paths:
-        rows = _side_by_side(rerun, suites or ["timing"], only or [], pairs)
+        rows = _side_by_side(rerun, entrants or [], suites or [], only or [], pairs)
         old, new = rerun, "the working copy"
     elif len(paths) == 2 and not rerun:
-        rows = comparison.compare(*(on_record(folder, typed=False).records for folder in paths))
+        before, after = map(_records, paths)
+        rows = comparison.compare(before, after, not {"solved", "error"}.isdisjoint(limits))
         old, new = map(str, paths)
     else:
         got = f"{len(paths)} folder{'' if len(paths) == 1 else 's'}"
@@ -74,15 +106,42 @@ def compare(
     return FAILED if failed else SUCCESS
 
 
+def _records(folder: Path) -> "list[Record]":
+    """Return the records of a folder, or of the baseline of its name."""
+    from plumbob.bench.harness.record import on_record
+
+    is_baseline = not folder.exists() and (BASELINES / folder).is_dir()
+    return on_record(BASELINES / folder if is_baseline else folder, typed=False).records
+
+
+def _save(name: str, folders: list[Path]) -> int:
+    """Keep the records of a folder as a baseline, in place of one of the same name."""
+    from plumbob.bench.harness.record import RecordFile
+
+    if Path(name).name != name or len(folders) > 1:
+        got = f"{name!r} and {len(folders)} folders"
+        raise ValueError(f"--save: expected a name without folders and one folder, got {got}")
+    records, target = _records(*folders or [REPORT]), BASELINES / name
+    writable(target)
+    file = RecordFile(target)
+    file.drop(lambda record: True)
+    file.append(records)
+    print(visible(f"{len(records)} records kept in {target}; plumbob compare {name} NEW compares."))
+    return SUCCESS
+
+
 def _side_by_side(
-    revision: str, suites: list[str], words: list[str], pairs: int
+    revision: str, solvers: list[str], suites: list[str], words: list[str], pairs: int
 ) -> "RunComparison":
-    from plumbob.bench.comparison.rerun import Plan, clone_root, rerun
+    from plumbob.bench.comparison.rerun import Plan, rerun
     from plumbob.bench.experiments import SUITES
 
-    names = tuple(valid_name("suite", name, SUITES) for name in suites)
+    names = suites or (["ik", "cloth"] if solvers else ["timing"])
+    names = [valid_name("suite", name, SUITES) for name in names]
+    words = words or (OF_SOLVERS if solvers else [])
     tell = partial(print, "plumbob:", file=sys.stderr, flush=True)
-    return rerun(Plan(revision, names, tuple(words), pairs), clone_root(Path.cwd()), tell)
+    plan = Plan(revision, tuple(names), tuple(words), pairs, solvers=tuple(solvers))
+    return rerun(plan, Path.cwd(), tell)
 
 
 def history(
@@ -91,9 +150,7 @@ def history(
     quantity: Annotated[
         str, option("NAME", "Quantity of the records, such as iterations.")
     ] = "seconds",
-    only: Annotated[
-        Texts, option("TEXT", "Problems or solvers with this text; repeatable.")
-    ] = None,
+    only: Only = None,
     output: Annotated[File, option("FILE", "Write a figure, an .svg.", "--output", "-o")] = None,
 ) -> int:
     """Show a quantity over many runs, the largest change first."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
 from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
-from plumbob.bench.harness.block import Block, Choice, Scale
+from plumbob.bench.harness.block import SEED, Block, Choice, Scale
 from plumbob.bench.peers import opening, registry
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.problems import files
@@ -31,6 +31,7 @@ class MeasurementRequest(NamedTuple):
         program: of the user, behind --.
         solvers, problems, robots: by name; all if empty. Problems may be files.
         targets: random targets a problem, if not as in the scale.
+        seed: of random targets, if not as in the scale.
         effector: link of the user's models that reaches the target.
         pins: rule for the pins of the user's cloths.
     """
@@ -41,6 +42,7 @@ class MeasurementRequest(NamedTuple):
     problems: Sequence[str] = ()
     robots: Sequence[str] = ()
     targets: int | None = None
+    seed: int | None = None
     effector: str | None = None
     pins: str | None = None
 
@@ -60,7 +62,7 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
         else:
             entrants.append(entrant)
     own, names = files.read(request.problems, suites, request.effector, request.pins)
-    size = scale_of(scale, request.targets, entrants, own)
+    size = replace(scale_of(scale, request.targets, entrants, own), seed=seed_of(request.seed))
     if not any((request.solvers, names, request.robots)):
         return Choice(scale, size, is_partial=request.targets is not None)
     every = [block for suite in suites for block in blocks(suite, size)]
@@ -76,6 +78,13 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
             f"`plumbob bench {suites[0]} --list` lists all"
         )
     return choice
+
+
+def seed_of(number: int | None) -> int:
+    """Return the seed of random targets, by default the same for everybody."""
+    if number is not None and not 0 <= number < 2**32:
+        raise ValueError(f"seed: expected 0 to {2**32 - 1}, got {number}")
+    return SEED if number is None else number
 
 
 def scale_of(

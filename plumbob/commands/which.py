@@ -72,5 +72,5 @@ def _choice(robot: Path, link: str | None) -> "Choice":
     except ValueError as error:
         hint = "" if link else "; --link names the link that must reach the targets"
         raise ValueError(str(error).replace("effector: ", "--link: ") + hint) from None
-    scale = replace(SCALES["quick"], targets=100, problems=tuple(own))
+    scale = replace(SCALES["quick"], problems=tuple(own))
     return Choice("quick", scale, problems=(poses,), is_partial=True)

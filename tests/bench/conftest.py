@@ -148,6 +148,8 @@ def raced(solver, kind, task="reachable", robot="arm", size=4, **changed):
     facts = {"task": task, "title": f"the {robot}"}
     problem = f"{'robots' if task == 'reachable' else task}/{robot}"
     which = {"problem": problem, "solver": solver, "size": size, "settings": {"kind": kind}}
+    if "seconds" in changed:
+        changed["seconds"] = np.atleast_2d(changed["seconds"])
     return sample("raced", **which, arrays=changed, facts=facts)
 
 

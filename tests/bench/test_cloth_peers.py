@@ -1,5 +1,6 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
+import contextlib
 import importlib
 import subprocess
 import sys
@@ -20,12 +21,10 @@ from plumbob.bench.experiments.cloth_peers import (
     truth,
 )
 from plumbob.bench.experiments.cloth_peers import measurement as peers_cloth
-from plumbob.bench.experiments.cloth_peers.job import Shape
 from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs, step_rungs
 from plumbob.bench.experiments.cloth_peers.truth import first_step, true_motion, truth_of
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import JobOutcome, WorkerProcess
-from plumbob.bench.harness.worker import Finished, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from plumbob.bench.problems.falling_cloth import (
@@ -34,14 +33,13 @@ from plumbob.bench.problems.falling_cloth import (
     FallingCloth,
     explicit_substeps,
     falling_cloth,
-    hanging_cloth,
     highest_frequency,
     highest_mode,
     level_cloth,
 )
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import best_cells
-from plumbob.reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
+from plumbob.reference import ImplicitEuler, MassSpring, State, symplectic_euler
 from plumbob.reference.mass_spring import stiffness_matrix
 
 SIZE, STIFFNESS = 5, 100.0
@@ -169,14 +167,6 @@ def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite
     assert peers_cloth.step_error(half, answers) == pytest.approx(0.5)
     for lost in (np.nan, np.inf, 1e200):
         assert peers_cloth.step_error(np.full_like(half, lost), answers) == np.inf
-
-
-def test_errors_do_not_care_how_the_world_is_turned_or_particles_are_numbered(rng):
-    x, exact, start = rng.standard_normal((3, 7, 3))
-    R, order = rotation.to_matrix(rotation.random(rng)), rng.permutation(7)
-    moved = [(points @ R.T + 5.0)[order] for points in (x, exact, start)]
-    assert metrics.relative_error(*moved) == pytest.approx(metrics.relative_error(x, exact, start))
-    assert metrics.rms_distance(*moved[:2]) == pytest.approx(metrics.rms_distance(x, exact))
 
 
 def test_a_motion_has_diverged_if_one_particle_is_ever_too_far():
@@ -354,8 +344,6 @@ class Mover:
                 raise FloatingPointError("too large a step")
             if self.manner == "explodes":
                 self.x = self.x * 1e300 * 1e300
-        if self.manner == "slow":
-            time.sleep(0.2)
 
     def positions(self):
         return self.x
@@ -370,28 +358,6 @@ def prepare(system, frame, manner="well"):
 @pytest.fixture(scope="module", autouse=True)
 def fakes(importable):
     importable("fake_cloth_solvers", FAKES)
-
-
-def messages(cloth, manner, frames=5, repeats=1):
-    shape = Shape(frames, repeats)
-    return list(peers_cloth.job(fake_peer(manner), cloth, {"manner": manner}, shape).perform())
-
-
-@pytest.mark.parametrize(
-    ("manner", "finite", "last"),
-    [
-        ("overflows", [True, True, False], Finished()),
-        ("explodes", [True, True, False], Finished()),
-        ("raises", [True, True], Finished("ArithmeticError: in one frame")),
-        ("unable", [], Finished("ValueError: takes no cloths")),
-        ("slow", [True] * 5, Finished()),
-    ],
-)
-def test_frames_before_an_overflow_or_an_exception_are_kept(cloth, manner, finite, last):
-    sent = messages(cloth, manner)
-    frames = [message.q for message in sent if isinstance(message, Solved)]
-    assert [bool(np.isfinite(q).all()) for q in frames] == finite
-    assert sent[-1] == last
 
 
 @pytest.fixture(scope="module")
@@ -422,6 +388,9 @@ FALL = peers_cloth.Fall(peers_cloth.Level(SIZE, 5), partial(falling_cloth, SIZE,
         ("hangs", "not finished: ended after 0.5 s of silence", True),
         ("crashes", "its process ended with code 3", True),
         ("explodes", "diverged", False),
+        ("overflows", "diverged", False),
+        ("raises", "ArithmeticError: in one frame", True),
+        ("unable", "ValueError: takes no cloths", True),
     ],
 )
 def test_every_manner_becomes_one_point(worker, monkeypatch, manner, remark, trouble):
@@ -479,31 +448,34 @@ def test_explicit_solvers_take_no_implicit_step_and_all_move():
     assert orders == [(solvers if i % 2 == 0 else solvers[::-1]) * cloths for i in range(3)]
 
 
-def errors_of_all(peers):
-    """The errors of every peer in a step and a motion of a tiny cloth, to the bit."""
-    return {
-        (task, peer.title): peers_cloth.work(task, peer, [FALL]).arrays["error"].tobytes()
-        for task in (ONE_STEP, MOTION)
-        for peer in peers
-        if task == MOTION or peer.kind != EXPLICIT
-    }
+@pytest.fixture
+def errors_of_all(monkeypatch):
+    """Return the errors of every installed peer on a tiny cloth in a fresh process, to the bit."""
+
+    def measured():
+        worker = WorkerProcess(600.0, 120.0)
+        monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
+        with contextlib.closing(worker):
+            return {
+                (task, peer.title): peers_cloth.work(task, peer, [FALL]).arrays["error"].tobytes()
+                for task in (ONE_STEP, MOTION)
+                for peer in registry.cloth_peers()
+                if peer.is_installed and (task == MOTION or peer.kind != EXPLICIT)
+            }
+
+    return measured
 
 
 @pytest.mark.slow
-def test_a_busy_machine_changes_no_error(monkeypatch):
-    """Every installed peer computes the same bits beside two busy processes."""
-    worker = WorkerProcess(600.0, 120.0)
-    monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
-    peers = [peer for peer in registry.cloth_peers() if peer.is_installed]
-    quiet = errors_of_all(peers)
+def test_a_busy_machine_changes_no_error(errors_of_all):
+    """PyBullet keeps its body in a process, and with it some rounding from run to run."""
+    quiet = errors_of_all()
     loop = [sys.executable, "-c", "while True: pass"]
-    busy = [subprocess.Popen(loop) for _ in range(2)]
-    try:
-        assert errors_of_all(peers) == quiet
-    finally:
-        for process in busy:
-            process.kill()
-        worker.close()
+    with contextlib.ExitStack() as stack:
+        for _ in range(2):
+            process = stack.enter_context(subprocess.Popen(loop))
+            stack.callback(process.kill)
+        assert errors_of_all() == quiet
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
@@ -555,12 +527,6 @@ def test_a_solver_that_fails_has_no_limit_and_says_why(here):
     measured = peers_cloth.stability(fake_peer("unable"), (STIFFNESS,))
     assert np.isnan(measured.arrays["limit"]).all()
     assert "TypeError" in measured.notes["remark"]
-
-
-def test_a_hanging_cloth_is_at_rest():
-    system, rest = hanging_cloth(4, STIFFNESS)
-    state = symplectic_euler(system, State(rest, np.zeros_like(rest)), 1e-3)
-    np.testing.assert_allclose(state.velocities, 0.0, atol=1e-9)
 
 
 # Tables and figures.

@@ -27,6 +27,12 @@ def verdicts(old, new):
     return [(row.verdict, row.quantity) for row in compare(old, new).rows]
 
 
+def stopped(rows, **limits):
+    """The rows that fail a gate, without the limit behind their sentences."""
+    names = {(row.key, row.quantity) for row in failing(rows, limits)}
+    return [row for row in rows if (row.key, row.quantity) in names]
+
+
 def test_a_run_beside_itself_differs_in_nothing(records):
     made = compare(records, records)
     assert {row.verdict for row in made.rows} == {ChangeVerdict.SAME}
@@ -55,7 +61,7 @@ def test_the_last_digit_of_one_number_is_seen_whatever_else_changed(
     assert ChangeVerdict.SLOWER in {row.verdict for row in rows}
     if step > 0:
         assert rows[0] == found
-        assert failing(rows, {"accuracy": 0.0}) == [found]
+        assert stopped(rows, accuracy=0.0) == [found]
 
 
 WORSE = {
@@ -157,7 +163,8 @@ def test_a_slowdown_beyond_the_drift_is_called_and_one_within_is_undecided(make)
     assert made.rows[0].verdict == ChangeVerdict.SLOWER
     assert made.rows[0].key[2] == "s0"
     assert made.rows[0].ratio.low < 1.2 < made.rows[0].ratio.high
-    assert failing(made.rows, {"time": 0.1}) == made.rows[:1]
+    assert stopped(made.rows, time=0.1) == made.rows[:1]
+    assert failing(made.rows, {"time": 0.1})[0].why.endswith("(1.16 to 1.29) (limit 1.1)")
     assert failing(made.rows, {"time": 0.5}) == []
     assert called_rows(compare(new, old).rows) == ["s0"]
     old, new = two_runs(make, rng, drift=0.3, factor=1.2)
@@ -261,7 +268,7 @@ def test_a_change_is_a_share_of_the_larger_number_and_a_gate_stops_from_there_on
     rows = compare([old], [new]).rows
     (row,) = (row for row in rows if row.quantity == "largest_angle")
     assert (row.verdict, row.change) == (ChangeVerdict.CHANGED, 0.5)
-    assert failing(rows, {"accuracy": 0.5}) == [row]
+    assert stopped(rows, accuracy=0.5) == [row]
     assert failing(rows, {"accuracy": 0.51}) == []
 
 
@@ -338,7 +345,7 @@ def test_the_terminal_shows_ten_lines_the_worst_first_and_exits_1(capsys, folder
     assert (code, err) == (1, "")
     lines = out.splitlines()
     assert len(lines) <= 10
-    assert lines[0] == "STOP: 1 row beyond the limits of --fail"
+    assert lines[0] == "STOP: 1 row beyond the limits"
     assert "LESS RIGHT arm/circle, ccd, residual (warm false): 0.0003" in lines[2]
     assert plumbob(capsys, "compare", "old", "new")[0] == 0
     assert plumbob(capsys, "compare", "old", "old", "--fail", "accuracy,time:0%,gone")[0] == 0
@@ -358,12 +365,39 @@ def test_markdown_and_json_hold_what_was_found(capsys, folders):
     assert ranks == sorted(ranks)
 
 
+def test_a_gate_says_which_statistic_failed_and_by_how_much(make):
+    """To the point for shares and to the factor for errors; within the limit nothing fails."""
+    old = [make.solving("a", 59, count=60), make.worked("b", error=(0.5, 1e-4))]
+    new = [make.solving("a", 55, count=60), make.worked("b", error=(0.5, 3e-4))]
+    rows = compare(old, new, statistics=True).rows
+    assert [row.why for row in failing(rows, {"solved": 0.01, "error": 1.0})] == [
+        "smallest error grew from 1.0e-4 to 3.0e-4 (limit 2 times)",
+        "share solved fell from 98.3 % to 91.7 % (limit 1 point)",
+    ]
+    assert failing(rows, {"solved": 0.07, "error": 2.5}) == []
+    assert failing(compare(new, old, statistics=True).rows, {"solved": 0.0, "error": 0.0}) == []
+    assert not {"share solved", "smallest error"} & {row.quantity for row in compare(old, new).rows}
+
+
+def test_a_baseline_is_a_run_under_a_name(capsys, folders):
+    code, out, _ = plumbob(capsys, "compare", "old", "--save", "v1")
+    assert code == 0
+    assert "plumbob compare v1 NEW" in out
+    RecordFile("old").drop(lambda record: True)
+    assert plumbob(capsys, "compare", "v1", "new", "--fail", "accuracy")[0] == 1
+    assert plumbob(capsys, "compare", "new", "--save", "v1")[0] == 0  # in place of the other
+    assert plumbob(capsys, "compare", "v1", "new", "--fail", "accuracy,gone")[0] == 0
+
+
 MISUSE = {
     "one folder": (["old"], "expected OLD and NEW, or --rerun REV, got 1 folder"),
     "nothing": ([], "expected OLD and NEW, or --rerun REV, got 0 folders"),
     "both": (["old", "new", "--rerun", "HEAD"], "expected OLD and NEW, or --rerun REV"),
     "no records": (["old", "nowhere"], "no records in nowhere"),
-    "limits": (["old", "new", "--fail", "speed"], "--fail: expected accuracy"),
+    "limits": (
+        ["old", "new", "--fail", "speed"],
+        "--fail: expected accuracy or accuracy:SHARE, time:SHARE, solved:POINTS",
+    ),
     "suite": (["--rerun", "HEAD", "--suite", "x"], "unknown suite 'x': expected one of check"),
 }
 

@@ -9,17 +9,13 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments.arm.tables import residuals_chart
-from plumbob.bench.experiments.chain import measurement as chain
 from plumbob.bench.experiments.chain.tables import iterations_chart
 from plumbob.bench.experiments.cloth_peers import tables as cloth_tables
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.peers import contestant, opening, registry
-from plumbob.bench.peers.entrant import CHAIN_TASK, Entrant
+from plumbob.bench.peers import opening
 from plumbob.bench.peers.sources import commit_of, digest_of
 from plumbob.bench.problems import models
-from plumbob.bench.problems.chains import chain_targets
 from plumbob.bench.problems.evaluate import Evaluator
 from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
@@ -193,45 +189,6 @@ def test_a_program_is_timed_by_its_own_clock_or_by_round_trips(folder, extra, re
     assert (record.arrays["seconds"] < 1e-6).all() == bool(extra)
 
 
-@pytest.mark.parametrize(
-    ("extra", "done"), [('"seconds": 1e-7', 6), pytest.param("", 2, marks=pytest.mark.slow)]
-)
-def test_a_budget_counts_the_seconds_of_the_solver_not_of_its_requests(folder, extra, done):
-    slow = PROGRAM.replace("EXTRA", extra).replace("print(json", "time.sleep(0.15); print(json")
-    (folder / "slow.py").write_text(slow.replace("import json", "import json, time"))
-    entrant = Entrant("slow", "", (sys.executable, str(folder / "slow.py")), tasks=(CHAIN_TASK,))
-    (peer,) = registry.chain_peers([entrant])
-    limits = chain.SolverLimits(1e-4, 5)
-    found = chain.solve_one_by_one(chain_targets("near", 6), peer, limits, budget=0.2)
-    assert np.isfinite(found.arrays["residual"]).sum() == done
-    assert ("cut by its time budget" in found.notes["remark"]) == (done < 6)
-
-
-@pytest.fixture
-def pass_by(monkeypatch):
-    """Let seconds pass on the clocks, which stand still otherwise."""
-    now = [0.0]
-    monkeypatch.setattr(stopwatch.time, "perf_counter", lambda: now[0])
-    monkeypatch.setattr(contestant, "perf_counter", lambda: now[0])
-
-    def advance(seconds):
-        now[0] += seconds
-
-    return advance
-
-
-def test_a_budget_ends_even_if_a_solver_claims_almost_no_time(pass_by):
-    budget = stopwatch.Budget(1.0)
-    for _ in range(int(stopwatch.MAXIMUM_EXTENSION)):
-        assert not budget.is_spent
-        pass_by(1.0)
-        budget.excuse(1.0 - 1e-12)
-    assert budget.is_spent
-    budget = stopwatch.Budget(1.0)
-    pass_by(1.5)
-    assert budget.is_spent
-
-
 # What else is broken is refused with its sentence: see `test_hostile_entrants`.
 BROKEN = {
     "crashes": "import os; os.abort()",
@@ -381,7 +338,6 @@ def test_a_dry_run_measures_nothing_and_knows_how_long_it_takes(folder, capsys):
     assert bench(*asked, "--dry-run") == 0
     told = capsys.readouterr().out
     assert "8 to measure, 0 already" in told
-    assert "from budgets" in told
     assert not Path("out").exists()
     bench(*asked, "--solver", "ccd")
     capsys.readouterr()

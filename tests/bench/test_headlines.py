@@ -203,6 +203,18 @@ def test_without_rivals_there_is_no_headline(make):
     assert headlines.overview(Results([])) == (None, [], "", [], [], [])
 
 
+def test_a_motion_is_a_race_of_its_own(make):
+    near = {"error": [np.inf, 5e-3, 1e-3]}
+    records = [
+        make.fell("Newton engine, semi-implicit", seconds=[1e-4, 2e-4, 1.0], **near),
+        make.fell("Plumbob symplectic Euler", **near),
+    ]
+    assert sentence(records, "Fastest in a motion within 1 % of the truth") == (
+        "In a motion within 1 % of the truth, Newton is the fastest on 1 of 1 cloth, 5.0 times "
+        "faster than the best other engine, Plumbob (ours)."
+    )
+
+
 def test_a_step_is_solved_first_by_an_engine(make):
     newton = make.worked("Plumbob Newton", error=(1e-3, 1e-9), seconds=(1e-3, 2e-3))
     hasty = make.worked("MuJoCo Euler", error=(0.5, 0.4))

@@ -18,6 +18,7 @@ import pytest
 from hostile_programs import LIMITS, running
 
 from plumbob.bench.experiments.chain import measurement as chain
+from plumbob.bench.harness import job as job_module
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.progress import TROUBLE, listening
 from plumbob.bench.peers import registry
@@ -175,7 +176,7 @@ def test_hostile_files_get_their_sentence(tmp_path, name):
 
 @pytest.fixture(scope="module")
 def worker():
-    impatient = WorkerProcess(60.0, 1.0)
+    impatient = WorkerProcess(60.0, 2.0)
     yield impatient
     impatient.close()
 
@@ -185,14 +186,20 @@ def solved(spec, targets):
     (peer,) = registry.chain_peers([Entrant("hostile", "", spec, tasks=(TASK,))])
     skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
     problem = TargetsForSkeleton("", "", skeleton, SKELETON["local_rotations"], targets)
-    return chain.solve_one_by_one(problem, peer, chain.SolverLimits(1e-4, HOSTILE), budget=60.0)
+    limits = chain.SolverLimits(1e-4, HOSTILE)
+    job = chain.job_of(problem, limits, peer.module, {"method": "", **peer.spec}, "hostile")
+    answers = partial(chain.solve_one_by_one, problem, job, limits)
+    found = chain.solve_alone(chain.ChainJob(answers, job))
+    if found.values is None:
+        raise NoAnswerError(found.notes["failed"])
+    return found
 
 
 @pytest.mark.parametrize("name", rows("bench", "claims -5 iterations"))
 def test_a_hostile_entrant_of_the_bench_reaches_nothing_by_it(tmp_path, monkeypatch, worker, name):
     """What is wrong with an answer costs the target; its time is never what it claims."""
     row = BEHAVIOURS[name]
-    monkeypatch.setattr(chain, "worker_process", lambda: worker)
+    monkeypatch.setattr(job_module, "worker_process", lambda: worker)
     (tmp_path / "solver.py").write_text(source(row.does, PYTHON))
     measure = partial(solved, str(tmp_path / "solver.py"), TARGETS)
     if row.bench == SILENT:
@@ -209,7 +216,7 @@ def _check(found, is_right, words):
     """Right answers are kept and timed, others are neither; what is wrong stands in the record."""
     assert not found.arrays["solved"].any()
     assert (np.isfinite(found.arrays["residual"]) == is_right).all()
-    assert ((found.arrays["seconds"] > 0.0) == is_right).all()
+    assert ("seconds" in found.arrays) == is_right
     told = f"{found.notes['remark']}; {found.facts['trouble']}"
     assert re.search("^; $" if is_right else words, told), told
 
@@ -227,7 +234,7 @@ for line in sys.stdin:
 
 def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch, worker):
     """Those of the first targets neither, which were claimed before it was seen."""
-    monkeypatch.setattr(chain, "worker_process", lambda: worker)
+    monkeypatch.setattr(job_module, "worker_process", lambda: worker)
     (tmp_path / "liar.py").write_text(HEAD + "    pass\n" + LIAR)
     targets = np.array([[6.0 + i % 3, 1.0, 1.0] for i in range(12)])
     announced = []

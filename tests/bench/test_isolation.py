@@ -1,19 +1,18 @@
 """Solvers in a process of their own: one that hangs, crashes, raises or lies costs one row."""
 
-from types import SimpleNamespace
+import itertools
 
 import numpy as np
 import pytest
 
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.robots import measurement as robots
-from plumbob.bench.experiments.robots.tables import outcomes
+from plumbob.bench.experiments.robots.tables import outcomes, robot_by_robot
 from plumbob.bench.harness import job as job_module
-from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
-from plumbob.bench.harness.job import REPEATS, Job
+from plumbob.bench.harness.job import Job, TimedTurns, times_in_turns
 from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.worker import Finished, Ready, Solved
+from plumbob.bench.harness.worker import Finished, Lap, Solved
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
@@ -56,8 +55,6 @@ def misbehave(manner):
         os._exit(3)
     if manner == "raises":
         raise ArithmeticError("on\\none target")
-    if manner == "slow":
-        time.sleep(0.3)
 
 def prepare(robot, tolerance, manner="perfect", at=2):
     if manner == "unable":
@@ -100,9 +97,9 @@ def targets(rng):
     return Targets(*evaluator.forward(q), q, np.zeros(COUNT, dtype=int))
 
 
-def job(targets, manner, restarts=0, budget=60.0, **settings):
+def job(targets, manner, restarts=0, **settings):
     settings = {"manner": manner, **settings}
-    return Job("fake_solvers", robot("iiwa14"), targets, TOLERANCE, settings, restarts, budget)
+    return Job("fake_solvers", robot("iiwa14"), targets, TOLERANCE, settings, restarts)
 
 
 def messages(targets, manner, **more):
@@ -129,52 +126,39 @@ def test_a_perfect_solver_is_perfect_in_its_own_process_whatever_it_prints(worke
     assert evaluation(targets, outcome.solved).solved.all()
 
 
-def test_a_quick_solve_is_repeated_before_the_next(targets, monkeypatch, fakes):
-    """Times are those of a loop of solves and nothing else."""
-    monkeypatch.setattr(job_module, "QUICK", 0.1)
-    counts, calls, prepare = [], [], fakes.prepare
-
-    def time_call(call):
-        counts.append(len(calls))
-        calls.clear()
-        return stopwatch.time_call(call)
-
-    def counting(*model, **settings):
-        ask = prepare(*model, **settings)
-
-        def ask_and_count(request):
-            solve = ask(request)
-            return lambda: calls.append(1) or solve()
-
-        return ask_and_count
-
-    monkeypatch.setattr(job_module, "time_call", time_call)
-    monkeypatch.setattr(fakes, "prepare", counting)
-    messages(targets, "slow", at=1)
-    assert counts == [0, 0, 1, 1 + REPEATS, 1, 1 + REPEATS]
-
-
-@pytest.mark.parametrize("repeats", [1, 7])
 @pytest.mark.parametrize(("manner", "restarts"), [("gives up", 3), ("rolls dice", 0)])
-def test_answers_do_not_depend_on_repeated_solves(targets, monkeypatch, manner, restarts, repeats):
-    """On a quick machine solves are repeated and on a slow one not."""
-
-    def answers(quick, repeats):
-        monkeypatch.setattr(job_module, "QUICK", quick)
-        monkeypatch.setattr(job_module, "REPEATS", repeats)
-        return np.array([answer.q for answer in solved(targets, manner, restarts=restarts)])
-
-    never = answers(0.0, 0)
-    assert not np.array_equal(never, targets.starts)  # else nothing was drawn
-    assert len(np.unique(never, axis=0)) == COUNT
-    np.testing.assert_array_equal(answers(10.0, repeats), never)
+def test_an_answer_depends_on_its_target_only(targets, manner, restarts):
+    """Neither on the targets before it nor on how often they were solved."""
+    forwards = np.array([a.q for a in solved(targets, manner, restarts=restarts)])
+    assert not np.array_equal(forwards, targets.starts)  # else nothing was drawn
+    assert len(np.unique(forwards, axis=0)) == COUNT
+    reverse = Targets(*(part[::-1] for part in targets))
+    backwards = np.array([a.q for a in solved(reverse, manner, restarts=restarts)])
+    np.testing.assert_array_equal(backwards[::-1], forwards)
+    later = solved(targets.after(2), manner, restarts=restarts)
+    np.testing.assert_array_equal([a.q for a in later], forwards[2:])
 
 
-def test_a_solver_without_time_left_begins_no_further_target(targets):
-    types = [type(message) for message in messages(targets, "perfect")]
-    assert types == [Ready, *[Solved] * COUNT, Finished]
-    types = [type(message) for message in messages(targets, "slow", at=0, budget=0.2)]
-    assert types == [Ready, Solved, Finished]
+def test_solvers_take_turns_and_a_lost_one_costs_its_own_times(worker, targets, monkeypatch):
+    monkeypatch.setattr(job_module, "worker_process", lambda: worker)
+    jobs = [job(targets, manner) for manner in ("perfect", "hangs", "unable", "raises")]
+    perfect, *others, raises = times_in_turns(jobs, 3, 2)
+    assert others == [None, None]
+    for times in (perfect, raises):
+        assert times.seconds.shape == (2, 3)
+        assert times.control.shape == (2,)
+        assert (times.seconds > 0).all()
+
+
+def test_a_turn_is_announced_before_it_begins_and_the_order_of_a_round_is_drawn(targets):
+    turns = TimedTurns(tuple(job(targets, "perfect") for _ in range(4)), 2, 3)
+    laps = [message for message in turns.perform() if isinstance(message, Lap)]
+    begun = [lap.number for lap in laps if lap.control]
+    rounds = np.reshape(begun, (3, 4))
+    assert (np.sort(rounds, axis=1) == range(4)).all()
+    assert len(np.unique(rounds, axis=0)) > 1
+    following = itertools.pairwise(laps)
+    assert all(b.number == a.number and b.times for a, b in following if a.control)
 
 
 def test_an_exception_costs_one_target_and_is_reported(targets):
@@ -284,7 +268,7 @@ def suite(monkeypatch, worker):
     ]
     monkeypatch.setattr(registry, "PEERS", peers)
     monkeypatch.setattr(robots, "ROBOTS", ("iiwa14",))
-    monkeypatch.setattr(robots, "worker_process", lambda: worker)
+    monkeypatch.setattr(job_module, "worker_process", lambda: worker)
     return {(b.solver, b.problem): b for b in robots.blocks(Scale(targets=3, seconds=10.0))}
 
 
@@ -299,7 +283,7 @@ def test_every_manner_becomes_one_record(suite):
     assert notes["remark"] == "takes no iiwas"
     solves, notes, _ = suite["hangs", "robots/iiwa14"].measure()
     assert solves.exception.tolist() == [False, True] * 3
-    assert (solves.solved[1], solves.seconds[1]) == (False, 0.5)
+    assert solves.seconds is None  # it hangs on a target that is timed
     assert np.isnan(solves.position[1])
     assert notes["remark"] == "ended after 0.5 s of silence, on 3 of 6 targets"
     assert sum(solver == "gone" for solver, _ in suite) == 1
@@ -308,12 +292,15 @@ def test_every_manner_becomes_one_record(suite):
     assert notes["remark"] == "a-package-that-nobody-has is not installed"
 
 
-def test_a_process_lost_at_the_end_of_the_budget_is_not_started_again(suite, monkeypatch):
-    """Else a solver that hangs on every target would take hours."""
-    monkeypatch.setattr(robots, "Budget", lambda seconds: SimpleNamespace(is_spent=True))
-    solves, notes, _ = suite["hangs", "robots/iiwa14"].measure()
-    assert solves.exception.tolist() == [False, True]
-    assert notes["remark"] == "ended after 0.5 s of silence"
+def test_a_solver_that_hangs_thrice_does_not_finish(suite, monkeypatch):
+    """Else a solver that hangs on every target would take hours; its share is not known."""
+    monkeypatch.setattr(job_module, "MAXIMUM_SILENCES", 1)
+    block = suite["hangs", "robots/iiwa14"]
+    measured = block.measure()
+    assert measured.values.exception.tolist() == [False, True]
+    table = robot_by_robot(Results([record_of(block, measured, 0.0)]))
+    row = dict(zip([column.title for column in table.columns], table.rows[0], strict=True))
+    assert (row["solved"], row["mark"].partition(";")[0]) == (None, "not finished")
 
 
 @pytest.mark.parametrize(("solver", "count"), [("hangs", 3), ("raises", 1)])

@@ -70,7 +70,7 @@ def document(tables, width):
     body = "\n\\clearpage\n".join(latex.latex(made, width) for made in tables)
     return (
         r"\pdfcompresslevel=0 \pdfobjcompresslevel=0 \documentclass{article}"
-        r"\usepackage[T1]{fontenc}\usepackage{lmodern,booktabs,xltabular,siunitx}"
+        r"\usepackage[T1]{fontenc}\usepackage{lmodern,booktabs,tabularx,siunitx}"
         rf"\usepackage[textwidth={latex.paper(width)[0]:.1f}pt,textheight=640pt]{{geometry}}"
         rf"\begin{{document}}{body}\end{{document}}"
     )
@@ -201,11 +201,27 @@ def test_groups_have_a_heading_in_common_and_rows_of_one_name_are_set_apart():
     assert latex.latex(table(("a", 1), ("a", 2), ("b", 3))).count("addlinespace") == 1
 
 
-@pytest.mark.parametrize(("rows", "is_long"), [(40, False), (41, True)])
-def test_more_than_forty_rows_break_over_pages(rows, is_long):
-    text = latex.latex(table(*((f"{i}", 1.0) for i in range(rows))))
-    assert (r"\begin{longtable}" in text) == is_long
-    assert (r"\begin{table*}" in text) == (not is_long)
+@pytest.mark.parametrize("width", ["page", "column"])
+@pytest.mark.parametrize(("rows", "count"), [(30, 1), (60, 2), (130, 3)])
+def test_more_rows_than_a_page_holds_stand_in_more_tables(rows, count, width):
+    """Never in a longtable, which does not work in two columns."""
+    text = latex.latex(table(*((f"{i}", 1.0) for i in range(rows)), measured="So."), width)
+    assert "longtable" not in text
+    assert text.count(r"\toprule") == text.count(r"\caption[") == count
+    assert re.findall(r"^(\d+) & 1.00", text, re.MULTILINE) == [str(i) for i in range(rows)]
+    assert (f"(part {count} of {count})." in text) == (count > 1)
+    assert text.count("So.") == text.count(r"\label") == 1
+
+
+def test_rows_without_a_number_are_left_out():
+    """A solver that is not installed takes no line of a paper."""
+    rows = (("a", 2.0), ("absent", None), ("b", 1.0))
+    text = latex.latex(table(*rows, compared=0))
+    assert "absent" not in text
+    assert "1 of 3 rows left out: they hold no number" in text
+    assert r"b & \bfseries 1.00" in text
+    words_only = table(("a", "x"), columns=(COLUMNS[0], Column("note", words=True)))
+    assert "a & x" in latex.latex(words_only)
 
 
 def test_what_is_too_wide_loses_folded_columns_then_stands_in_parts():
@@ -217,10 +233,12 @@ def test_what_is_too_wide_loses_folded_columns_then_stands_in_parts():
     assert len(re.findall(r"S\[", text)) == 20
 
 
-def test_a_caption_says_how_many_on_which_machine_with_what(records):
-    made = sections.tables(Results(records))
-    captions = {t.name: latex.latex(t).split(r"\caption")[1].split(r"\label")[0] for t in made}
-    arm = captions["accuracy"]
+def test_a_caption_is_one_sentence_and_a_note_says_how_many_on_which_machine_with_what(records):
+    (made,) = [t for t in sections.tables(Results(records)) if t.name == "accuracy"]
+    caption, arm = latex.latex(made).split(r"\caption")[1].split(r"\label")
+    assert caption.endswith(f"{{{made.title}.}}")
+    assert caption.count(".") == 1
+    assert arm.index(r"\bottomrule") < arm.index("minipage") < arm.index("Starts:")
     for fact in ("n = 2 to 3", r"tolerance \num{1.0e-4}", "slide", "Plumbob 0.0", "2000-01-02"):
         assert fact in arm
     assert "Starts:" in arm

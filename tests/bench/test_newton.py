@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments import SCALES, blocks
-from plumbob.bench.experiments.newton import STIFFNESSES, tables
 from plumbob.bench.experiments.newton import measurement as suite
+from plumbob.bench.experiments.newton import tables
 from plumbob.bench.tables.results import Results
-from plumbob.reference import STEP_SOLVERS
 
 SIZE = 6
 
@@ -53,25 +51,6 @@ def test_an_answer_far_from_the_limit_has_no_bound_but_an_error(stiff):
     assert arrays["error"] > 0.1
     assert arrays["above"] > 0
     assert notes["why"].startswith("No bound")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("stiffness", STIFFNESSES)
-def test_on_thirty_by_thirty_newton_converges_and_the_others_limits_agree(stiffness):
-    answers = {
-        (block.solver, block.settings["start"]): block.measure().arrays
-        for block in blocks("newton", SCALES["full"])
-        if block.problem == f"swing/k{stiffness:g}" and block.settings["iterations"] > suite.USUAL
-    }
-    newton = answers["newton", suite.FROM_Y]
-    assert newton["residual"] <= suite.TOLERANCE or newton["at_floor"]
-    assert newton["covered"]
-    for arrays in (arrays for arrays in answers.values() if arrays["covered"]):
-        assert arrays["same"]
-        assert arrays["apart"] <= arrays["distance"] + newton["distance"]
-    others = set(STEP_SOLVERS) - {"newton", "gauss_newton"}
-    start = suite.NEAR_NEWTON if stiffness >= suite.STIFF else suite.FROM_Y
-    assert all(answers[solver, start]["covered"] for solver in others)
 
 
 def test_table_and_sentence_follow_the_records(make, stiff):

@@ -22,7 +22,7 @@ from plumbob.bench.report.page import page as pages
 from plumbob.bench.report.sections import SECTIONS
 
 DESK, PHONE = (1440, 900), (390, 844)
-ROBOTS = ("Panda", "UR5", "xArm7", "PR2", "character")
+ROBOTS = ("Panda", "UR5", "xArm7", "PR2", "Atlas")
 # The table that is tried: it is folded, and has a row for each of these solvers on each robot.
 MAIN = "robots_by_robot"
 PRESENT = registry.PEERS[:8]  # the others are absent

@@ -180,6 +180,16 @@ def test_times_that_a_solver_measures_are_added_over_its_restarts(each, together
     assert answer.time == (together and OwnTime(together))
 
 
+def test_a_robot_of_other_lengths_is_none_of_the_makers_models():
+    model_of = pytest.importorskip("plumbob.bench.peers.ik.ur_analytic").model_of
+    arm = robot("ur5")
+    assert model_of(arm).solver.__name__.endswith("ur5")
+    longer = replace(arm, text=arm.text.replace("0.425", "0.42501"))
+    assert longer.text != arm.text
+    with pytest.raises(UnableError, match="Universal Robots only"):
+        model_of(longer)
+
+
 def test_every_entry_has_a_name_of_its_own_within_its_kind():
     names = [(entry.kind, peer.label_of(entry)) for peer in PEERS for entry in peer.entries]
     assert len(set(names)) == len(names)

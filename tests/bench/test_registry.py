@@ -12,9 +12,8 @@ from plumbob.bench.experiments.cloth import measurement as cloth
 from plumbob.bench.experiments.cloth import tables as cloth_tables
 from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.newton import tables as newton_tables
-from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots import tables as robot_tables
-from plumbob.bench.harness import run
+from plumbob.bench.harness import job, run
 from plumbob.bench.harness.experiment import Experiment
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import registry
@@ -73,7 +72,7 @@ def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(
     monkeypatch.syspath_prepend(tmp_path)
     line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (PeerEntry(ONE_START),))
     monkeypatch.setattr(registry, "PEERS", (*registry.PEERS, line))
-    monkeypatch.setattr(robots, "worker_process", in_this_process)
+    monkeypatch.setattr(job, "worker_process", in_this_process)
     name = ("robots/character", "Stays put")
     (block,) = [b for b in blocks("ik", TINY) if (b.problem, b.solver) == name]
     record = run.measure(block)
@@ -138,6 +137,11 @@ def test_a_new_experiment_is_a_folder_and_a_line(tmp_path, monkeypatch):
         assert table.rows == (("One", 2),)
     finally:
         plumbob.bench.experiments.EXPERIMENTS.remove(line)
+
+
+def test_an_unknown_style_is_one_clear_error():
+    with pytest.raises(ValueError, match="style of 'ours': expected one of first, second"):
+        registry.style_of({"name": "ours", "style": "loud"})
 
 
 def test_every_solver_has_one_entry_and_every_style_is_its_own():

@@ -1,6 +1,7 @@
 """Two revisions side by side: with itself one differs in nothing, planted faults are found."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -201,7 +202,7 @@ def test_what_cannot_be_measured_is_said_and_nothing_is_left(repository):
     with pytest.raises(ValueError, match="something to measure in both revisions, got nothing"):
         side_by_side(repository, words=("no such solver",))
     (repository / "bench" / "experiments" / "__init__.py").write_text("raise OSError('broken')")
-    with pytest.raises(ValueError, match="a process of the rerun ended: OSError: broken"):
+    with pytest.raises(ValueError, match="the working copy cannot be measured: OSError: broken"):
         side_by_side(repository)
     assert worktrees(repository) == 1
 
@@ -276,8 +277,8 @@ def test_another_project_is_refused_and_nothing_is_measured(capsys, tmp_path, mo
     project = tmp_path / "project"
     project.mkdir()
     refusal = (
-        "plumbob: --rerun: expected to be run in a clone of Plumbob, whose revisions it measures, "
-        f"got {project}: change to a clone, or compare two folders of records\n"
+        "plumbob: --rerun: expected --with and a solver of yours, or to be run in a clone of "
+        f"Plumbob, got {project}\n"
     )
     monkeypatch.chdir(project)
     for prepare in (
@@ -299,8 +300,53 @@ def test_the_command_measures_the_clone_in_which_it_is_run(capsys, repository, m
     code = cli.run_command(["compare", *arguments])
     out, err = capsys.readouterr()
     assert code == 1
-    assert out.splitlines()[0] == "STOP: 2 rows beyond the limits of --fail"
+    assert out.splitlines()[0] == "STOP: 2 rows beyond the limits"
     assert "plumbob: pair 2 of 2" in err
+
+
+ARM = """from .sweeps import SWEEPS
+
+import numpy as np
+
+
+class Arm:
+    PLUMBOB = {"name": "My arm"}
+
+    def inverse_kinematics(self, offsets, target, tolerance, max_iterations):
+        x, d = np.cumsum(offsets, axis=0), np.linalg.norm(offsets, axis=1)
+        for _ in range(SWEEPS):
+            x[-1] = target
+            for i in range(len(x) - 2, -1, -1):
+                x[i] = x[i + 1] + d[i + 1] * (x[i] - x[i + 1]) / np.linalg.norm(x[i] - x[i + 1])
+            x[0] = offsets[0]
+            for i in range(1, len(x)):
+                x[i] = x[i - 1] + d[i] * (x[i] - x[i - 1]) / np.linalg.norm(x[i] - x[i - 1])
+        return {"positions": x}
+"""
+
+
+def test_a_solver_of_another_project_is_measured_at_both_revisions(capsys, tmp_path, monkeypatch):
+    """In a package below src, which is not installed, and whose settings stand in another file."""
+    package = tmp_path / "src" / "armkit"
+    package.mkdir(parents=True)
+    for name, text in (("__init__", ""), ("sweeps", "SWEEPS = 40\n"), ("arm", ARM)):
+        (package / f"{name}.py").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    gate = ["compare", "--rerun", "HEAD", "--only", "chain/near", "--pairs", "1"]
+    assert cli.run_command([*gate, "--with", "armkit.arm:Arm"]) == 2
+    assert "--rerun: expected to be run in a git repository" in capsys.readouterr().err
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "-q", "-m", "good")
+    (package / "sweeps.py").write_text("SWEEPS = 2\n")
+    assert cli.run_command([*gate, "--with", "armkit.arm:Arm"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "STOP: 1 row beyond the limits"
+    found = r"  LESS RIGHT chain/near, My arm: share solved fell from \d+.\d % to \d+.\d % "
+    assert re.match(found + r"\(limit 1 point\)$", lines[2])
+    (package / "new.py").write_text(ARM)
+    assert cli.run_command([*gate, "--with", "armkit.new:Arm"]) == 2
+    assert "--rerun: HEAD cannot be measured: with: expected a solver" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -85,18 +85,61 @@ def test_one_start_and_restarts_are_never_compared(run, layout):
 
 
 @pytest.mark.parametrize("layout", SCORES[:2], ids=lambda layout: layout.name)
-def test_a_solver_cut_by_its_budget_is_scored_over_all_targets_and_never_leads(cut, layout):
+def test_a_solver_that_did_not_finish_has_no_share_and_never_leads(cut, layout):
     table = layout(cut)
-    assert shares(table, "solved") == {"steady": (60, MANY), "slow": (2, MANY)}
-    marks = {"slow": "cut at 3 of 120", "steady": "most solved, shortest time"}
+    shares = by_solver(table, "solved (95 % interval)")
+    assert shares["slow"] is None
+    assert (shares["steady"].hits, shares["steady"].total) == (60, MANY)
+    marks = {"slow": "not finished", "steady": "most solved, shortest time"}
     assert by_solver(table, "mark") == marks
     (point,) = table.summary.points
     assert "steady" in point
     assert "slow" not in point
     assert {row for row, _ in best_cells(table)} <= {column(table, "solver").index("steady")}
+    (curve,) = FIGURES[2](cut).data.panels[0].series
+    assert (curve.solver, curve.y[-1]) == ("steady", pytest.approx(50.0))
 
 
-def test_strata_and_curves_count_the_targets_never_begun(cut, make):
+def test_a_solver_with_a_time_limit_is_marked_and_not_ranked(run):
+    """Its answers depend on how busy the machine is."""
+    limited = run("limited", MANY, facts={"time_limited": True})
+    table = over_all(Results([limited, run("a", 90), run("b", 20)]))
+    assert by_solver(table, "mark")["limited"] == "time-limited"
+    assert "limited" not in " ".join(table.summary.points)
+    assert column(table, "solver").index("limited") in table.unranked
+
+
+def test_robots_for_tuning_and_robots_held_out_are_never_averaged(run):
+    groups = {"arm": "tuning", "leg": "tuning", "hand": "held out"}
+    records = [
+        run(solver, hits, robot=robot, facts={"group": group})
+        for solver, hits in (("a", 100), ("b", 10)) for robot, group in groups.items()
+    ]  # fmt: skip
+    table = over_all(Results(records))
+    assert [(row["robots"], row["solver"]) for row in rows(table)] == [
+        *(("all 2 robots for tuning", solver) for solver in "ab"),
+        *(("the hand", solver) for solver in "ab"),
+    ]
+    assert shares(table, "solved") == {"a": (100, MANY), "b": (10, MANY)}  # the last rows
+    assert column(robot_by_robot(Results(records)), "group") == [*["tuning"] * 4, *["held out"] * 2]
+
+
+def test_bold_numbers_are_those_of_the_solvers_that_lead(run):
+    """Overlapping intervals once set a solver in bold that the paired test tells from the best."""
+    table = over_all(Results([run("a", 100), run("b", 92), run("c", 99)]))
+    leads = {i for i, row in enumerate(rows(table)) if "most solved" in row["mark"]}
+    titles = [one.title for one in table.columns]
+    assert {i for i, j in best_cells(table) if titles[j] == "solved"} == leads
+    assert len(leads) == 2
+
+
+def test_answers_that_the_engines_place_differently_are_counted(run):
+    disputed = run("a", 3, count=4)
+    disputed.arrays["disputed"] = np.array([1, 3])
+    assert column(over_all(Results([disputed])), "disputed answers") == [2]
+
+
+def test_strata_count_the_targets_never_begun(cut, make):
     table = outcomes(cut)
     for stratum in ("joint space", "space"):
         assert shares(table, f"solved, {stratum}")["slow"] == (1, MANY // 2)
@@ -106,10 +149,6 @@ def test_strata_and_curves_count_the_targets_never_begun(cut, make):
         ("space", "1/2"),
         ("joint space", "2/2"),
     ]
-    for figure, rates in ((FIGURES[2], (2 / MANY, 0.5)), (FIGURES[4], (2 / 60, 1.0))):
-        curves = {one.solver: one.y[-1] for one in figure(cut).data.panels[0].series}
-        slow, steady = rates
-        assert curves == pytest.approx({"slow": 100 * slow, "steady": 100 * steady})
 
 
 def test_records_of_other_targets_are_marked_and_not_ranked(run):
@@ -236,16 +275,14 @@ def test_solvers_are_compared_over_robots_that_all_of_them_take(run):
     table = over_all(Results(records))
     assert [(row["robots"], row["solver"]) for row in rows(table)] == [
         *(("all 3 robots", "a"), ("all but the hand", "a"), ("all but the hand", "b")),
-        *(("the arm", solver) for solver in "cab"),
     ]
-    assert table.summary.points[-1].startswith("the arm, one start: c, 120/120")
 
 
 def test_a_solver_cut_on_one_robot_is_not_ranked_over_all(run):
     records = [run(solver, 50, robot=robot) for solver in "ab" for robot in ("arm", "leg")]
     records += [run("slow", 100), run("slow", 2, begun=3, robot="leg")]
     table = over_all(Results(records))
-    assert by_solver(table, "mark")["slow"] == "cut at 123 of 240"
+    assert by_solver(table, "mark")["slow"] == "not finished"
     assert column(table, "solver").index("slow") in table.unranked
     assert "slow" not in table.summary.points[0]
 
@@ -265,13 +302,17 @@ def test_missing_and_refused_solvers_are_listed_with_the_reason(make):
     refused = make.lacking("Mine", ONE, "not asked for this robot")
     refused.settings["version"] = "1"
     results = Results([
-        make.raced("Plumbob LM", ONE), make.raced("Plumbob LM, 100 restarts", AGAIN, robot="leg"),
+        make.raced("Plumbob LM", ONE, overhead=2.5e-7),
+        make.raced("Plumbob LM, 100 restarts", AGAIN, robot="leg"),
         make.lacking("pink", ONE, "pink is not installed"), entrant, refused,
     ])  # fmt: skip
     table = participants(results)
     versions = {"Plumbob LM": "1.2", "pink": "not installed", "Mine": "1.0"}
     assert by_solver(table, "version") == versions
     assert list(by_solver(table, "robots").values()) == ["all 2 robots", "", "the leg"]
+    assert by_solver(table, "harness overhead, median [µs]")["Plumbob LM"] == pytest.approx(0.25)
+    assert "made by the bench" in by_solver(table, "entries")["pink"]
+    assert "made by the bench" not in by_solver(table, "entries")["Plumbob LM"]
     assert by_solver(table, "remark")["Mine"] == "every robot: not asked for this robot"
     assert table.summary.sentence.startswith("2 of 3 ")
     assert "Pinoc" in table.summary.sentence
@@ -283,21 +324,17 @@ def test_missing_and_refused_solvers_are_listed_with_the_reason(make):
     assert measured == ["Plumbob LM", "Mine", "Plumbob LM, 100 restarts"]
 
 
-@pytest.mark.parametrize(
-    ("pace", "sentence"),
-    [(1.01e-4, "steady within 5 %"), (1.5e-4, "too noisy for a precision of 5 %")],
-)
-def test_the_pace_of_the_machine_tells_whether_robots_were_timed_in_peace(make, pace, sentence):
+def test_drift_between_turns_is_reported(make):
+    """A factor of 2.5 between rows that should be equal went unseen."""
     records = [make.raced(solver, ONE) for solver in "abc"]
-    assert "within the 5 %" not in robot_by_robot(Results(records)).measured
-    for record, seconds in zip(records, (1e-4, pace, 1e-4), strict=True):
-        record.conditions["pace"] = seconds
-    assert sentence in robot_by_robot(Results(records)).measured
+    assert "drifted" not in robot_by_robot(Results(records)).measured
+    for record, seconds in zip(records, (1e-4, 2.5e-4, 1.1e-4), strict=True):
+        record.arrays["control"] = np.array([1e-4, seconds])
+    assert "drifted by up to a factor of 2.50." in robot_by_robot(Results(records)).measured
 
 
-@pytest.mark.parametrize(("size", "share", "mark"), [(2, 50.0, ""), (4, 25.0, "cut at 2 of 4")])
+@pytest.mark.parametrize(("size", "share", "mark"), [(2, 50.0, ""), (4, None, "not finished")])
 def test_published_numbers_stand_beside_those_measured_here(make, size, share, mark):
-    """Targets that were never begun count as not solved."""
     table = published_ik(Results([replace(record, size=size) for record in make.republished()]))
 
     def numbers(problem, quantity):
@@ -309,10 +346,9 @@ def test_published_numbers_stand_beside_those_measured_here(make, size, share, m
         ("KDL with restarts", 88.71, None, ""),
         ("TRAC-IK, 5 ms", 99.62, share, mark),
     ]
-    infeasible = ("ik_LM, NR", 11.0, 100.0 - share, mark)
+    infeasible = ("ik_LM, NR", 11.0, share and 100.0 - share, mark)
     assert numbers("ur5", "declared infeasible [%]") == [infeasible]
     assert numbers("reachable", "iterations, mean") == [("FABRIK", 15.5, 5.0, "")]
     assert numbers("unreachable", "iterations, largest") == [("FABRIK", None, 6.0, "")]
     assert "jhavl/dkt at 1155dcb" in markdown(table)
     assert "TRAC-IK README, v1.1.0" in markdown(table)
-    assert table.summary.points[0].endswith(mark)

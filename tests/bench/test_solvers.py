@@ -8,11 +8,13 @@ import pytest
 from plumbob.bench.experiments.chain import CHAIN
 from plumbob.bench.experiments.chain.measurement import (
     SolverLimits,
+    job_of,
+    solve_one_by_one,
     solve_targets,
-    solve_with_engine,
 )
 from plumbob.bench.experiments.chain.tables import beyond_reach
 from plumbob.bench.harness.record import Record
+from plumbob.bench.peers.ik import chain_loops
 from plumbob.bench.peers.ik.levenberg_marquardt import (
     ReferenceKinematics,
     levenberg_marquardt,
@@ -68,7 +70,8 @@ def test_beyond_reach_the_loop_on_an_engine_does_as_the_reference_does(engine):
     """Towards the far target itself it swung for all iterations: 22 of 60 straight, not 60."""
     problem, limits = chain_targets("beyond", 20), SolverLimits(1e-6, 1000)
     ours = solve_targets(problem, "levenberg_marquardt", limits).arrays
-    theirs = solve_with_engine(problem, engine, limits).arrays
+    job = job_of(problem, limits, chain_loops.__name__, {"engine": engine})
+    theirs = solve_one_by_one(problem, job, limits).arrays
     np.testing.assert_array_equal(theirs["iterations"], ours["iterations"])
     np.testing.assert_allclose(theirs["excess"], ours["excess"], atol=1e-7)  # a tenth of 1e-6
     settings = {"tolerance": 1e-6, "max_iterations": 1000}

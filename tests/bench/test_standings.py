@@ -58,8 +58,7 @@ def test_the_best_is_told_by_how_much_it_is_faster(make):
 def test_a_solver_that_is_cut_off_has_no_rank_and_one_that_solves_nothing_neither(make):
     rivals = [make.solving("pink", 100), make.solving("mink", 50)]
     cut = only([*rivals, make.solving("Mine", 3, begun=18, mine=True)])
-    why = "it was cut at 18 of 200, and it solves 1.5 % of 200 targets"
-    assert cut.sentence == f"Mine is not ranked: {why}."
+    assert cut.sentence == "Mine is not ranked: it is marked “not finished”."
     none = only([*rivals, make.solving("Mine", 0, mine=True)])
     assert none.sentence == "Mine is not ranked: it solves no target."
 
@@ -249,11 +248,11 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
     out, err = capsys.readouterr()
     why = "It raised ValueError in line 5 of raiser.py: too far"
     line = f"robots/ur5, My raiser: {why}\n"
-    assert printed_before[0] == line
+    assert printed_before[0].startswith(line)
     assert err.count(why) == 1
     said = " ".join(out.split())
     rank = "My raiser had trouble on 2 of 2 problems"
-    assert f"{rank}; the first is robots/ur5: {why}, on 12 of 12 targets." in said
+    assert f"{rank}; the first is robots/ur5: {why}, on 6 of 6 targets." in said
     results = Results(RecordFile("out").read().records)
     made = {table.name: table for table in tables(results, ["ik"])}
     for name, title in (
@@ -263,7 +262,7 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
     ):
         (j,) = [j for j, column in enumerate(made[name].columns) if column.title == title]
         assert not made[name].columns[j].folded or name == "entered"
-        assert f"{why}, on 12 of 12 targets" in made[name].rows[0][j], name
+        assert f"{why}, on 6 of 6 targets" in made[name].rows[0][j], name
 
 
 def test_what_fails_alike_is_said_once_and_counted(tmp_path, monkeypatch, capsys):

@@ -71,12 +71,6 @@ def test_coordinates_and_freedoms_are_counted(arm):
     assert repr(arm) == "Articulation(6 joints, 11 degrees of freedom)"
 
 
-def test_joints_are_found_by_name(arm):
-    assert arm.names == arm.skeleton.names
-    assert arm.index("joint3") == arm.index(-3) == 3
-    assert arm.coordinates_of("joint3") == slice(2, 6)
-
-
 def test_a_mimic_of_a_mimic_moves_with_the_first(backend):
     chain = Skeleton([-1, 0, 1], np.zeros((3, 3)), ["a", "b", "c"])
     model = Articulation(

@@ -12,8 +12,6 @@ from plumbob.reference import (
     Articulation,
     ImplicitEuler,
     Target,
-    forward_kinematics,
-    judge_pose,
     scenes,
     solve_ik,
 )
@@ -74,8 +72,3 @@ def test_what_no_target_can_hold_is_refused_where_it_is_used():
 @pytest.mark.parametrize("copied", COPIES, ids=["copy", "deepcopy", "pickle"])
 def test_solvers_come_back_from_a_pickle_as_they_were(copied, solvers):
     assert copied(solvers) == solvers
-
-
-def test_a_pose_without_a_length_is_named_as_the_argument():
-    with pytest.raises(ValueError, match=r"^local_rotations: expected lengths above 0"):
-        judge_pose(ARM, np.zeros(REST.shape), forward_kinematics(ARM, REST).positions[-1])

@@ -113,17 +113,6 @@ def test_gauss_newton_linearises_where_the_pins_start(hung, rng, backend):
     np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-12)
 
 
-def test_a_damper_drags_by_the_velocity_of_its_pin(backend):
-    """Without a spring, m v' = h c (w - v') along it, w being the pin's velocity."""
-    system = MassSpring([1.0, 2.0], [[0, 1]], 1.0, 0.0, 3.0, pinned=[0], gravity=(0, 0, 0))
-    state = State([[0.0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)))
-    pins_at = [[-0.04, 0, 0]]
-    dragged = ImplicitEuler(system, h=h, tolerance=1e-14).step(state, None, pins_at).state
-    assert dragged.velocities[1, 0] == pytest.approx(-2.0 * h * 3 / (2 + h * 3), rel=1e-12)
-    pulled = symplectic_euler(system, state, h, None, pins_at)
-    assert pulled.velocities[1, 0] == pytest.approx(-2.0 * h * 3 / 2, rel=1e-14)
-
-
 @pytest.mark.parametrize("name", STEP_SOLVERS)
 def test_a_used_integrator_takes_pins_like_a_fresh_one(hung, name):
     system, state, pins_at = hung

@@ -9,7 +9,6 @@ from plumbob.reference import (
     MassSpring,
     Outcome,
     State,
-    judge_step,
     scenes,
 )
 from plumbob.reference.implicit_euler.certificate import Coverage
@@ -172,16 +171,6 @@ def test_ordinary_steps_factorise_once_an_iteration(monkeypatch):
         assert result.outcome is Outcome.CONVERGED
         assert result.iterations > 1
         assert count[0] == result.iterations
-
-
-def test_a_judged_step_says_that_newton_came_to_a_saddle():
-    system, state = rod(0.5)
-    found = judge_step(system, state, 1.0, state.positions)
-    assert found.outcome is Outcome.SADDLE
-    assert found.error == found.distance == np.inf
-    assert not found.certificate.covered
-    assert "Newton's method found no minimiser to compare with (SADDLE)" in found.summary
-    assert found.certificate.coverage is Coverage.NOT_CONVEX
 
 
 @pytest.mark.parametrize("solver", ["local_global", "chebyshev", "lbfgs", "newton_cg"])

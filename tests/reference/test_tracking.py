@@ -62,17 +62,6 @@ def test_a_cold_motion_is_a_batch_solved_with_the_same_options(arm, options, rng
         np.testing.assert_array_equal(tracked, solved)
 
 
-@pytest.mark.parametrize("solver", ["ccd", "fabrik"])
-def test_warm_starts_keep_neighbouring_frames_alike(arm, solver):
-    """The triangle's corner lies on the straight arm's line: solved from rest, the arm jumps."""
-
-    def largest_jump(warm):
-        q = track(arm, curves["triangle"](), solver, warm=warm).local_rotations
-        return rotation.angle(q[1:], q[:-1]).max()
-
-    assert largest_jump(warm=True) < 0.1 < 1.0 < largest_jump(warm=False)
-
-
 def test_only_a_coherent_motion_is_closed(arm):
     with pytest.raises(ValueError, match="closed: expected False where coherent is False"):
         track(arm, curves["circle"](3), closed=True)

@@ -159,12 +159,6 @@ def test_two_hinges_follow_a_line_as_trigonometry_says(elbow, backend):
     np.testing.assert_allclose(motion.coordinates, expected, rtol=0, atol=1e-8)
 
 
-def test_slides_share_a_distance_evenly(backend):
-    motion = track(slides(), line([0, 0, 1], [3, 0, 1], 7), LM, coherent=True)
-    steps = np.diff(motion.coordinates, axis=0)
-    np.testing.assert_allclose(steps, 0.25, rtol=0, atol=1e-9)
-
-
 def test_a_slide_with_limits_goes_as_far_as_they_let_it(backend):
     """Of 3 m the second slide may go 0.6: all of it, evenly, and the first one the rest."""
     gantry = slides(lower=[-9, -0.1, 0], upper=[9, 0.5, 0])

@@ -1,28 +1,25 @@
 """Inverse kinematics of a ten-ball chain, by us, on the kinematics of engines, and by users."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from msgspec import structs
 
-from plumbob.crosscheck.engines import SKELETON_ENGINES
-from plumbob.crosscheck.engines.skeleton_engine import coordinates
-from plumbob.reference import IK_SOLVERS, IKSolution, forward_kinematics, solve_ik
+from plumbob.reference import IK_SOLVERS, forward_kinematics, solve_ik
 from plumbob.reference.arguments import FloatArray
 
 from ...harness import metrics
-from ...harness.block import Block, Measured, Scale
+from ...harness.block import Block, Group, Measured, Scale
 from ...harness.isolation import JobOutcome, raised
-from ...harness.job import Job, worker_process
-from ...harness.measure import not_asked
-from ...harness.stopwatch import time_call
+from ...harness.job import Job, answers, times_in_turns
+from ...harness.measure import failure, not_asked
 from ...peers import registry
 from ...peers.entrant import CHAIN_TASK
-from ...peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
-from ...peers.protocol import NoAnswerError
-from ...peers.registry import ChainPeer
+from ...peers.ik import chain_loops
+from ...peers.protocol import NoAnswerError, describe
 from ...problems.chains import BEYOND, STRATA, ChainRequests, TargetsForSkeleton, chain_targets
 from . import CHAIN
 from .values import ChainSolves
@@ -36,9 +33,8 @@ MAX_ITERATIONS = 1000
 # many targets and iterations, each by a solve from the start with that many at most.
 HISTORY = 200
 FOLLOWED_TARGETS, FOLLOWED_ITERATIONS = 20, 30
-# Seconds that a user's solver has for a stratum, for those of a scale: enough for as many
-# iterations as ours may make, in the interpreter.
-BUDGET = 250.0
+# The first targets are timed, so many, in so many rounds.
+TIMED, ROUNDS = 20, 3
 NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
 NOT_FOLLOWED = "not followed, for its answers do not depend on max_iterations"
 
@@ -53,7 +49,7 @@ class SolverLimits(NamedTuple):
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every stratum, and a user's targets, for every solver."""
     for stratum in STRATA:
-        problem = chain_targets(stratum, scale.targets)
+        problem = chain_targets(stratum, scale.targets, scale.seed)
         tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
         yield from _blocks_on(problem, stratum, SolverLimits(tolerance, MAX_ITERATIONS), scale)
     limits = SolverLimits(TOLERANCE, MAX_ITERATIONS)
@@ -67,18 +63,61 @@ def blocks(scale: Scale) -> Iterator[Block]:
             yield Block(SUITE, "chain/all", entrant.name, measure, facts=facts).of(entrant)
 
 
+class ChainJob(NamedTuple):
+    """Targets and a solver: how it answers all of them, and the job that is timed."""
+
+    answers: Callable[[], Measured]
+    job: Job
+
+    def block(self, problem: TargetsForSkeleton, solver: str, limits: SolverLimits) -> Block:
+        """Return the block of the targets; solvers of the same targets are measured together."""
+        measure, group = partial(solve_alone, self), Group(problem.name, solve_together, self)
+        return Block(SUITE, problem.name, solver, measure, limits._asdict(), group=group)
+
+
+def solve_alone(job: ChainJob) -> Measured:
+    """Solve and time the targets of a solver by itself."""
+    return solve_together([job])[0]
+
+
+def solve_together(jobs: Sequence[ChainJob]) -> list[Measured]:
+    """Solve the targets of every solver; then time the first targets, the solvers in turns."""
+    results = [_answered(job) for job in jobs]
+    timed = [i for i, result in enumerate(results) if _has_answer(result)]
+    count = min(TIMED, jobs[0].job.targets.shape[0])
+    turns = times_in_turns([jobs[i].job for i in timed], count, ROUNDS)
+    for i, times in zip(timed, turns, strict=True):
+        if times is not None:
+            values = structs.replace(results[i].values, **times._asdict())
+            results[i] = results[i]._replace(values=values)
+    return results
+
+
+def _has_answer(measured: Measured) -> bool:
+    return measured.values is not None and bool(np.isfinite(measured.values.residual).any())
+
+
+def _answered(job: ChainJob) -> Measured:
+    try:
+        return job.answers()
+    except NoAnswerError as error:
+        return failure(describe(error))
+
+
 def _blocks_on(
     problem: TargetsForSkeleton, stratum: str, limits: SolverLimits, scale: Scale
 ) -> Iterator[Block]:
     """Yield targets for every solver of ours, for one loop on each engine, and for users'."""
     facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
-    common = (limits._asdict(), len(problem.targets), facts)
-    for solver in IK_SOLVERS:
-        measure = partial(solve_targets, problem, solver, limits, record=True)
-        yield Block(SUITE, problem.name, solver, measure, *common)
-    for loop in registry.LOOPS:
-        measure = partial(solve_with_engine, problem, loop.engine, limits)
-        yield Block(SUITE, problem.name, loop.name, measure, *common)
+    adapters: dict[str, dict[str, str]] = {solver: {"solver": solver} for solver in IK_SOLVERS}
+    adapters |= {loop.name: {"engine": loop.engine} for loop in registry.LOOPS}
+    for name, settings in adapters.items():
+        job = job_of(problem, limits, chain_loops.__name__, settings)
+        answers = partial(solve_one_by_one, problem, job, limits)
+        if name in IK_SOLVERS:
+            answers = partial(solve_targets, problem, name, limits, record=True)
+        block = ChainJob(answers, job).block(problem, name, limits)
+        yield replace(block, size=len(problem.targets), facts=facts)
     for block in blocks_of_users(problem, limits, scale, followed=stratum != BEYOND):
         yield replace(block, size=len(problem.targets), facts={**facts, **block.facts})
 
@@ -87,11 +126,24 @@ def blocks_of_users(
     problem: TargetsForSkeleton, limits: SolverLimits, scale: Scale, followed: bool = False
 ) -> Iterator[Block]:
     """Yield targets for each method of users' solvers."""
-    budget, settings = BUDGET * scale.seconds, limits._asdict()
     for peer in registry.chain_peers(scale.entrants):
-        measure = partial(solve_one_by_one, problem, peer, limits, budget, followed=followed)
-        block = Block(SUITE, problem.name, peer.title, measure, settings, budget=budget)
-        yield block.of(peer.entrant)
+        settings = {"method": peer.method, **peer.spec}
+        job = job_of(problem, limits, peer.module, settings, peer.entrant_name)
+        answers = partial(solve_one_by_one, problem, job, limits, followed=followed)
+        yield ChainJob(answers, job).block(problem, peer.title, limits).of(peer.entrant)
+
+
+def job_of(
+    problem: TargetsForSkeleton,
+    limits: SolverLimits,
+    module: str,
+    settings: dict[str, str],
+    entrant: str = "",
+) -> Job:
+    """Return the job of an adapter with these settings."""
+    requests = ChainRequests(problem, np.full(len(problem.targets), limits.max_iterations))
+    model = (module, problem.skeleton, requests, limits.tolerance, settings)
+    return Job(*model, entrant=entrant, warms_up=False)
 
 
 def solve_targets(
@@ -99,83 +151,42 @@ def solve_targets(
 ) -> Measured:
     """Solve all targets with a solver of ours; recompute residuals from the solutions.
 
-    `record` keeps residuals by iteration, and the seconds of each target by a call of its own.
+    `record` keeps residuals by iteration.
     """
-
-    def solve(starts: FloatArray, targets: FloatArray, record: bool = False) -> IKSolution:
-        options = {**limits._asdict(), "record": record}
-        return solve_ik(problem.skeleton, starts, targets, solver, **options)
-
-    solution = solve(problem.starts, problem.targets, record)
+    options: dict[str, Any] = {**limits._asdict(), "record": record}
+    solution = solve_ik(problem.skeleton, problem.starts, problem.targets, solver, **options)
     positions = forward_kinematics(problem.skeleton, solution.local_rotations).positions
     arrays = _evaluated(problem, limits, positions, solution.iterations)
     arrays["outcome"] = np.asarray(solution.outcome)
     if record:
         arrays |= _quantiles(solution.history[:, : HISTORY + 1])
-        pairs = zip(problem.every_start, problem.targets, strict=True)
-        calls = [partial(solve, start, target) for start, target in pairs]
-        calls[0]()  # may compile
-        arrays["seconds"] = np.array([time_call(call)[1] for call in calls])
     return Measured(ChainSolves(**arrays))
 
 
-def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: SolverLimits) -> Measured:
-    """Solve all targets by Levenberg-Marquardt on an engine's kinematics."""
-    engine = SKELETON_ENGINES[name](problem.skeleton)
-    effector, root = problem.skeleton.joint_count - 1, problem.skeleton.offsets[0]
-    targets = within_reach(problem.targets, root, problem.skeleton.reach())
-    results = [
-        time_call(partial(levenberg_marquardt, engine, q, target, effector, **limits._asdict()))
-        for q, target in zip(coordinates(engine, problem.starts), targets, strict=True)
-    ]
-    rotations = np.array([answer.q[engine.columns] for answer, _ in results])
-    positions = forward_kinematics(problem.skeleton, rotations).positions
-    arrays = _evaluated(problem, limits, positions, [answer.iterations for answer, _ in results])
-    return Measured(ChainSolves(**arrays, seconds=np.array([seconds for _, seconds in results])))
-
-
 def solve_one_by_one(
-    problem: TargetsForSkeleton,
-    peer: ChainPeer,
-    limits: SolverLimits,
-    budget: float,
-    followed: bool = False,
+    problem: TargetsForSkeleton, job: Job, limits: SolverLimits, followed: bool = False
 ) -> Measured:
-    """Have a user's solver solve all targets, for as long as its budget lasts.
+    """Have a solver solve all targets in a process of its own.
 
-    A target without an answer, or not attempted, counts as infinitely far from being reached.
+    A target without an answer counts as infinitely far from being reached.
     """
-    total = len(problem.targets)
-    requests = ChainRequests(problem, np.full(total, limits.max_iterations))
-    outcome = _performed(requests, peer, limits.tolerance, budget)
+    total, outcome = len(problem.targets), answers(job)
     solves, count = outcome.solved, len(outcome.solved)
     if not solves:
         raise NoAnswerError(outcome.trouble or "It answered nothing.")
-    arrays = _evaluated(problem, limits, *_answers(requests, outcome))
+    arrays = _evaluated(problem, limits, *_answers(job.targets, outcome))
     has_answer = np.isfinite(arrays["residual"][:count])
     arrays["solved"] = arrays["solved"][:count]
     arrays["claims"] = np.where(has_answer, [solve.claim for solve in solves], -1)
-    arrays["seconds"] = np.where(has_answer, [solve.seconds for solve in solves], 0.0)
     remarks = [outcome.note]
     if count < total:
-        reason = "" if outcome.is_lost else f" by its time budget of {budget:g} s"
-        remarks += [f"cut{reason} at {count} of {total} targets, the others count as not reached"]
+        remarks += [f"not finished: {count} of {total} targets, the others count as not reached"]
     if followed and not outcome.is_lost:
-        history = _history(problem, peer, limits, budget)
+        history = _history(problem, job)
         arrays |= history
         remarks += [] if history else [NOT_FOLLOWED]
     facts = {"trouble": raised(solves)}
     return Measured(ChainSolves(**arrays), {"remark": "; ".join(filter(None, remarks))}, facts)
-
-
-def _performed(
-    requests: ChainRequests, peer: ChainPeer, tolerance: float, budget: float
-) -> JobOutcome:
-    settings, skeleton = {"method": peer.method, **peer.spec}, requests.problem.skeleton
-    limits = (tolerance, settings, 0, budget)
-    return worker_process().perform(
-        Job(peer.module, skeleton, requests, *limits, peer.entrant_name, warms_up=False)
-    )
 
 
 def _answers(requests: ChainRequests, outcome: JobOutcome) -> tuple[FloatArray, FloatArray]:
@@ -207,9 +218,7 @@ def _evaluated(
     }
 
 
-def _history(
-    problem: TargetsForSkeleton, peer: ChainPeer, limits: SolverLimits, budget: float
-) -> dict[str, FloatArray]:
+def _history(problem: TargetsForSkeleton, job: Job) -> dict[str, FloatArray]:
     """Return the residuals by the iterations allowed; nothing if they do not depend on them."""
     allowed = np.arange(1, FOLLOWED_ITERATIONS + 1)
     starts, targets = problem.every_start[:FOLLOWED_TARGETS], problem.targets[:FOLLOWED_TARGETS]
@@ -217,7 +226,7 @@ def _history(
     starts, repeated = (np.repeat(part, len(allowed), axis=0) for part in (starts, targets))
     every = replace(problem, starts=starts, targets=repeated)
     requests = ChainRequests(every, np.tile(allowed, len(targets)))
-    outcome = _performed(requests, peer, limits.tolerance, budget)
+    outcome = answers(job._replace(targets=requests))
     if len(outcome.solved) < len(repeated):
         return {}
     positions = _answers(requests, outcome)[0][:, -1].reshape(len(targets), len(allowed), 3)

@@ -4,7 +4,7 @@ import math
 
 import msgspec
 
-from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
+from ...harness.values import Booleans1, Details, Floats1, Floats2, Integers1, Kind, Values
 from . import CHAIN
 
 
@@ -22,7 +22,8 @@ class ChainSolves(Values, frozen=True):
     history_low: Floats1 | None = None  # 10th percentile of the residuals by iteration
     history_median: Floats1 | None = None
     history_high: Floats1 | None = None  # 90th percentile
-    seconds: Floats1 | None = None  # for a target by itself
+    seconds: Floats2 | None = None  # of the first targets, (round, target)
+    control: Floats1 | None = None  # of a fixed loop before each round
     # 1 or 0 as a user's solver claims, or -1 for no claim
     claims: Integers1 | None = msgspec.field(default=None, name="claimed")
 

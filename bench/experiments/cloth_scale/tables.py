@@ -1,6 +1,6 @@
 """The cost of factors and steps as cloths grow to a million particles."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from ...harness import metrics
@@ -8,8 +8,7 @@ from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
 from ...tables.layout import Layout
-from ...tables.results import grouped
-from ...tables.table import Summary, words
+from ...tables.table import NO_SUMMARY, Summary, words
 
 CAPTIONS = Captions(__file__)
 LABELS = {library.name: library.label for library in registry.FACTORS}
@@ -48,36 +47,16 @@ def _row(record: Record) -> dict[str, Any]:
 
 
 def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
-    return Summary(_largest(rows), tuple(_relative_to_cholmod(rows)))
-
-
-def _largest(rows: Sequence[dict[str, Any]]) -> str:
     steps = [row for row in rows if row["all iterations"] is not None]
     if not steps:
-        return ""
+        return NO_SUMMARY
     row = max(steps, key=lambda row: int(row["particles"]))
-    return (
+    return Summary(
         f"With {words(row['particles'])} particles {words(row['record'].details.iterations)} "
         f"iterations take {words(row['all iterations'])} s, as long as "
         f"{words(row['all iterations relative to a solve'])} solves; the residual after them is "
         f"{words(row['final residual'])}."
     )
-
-
-def _relative_to_cholmod(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
-    measured = [row for row in rows if row["record"].values]
-    for particles, group in grouped(measured, lambda row: int(row["particles"])).items():
-        libraries = {row["record"].solver: row for row in group}
-        if libraries.keys() >= LABELS.keys():
-            supernodal, cholmod = (libraries[name] for name in LABELS)
-            factor, solve, memory = (
-                words(metrics.ratio(supernodal[title], cholmod[title]))
-                for title in ("first factor", "solve", "peak memory")
-            )
-            yield (
-                f"{words(particles)} particles, Plumbob relative to CHOLMOD: factor {factor}, "
-                f"solve {solve}, memory {memory}"
-            )
 
 
 scale = Layout(

@@ -1,7 +1,7 @@
 """The published tables again: the same set-up as far as it is known, with the solvers at hand."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -14,18 +14,18 @@ from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS, Peer, PeerEntry
 from ...problems.chains import TargetsForSkeleton, unit
-from ...problems.evaluate import Tolerance
+from ...problems.evaluate import Targets, Tolerance
 from ...problems.robot_targets import uniform_targets
 from ...problems.robots import is_installed
 from ..chain.measurement import SolverLimits, blocks_of_users
-from ..robots.measurement import SUITE, RobotJob, solve
+from ..robots.measurement import SUITE, RobotJob
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
-from .values import FabrikSolves, RobotSearches
+from .values import FabrikSolves
 
-# Random targets, and a solver's seconds for them, for those of a scale.
+# Random targets for those of a scale, and how many of them are timed.
 _TARGETS = 5
-_BUDGET = 15.0
+_TIMED = 200
 _SEED = 2011
 _LIMITS = SolverLimits(published.FABRIK.tolerance, published.FABRIK.iterations)
 # The solvers fast enough for 10,000 targets, with restarts as TRAC-IK has them.
@@ -34,21 +34,21 @@ _FAST = (registry.PLUMBOB_LM, registry.TOOLBOX, registry.TRAC_IK)
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield TRAC-IK's table, the toolbox's, FABRIK's; leave out solvers that are not installed."""
-    count, budget = _TARGETS * scale.targets, _BUDGET * scale.seconds
+    count = _TARGETS * scale.targets
     tolerance = Tolerance(*[math.sqrt(3.0) * published.TRAC_IK.tolerance] * 2)
     for peer in (peer for peer in _FAST if peer.is_installed):
         for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK.rates):
             if is_installed(robot):
-                job = RobotJob(robot, peer, peer.entry(RESTARTS), tolerance, budget)
+                targets = partial(uniform_targets, robot, count, middle=True)
+                job = _job(robot, peer, peer.entry(RESTARTS), tolerance, targets, count)
                 facts = {"task": TRAC_IK, "robot": robot, "title": robot}
-                measure = partial(_solve, job, count, middle=True)
-                yield job.block(f"published/trac_ik/{robot}", measure, count, facts)
+                yield job.block(f"published/trac_ik/{robot}", facts)
     tolerance = Tolerance(*[math.sqrt(2.0 * published.TOOLBOX.half_square)] * 2)
+    targets = partial(uniform_targets, "ur5", count, middle=False)
     for peer, entry, infeasible in _toolbox() if is_installed("ur5") else ():
-        job = RobotJob("ur5", peer, entry, tolerance, budget)
+        job = _job("ur5", peer, entry, tolerance, targets, count)
         about: dict[str, Any] = {"task": TOOLBOX, "title": "ur5", "infeasible": infeasible}
-        measure = partial(_solve, job, count, middle=False)
-        yield job.block("published/toolbox/ur5", measure, count, about)
+        yield job.block("published/toolbox/ur5", about)
     for stratum, distance in published.FABRIK.distances.items():
         yield from _fabrik(stratum, distance, scale)
 
@@ -63,10 +63,15 @@ def _toolbox() -> Iterator[tuple[Peer, PeerEntry, float | None]]:
         yield toolbox, PeerEntry(ONE_START, settings, note=search.title), search.infeasible
 
 
-def _solve(job: RobotJob, count: int, middle: bool) -> Measured:
-    solves, notes, facts = solve(job, uniform_targets(job.robot, count, middle))
-    fields = {name: getattr(solves, name) for name in RobotSearches.__struct_fields__}
-    return Measured(RobotSearches(**fields), notes, facts)
+def _job(
+    robot: str,
+    peer: Peer,
+    entry: PeerEntry,
+    tolerance: Tolerance,
+    targets: Callable[[], Targets],
+    count: int,
+) -> RobotJob:
+    return RobotJob(robot, peer, entry, tolerance, targets, count, min(count, _TIMED))
 
 
 def _fabrik(stratum: str, distance: float, scale: Scale) -> Iterator[Block]:

@@ -57,8 +57,8 @@ def _of_trac_ik(records: Sequence[Record]) -> Iterator[Row]:
                 score = Score(robot, "", record.solver, (record,))
                 about |= _about(score)
                 share, time = (
-                    _percent(score.solved),
-                    [1e3 * metrics.mean(score.attempted("seconds"))],
+                    _percent(score, score.solved),
+                    [1e3 * metrics.mean(score.seconds)],
                 )
             yield _row(about, "solved [%]", percent, share)
             yield _row(about, "time, mean [ms]", milliseconds, time)
@@ -71,9 +71,11 @@ def _of_toolbox(record: Record) -> Iterator[Row]:
     source = "" if rate is None else published.TOOLBOX.source
     about = {"table": "Robotics Toolbox", "problem": record.title, "source": source}
     about |= _about(score)
-    yield _row(about, "declared infeasible [%]", rate, _percent(score.all("claimed", 0) != 1))
-    yield _row(about, "not solved within the limits [%]", None, _percent(~score.solved))
-    median = metrics.median_interval(score.attempted("seconds"))
+    yield _row(
+        about, "declared infeasible [%]", rate, _percent(score, score.all("claimed", 0) != 1)
+    )
+    yield _row(about, "not solved within the limits [%]", None, _percent(score, ~score.solved))
+    median = metrics.median_interval(score.seconds)
     yield _row(about, "time, median [µs]", None, [1e6 * seconds for seconds in median])
 
 
@@ -96,8 +98,10 @@ def _of_fabrik(record: Record) -> Iterator[Row]:
     yield _row(about, "iterations, largest", None, [float(counts.max())] if counts.size else ())
 
 
-def _percent(hits: np.ndarray) -> list[float]:
-    """Return a share with its interval [%]."""
+def _percent(score: Score, hits: np.ndarray) -> list[float]:
+    """Return a share with its interval [%]; nothing of a solver that did not finish."""
+    if not score.is_finished:
+        return []
     share = metrics.share(hits)
     return [100.0 * metrics.ratio(*share[:2]), 100.0 * share.low, 100.0 * share.high]
 

@@ -1,18 +1,8 @@
 """The records of published tables that are measured again."""
 
-import msgspec
-
-from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
+from ...harness.values import Details, Floats1, Kind, Values
+from ..robots.values import RobotSolves
 from . import FABRIK, TOOLBOX, TRAC_IK
-
-
-class RobotSearches(Values, frozen=True, kw_only=True):
-    """Searches for targets of a robot, as in `RobotSolves`, without residuals."""
-
-    solved: Booleans1 | None = None
-    claims: Integers1 | None = msgspec.field(default=None, name="claimed")
-    seconds: Floats1 | None = None
-    setup: float
 
 
 class TracIKDetails(Details, frozen=True):
@@ -41,7 +31,7 @@ class FabrikDetails(Details, frozen=True):
 
 
 KINDS = {
-    TRAC_IK: Kind(RobotSearches, TracIKDetails),
-    TOOLBOX: Kind(RobotSearches, ToolboxDetails),
+    TRAC_IK: Kind(RobotSolves, TracIKDetails),
+    TOOLBOX: Kind(RobotSolves, ToolboxDetails),
     FABRIK: Kind(FabrikSolves, FabrikDetails),
 }

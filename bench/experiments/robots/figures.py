@@ -11,6 +11,7 @@ from ...figures.sketch import Sketch
 from ...figures.style import COLOURS, plain_label
 from ...harness import metrics
 from ...harness.metrics import Floats
+from ...problems.evaluate import AGREEMENT
 from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
@@ -29,6 +30,7 @@ CAPTIONS = Captions(
     penalty=words_in(PENALTY, "ms"),
     resamples=str(metrics.RESAMPLES),
     limit_tolerance=words(LIMIT_TOLERANCE),
+    agreement=words(AGREEMENT),
 )
 # So many times the least time is drawn as the palest, and the least time as the fullest.
 SLOWEST = 1000.0
@@ -40,7 +42,9 @@ def budgets(start: str, results: Results) -> Sketch | None:
     """Return the shares of targets that are solved within each budget of time."""
 
     def rates(field: Sequence[Score], seconds: Floats) -> list[Floats]:
-        return [metrics.within_budget(score.seconds, score.solved, seconds) for score in field]
+        return [
+            metrics.within_budget(score.seconds, score.timed_solved, seconds) for score in field
+        ]
 
     return _chart("budget", rates, np.logspace(-6, 0, 121), fields_of(results, start), results)
 
@@ -49,7 +53,10 @@ def performance_profiles(start: str, results: Results) -> Sketch | None:
     """Return the performance profiles of solvers on the same targets (Dolan and Moré 2002)."""
 
     def rates(field: Sequence[Score], ratios: Floats) -> list[Floats]:
-        seconds, solved = (np.array([getattr(s, n) for s in field]) for n in ("seconds", "solved"))
+        if not field:
+            return []
+        seconds = np.array([score.seconds for score in field])
+        solved = np.array([score.timed_solved for score in field])
         return list(metrics.performance_profiles(seconds, solved, ratios))
 
     fields = {
@@ -68,7 +75,8 @@ def _chart(
 ) -> Sketch | None:
     """Return a panel of curves for each robot; None if there are no solvers with this start."""
     panels = []
-    for robot, field in fields.items():
+    for robot, scores in fields.items():
+        field = [score for score in scores if score.is_timed and score.is_finished]
         curves = zip(field, rates(field, x), strict=True)
         panels.append(Panel(robot, tuple(_share(score, x, curve) for score, curve in curves)))
     start = next((score.start for field in fields.values() for score in field), "")
@@ -80,7 +88,7 @@ def _chart(
 
 def _share(score: Score, x: Floats, rates: Floats) -> Series:
     """Return a share with its 95 % interval [%]."""
-    low, high = metrics.wilson(rates, max(1, score.total))
+    low, high = metrics.wilson(rates, max(1, len(score.seconds)))
     return series(score.solver, x, 100 * rates, (100 * low, 100 * high))
 
 
@@ -128,6 +136,8 @@ def _success(score: Score) -> MapCell:
 
 def _slowness(score: Score) -> MapCell:
     ratio = score.relative_time
+    if np.isnan(ratio):
+        return 0.0, "–"
     fullness = 1.0 - np.log(max(ratio, 1.0)) / np.log(SLOWEST)
     size, unit = (ratio, "") if ratio < 999.5 else (ratio / 1e3, "k")  # as wide as a cell
     text = f"{size:.{1 if size < 10 else 0}f}{unit}{_star(score)}"

@@ -1,39 +1,46 @@
 """Robots: every solver that is installed on every arm and on the character, in all strata.
 
-Each solver works in a process of its own. Its answers are evaluated here, by MuJoCo's kinematics.
+Each solver works in a process of its own and is given a fixed number of targets. Its answers are
+evaluated here, by an engine that it is not built on. Then the solvers of a robot take turns, and
+are timed.
 """
 
+import dataclasses
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from msgspec.structs import replace
 
-from ...harness.block import Block, Measured, Scale
+from ...harness.block import Block, Group, Measured, Scale
 from ...harness.isolation import JobOutcome, raised
-from ...harness.job import Job, worker_process
+from ...harness.job import Job, Times, answers, times_in_turns
 from ...harness.measure import not_asked, not_installed
-from ...harness.stopwatch import Budget
+from ...harness.progress import announce
 from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.entrant import ROBOT_TASK
 from ...peers.registry import Peer, PeerEntry
-from ...problems.evaluate import Targets, Tolerance, evaluator_of
-from ...problems.robot_targets import STRATA, least_distances, robot_targets, unreachable_targets
-from ...problems.robots import PACKAGE, ROBOTS, enter, is_installed, title
+from ...problems.evaluate import AGREEMENT, Targets, Tolerance, arbiter_of, evaluator_of
+from ...problems.robot_targets import (
+    SEED,
+    STRATA,
+    least_distances,
+    robot_targets,
+    unreachable_targets,
+)
+from ...problems.robots import PACKAGE, ROBOTS, enter, group_of, is_installed, title
 from . import REACHABLE, UNREACHABLE
 from .values import RobotSolves
 
 SUITE = "ik"
 TOLERANCE = Tolerance(1e-3, 1e-3)
-# Targets in a stratum, and a solver's seconds for a robot within reach and beyond, for those of a
-# scale.
-_TARGETS = 0.1
-_BUDGET, _BUDGET_BEYOND = 5.0, 3.0
-# Targets out of reach are no fewer than these, however few are asked for in a stratum.
-OUT_OF_REACH = 100
+# Targets in a stratum, and out of reach of a robot, for those of a scale.
+_TARGETS = 0.05
+# Of so many targets of a stratum one is timed, and of so many out of reach.
+_TIMED, _TIMED_BEYOND = 5, 3
+ROUNDS = 3
 # Digits kept of times and residuals: more would fill the disk with noise.
 _DIGITS = 5
 _ANY = {"kind": "any"}
@@ -41,16 +48,31 @@ NO_ROBOTS = "not asked for robots: it offers no robot_inverse_kinematics"
 
 
 class RobotJob(NamedTuple):
-    """A robot, and a solver with its settings, tolerance and budget [s]."""
+    """Targets of a robot, and a solver with its settings and tolerance."""
 
     robot: str
     peer: Peer
     entry: PeerEntry
     tolerance: Tolerance
-    budget: float
+    targets: Callable[[], Targets]
+    size: int  # how many targets there are
+    timed: int  # so many of them, the first, are timed
+    seed: int = SEED  # of the targets
+    is_beyond: bool = False  # whether the targets are out of reach
 
-    def block(self, problem: str, measure: Any, size: float, facts: dict[str, Any]) -> Block:
-        """Return the block of a problem; its settings are all that changes an answer."""
+    @property
+    def job(self) -> Job:
+        """The job of a worker process."""
+        settings = {**self.entry.settings, **self.peer.spec}
+        model, restarts = evaluator_of(self.robot).robot, self.entry.restarts
+        request = (self.peer.module, model, self.targets(), self.tolerance, settings, restarts)
+        return Job(*request, self.peer.entrant_name)
+
+    def block(self, problem: str, facts: dict[str, Any]) -> Block:
+        """Return the block of a problem; its settings are all that changes an answer.
+
+        Solvers of the same targets are measured together; one with a time limit is by itself.
+        """
         settings = {
             **self.entry.settings,
             "kind": self.entry.kind,
@@ -58,18 +80,18 @@ class RobotJob(NamedTuple):
             "version": self.peer.version,
             "tolerance": self.tolerance.position,
             "tolerance_rotation": self.tolerance.rotation,
+            "seed": self.seed,
         }
         solver = self.peer.label_of(self.entry)
-        block = Block(SUITE, problem, solver, measure, settings, size, facts, budget=self.budget)
+        group = None if self.entry.has_time_limit else Group(problem, solve_together, self)
+        block = Block(
+            *(SUITE, problem, solver, partial(solve, self), settings, self.size, facts), group=group
+        )
         return block.of(self.peer.entrant)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield each solver on each robot, and a block for each that is not installed.
-
-    The solvers of a robot follow each other in a drawn order, so that a machine that gets slower or
-    faster does so to all of them.
-    """
+    """Yield each solver on each robot, and a block for each that is not installed."""
     own = {problem.name: problem for problem in scale.problems if problem.robot is not None}
     for problem in own.values():
         if problem.robot is not None:
@@ -98,106 +120,113 @@ def _facts(task: str, title: str) -> dict[str, Any]:
 def _blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
     """Yield a solver on installed robots, with each of its settings."""
     count = max(1, round(_TARGETS * scale.targets))
-    beyond = max(OUT_OF_REACH, count)
     for entry in peer.entries:
         if not peer.is_installed:
+            nothing = partial(robot_targets, "", 0)
+            job = RobotJob("", peer, entry, TOLERANCE, nothing, 0, 0, scale.seed)
+            block = job.block("robots/all", _facts(REACHABLE, "every robot"))
             absent = partial(not_installed, peer.package)
-            job = RobotJob("", peer, entry, TOLERANCE, 0.0)
-            yield job.block("robots/all", absent, 0, _facts(REACHABLE, "every robot"))
+            yield dataclasses.replace(block, measure=absent, group=None)
             continue
         for name in robots:
-            job = RobotJob(name, peer, entry, TOLERANCE, _BUDGET * scale.seconds)
-            measure, size = partial(_solve_strata, job, count), count * len(STRATA)
-            yield job.block(f"robots/{name}", measure, size, _facts(REACHABLE, title(name)))
-            job = job._replace(budget=_BUDGET_BEYOND * scale.seconds)
-            measure, facts = partial(_solve_beyond, job, beyond), _facts(UNREACHABLE, title(name))
-            yield job.block(f"unreachable/{name}", measure, beyond, facts)
+            targets = partial(robot_targets, name, count, scale.seed)
+            timed = len(STRATA) * -(-count // _TIMED)
+            sizes = (count * len(STRATA), timed, scale.seed)
+            job = RobotJob(name, peer, entry, TOLERANCE, targets, *sizes)
+            yield job.block(f"robots/{name}", _facts(REACHABLE, title(name)))
+            targets = partial(unreachable_targets, name, count, scale.seed)
+            sizes = (count, -(-count // _TIMED_BEYOND), scale.seed)
+            job = RobotJob(name, peer, entry, TOLERANCE, targets, *sizes, is_beyond=True)
+            yield job.block(f"unreachable/{name}", _facts(UNREACHABLE, title(name)))
 
 
 def _drawn(blocks: Iterable[Block]) -> list[Block]:
-    """Return blocks problem by problem, the solvers of each in an order of its own.
+    """Return blocks problem by problem, those of a group in a row, in an order of its own.
 
     It is the same every time, whichever other solvers take part.
     """
     blocks = list(blocks)
     problems = list(dict.fromkeys(block.problem for block in blocks))
 
-    def rank(block: Block) -> tuple[int, int]:
+    def rank(block: Block) -> tuple[int, bool, int]:
         lot = zlib.crc32(f"{block.problem}, {block.solver}".encode())
-        return problems.index(block.problem), lot
+        return problems.index(block.problem), block.group is None, lot
 
     return sorted(blocks, key=rank)
 
 
-def _solve_strata(job: RobotJob, count: int) -> Measured:
-    return solve(job, robot_targets(job.robot, count))
+def solve(job: RobotJob) -> Measured:
+    """Solve and time the targets of a solver by itself."""
+    return solve_together([job])[0]
 
 
-def _solve_beyond(job: RobotJob, count: int) -> Measured:
-    """Solve targets out of reach; keep beside them how near any pose may come."""
-    targets = unreachable_targets(job.robot, count)
-    solves, notes, facts = solve(job, targets)
-    if solves.solved is not None:
-        bound = least_distances(job.robot, targets)[: np.size(solves.solved)]
-        solves = replace(solves, bound=bound)
-    return Measured(solves, notes, facts)
+def solve_together(jobs: Sequence[RobotJob]) -> list[Measured]:
+    """Solve the targets of every solver; then time the first targets, the solvers in turns."""
+    outcomes = []
+    for job in jobs:
+        announce(f"{job.peer.label_of(job.entry)}: answers")
+        outcomes.append(answers(job.job))
+    finished = [i for i, outcome in enumerate(outcomes) if len(outcome.solved) == jobs[i].size]
+    turns = [i for i in finished if not jobs[i].entry.has_time_limit]
+    times: dict[int, Times | None] = {i: _own_times(jobs[i], outcomes[i]) for i in finished}
+    if turns:
+        announce("times, all solvers in turns")
+        requests = [jobs[i].job for i in turns]
+        times |= zip(turns, times_in_turns(requests, jobs[0].timed, ROUNDS), strict=True)
+    return [
+        _measured(job, outcome, times.get(i))
+        for i, (job, outcome) in enumerate(zip(jobs, outcomes, strict=True))
+    ]
 
 
-def solve(job: RobotJob, targets: Targets) -> Measured:
-    """Solve the targets, and evaluate the answers, finished or not.
+def _own_times(job: RobotJob, outcome: JobOutcome) -> Times:
+    """Return the times that were taken with the answers, of a solver with a time limit."""
+    seconds = [answer.seconds for answer in outcome.solved[: job.timed]]
+    return Times(np.array([seconds]), np.zeros(0))
 
-    Of targets never begun there is nothing, and tables count them as not solved.
+
+def _measured(job: RobotJob, outcome: JobOutcome, times: Times | None) -> Measured:
+    """Return the numbers of answers and times.
+
+    Of targets never begun there is nothing, and the solver did not finish.
     """
-    evaluator = evaluator_of(job.robot)
-    robot, outcome = evaluator.robot, _performed(job, targets, Budget(job.budget))
-    arrays = _evaluated(job, targets, outcome.solved) if outcome.solved else {}
-    return Measured(
-        RobotSolves(**arrays, setup=outcome.setup, overhead=outcome.overhead),
-        {"remark": outcome.note},
-        {
-            "strata": list(STRATA),
-            "tips": list(robot.effectors),
-            "joints": len(robot.joints),
-            "freedom": int(evaluator.model.nv),
-            "wanted": "pose" if robot.oriented else "position",
-            "trouble": raised(outcome.solved),
-        },
-    )
+    evaluator, engine = evaluator_of(job.robot), arbiter_of(job.peer.built_on)
+    robot = evaluator.robot
+    arrays = _evaluated(job, outcome.solved, engine) if outcome.solved else {}
+    if times is not None:
+        arrays |= {"seconds": _rounded(times.seconds), "control": _rounded(times.control)}
+    facts = {
+        "strata": list(STRATA),
+        "tips": list(robot.effectors),
+        "joints": len(robot.joints),
+        "freedom": int(evaluator.model.nv),
+        "wanted": "pose" if robot.oriented else "position",
+        "trouble": raised(outcome.solved),
+        "arbiter": engine,
+        "group": group_of(job.robot),
+        "time_limited": job.entry.has_time_limit,
+    }
+    solves = RobotSolves(**arrays, setup=outcome.setup, overhead=outcome.overhead)
+    return Measured(solves, {"remark": outcome.note}, facts)
 
 
-def _performed(job: RobotJob, targets: Targets, budget: Budget) -> JobOutcome:
-    """Return the solves of targets; continue in a new process behind a target that crashes it."""
-    peer, entry, robot = job.peer, job.entry, evaluator_of(job.robot).robot
-    request = (peer.module, robot, targets, job.tolerance, {**entry.settings, **peer.spec})
-    outcome = worker_process().perform(Job(*request, entry.restarts, job.budget, peer.entrant_name))
-    count, size = targets.shape
-    if not outcome.is_lost or len(outcome.solved) == count:
-        return outcome
-    crash = Solved(np.full(size, np.nan), 0, worker_process().patience, outcome.trouble)
-    solves = [*outcome.solved, crash]
-    if budget.is_spent or len(solves) == count:
-        return outcome._replace(solved=solves)
-    following = _performed(job, targets.after(len(solves)), budget)
-    solves += following.solved
-    return following._replace(
-        setup=outcome.setup, overhead=outcome.overhead, solved=solves, trouble=raised(solves)
-    )
-
-
-def _evaluated(job: RobotJob, targets: Targets, solves: list[Solved]) -> dict[str, np.ndarray]:
-    answers = np.array([solve.q for solve in solves])
-    evaluation = evaluator_of(job.robot).evaluate(targets, answers, job.tolerance)
-    return {
+def _evaluated(job: RobotJob, solved: list[Solved], engine: str) -> dict[str, np.ndarray]:
+    q, targets = np.array([answer.q for answer in solved]), job.targets()
+    evaluation = evaluator_of(job.robot).evaluate(targets, q, job.tolerance, engine)
+    arrays = {
         "solved": evaluation.solved,
-        "claims": np.array([solve.claim for solve in solves]),
-        "seconds": _rounded([solve.seconds for solve in solves]),
+        "claims": np.array([answer.claim for answer in solved]),
         "position": _rounded(evaluation.position),
         "rotation": _rounded(evaluation.rotation),
         "beyond": _rounded(evaluation.beyond),
-        "exception": np.array([bool(solve.trouble) for solve in solves]),
-        "stratum": targets.strata[: len(solves)],
+        "exception": np.array([bool(answer.trouble) for answer in solved]),
+        "stratum": targets.strata[: len(solved)],
+        "disputed": np.flatnonzero(evaluation.difference > AGREEMENT),
     }
+    if job.is_beyond:  # how near any pose may come
+        arrays["bound"] = least_distances(job.robot, targets)[: len(solved)]
+    return arrays
 
 
-def _rounded(numbers: Iterable[float]) -> np.ndarray:
-    return np.array([float(f"{number:.{_DIGITS - 1}e}") for number in numbers])
+def _rounded(numbers: np.ndarray) -> np.ndarray:
+    return np.vectorize(lambda number: float(f"{number:.{_DIGITS - 1}e}"), otypes=[float])(numbers)

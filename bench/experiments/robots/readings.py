@@ -1,8 +1,8 @@
-"""Scores of solvers on robots: the targets that they solve, and their times.
+"""Scores of solvers on robots: the targets that they solve, and the times of the first of them.
 
-A solver that a budget of time cut short is scored over all targets that it was given: those that it
-never began count as not solved. It has a mark, and is not ranked; nor is one whose record is of
-other targets than those of most solvers.
+A solver is not ranked if it did not finish, if a time limit ends its solves, or if its record is of
+other targets than those of most solvers. Robots for tuning, robots held out and the character are
+never averaged together.
 """
 
 from collections import Counter
@@ -16,7 +16,7 @@ from ...harness.metrics import Floats, Ranking, Share
 from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
-from ...problems.robots import LIMIT_TOLERANCE
+from ...problems.robots import LIMIT_TOLERANCE, group_of
 from ...tables.results import Results, grouped, listed
 from ...tables.table import words
 from . import REACHABLE, UNREACHABLE
@@ -26,8 +26,8 @@ STARTS = (ONE_START, RESTARTS)
 PENALTY = 0.1
 # Added to times before their geometric mean is taken, so that microseconds do not decide [s].
 SHIFT = 1e-5
-# Solvers are compared over so many sets of robots: the largest, where they take different ones.
-SETS = 3
+# Solvers that take different robots of a group are compared over so many sets, the largest.
+SETS = 2
 # The outcomes of a target; it counts under the first that applies.
 OUTCOMES = (
     *("solved", "beyond a limit", "wrong claim", "missed"),
@@ -55,6 +55,17 @@ class Score(NamedTuple):
         """The number of its targets, attempted or not."""
         return sum(map(total, self.records))
 
+    @property
+    def group(self) -> str:
+        """The group of its robots: "tuning", "held out", "character", or "yours"."""
+        record = self.records[0]
+        return str(record.facts.get("group") or group_of(record.problem.rpartition("/")[2]))
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it attempted all of its targets."""
+        return self.attempted("solved").size == self.total
+
     def attempted(self, name: str) -> np.ndarray:
         """Return an array of the targets that were attempted, (target,)."""
         return np.concatenate([record.arrays[name] for record in self.records])
@@ -79,18 +90,36 @@ class Score(NamedTuple):
 
     @property
     def seconds(self) -> Floats:
-        """The time of each target, infinite if it was not attempted [s], (target,)."""
-        return self.all("seconds", np.inf)
+        """The time of each timed target, the median of its rounds [s], (timed target,)."""
+        return np.concatenate([np.median(rounds_of(record), axis=0) for record in self.records])
+
+    @property
+    def timed_solved(self) -> np.ndarray:
+        """Which of the timed targets are solved, (timed target,)."""
+        parts = [r.arrays["solved"][: rounds_of(r).shape[1]] for r in self.records]
+        return np.concatenate(parts)
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether there are times of all of its robots."""
+        return all(rounds_of(record).size for record in self.records)
 
     @property
     def penalised(self) -> Floats:
-        """The time of each target, or the penalty where it is not solved [s], (target,)."""
-        return metrics.penalised(self.seconds, self.solved, PENALTY)
+        """The time of each timed target, or the penalty where it is not solved [s]."""
+        return metrics.penalised(self.seconds, self.timed_solved, PENALTY)
 
     @property
     def mean_time(self) -> float:
-        """The geometric mean of the penalised times [s]."""
+        """The geometric mean of the penalised times [s]; NaN without times."""
+        if not self.is_timed:
+            return np.nan
         return float(np.exp(np.mean(np.log(self.penalised + SHIFT))) - SHIFT)
+
+    @property
+    def disputed(self) -> int:
+        """The number of answers that the two engines place differently."""
+        return sum(np.size(record.arrays.get("disputed", ())) for record in self.records)
 
     @property
     def relative_time(self) -> float:
@@ -111,15 +140,18 @@ class Score(NamedTuple):
 
     @property
     def limits(self) -> str:
-        """Why it is not ranked, "" if it is: its time ran out, or its targets differ."""
-        count = self.attempted("solved").size
-        reasons = [f"cut at {words(count)} of {words(self.total)}"] * (count < self.total)
-        reasons += [f"other targets, {words(self.total)}"] * (not self.has_same_targets)
-        return "; ".join(reasons)
+        """Why it is not ranked, "" if it is."""
+        is_limited = any(record.facts.get("time_limited") for record in self.records)
+        reasons = {
+            "not finished": not self.is_finished,
+            "time-limited": is_limited,
+            f"other targets, {words(self.total)}": not self.has_same_targets,
+        }
+        return "; ".join(reason for reason, applies in reasons.items() if applies)
 
     @property
     def is_ranked(self) -> bool:
-        """Whether it attempted all of its targets, and has the same targets as most solvers."""
+        """Whether it finished the same targets as most solvers, without a limit of time."""
         return not self.limits
 
     @property
@@ -136,6 +168,26 @@ class Score(NamedTuple):
 def total(record: Record) -> int:
     """Return the number of targets of a record, attempted or not."""
     return max(int(record.size), record.arrays["solved"].size)
+
+
+def rounds_of(record: Record) -> Floats:
+    """Return the times of a record [s], (round, timed target)."""
+    seconds = record.arrays.get("seconds")
+    return np.empty((1, 0)) if seconds is None else np.atleast_2d(seconds)
+
+
+def drift(scores: Iterable[Score]) -> str:
+    """Return a sentence on how much the machine's speed changed while solvers took turns."""
+    records = {id(r): r for score in scores for r in score.records if "control" in r.arrays}
+    controls = [np.empty(0), *(record.arrays["control"] for record in records.values())]
+    seconds = np.concatenate(controls)
+    if not seconds.size:
+        return ""
+    low, high = metrics.extent(seconds)
+    return (
+        f"A fixed loop, timed before every turn of a solver, took {words(1e3 * low)} to "
+        f"{words(1e3 * high)} ms: times of this run drifted by up to a factor of {high / low:.2f}."
+    )
 
 
 def _padded(record: Record, name: str, number: float) -> np.ndarray:
@@ -196,42 +248,61 @@ def _ranked(field: Sequence[Score]) -> list[Score]:
     """Return solvers on the same targets with the rankings among them."""
     ranked = [score for score in field if score.is_ranked]
     success = metrics.ranking({score.solver: score.solved for score in ranked})
-    time = metrics.ranking({s.solver: -np.log(s.penalised + SHIFT) for s in ranked})
-    least_time = min((score.mean_time for score in field), default=np.nan)
+    times = {s.solver: -np.log(s.penalised + SHIFT) for s in ranked if s.is_timed}
+    most = max(map(len, times.values()), default=0)
+    time = metrics.ranking({solver: logs for solver, logs in times.items() if len(logs) == most})
+    mean_times = [score.mean_time for score in field if score.is_timed]
+    least_time = min(mean_times, default=np.nan)
     return [s._replace(success=success, time=time, least_time=least_time) for s in field]
 
 
 def overall(results: Results) -> list[Score]:
     """Return every solver over each set of robots that it takes, the largest sets first.
 
-    Solvers are compared only over robots that all of them take.
+    Solvers are compared only over robots of one group that all of them take.
     """
     scores = [score for start in STARTS for score in over_sets(fields_of(results, start))]
-    return sorted(scores, key=lambda score: -len(score.records))
+    groups = list(dict.fromkeys(score.group for score in scores))
+    return sorted(scores, key=lambda score: (groups.index(score.group), -len(score.records)))
+
+
+def in_groups(fields: dict[str, list[Score]]) -> dict[str, dict[str, list[Score]]]:
+    """Return solvers, robot by robot, in the groups of robots."""
+    groups: dict[str, dict[str, list[Score]]] = {}
+    for robot, field in fields.items():
+        groups.setdefault(field[0].group, {})[robot] = field
+    return groups
 
 
 def over_sets(fields: dict[str, list[Score]]) -> list[Score]:
-    """Return every solver over each set of robots that some solver takes."""
-    sets = {frozenset(members) for members in _by_solver(fields)}
-    largest = sorted(sets, key=lambda robots: (-len(robots), sorted(robots)))[:SETS]
-    return [score for robots in largest for score in together(robots, fields)]
+    """Return every solver over each set of robots of a group that some solver takes."""
+    scores = []
+    for members in in_groups(fields).values():
+        sets = {frozenset(robots) for robots in _by_solver(members)}
+        largest = sorted(sets, key=lambda robots: (-len(robots), sorted(robots)))[:SETS]
+        scores += [score for robots in largest for score in together(robots, members)]
+    return scores
 
 
 def together(robots: Collection[str], fields: dict[str, list[Score]]) -> list[Score]:
     """Return every solver that takes all of these robots, over them."""
     names = [robot for robot in fields if robot in robots]
-    title = title_of(names, [robot for robot in fields if robot not in robots])
+    group = next((field[0].group for robot, field in fields.items() if robot in names), "")
+    title = title_of(names, [robot for robot in fields if robot not in robots], group)
     takers = [by_robot for by_robot in _by_solver(fields) if by_robot.keys() >= {*names}]
     return _ranked([_over_robots(title, [by_robot[name] for name in names]) for by_robot in takers])
 
 
-def title_of(names: Sequence[str], remaining: Sequence[str]) -> str:
-    """Return the title of a set of robots: by the remaining ones if these are fewer."""
+def title_of(names: Sequence[str], remaining: Sequence[str], group: str = "") -> str:
+    """Return the title of a set of robots of a group: by the remaining ones if these are fewer."""
     if len(names) == 1:
         return names[0]
+    listing = {"tuning": " for tuning", "held out": " held out"}.get(group, "")
     if not remaining:
-        return f"all {len(names)} robots"
-    return f"all but {listed(remaining)}" if len(remaining) < len(names) else listed(names)
+        return f"all {len(names)} robots{listing}"
+    if len(remaining) < len(names):
+        return f"all{' robots' * bool(listing)}{listing} but {listed(remaining)}"
+    return listed(names)
 
 
 def _by_solver(fields: dict[str, list[Score]]) -> list[dict[str, Score]]:

@@ -14,7 +14,7 @@ from ...peers.registry import Peer, PeerEntry
 from ...tables.columns import words_in
 from ...tables.entered import entrant_table
 from ...tables.layout import Layout, Row
-from ...tables.results import Results, counted, grouped, leaders, listed, steadiness
+from ...tables.results import Results, counted, grouped, leaders, listed
 from ...tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from . import REACHABLE, readings
 from .figures import CAPTIONS, FIGURES
@@ -66,7 +66,7 @@ def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Rec
         "package": peer.package,
         "version": version or "not installed",
         "license": peer.license,
-        "robots": title_of(*robot_names),
+        "robots": title_of(robot_names[0], robot_names[1]),
         "solves": peer.can,
         "entries": listed(list(map(_entry, peer.entries))),
         "harness overhead, median": _cell(float(np.median(overheads)) if overheads else math.nan),
@@ -76,7 +76,7 @@ def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Rec
 
 def _entry(entry: PeerEntry) -> str:
     """Return the start of an entry, its note, and who makes its restarts."""
-    maker = "made by the bench, the package has none" if entry.restarts else ""
+    maker = "made by the bench" if entry.restarts else ""
     notes = "; ".join(filter(None, (entry.note, maker)))
     return f"{entry.kind} ({notes})" if notes else entry.kind
 
@@ -112,7 +112,7 @@ participants = Layout(
 
 def _row(score: Score) -> Row:
     """Return the cells that all tables of scores have."""
-    seconds, claims = score.attempted("seconds"), score.attempted("claimed")
+    seconds, claims = score.seconds, score.attempted("claimed")
     false_successes = metrics.share((claims == 1) & ~score.attempted("solved"))
     trouble = next((record.trouble for record in score.records if record.trouble), "")
     return {
@@ -123,6 +123,8 @@ def _row(score: Score) -> Row:
         "robots": score.robots,
         "starts": score.start,
         "solver": score.solver,
+        "group": score.group,
+        "disputed answers": score.disputed,
         "targets": score.total,
         "false successes": false_successes.hits if (claims >= 0).any() else None,
         "mark": "; ".join(filter(None, (score.limits, score.leads, trouble))),
@@ -134,11 +136,14 @@ def _row(score: Score) -> Row:
 
 
 def _reachable_row(score: Score) -> Row:
-    reached, sizes = score.attempted("solved"), [readings.total(r) for r in score.records]
-    mean = metrics.shifted_geometric_mean(score.penalised, readings.SHIFT, sizes)
+    reached = score.attempted("solved")
+    sizes = [readings.rounds_of(record).shape[1] for record in score.records]
+    mean = metrics.Interval(math.nan, math.nan, math.nan)
+    if score.is_timed:
+        mean = metrics.shifted_geometric_mean(score.penalised, readings.SHIFT, sizes)
     return {
         **_row(score),
-        "solved": score.share,
+        "solved": score.share if score.is_finished else None,
         **_interval(MEAN, mean),
         "time relative to fastest": _cell(score.relative_time),
         **_spread("position residual", score.attempted("position")[reached]),
@@ -176,11 +181,20 @@ def _spread(title: str, numbers: metrics.Floats) -> Row:
 
 
 def _measured(rows: Sequence[Row]) -> dict[str, str]:
-    """Return whether the machine was steady."""
-    records = (record for row in rows for record in row["score"].records)
-    paces = [float(r.conditions["pace"]) for r in records if r.conditions.get("pace")]
-    noise = metrics.relative_spread(np.array(paces)) if len(paces) > 1 else math.nan
-    return {"steadiness": steadiness(noise)}
+    """Return by how much times drifted."""
+    return {"steadiness": readings.drift(row["score"] for row in rows)}
+
+
+def _leads(row: Row) -> dict[str, bool]:
+    """Return whether a solver is first, or ties with the first, by the titles of columns."""
+    score: Score = row["score"]
+    if not score.success.order:
+        return {}
+    solved, time = (
+        len(ranking.order) > 1 and score.solver in ranking.first
+        for ranking in (score.success, score.time)
+    )
+    return {"solved": solved, MEAN: time, "time relative to fastest": time}
 
 
 def _layout(
@@ -195,6 +209,7 @@ def _layout(
         subjects=lambda results: map(row, scores(results)),
         compared=2,
         ranked=lambda row: row["score"].is_ranked,
+        leads=_leads,
     )
 
 
@@ -204,14 +219,19 @@ def _points(rows: Sequence[Row]) -> Iterator[str]:
         success, time = field[0]["score"].success, field[0]["score"].time
         if success.order:
             solvers = {row["solver"]: row for row in field}
-            fastest = solvers[time.order[0]]
-            low, high = (fastest[f"{MEAN}, 95 % {bound}"] for bound in ("low", "high"))
-            yield (
-                f"{robots}, {start}: {leaders(success)}, "
-                f"{words(solvers[success.order[0]]['solved'])}; shortest time "
-                f"{leaders(time)}, {words_in(fastest[MEAN], 'µs')} ({words(in_unit(low, 'µs'))}–"
-                f"{words(in_unit(high, 'µs'))}, n = {words(fastest['targets'])})"
-            )
+            solved = words(solvers[success.order[0]]["solved"])
+            speed = f"; shortest time {_time(time, solvers)}" if time.order else ""
+            yield f"{robots}, {start}: {leaders(success)}, {solved}{speed}"
+
+
+def _time(time: metrics.Ranking, solvers: Mapping[str, Row]) -> str:
+    """Return the fastest solvers, and the mean time of the first with its interval."""
+    fastest = solvers[time.order[0]]
+    low, high = (
+        words(in_unit(fastest[f"{MEAN}, 95 % {bound}"], "µs")) for bound in ("low", "high")
+    )
+    count = words(len(fastest["score"].seconds))
+    return f"{leaders(time)}, {words_in(fastest[MEAN], 'µs')} ({low}–{high}, n = {count})"
 
 
 def _fields(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:

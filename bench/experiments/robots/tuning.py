@@ -16,7 +16,7 @@ import itertools
 import json
 import math
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -45,7 +45,7 @@ EQUAL_TIMES = 1.25
 _SHIFT = 1e-5
 # A worker is ended that has not finished a robot after so long [s].
 _PATIENCE = 3600.0
-Settings = Mapping[str, Any]
+Settings = dict[str, Any]
 
 
 class Search(NamedTuple):
@@ -61,6 +61,11 @@ class Search(NamedTuple):
     def peer(self) -> Peer:
         """The solver."""
         return next(peer for peer in PEERS if peer.title == self.solver)
+
+    def ordered(self, trials: Sequence["Trial"]) -> list["Trial"]:
+        """Return the trials of candidates in their order."""
+        candidates = [trial for trial in trials if trial.settings in self.candidates]
+        return sorted(candidates, key=lambda trial: self.candidates.index(trial.settings))
 
     @property
     def settings(self) -> list[Settings]:
@@ -78,7 +83,8 @@ class Trial(msgspec.Struct, frozen=True):
     targets: int  # of each robot
     microseconds: float  # of processors for a target, the geometric mean
     bits: str  # whether it solves each target, robot by robot, four in a digit to base 16
-    trouble: str = ""  # why its process was lost, else ""
+    exceptions: int = 0  # targets over which it raised, or its process was lost
+    trouble: str = ""  # the first of these
 
     @property
     def solved(self) -> np.ndarray:
@@ -127,7 +133,7 @@ def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, 
     restarts = options.pop("bench_restarts", 0)
     ask = importlib.import_module(peer.module).prepare(robot, TOLERANCE, **options)
     ask = restarted(ask, robot, restarts) if restarts else ask
-    targets, seconds = tuning_targets(name, count), []
+    targets, seconds, errors = tuning_targets(name, count), [], []
     attempt(ask(targets.request(0)))  # which compiles
     q = np.full(targets.starts.shape, math.nan)
     for i in range(count):
@@ -136,35 +142,37 @@ def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, 
         seed_shared_generators(digest_of(*request))
         output, duration = processor_time_of(functools.partial(attempt, solve))
         q[i] = math.nan if output.q is None else output.q
+        errors += [output.error] if output.error else []
         # A solver that works in yet another process has a clock of its own.
         own_time = output.time if peer.environment else None
         seconds.append(own_time.seconds if own_time else duration)
-    return {"q": q, "seconds": seconds}
+    return {"q": q, "seconds": seconds, "errors": errors}
 
 
 def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int) -> Trial:
     """Try settings in a worker's process; a robot over which that is lost is not solved."""
     solved, seconds = np.zeros((len(TUNING), count), dtype=bool), list[float]()
-    trouble = ""
+    errors = list[str]()
     for robot, name in enumerate(TUNING):
         try:
             values = worker.calculate(answers, search.peer, name, count, settings)
             targets = tuning_targets(name, count)
             evaluation = evaluator_of(name).evaluate(targets, values["q"], TOLERANCE)
-            solved[robot], seconds = evaluation.solved, [*seconds, *values["seconds"]]
+            solved[robot] = evaluation.solved
+            seconds, errors = seconds + values["seconds"], errors + values["errors"]
         except RuntimeError as error:
-            trouble = f"{name}: {error}"
+            errors = [f"{name}: {error}"] * count
     time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else -1.0
     bits = np.packbits(solved).tobytes().hex()
-    version = search.peer.version
-    return Trial(*search[:2], dict(settings), version, count, round(time, 1), bits, trouble)
+    names = (*search[:2], settings, search.peer.version)
+    return Trial(*names, count, round(time, 1), bits, len(errors), errors[0] if errors else "")
 
 
 def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
     """Return the settings to try on all targets, from their trials on the first."""
-    share = {json.dumps(trial.settings): trial.share for trial in trials}
-    order = sorted(search.candidates, key=lambda settings: -share[json.dumps(settings)])
-    best = [*order[: math.ceil(len(order) / 4)], search.default, search.before]
+    order = sorted(search.ordered(trials), key=lambda trial: -trial.share)
+    best = [trial.settings for trial in order[: math.ceil(len(order) / 4)]]
+    best += [search.default, search.before]
     return [settings for i, settings in enumerate(best) if settings not in best[:i]]
 
 
@@ -172,10 +180,10 @@ def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
     """Return the best of the trials on all targets.
 
     Trials tie with the greatest share that McNemar's paired test cannot tell from it. Of these,
-    those tie whose times are equal to the fastest; of these it is the default, if there, or the one
-    with the greatest share.
+    those tie whose times are equal to the fastest; of these it is the default, if there and without
+    exceptions, or the one with the greatest share.
     """
-    candidates = [trial for trial in trials if trial.settings in search.candidates]
+    candidates = search.ordered(trials)
     best = max(candidates, key=lambda trial: trial.share).solved.ravel()
     tied = [
         trial
@@ -184,6 +192,7 @@ def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
     ]
     limit = EQUAL_TIMES * min(trial.microseconds for trial in tied)
     fast = [trial for trial in tied if trial.microseconds <= limit]
+    fast = [trial for trial in fast if not trial.exceptions] or fast
     return max(fast, key=lambda trial: (trial.settings == search.default, trial.share))
 
 

@@ -3,17 +3,18 @@
 import msgspec
 import numpy as np
 
-from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
+from ...harness.values import Booleans1, Details, Floats1, Floats2, Integers1, Kind, Values
 from . import REACHABLE, UNREACHABLE
 
 
 class RobotSolves(Values, frozen=True, kw_only=True):
-    """The targets that a solver began, (target,); only `setup` is there if it began none.
+    """The targets of a solver, (target,); only `setup` is there if it began none.
 
     Attributes:
         solved: whether the evaluation finds the target solved.
         claims: 1 or 0 as the solver claims, or -1 if it makes no claims.
-        seconds: how long each took [s].
+        seconds: how long the first targets took [s], (round, target).
+        control: how long a fixed loop took before each round [s], (round,).
         position, rotation: distance of the effectors from the target [m], [rad]; NaN without an
             answer.
         beyond: by how much the answer oversteps limits [rad].
@@ -22,11 +23,13 @@ class RobotSolves(Values, frozen=True, kw_only=True):
         setup: how long the solver took before the first [s].
         overhead: of the time of a solve, what the harness adds [s]; NaN if that is not known.
         bound: how near any pose may come to a target out of reach [m].
+        disputed: the numbers of the targets whose answers the engines place differently.
     """
 
     solved: Booleans1 | None = None
     claims: Integers1 | None = msgspec.field(default=None, name="claimed")
-    seconds: Floats1 | None = None
+    seconds: Floats2 | None = None
+    control: Floats1 | None = None
     position: Floats1 | None = None
     rotation: Floats1 | None = None
     beyond: Floats1 | None = None
@@ -35,10 +38,11 @@ class RobotSolves(Values, frozen=True, kw_only=True):
     setup: float
     overhead: float | None = None
     bound: Floats1 | None = None
+    disputed: Integers1 | None = None
 
     def __post_init__(self) -> None:
         """Refuse records of which some arrays are missing, or of other lengths."""
-        names = ("solved", "claims", "seconds", "position", "rotation", "beyond", "stratum")
+        names = ("solved", "claims", "position", "rotation", "beyond", "stratum")
         if len({np.shape(getattr(self, name)) for name in names}) > 1:
             raise ValueError("solved: expected as many entries in every array")
 
@@ -59,6 +63,9 @@ class RobotDetails(Details, frozen=True):
     joints: int = 0
     freedom: int = 0
     target: str = msgspec.field(default="", name="wanted")
+    arbiter: str = ""  # the engine that evaluated the answers
+    group: str = ""  # the list that the robot is in
+    time_limited: bool = False  # whether the solver takes a time limit for each target
 
 
 KINDS = dict.fromkeys((REACHABLE, UNREACHABLE), Kind(RobotSolves, RobotDetails))

@@ -1,11 +1,12 @@
 """Where blocks are measured, by its address: in this process, or by the workers of a cluster."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
 from typing import Any, NamedTuple
 
 from ..block import Block, Scale
 from ..machine import difference, stamp
-from ..measure import measure
+from ..measure import measure, measure_together
 from ..record import Record
 
 LOCAL, DASK = "local", "dask://"
@@ -39,9 +40,16 @@ class Executor:
 
     def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
         """Yield each block when it is begun, and its record or why there is none, in any order."""
-        for block in blocks:
-            yield block
-            yield measure(block)
+        for name, members in groupby(blocks, lambda block: block.group and block.group.name):
+            group = list(members)
+            if name:
+                yield group[0]
+                for block, record in zip(group, measure_together(group), strict=True):
+                    yield block
+                    yield record
+            for block in () if name else group:
+                yield block
+                yield measure(block)
 
     def stamp(self) -> Mapping[str, Any]:
         """Return the machine that times are taken on, versions and sources."""

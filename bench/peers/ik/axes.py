@@ -9,20 +9,16 @@ REVOLUTION = 2.0 * np.pi
 
 
 def first_within(robot: BenchRobot, solutions: FloatArray) -> tuple[FloatArray | None, bool]:
-    """Return the first solution, (solution, joint), within the limits, and whether there is one."""
-    angles = within(robot, solutions)
-    is_valid = ((angles >= robot.lower) & (angles <= robot.upper)).all(axis=-1)
+    """Return the first solution, (solution, joint), within the limits, and whether there is one.
+
+    Whole revolutions bring angles above their lower limits.
+    """
+    lowest, highest = robot.lower - LIMIT_TOLERANCE, robot.upper + LIMIT_TOLERANCE
+    angles = solutions - REVOLUTION * np.floor((solutions - lowest) / REVOLUTION)
+    is_valid = (angles <= highest).all(axis=-1)
     if not is_valid.any():
         return None, False
-    return angles[is_valid.argmax()], True
-
-
-def within(robot: BenchRobot, q: FloatArray) -> FloatArray:
-    """Return angles brought within the limits by whole revolutions where that can be done."""
-    q = q + REVOLUTION * np.ceil((robot.lower - LIMIT_TOLERANCE - q) / REVOLUTION).clip(0.0)
-    q = q - REVOLUTION * np.ceil((q - robot.upper - LIMIT_TOLERANCE) / REVOLUTION).clip(0.0)
-    nearest = np.clip(q, robot.lower, robot.upper)
-    return np.where(np.abs(q - nearest) <= LIMIT_TOLERANCE, nearest, q)
+    return np.clip(angles[is_valid.argmax()], robot.lower, robot.upper), True
 
 
 def axes_at_zero(robot: BenchRobot) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -10,7 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio
 
+from ...problems.evaluate import pinocchio_model, to_pinocchio
 from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+
+__all__ = ["from_pinocchio", "pinocchio_model", "prepare", "to_pinocchio"]
 
 
 def prepare(
@@ -69,33 +72,9 @@ def _error(
     return np.concatenate(errors), np.vstack(slopes)
 
 
-def pinocchio_model(robot: BenchRobot) -> pinocchio.Model:
-    """Return the robot in Pinocchio.
-
-    Raises:
-        ValueError: if Pinocchio orders its joints otherwise.
-    """
-    if robot.is_chain:
-        model = pinocchio.buildModelFromXML(robot.text)
-    else:
-        with robot.file() as file:
-            model = pinocchio.buildModelFromMJCF(file)
-    robot.check_order("Pinocchio", list(model.names)[1:])
-    return model
-
-
-def to_pinocchio(robot: BenchRobot, q: FloatArray) -> FloatArray:
-    """Return coordinates with w at the end of quaternions."""
-    return _permuted(robot, q, [1, 2, 3, 0])
-
-
 def from_pinocchio(robot: BenchRobot, q: FloatArray) -> FloatArray:
     """Return coordinates with w at the start of quaternions."""
-    return _permuted(robot, q, [3, 0, 1, 2])
-
-
-def _permuted(robot: BenchRobot, q: FloatArray, order: list[int]) -> FloatArray:
     permuted = q.copy()
     for i in robot.balls:
-        permuted[i : i + 4] = q[i : i + 4][order]
+        permuted[i : i + 4] = q[[i + 3, i, i + 1, i + 2]]
     return permuted

@@ -42,13 +42,6 @@ def test_slices_are_as_many_as_the_cores_want_and_no_shorter_than_worth_while():
         assert len(slices_of(1000, minimum=10)) == 1
 
 
-def test_what_slices_return_comes_in_their_order():
-    values = np.arange(24.0)
-    with set_num_threads(3):
-        sums = in_slices(compiled.Kernel(total), 24, lambda part: (values[part],), minimum=1)
-    assert sums == [a + b for a, b in values.reshape(3 * SLICES_PER_CORE, 2)]
-
-
 def test_threads_are_kept_and_only_used_for_more_than_one_slice():
     def who():
         return threading.get_ident()

@@ -12,7 +12,6 @@ from plumbob.reference import (
     forward_kinematics,
     rotation,
     scenes,
-    solve_ik,
     track,
 )
 from plumbob.reference.formats import FormatWarning, bvh
@@ -146,13 +145,6 @@ def test_a_tracked_motion_opens_in_other_programs(solver, tmp_path):
     plain = forward_kinematics(back.skeleton, back.local_rotations).positions
     np.testing.assert_allclose(plain, tracked.positions, atol=bound(skeleton).max())
     assert np.ptp(plain[:, -1], axis=0).max() > 0.5
-
-
-def test_one_pose_is_one_frame():
-    skeleton, rest = scenes.lab_arm()
-    found = solve_ik(skeleton, rest, [0.5, 0.5, 0.5], solver="fabrik")
-    text = bvh.format(skeleton, found.local_rotations)
-    assert_same_positions(skeleton, found.positions[None], text)
 
 
 def test_joints_that_shift_read_back(rng):

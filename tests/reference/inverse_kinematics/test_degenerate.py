@@ -24,29 +24,30 @@ shared = settings(max_examples=150, suppress_health_check=[HealthCheck.function_
 ITERATIONS = 500
 
 
-def straight(kind, direction, links=4):
-    """Return joints in line, a metre apart, hinges about an axis across it."""
-    offsets = np.outer([0.0] + [1.0] * links, direction)
-    across = np.cross(direction, [0.0, 0.3, 1.0])
-    return Articulation(Skeleton(range(-1, links), offsets), kind, across)
+def model_of(skeleton, kind, axes=(0.0, 0.0, 1.0)):
+    """Return joints of a kind, or the skeleton itself, and the coordinates of zero."""
+    if kind == "skeleton":
+        return skeleton, rotation.identity(skeleton.joint_count)
+    model = Articulation(skeleton, kind, axes)
+    return model, model.zero()
 
 
 DIRECTIONS = [np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.48, 0.64])]
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS, ids=["axis", "oblique"])
-@pytest.mark.parametrize("kind", ["ball", "hinge"])
+@pytest.mark.parametrize("kind", ["skeleton", "ball", "hinge"])
 @pytest.mark.parametrize("height", [-3.0, -2.0, -0.3, 0.0, 0.5, 1.0, 2.0, 2.5, 3.8])
 def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(direction, kind, height, solver):
+    """Four links of a metre; hinges rotate about an axis across them."""
     if solver == "fabrik" and kind == "hinge":
         return
-    model = straight(kind, direction)
-    target = Target(height * direction)
-    solution = solve_ik(
-        model, model.zero(), target, solver, tolerance=1e-3, max_iterations=ITERATIONS
-    )
+    chain = Skeleton(range(-1, 4), np.outer([0.0] + [1.0] * 4, direction))
+    model, q = model_of(chain, kind, np.cross(direction, [0.0, 0.3, 1.0]))
+    options = {"tolerance": 1e-3, "max_iterations": ITERATIONS}
+    solution = solve_ik(model, q, Target(height * direction), solver, **options)
     assert solution.outcome is Outcome.CONVERGED
-    again = solve_ik(model, model.zero(), target, solver, tolerance=1e-3, max_iterations=ITERATIONS)
+    again = solve_ik(model, q, Target(height * direction), solver, **options)
     assert (again.coordinates == solution.coordinates).all()
 
 
@@ -111,14 +112,15 @@ def test_without_freedom_the_start_is_the_answer(solver, backend):
     assert wrong.residual_rotation == pytest.approx(0.5, abs=1e-15)
 
 
-@pytest.mark.parametrize("kind", ["hinge", "ball"])
+@pytest.mark.parametrize("kind", ["skeleton", "hinge", "ball"])
 def test_the_root_as_effector_can_rotate_but_not_move(kind, solver, backend):
-    model = Articulation(Skeleton([-1, 0], [[1.0, 0, 0], [0, 1.0, 0]]), kind)
-    off = solve_ik(model, model.zero(), [1.0, 3.0, 4.0], solver, effector=0)
-    assert (off.residual, off.outcome) == (5.0, Outcome.UNREACHABLE)
+    model, q = model_of(Skeleton([-1, 0], [[1.0, 0, 0], [0, 1.0, 0]]), kind)
+    off = solve_ik(model, q, [1.0, 3.0, 4.0], solver, effector=0)
+    assert (off.residual, off.iterations, off.outcome) == (5.0, 0, Outcome.UNREACHABLE)
     Q = rotation.exponential([0.0, 0.0, 0.7])
-    posed = solve_ik(model, model.zero(), Target([1.0, 0, 0], Q, 0), solver, max_iterations=300)
-    assert posed.outcome is Outcome.CONVERGED
+    for target in (Target([1.0, 0, 0], effector=0), Target([1.0, 0, 0], Q, 0)):
+        there = solve_ik(model, q, target, solver, max_iterations=300)
+        assert there.outcome is Outcome.CONVERGED
 
 
 def test_limits_without_width_hold_fast(solver, backend, rng, beyond_limits):

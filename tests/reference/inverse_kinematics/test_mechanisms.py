@@ -228,15 +228,20 @@ def many(articulated, rng):
     return model, model.random(rng, 2, 1), [near, Target(there.positions[0, 2], effector=2)]
 
 
-def test_a_batch_is_its_solves(many, solver, backend):
-    model, starts, (near, far) = many
-    options = {"max_iterations": 6, "record": True, "restarts": 1}
-    batch = solve_ik(model, starts, [near, far], solver, **options)
+@pytest.mark.parametrize("restarts", [0, 1])
+@pytest.mark.parametrize("on_chain", [False, True])
+def test_a_batch_is_its_solves(many, on_chain, restarts, rng, solver, backend):
+    model, starts, (near, *others) = many
+    if on_chain:
+        model, starts = model.skeleton, rotation.random(rng, 2, 1, 7)
+        near, others = near._replace(rotation=None), []
+    options = {"max_iterations": 6, "record": True, "restarts": restarts}
+    batch = solve_ik(model, starts, [near, *others], solver, **options)
     assert batch.positions.shape == (2, 3, 7, 3)
-    assert batch.coordinates.shape == (2, 3, model.coordinate_count)
+    assert batch.coordinates.shape == (2, 3, *starts.shape[2:])
     for i in range(2):
         for j in range(3):
-            target = [near._replace(position=near.position[j]), far]
+            target = [near._replace(position=near.position[j]), *others]
             one = solve_ik(model, starts[i, 0], target, solver, **options)
             assert (batch.coordinates[i, j] == one.coordinates).all()
             assert (batch.local_rotations[i, j] == one.local_rotations).all()
