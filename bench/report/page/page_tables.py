@@ -15,7 +15,6 @@ from ...tables.results import label
 from ...tables.table import (
     Cell,
     Source,
-    Summary,
     Table,
     best_cells,
     number_of,
@@ -67,7 +66,6 @@ class PageTable(NamedTuple):
 
     name: str  # its address within the page
     question: str  # that it answers
-    answer: str  # to the question, in a sentence
     table: Table  # whose cells it shows
     # name and span of headings above several columns; empty if there are none
     groups: list[tuple[str, int]]
@@ -91,17 +89,7 @@ def page_table(
         runs = itertools.groupby(table.columns, key=lambda column: column.group)
         groups = [(name, len(list(columns))) for name, columns in runs]
     marks = {mark for row in rows for cell in row.cells for mark in cell.classes.split()}
-    answer = gist(table.summary)
-    return PageTable(
-        table.name, question, answer, table, groups, heads, rows, marks, list(drawings)
-    )
-
-
-def gist(summary: Summary) -> str:
-    """Return a summary in a line: of a list only the first point."""
-    if not summary.sentence.endswith(":") or not summary.points:
-        return summary.sentence
-    return f"{summary.sentence} {summary.points[0]}" + ("; …" if len(summary.points) > 1 else "")
+    return PageTable(table.name, question, table, groups, heads, rows, marks, list(drawings))
 
 
 def _head(table: Table, j: int, folded: bool, names_solver: bool) -> PageHead:
