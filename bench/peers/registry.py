@@ -21,7 +21,7 @@ from plumbob.reference import IK_SOLVERS, STEP_SOLVERS
 
 from .entrant import CHAIN_TASK, ROBOT_TASK, Entrant
 
-PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
+PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton engine"
 
 
 class Style(NamedTuple):
@@ -338,7 +338,7 @@ def find(name: str) -> Solver:
 
 def is_ours(name: str) -> bool:
     """Return whether a solver is Plumbob's, by its name in records, or Plumbob as an engine."""
-    return PLUMBOB.casefold() in (name.casefold(), find(name).engine.casefold())
+    return engine_of(name) == PLUMBOB.casefold()
 
 
 def is_loop(name: str) -> bool:
@@ -347,8 +347,9 @@ def is_loop(name: str) -> bool:
 
 
 def engine_of(name: str) -> str:
-    """Return the engine or package of a solver, else its name."""
-    return (PLUMBOB if is_ours(name) else find(name).engine or name).casefold()
+    """Return the engine or package of a solver, whatever its settings were, else its name."""
+    title = name.partition(", ")[0]
+    return (find(name).engine or find(title).engine or name).casefold()
 
 
 @functools.cache

@@ -33,7 +33,7 @@ from ..experiments.timing.tables import median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import registry
-from ..problems.robots import CHARACTER, group_of
+from ..problems.robots import CHARACTER
 from ..tables.results import Results, by_problem, counted, grouped, listed
 from ..tables.table import words
 from .standings import MISSES, Headline, best_rival, factor, named, percent, speed, standings
@@ -138,7 +138,8 @@ def not_asked(results: Results) -> list[str]:
     solvers = [
         peer for peer, names in _recorded_names().items() if requested and not names & requested
     ]
-    present = {registry.find(point.solver).engine for point in points(results, ONE_STEP)}
+    measured = [point for task in _CLOTH_GOALS for point in points(results, task)]
+    present = {registry.find(point.solver).engine for point in measured}
     engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers())
     cloth = [f"{engine} (cloth)" for engine in engines if present and engine not in present]
     missing = absent(results)
@@ -153,15 +154,10 @@ def _recorded_names() -> dict[str, set[str]]:
 def _robot_groups(results: Results) -> Iterator[tuple[str, str, dict[str, list[Score]]]]:
     """Yield group, start and solvers on each robot; robots held out from tuning come first."""
     by_start = {start: fields_of(results, start) for start in STARTS}
-    groups = {robot: _group_of(f[robot][0].records[0]) for f in by_start.values() for robot in f}
+    groups = {robot: f[robot][0].group for f in by_start.values() for robot in f}
     for group in sorted(set(groups.values()), key=_GROUPS.index):
         for start, fields in by_start.items():
             yield group, start, {robot: fields[robot] for robot in fields if groups[robot] == group}
-
-
-def _group_of(record: Record) -> str:
-    """Return the group of a record's robot: for tuning, held out, the character, or the user's."""
-    return group_of(record.problem.rpartition("/")[2])
 
 
 def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> Iterator[Headline]:
@@ -328,19 +324,17 @@ def _win_headline(wins: Sequence[Win]) -> Headline:
 def _robot_wins(group: str, start: str, fields: dict[str, list[Score]]) -> Iterator[Win]:
     """Yield the robots on which another solver solves more, or is faster."""
     for robot, field in fields.items():
-        rows = {row.solver: row for row in field if row.is_ranked}
-        for verb, ranking in (
-            ("solves more poses", field[0].success),
-            ("is faster", field[0].time),
-        ):
+        rows = {row.solver: row for row in field}
+        rankings = {"solves more poses": field[0].success, "is faster": field[0].time}
+        for verb, ranking in rankings.items():
             ours = next(filter(registry.is_ours, ranking.order), "")
-            first = _first(ranking.order)
-            if not ours or ours in ranking.first or first not in ranking.first:
+            first = _first(ranking.first)
+            if not ours or not first or ours in ranking.first:
                 continue
-            shares = [rows[solver].share for solver in (first, ours)]
-            points = 100 * (shares[0].hits - shares[1].hits) / shares[0].total
-            ratio = ratio_of_times(rows[ours], rows[first]).mean
-            size = points if ranking is field[0].success else ratio
+            if ranking is field[0].time:
+                size = ratio_of_times(rows[ours], rows[first]).mean
+            else:
+                size = 100 * float(np.mean(rows[first].solved) - np.mean(rows[ours].solved))
             result = f"{verb} than {named(ours)} {_FROM[start]}"
             cases = _robots(group, len(fields))
             yield Win("kinematics", first, result, robot, size, cases, "robots_by_robot")

@@ -71,7 +71,7 @@ def explain(
 
 
 def _telling(matches: Sequence[Match]) -> list[Match]:
-    """Return the perfect matches, or else all, that explain more than any part of their faults."""
+    """Return the perfect or else the faulty matches that explain more than any of their parts."""
 
     def is_needless(match: Match) -> bool:
         faults = set(match.variant.faults)
@@ -80,7 +80,8 @@ def _telling(matches: Sequence[Match]) -> list[Match]:
         )
 
     perfect = [match for match in matches if match.share == 1.0]
-    return [match for match in perfect or matches if not is_needless(match)]
+    faulty = [match for match in matches if match.variant.faults]
+    return [match for match in perfect or faulty if not is_needless(match)]
 
 
 def _match(

@@ -1,7 +1,6 @@
 """Test the judge: laws catch every known fault, the search names it, honest solvers are right.
 
-A fault counts as caught also by a reservation (RIGHT BUT): where a fault is small, as a sign that
-matters in few cases, the user is told of it even if no answer is wrong.
+A fault is caught if a law calls an answer wrong; a mere reservation (RIGHT BUT) does not count.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -82,12 +81,11 @@ def attempt(subject: Subject) -> Trial:
     """Judge a subject as `verify` judges any solver."""
     contestant = FunctionContestant({subject.task: subject.function}, subject.greeting)
     report = verify(contestant).tasks[0]
-    threshold = Verdict.RIGHT_BUT if subject.fault else Verdict.WRONG
     laws = frozenset(
         finding.law
         for judgement in report.judgements
         for finding in judgement.findings
-        if finding.verdict >= threshold and finding.law != "remarks"
+        if finding.verdict >= Verdict.WRONG
     )
     explanations = report.diagnosis.explanations
     keys = explanations[0].faults if explanations else ()

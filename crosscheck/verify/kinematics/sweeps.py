@@ -18,7 +18,7 @@ from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
-from ..laws import HOLDS
+from ..laws import LAWS, finding
 from ..sentence import Sentence, sentence
 from . import pose_laws, rounding
 from .faults import FAULTS, by_key, describe, switches
@@ -100,25 +100,17 @@ def compare(
         else "Its sweeps are those of {method}.",
         method=NAMES[method],
     )
-    verdict, message, damped = Verdict.RIGHT, HOLDS, None
+    key, damped, choice = LAW, None, None
     if wrong:
         honest = honest_variant(trials, method, greeting)
         damped = damping_of(trials, greeting) if method == "ccd" and honest is None else None
         choice = honest or damped
-        verdict, message = (
-            (Verdict.RIGHT_BUT, choice)
-            if choice
-            else _verdict(trials, method, others_hold, greeting)
-        )
+        key = f"{LAW}, honest" if choice else _reason(trials, method, others_hold, greeting)
     findings = {
-        name: [
-            Finding(LAW, verdict, error, bound, "m", message)
-            if name in wrong
-            else Finding(LAW, Verdict.RIGHT, error, bound, "m", HOLDS)
-        ]
+        name: [finding(key, error, bound, method=NAMES[method], choice=choice)]
         for name, (error, bound) in errors.items()
     }
-    is_honest = verdict is Verdict.RIGHT_BUT
+    is_honest = LAWS[key].get("verdict") == "RIGHT_BUT"
     return SweepComparison(
         method, None if declared else behaviour, wrong, findings, is_honest, damped
     )
@@ -165,28 +157,13 @@ def _error(trial: PoseTrial, method: str, greeting: Greeting) -> tuple[float, fl
     return trial.pose.distance_to(x), bound
 
 
-def _verdict(
-    trials: Sequence[PoseTrial], method: str, others_hold: bool, greeting: Greeting
-) -> tuple[Verdict, Sentence]:
-    """Return the verdict on sweeps that are not the textbook's."""
+def _reason(trials: Sequence[PoseTrial], method: str, others_hold: bool, greeting: Greeting) -> str:
+    """Return what there is to say of sweeps that are not the textbook's, a key of `laws.toml`."""
     if others_hold and all(_has_arrived(trial, greeting) for trial in trials):
-        return Verdict.RIGHT_BUT, sentence(
-            "It goes on to the target although one sweep was requested (max_iterations 1, "
-            "tolerance 0), so that its sweeps cannot be judged."
-        )
+        return f"{LAW}, goes on"
     if others_hold and (method == "fabrik" or all(map(_ends_well, trials))):
-        return Verdict.RIGHT_BUT, sentence(
-            "Its sweep satisfies every law of {method}, but differs from the textbook's sweep.",
-            method=NAMES[method],
-        )
-    return Verdict.WRONG, sentence(
-        "Its sweep is not a sweep of {method}, which goes from the effector's parent to the "
-        "root and rotates each joint until the effector is as near to the target as possible."
-        if method == "ccd"
-        else "Its sweep is not a sweep of {method}, which goes backward from the target to the "
-        "root, then forward from the root's position, and keeps the length of every link.",
-        method=NAMES[method],
-    )
+        return f"{LAW}, another"
+    return f"{LAW}, no {NAMES[method]}"
 
 
 def _has_arrived(trial: PoseTrial, greeting: Greeting) -> bool:

@@ -22,7 +22,6 @@ from .faults import read_table
 # In place of the mass 1, which hides what is divided by it.
 ONE_MASS = 0.8
 MOTION_STEPS = 6
-STEPS = ("mass_spring_step", "mass_spring_motion")
 GRAVITY = np.array([0.0, -9.81, 0.0])
 _TABLE = read_table("scenes.toml")
 
@@ -174,21 +173,12 @@ def _pins_still(scene: SpringScene) -> SpringScene:
 
 def _changes(seed: int) -> list[SpringScene]:
     """Return scenes whose requests follow each other."""
-    before = replace(
-        _random(seed + 1, 3, name="before h changes", family="h changes", sentence=""),
-        about=sentence("Three particles, the step before h changes."),
-        tasks=STEPS, dampings=np.zeros(3),
-    )  # fmt: skip
-    after = replace(
-        before, name="h changed", about=sentence("The same three particles with half the h."),
-        h=before.h / 2, follows=before.name,
-    )  # fmt: skip
+    first, second, third = map(_fields, _TABLE["change"])
+    before = replace(_random(seed + 1, 3, **first), dampings=np.zeros(3))
+    after = replace(before, h=before.h / 2, **second)
     other_masses = replace(
-        before, name="masses changed", family="system changes",
-        about=sentence("The same three particles with other masses and springs."),
-        masses=before.masses[::-1] * 1.3, stiffnesses=before.stiffnesses * 2.0,
-        h=before.h / 2, follows=after.name,
-    )  # fmt: skip
+        after, masses=before.masses[::-1] * 1.3, stiffnesses=before.stiffnesses * 2.0, **third
+    )
     return [before, after, other_masses]
 
 

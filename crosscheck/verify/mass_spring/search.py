@@ -20,7 +20,7 @@ from .problem import SpringProblem
 
 # The number of combinations that are tried, in a fixed order, with no fault, one, two and three: a
 # few seconds each, for a solver that none explains. On all machines the same faults are named.
-COMBINATIONS = (10_000, 8_000, 10_000, 20_000)
+COMBINATIONS = (5_000, 12_000, 12_000, 20_000)
 # Integrators with more iterations are not combined with faults.
 MAX_ITERATIONS = 10
 # Matrices that are singular without pins, where they predict nothing.

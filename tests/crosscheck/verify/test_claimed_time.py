@@ -148,18 +148,6 @@ def test_an_honest_program_is_believed(tmp_path, begin):
     assert all(one.untimed is None for one in found)
 
 
-IMPOSSIBLE = ["-1.0", "float('nan')", "float('inf')", "1e-12", "5e-324", "'soon'", "1e9", "[1]"]
-
-
-@pytest.mark.parametrize("seconds", IMPOSSIBLE)
-def test_impossible_seconds_are_refused_in_one_sentence(tmp_path, seconds):
-    (answer,), _ = answers(program(tmp_path, seconds), 1)
-    assert answer.seconds > 1e-4
-    assert 'expected "seconds" as 0, or a number from 1e-9 to the time that the answer took' in str(
-        answer.untimed
-    )
-
-
 @pytest.mark.parametrize("seconds", ["0.0", "0.016"])
 def test_a_clock_that_ticks_seldom_is_no_lie(tmp_path, seconds):
     found, remarks = answers(program(tmp_path, seconds), 11)

@@ -135,11 +135,6 @@ def test_inputs_arrive_as_arrays_and_only_those_that_are_taken(inside):
     assert energy.values == {"kinetic": 0.5}
 
 
-def test_own_time_is_measured_inside(solver):
-    contestant = solver(f"import time\n{FORWARD}time.sleep(0.2)\n    return offsets\n")
-    assert contestant.answer(case(2)).seconds >= 0.2
-
-
 @rows("methods")
 def test_methods_of_inverse_kinematics_are_found(inside, text, methods):
     contestant = inside(text)
@@ -349,17 +344,6 @@ def test_the_host_loads_nothing_of_ours_that_it_does_not_need(solver):
         "        for name in sys.modules)\n"
     )
     assert contestant.answer(case(2)).values["positions"][0, 0] == 0.0
-
-
-def test_what_a_function_starts_is_ended(solver):
-    contestant = solver(
-        "import subprocess, sys\n"
-        f"{FORWARD}subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)', "
-        "__file__], start_new_session=True)\n    return offsets\n"
-    )
-    assert isinstance(contestant.answer(case(2)), Answer)
-    contestant.close()
-    assert "left processes running that it had started (1)" in str(contestant.remarks[0])
 
 
 @pytest.mark.parametrize("kind", ["list", "program", "folder"])

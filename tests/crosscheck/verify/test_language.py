@@ -32,11 +32,6 @@ def test_a_translation_has_the_fields_of_its_template(language):
 
 
 @pytest.mark.parametrize("language", TRANSLATED)
-def test_no_translation_is_left_of_a_sentence_that_is_gone(language):
-    assert entries(language).keys() - TEMPLATES.keys() == set()
-
-
-@pytest.mark.parametrize("language", TRANSLATED)
 def test_the_compiled_catalogue_is_that_of_the_text(language):
     with catalogue.path_of(language, ".mo").open("rb") as file:
         compiled = gettext.GNUTranslations(file)

@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 import pytest
+from kinematics_solvers import textbook
 
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import Report, Verdict
 from plumbob.crosscheck.verify.kinematics import report as kinematics_report
-from plumbob.crosscheck.verify.kinematics.faults import FAULTS, switches
-from plumbob.crosscheck.verify.kinematics.predictions import forward, solve
+from plumbob.crosscheck.verify.kinematics.faults import FAULTS
 from plumbob.crosscheck.verify.mass_spring import forces as force_report
 from plumbob.crosscheck.verify.mass_spring import search
 from plumbob.crosscheck.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, apply
@@ -24,38 +24,28 @@ from plumbob.crosscheck.verify.self_test import DECLARED, Stepper
 from plumbob.crosscheck.verify.verify import DISCIPLINES, judge_cases, verify
 
 
-def fault_of(options, key):
-    return next(one for one in options if one.key == key)
+def options_of(faults, key):
+    return [fault for fault in faults if fault.key == key][:1]
 
 
 def forward_kinematics(key):
-    switched = switches([fault_of(FAULTS["forward"], key)] if key else [])
-    return lambda **inputs: dict(
-        zip(("positions", "rotations"), forward(inputs, switched), strict=True)
-    )
+    return textbook("forward_kinematics", options_of(FAULTS["forward"], key))
 
 
 def ccd(key):
-    switched = switches([fault_of(FAULTS["ccd"], key)] if key else [])
-
-    def function(**inputs):
-        local, positions, _ = solve("ccd", inputs, switched)
-        return {"local_rotations": local, "positions": positions}
-
-    return function
+    return textbook("inverse_kinematics", options_of(FAULTS["ccd"], key))
 
 
 def forces(key):
-    def function(**inputs):
-        faults = [fault_of(FORCE_FAULTS, key)] if key else []
-        p, _ = apply(faults, problem_of(inputs), StepModel())
-        return {"forces": all_forces(p)}
-
-    return function
+    return lambda **inputs: {
+        "forces": all_forces(
+            apply(options_of(FORCE_FAULTS, key), problem_of(inputs), StepModel())[0]
+        )
+    }
 
 
 def step(key):
-    return Stepper(DECLARED["linearised"][0], [fault_of(STEP_FAULTS, key)] if key else [])
+    return Stepper(DECLARED["linearised"][0], options_of(STEP_FAULTS, key))
 
 
 # What makes a solver by the key of its fault, a fault, and what the greeting says besides.
