@@ -30,9 +30,9 @@ from ...harness.stopwatch import processor_time_of
 from ...peers.ik.protocol import attempt
 from ...peers.ik.restarts import digest_of, restarted
 from ...peers.registry import PEERS, Peer
-from ...problems.evaluate import Targets, evaluator_of
-from ...problems.robot_targets import STRATA, stratum_poses
-from ...problems.robots import TUNING, seed_of
+from ...problems.evaluate import Targets, arbiter_of, evaluator_of
+from ...problems.robot_targets import STRATA, robot_targets
+from ...problems.robots import TUNING
 from .measurement import TOLERANCE
 
 RESULTS = Path("docs/peers/tuning.jsonl")
@@ -61,11 +61,6 @@ class Search(NamedTuple):
     def peer(self) -> Peer:
         """The solver."""
         return next(peer for peer in PEERS if peer.title == self.solver)
-
-    def ordered(self, trials: Sequence["Trial"]) -> list["Trial"]:
-        """Return the trials of candidates in their order."""
-        candidates = [trial for trial in trials if trial.settings in self.candidates]
-        return sorted(candidates, key=lambda trial: self.candidates.index(trial.settings))
 
     @property
     def settings(self) -> list[Settings]:
@@ -119,12 +114,8 @@ def _search(
 
 def tuning_targets(name: str, count: int) -> Targets:
     """Return the first targets of a tuning robot, the strata alternating, and random starts."""
-    evaluator, rng = evaluator_of(name), np.random.default_rng([SEED, seed_of(name)])
-    poses = np.stack([*stratum_poses(evaluator, rng, -(-COUNT // len(STRATA))).values()], axis=1)
-    poses = poses.reshape(-1, poses.shape[-1])[:COUNT]
-    starts, strata = evaluator.robot.draw(rng, COUNT), np.arange(COUNT) % len(STRATA)
-    positions, rotations = evaluator.forward(poses)
-    return Targets(positions[:count], rotations[:count], starts[:count], strata[:count])
+    targets = robot_targets(name, -(-COUNT // len(STRATA)), SEED)
+    return Targets(*(part[:count] for part in targets))
 
 
 def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, Any]:
@@ -137,8 +128,7 @@ def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, 
     attempt(ask(targets.request(0)))  # which compiles
     q = np.full(targets.starts.shape, math.nan)
     for i in range(count):
-        request = targets.request(i)
-        solve = ask(request)
+        solve = ask(request := targets.request(i))
         seed_shared_generators(digest_of(*request))
         output, duration = processor_time_of(functools.partial(attempt, solve))
         q[i] = math.nan if output.q is None else output.q
@@ -151,18 +141,20 @@ def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, 
 
 def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int) -> Trial:
     """Try settings in a worker's process; a robot over which that is lost is not solved."""
-    solved, seconds = np.zeros((len(TUNING), count), dtype=bool), list[float]()
-    errors = list[str]()
+    solved = np.zeros((len(TUNING), count), dtype=bool)
+    seconds, errors = list[float](), list[str]()
     for robot, name in enumerate(TUNING):
         try:
             values = worker.calculate(answers, search.peer, name, count, settings)
             targets = tuning_targets(name, count)
-            evaluation = evaluator_of(name).evaluate(targets, values["q"], TOLERANCE)
+            engine = arbiter_of(search.peer.built_on)
+            evaluation = evaluator_of(name).evaluate(targets, values["q"], TOLERANCE, engine)
             solved[robot] = evaluation.solved
-            seconds, errors = seconds + values["seconds"], errors + values["errors"]
+            seconds += values["seconds"]
+            errors += values["errors"]
         except RuntimeError as error:
-            errors = [f"{name}: {error}"] * count
-    time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else -1.0
+            errors += [f"{name}: {error}"] * count
+    time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else 0.0
     bits = np.packbits(solved).tobytes().hex()
     names = (*search[:2], settings, search.peer.version)
     return Trial(*names, count, round(time, 1), bits, len(errors), errors[0] if errors else "")
@@ -170,9 +162,9 @@ def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int)
 
 def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
     """Return the settings to try on all targets, from their trials on the first."""
-    order = sorted(search.ordered(trials), key=lambda trial: -trial.share)
-    best = [trial.settings for trial in order[: math.ceil(len(order) / 4)]]
-    best += [search.default, search.before]
+    candidates = [trial for trial in trials if trial.settings in search.candidates]
+    order = sorted(candidates, key=lambda trial: -trial.share)[: math.ceil(len(candidates) / 4)]
+    best = [*(trial.settings for trial in order), search.default, search.before]
     return [settings for i, settings in enumerate(best) if settings not in best[:i]]
 
 
@@ -183,7 +175,7 @@ def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
     those tie whose times are equal to the fastest; of these it is the default, if there and without
     exceptions, or the one with the greatest share.
     """
-    candidates = search.ordered(trials)
+    candidates = [trial for trial in trials if trial.settings in search.candidates]
     best = max(candidates, key=lambda trial: trial.share).solved.ravel()
     tied = [
         trial
@@ -203,13 +195,14 @@ def read(path: Path) -> list[Trial]:
 
 
 def trials_of(search: Search, trials: Sequence[Trial], count: int) -> list[Trial]:
-    """Return the trials of a search on so many targets of each robot."""
-    return [
+    """Return the trials of a search on so many targets of each robot, in its order."""
+    trials = [
         trial
         for trial in trials
         if (trial.solver, trial.start, trial.targets) == (*search[:2], count)
-        and trial.settings in search.settings
     ]
+    known = [trial for trial in trials if trial.settings in search.settings]
+    return sorted(known, key=lambda trial: search.settings.index(trial.settings))
 
 
 def perform(search: Search, path: Path) -> Iterator[Trial]:
