@@ -89,7 +89,7 @@ _INTERNAL = {
         reference.implicit_euler.certificate.laplacian_norm
         reference.implicit_euler.certificate.rounding_errors""",
     "for kernels": """
-        reference.backend.compiled.Kernel reference.backend.compiled.compile_kernel
+        reference.backend.compiled.Kernel
         reference.backend.compiled.bind reference.backend.compiled.digest
         reference.backend.compiled.compiled_in reference.backend.threads.in_slices""",
     "made only by check_claim": """

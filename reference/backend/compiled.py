@@ -84,6 +84,7 @@ class Kernel:
         return self.compiled(*arguments)
 
 
+@functools.cache
 def compile_kernel(
     kernel: PythonKernel, relaxed: bool = False, label: str | None = None
 ) -> PythonKernel:
@@ -95,8 +96,19 @@ def compile_kernel(
     Callees are inlined: a call would pass every number of every array in its tuples, more than a
     hundred, and take longer than most kernels. Exceptions are LARGE callees that are called in
     several places, as copies of them would take seconds to compile.
+
+    Where NUMBA_DISABLE_JIT turns numba's compiler off, the interpreter runs the kernel.
     """
-    return _entry(kernel, relaxed, label)
+    if compilation.numba_settings().DISABLE_JIT:
+        return kernel
+    from . import disk_cache, linking
+
+    compilation.watch_numba()
+    options = {"pipeline_class": linking.KernelCompiler} if linking.is_supported() else {}
+    compiled = _jit(kernel, relaxed, **options)
+    compiled.label = label or kernel.__name__.strip("_").replace("_", " ")
+    disk_cache.use_cache(compiled)
+    return compiled
 
 
 def bind(kernel: PythonKernel, **bound: Any) -> PythonKernel:
@@ -121,24 +133,6 @@ def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
         return plain
 
     return mark
-
-
-@functools.cache
-def _entry(kernel: PythonKernel, relaxed: bool, label: str | None) -> PythonKernel:
-    """Compile a kernel for calls from Python, cached on disk together with its callees.
-
-    Where NUMBA_DISABLE_JIT turns numba's compiler off, the interpreter runs the kernel.
-    """
-    if compilation.numba_settings().DISABLE_JIT:
-        return kernel
-    from . import disk_cache, linking
-
-    compilation.watch_numba()
-    options = {"pipeline_class": linking.KernelCompiler} if linking.is_supported() else {}
-    compiled = _jit(kernel, relaxed, **options)
-    compiled.label = label or kernel.__name__.strip("_").replace("_", " ")
-    disk_cache.use_cache(compiled)
-    return compiled
 
 
 @functools.cache

@@ -210,8 +210,8 @@ def test_a_motion_is_a_race_of_its_own(make):
         make.fell("Plumbob symplectic Euler", **near),
     ]
     assert sentence(records, "Fastest in a motion within 1 % of the truth") == (
-        "In a motion within 1 % of the truth, Newton is the fastest on 1 of 1 cloth, 5.0 times "
-        "faster than the best other engine, Plumbob (ours)."
+        "In a motion within 1 % of the truth, Newton engine is the fastest on 1 of 1 cloth, "
+        "5.0 times faster than the best other engine, Plumbob (ours)."
     )
 
 

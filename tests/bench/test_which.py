@@ -43,6 +43,12 @@ def test_a_solver_has_a_row_with_its_best_settings_and_the_best_is_first(make):
     )
 
 
+def test_every_solver_is_good_for_something_that_fits_a_line_of_80_letters():
+    uses = [peer.use for peer in registry.PEERS]
+    assert all(0 < len(use) <= 29 for use in uses)
+    assert len(set(uses)) == len(uses)
+
+
 def test_the_advice_is_for_whoever_is_best(make):
     best = make.solving("pink", 200, seconds=1e-3)
     ours, loop = make.solving("Plumbob LM", 100), make.solving("our closed loop on Pinocchio", 200)

@@ -97,30 +97,6 @@ def negate(context, builder, signature, arguments):
 
 
 @intrinsic
-def load_vectors(typingctx, tile, j):
-    """Read three doubles of each pose and transpose them into three lanes."""
-    return _reading(tile, 3)
-
-
-@intrinsic
-def load_quaternions(typingctx, tile, j):
-    """Read four doubles of each pose and transpose them into four lanes."""
-    return _reading(tile, 4)
-
-
-@intrinsic
-def store_vectors(typingctx, tile, j, value):
-    """Transpose three lanes and write three doubles into each pose."""
-    return _writing(tile, 3)
-
-
-@intrinsic
-def store_quaternions(typingctx, tile, j, value):
-    """Transpose four lanes and write four doubles into each pose."""
-    return _writing(tile, 4)
-
-
-@intrinsic
 def load_lanes(typingctx, scratch, j):
     """Read four lanes."""
 
@@ -232,7 +208,9 @@ def prefetch(typingctx, values, i):
     return types.none(_contiguous(values, 1), i), generate
 
 
-def _reading(tile, count):
+def _reader(count):
+    """Return a function that reads so many doubles of each pose and transposes them into lanes."""
+
     def generate(context, builder, signature, arguments):
         pointers = _tile_row(context, builder, signature, arguments, count, READ)
         rows = [builder.load(pointer, align=DOUBLE_BYTES) for pointer in pointers]
@@ -241,10 +219,15 @@ def _reading(tile, count):
         parts = _transposed(builder, [_shuffled(builder, *pair, range(LANES)) for pair in pairs])
         return context.make_tuple(builder, signature.return_type, parts[:count])
 
-    return types.UniTuple(lanes, count)(_contiguous(tile), types.intp), generate
+    def read(typingctx, tile, j):
+        return types.UniTuple(lanes, count)(_contiguous(tile), types.intp), generate
+
+    return intrinsic(read)
 
 
-def _writing(tile, count):
+def _writer(count):
+    """Return a function that transposes lanes and writes so many doubles into each pose."""
+
     def generate(context, builder, signature, arguments):
         pointers = _tile_row(context, builder, signature, arguments, count, WRITE)
         parts = cgutils.unpack_tuple(builder, arguments[2])
@@ -255,7 +238,10 @@ def _writing(tile, count):
             builder.store(row, pointer, align=DOUBLE_BYTES)
         return context.get_dummy_value()
 
-    return types.none(_contiguous(tile), types.intp, types.UniTuple(lanes, count)), generate
+    def write(typingctx, tile, j, value):
+        return types.none(_contiguous(tile), types.intp, types.UniTuple(lanes, count)), generate
+
+    return intrinsic(write)
 
 
 def _transposed(builder, rows):
@@ -346,3 +332,7 @@ def _row(context, builder, signature, arguments):
 def _pointer(context, builder, signature, array, entry):
     """Return a pointer to an entry, counted from an array's first."""
     return builder.gep(context.make_array(signature.args[0])(context, builder, array).data, [entry])
+
+
+load_vectors, load_quaternions = _reader(3), _reader(4)
+store_vectors, store_quaternions = _writer(3), _writer(4)

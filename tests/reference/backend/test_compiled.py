@@ -307,10 +307,10 @@ def test_the_cache_on_disk_is_used_but_never_stale(tmp_path):
 def test_with_numbas_compiler_off_the_interpreter_runs_every_kernel(monkeypatch):
     """As numba's own functions do under NUMBA_DISABLE_JIT."""
     monkeypatch.setattr("numba.core.config.DISABLE_JIT", 1)
-    compiled._entry.cache_clear()
+    compiled.compile_kernel.cache_clear()
     kernel = compiled.Kernel(total)
     assert kernel(np.arange(4.0)) == 3.0 * (1 + 4 + 9)
     assert kernel.compiled is total
     monkeypatch.undo()
-    compiled._entry.cache_clear()
+    compiled.compile_kernel.cache_clear()
     assert compiled.Kernel(total).compiled is not total
