@@ -138,7 +138,8 @@ def not_asked(results: Results) -> list[str]:
     solvers = [
         peer for peer, names in _recorded_names().items() if requested and not names & requested
     ]
-    present = {registry.find(point.solver).engine for point in points(results, ONE_STEP)}
+    measured = [point for task in _CLOTH_GOALS for point in points(results, task)]
+    present = {registry.find(point.solver).engine for point in measured}
     engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers())
     cloth = [f"{engine} (cloth)" for engine in engines if present and engine not in present]
     missing = absent(results)

@@ -67,8 +67,8 @@ def test_from_a_start_beside_the_solution_a_peer_finds_it(peer, arm, rng):
     q = 0.7 * evaluator.robot.draw(rng, FEW)
     starts = q + rng.uniform(-0.1, 0.1, q.shape)
     targets = Targets(*evaluator.forward(q), starts, np.zeros(FEW, int))
-    # with 5 ms, TRAC-IK misses one on a busy machine
-    entry = peer.entries[-1 if module(peer) == "trac_ik" else 0]
+    # with 5 ms, TRAC-IK misses one on a busy machine; IPOPT ends at the edge of the tolerance
+    entry = peer.entries[{"trac_ik": -1, "drake": 1}.get(module(peer), 0)]
     solved, evaluation = answers(peer, entry, arm, targets)
     assert evaluation.solved.all()
     assert all(answer.claim in (1, -1) and not answer.trouble for answer in solved)

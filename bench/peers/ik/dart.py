@@ -7,7 +7,16 @@ the joints' limits. DART's own restarts draw from a generator without a seed, so
 import dartpy
 import numpy as np
 
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from .protocol import (
+    Ask,
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    Tolerance,
+    forward_by,
+)
 
 
 def prepare(
@@ -54,12 +63,11 @@ def kinematics(robot: BenchRobot) -> Forward:
     skeleton = dart_skeleton(robot)
     effector = skeleton.getBodyNode(robot.effectors[0])
 
-    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def pose(q: FloatArray) -> FloatArray:
         skeleton.setPositions(q)
-        T = effector.getWorldTransform().matrix()
-        return T[None, :3, 3], T[None, :3, :3]
+        return effector.getWorldTransform().matrix()
 
-    return forward
+    return forward_by(pose)
 
 
 def dart_skeleton(robot: BenchRobot) -> dartpy.dynamics.Skeleton:

@@ -15,78 +15,54 @@ from .protocol import Ask, PoseRequest, Solve, SolverOutput
 
 REPEATS = 5
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-class Meter:
-    """The time that functions of a library take.
-
-    Attributes:
-        seconds: their sum [s].
-    """
-
-    def __init__(self) -> None:
-        self.seconds = 0.0
-
-    def metered(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function whose time is added up."""
-
-        def call(*arguments: Any, **options: Any) -> Any:
-            begin = perf_counter()
-            result = function(*arguments, **options)
-            self.seconds += perf_counter() - begin
-            return result
-
-        return call
-
-
-_meters: list[Meter] = []
+# The time of a library's functions while an overhead is measured [s], else nothing.
+_library_seconds: list[float] = []
 
 
 def library(function: Function) -> Function:
-    """Return a library's function itself; a metered one while an overhead is measured."""
-    metered: Any = _meters[-1].metered(function) if _meters else function
-    return metered
+    """Return a library's function; one that adds up its time while an overhead is measured."""
+    if not is_metered():
+        return function
+
+    def metered(*arguments: Any, **options: Any) -> Any:
+        begin = perf_counter()
+        result = function(*arguments, **options)
+        _library_seconds[0] += perf_counter() - begin
+        return result
+
+    call: Any = metered
+    return call
 
 
 def is_metered() -> bool:
     """Return whether an overhead is being measured."""
-    return bool(_meters)
+    return bool(_library_seconds)
 
 
 def report_library(seconds: float) -> None:
     """Report the time that a library took in another process [s]."""
-    if _meters:
-        _meters[-1].seconds += seconds
+    if is_metered():
+        _library_seconds[0] += seconds
 
 
 def overhead(adapter: Any, prepare: Callable[[], Ask], request: PoseRequest) -> float:
     """Return the median time of a solve that its solver's library does not use [s].
 
-    It is an upper bound, for reading the clock costs time too; NaN if the solver raises.
-
-    Args:
-        adapter: its module.
-        prepare: sets the solver up by the adapter.
-        request: a target, which is solved several times if the adapter is metered.
+    It is an upper bound, for reading the clock costs time too; NaN if the solver raises. `prepare`
+    sets the solver up by its adapter.
     """
-    if not getattr(adapter, "METERED", False):
-        stored = Solve(lambda: None, lambda answer: (answer, None))
-        return median(_seconds(stored()) for _ in range(REPEATS))
-    meter = Meter()
-    _meters.append(meter)
+    _library_seconds.append(0.0)
     try:
-        solve = prepare()(request)
-        return median(_remaining(solve, meter) for _ in range(REPEATS))
+        is_loop = getattr(adapter, "METERED", False)
+        solve = prepare()(request) if is_loop else Solve(lambda: None, lambda q: (q, None))
+        return median(_remaining(solve) for _ in range(REPEATS))
     except Exception:  # which is a failed attempt where its answers count
         return math.nan
     finally:
-        _meters.remove(meter)
+        _library_seconds.clear()
 
 
-def _remaining(solve: Callable[[], SolverOutput], meter: Meter) -> float:
-    meter.seconds = 0.0
-    return _seconds(solve()) - meter.seconds
-
-
-def _seconds(output: SolverOutput) -> float:
-    return output.time.seconds if output.time else math.nan
+def _remaining(solve: Callable[[], SolverOutput]) -> float:
+    _library_seconds[0] = 0.0
+    time = solve().time
+    return time.seconds - _library_seconds[0] if time else math.nan

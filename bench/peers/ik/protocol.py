@@ -16,6 +16,8 @@ from math import hypot
 from time import perf_counter
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from plumbob.reference.arguments import FloatArray
 
 from ...problems.evaluate import PoseRequest, Tolerance
@@ -58,6 +60,16 @@ class Solve:
 Ask = Callable[[PoseRequest], Callable[[], SolverOutput]]
 # Coordinates to the effectors' positions [m], (effector, 3), and rotations, (effector, 3, 3).
 Forward = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+def forward_by(pose: Callable[[FloatArray], FloatArray]) -> Forward:
+    """Return the forward kinematics of a chain from its effector's transform, (4, 4)."""
+
+    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        T = np.asarray(pose(q))
+        return T[None, :3, 3], T[None, :3, :3]
+
+    return forward
 
 
 def attempt(solve: Callable[[], SolverOutput]) -> SolverOutput:

@@ -11,7 +11,16 @@ import numpy as np
 import pytorch_kinematics
 import torch
 
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from .protocol import (
+    Ask,
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    Tolerance,
+    forward_by,
+)
 from .restarts import generator_of
 
 
@@ -65,12 +74,7 @@ def _read(output: Any) -> tuple[FloatArray, bool]:
 def kinematics(robot: BenchRobot) -> Forward:
     """Return the forward kinematics of the effector."""
     chain = torch_chain(robot)
-
-    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        T = chain.forward_kinematics(torch.tensor(q)).get_matrix().numpy()
-        return T[:, :3, 3], T[:, :3, :3]
-
-    return forward
+    return forward_by(lambda q: chain.forward_kinematics(torch.tensor(q)).get_matrix()[0].numpy())
 
 
 def torch_chain(robot: BenchRobot) -> pytorch_kinematics.SerialChain:

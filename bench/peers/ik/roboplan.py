@@ -4,10 +4,9 @@ Its limit of time is lifted, so that the iterations end it; its generator is see
 which its user would do for answers that can be repeated. Its own default is two restarts.
 """
 
-import numpy as np
 from roboplan import core, simple_ik
 
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from .protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance, forward_by
 
 GROUP, SEED, UNLIMITED = "arm", 1986, 1e6
 
@@ -52,13 +51,8 @@ def prepare(
 
 def kinematics(robot: BenchRobot) -> Forward:
     """Return roboplan's forward kinematics of the effector."""
-    scene = scene_of(robot)
-
-    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        T = np.asarray(scene.forwardKinematics(q, robot.effectors[0], robot.root))
-        return T[None, :3, 3], T[None, :3, :3]
-
-    return forward
+    scene, frames = scene_of(robot), (robot.effectors[0], robot.root)
+    return forward_by(lambda q: scene.forwardKinematics(q, *frames))
 
 
 def scene_of(robot: BenchRobot) -> core.Scene:

@@ -14,12 +14,20 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
 from ssik import cli
 
 from ...problems.robots import UnableError
 from ..protocol import describe
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from .protocol import (
+    Ask,
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    Tolerance,
+    forward_by,
+)
 
 
 def prepare(robot: BenchRobot, tolerance: Tolerance, solutions: int = 1) -> Ask:
@@ -38,13 +46,7 @@ def _read(solutions: list[Any]) -> tuple[FloatArray | None, bool]:
 
 def kinematics(robot: BenchRobot) -> Forward:
     """Return its forward kinematics of the effector."""
-    solver = built_solver(robot)
-
-    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        T = np.asarray(solver.fk(q))
-        return T[None, :3, 3], T[None, :3, :3]
-
-    return forward
+    return forward_by(built_solver(robot).fk)
 
 
 def built_solver(robot: BenchRobot) -> ModuleType:

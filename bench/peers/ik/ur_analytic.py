@@ -7,6 +7,7 @@ returns all solutions: the choice among them is its user's.
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,16 @@ import ur_analytic_ik
 from ...problems.evaluate import Evaluator
 from ...problems.robots import UnableError
 from .axes import first_within
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from .protocol import (
+    Ask,
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    Tolerance,
+    forward_by,
+)
 
 HINGES, SAMPLES = 6, 20
 # Of positions [m] and of rotation matrices: a model whose lengths are rounded otherwise is another.
@@ -51,13 +61,7 @@ def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
 
 def kinematics(robot: BenchRobot) -> Forward:
     """Return its forward kinematics of the effector."""
-    model = model_of(robot)
-
-    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        T = model.pose(q)
-        return T[None, :3, 3], T[None, :3, :3]
-
-    return forward
+    return forward_by(model_of(robot).pose)
 
 
 def model_of(robot: BenchRobot) -> RobotModel:
@@ -67,25 +71,16 @@ def model_of(robot: BenchRobot) -> RobotModel:
         UnableError: if there is none.
     """
     robot.require_chain()
-    if len(robot.joints) == HINGES:
-        half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
-        names = [name for name in dir(ur_analytic_ik) if name.startswith("ur")]
-        solvers = [getattr(ur_analytic_ik, name) for name in names]
-        q = robot.draw(np.random.default_rng(0), SAMPLES)
-        poses = _poses(robot, np.vstack([np.zeros(HINGES), q]))
-        for solver in solvers:
-            for root in (np.eye(4), half_turn):
-                tool = np.linalg.inv(root @ solver.forward_kinematics(*np.zeros(HINGES))) @ poses[0]
-                model = RobotModel(solver, root, tool)
-                errors = [model.pose(row) - pose for row, pose in zip(q, poses[1:], strict=True)]
-                if np.abs(errors).max() <= AGREEMENT:
-                    return model
-    raise UnableError("has models of Universal Robots only")
-
-
-def _poses(robot: BenchRobot, q: FloatArray) -> FloatArray:
-    """Return the effector's transforms, (row, 4, 4)."""
+    names = [name for name in dir(ur_analytic_ik) if name.startswith("ur")]
+    roots = np.eye(4), np.diag([-1.0, -1.0, 1.0, 1.0])
+    q = robot.draw(np.random.default_rng(0), SAMPLES)
+    poses = np.tile(np.eye(4), (SAMPLES, 1, 1))
     positions, rotations = Evaluator(robot).forward(q)
-    poses = np.tile(np.eye(4), (len(q), 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = rotations[:, 0], positions[:, 0]
-    return poses
+    for name, root in product(names if len(robot.joints) == HINGES else (), roots):
+        solver = getattr(ur_analytic_ik, name)
+        tool = np.linalg.inv(root @ solver.forward_kinematics(*q[0])) @ poses[0]
+        model = RobotModel(solver, root, tool)
+        if np.abs(np.array([*map(model.pose, q)]) - poses).max() <= AGREEMENT:
+            return model
+    raise UnableError("has models of Universal Robots only")
