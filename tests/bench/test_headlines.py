@@ -64,7 +64,7 @@ def test_only_what_chance_would_not_do_as_much_leads_or_wins(run):
 
 
 def test_our_loop_on_an_engine_and_our_other_solvers_are_nobodys_rivals(run):
-    loop, again = "our closed loop on Pinocchio", "Plumbob LM, 100 restarts"
+    loop, again = "our closed loop on Pinocchio", "Plumbob LM, 20 restarts"
     records = [run("Plumbob LM", 150), run(again, 140), run(loop, 130), run("pink", 20)]
     for question in (MOST, FASTEST):
         assert "pink" in sentence(records, question)
