@@ -73,7 +73,7 @@ def test_of_solvers_that_solve_as_much_the_fastest_is_named_first(run):
 
 
 def test_our_loop_on_an_engine_and_our_other_solvers_are_nobodys_rivals(run):
-    loop, again = "our closed loop on Pinocchio", "Plumbob LM, 100 restarts"
+    loop, again = "our closed loop on Pinocchio", "Plumbob LM, 20 restarts"
     records = [run("Plumbob LM", 150), run(again, 140), run(loop, 130), run("pink", 20)]
     for question in (MOST, FASTEST):
         assert "pink" in sentence(records, question)
