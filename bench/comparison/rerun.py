@@ -53,6 +53,7 @@ class Plan(NamedTuple):
     scale: str = "quick"  # of each measurement
     seed: int = SEED  # of the order
     solvers: tuple[str, ...] = ()  # addresses of the user's solvers; the bench's own if none
+    place: Path = Path()  # where the addresses are from, below the root of the repository
 
 
 def rerun(plan: Plan, place: Path, tell: Callable[[str], None] = lambda _: None) -> RunComparison:
@@ -69,8 +70,8 @@ def rerun(plan: Plan, place: Path, tell: Callable[[str], None] = lambda _: None)
         old, new = folder / "old", folder / "new"
         _check_out(root, plan.revision, old)
         new.symlink_to(root, target_is_directory=True)  # so that both paths are as long
-        sources = tuple(_Sources(path, place.resolve().relative_to(root)) for path in (old, new))
-        return _measure(_Bench(sources, plan, tell))
+        plan = plan._replace(place=place.resolve().relative_to(root) if plan.solvers else Path())
+        return _measure(_Bench((old, new), plan, tell))
 
 
 def _repository(folder: Path, plan: Plan) -> Path:
@@ -88,26 +89,6 @@ def _repository(folder: Path, plan: Plan) -> Path:
         "--rerun: expected --with and a solver of yours, or to be run in a clone of Plumbob, got "
         f"{folder}"
     )
-
-
-class _Sources(NamedTuple):
-    """The sources of a revision."""
-
-    root: Path
-    place: Path  # of the solvers below the root
-
-    def command(self, plan: Plan) -> list[str]:
-        """Return the arguments of the process that measures them."""
-        folder = self.root / self.place if plan.solvers else self.root
-        suites, solvers = json.dumps(plan.suites), json.dumps(plan.solvers) if plan.solvers else ""
-        return [str(folder), plan.scale, suites, solvers]
-
-    def path(self, plan: Plan) -> str:
-        """Return where Python looks for modules: first in the revision, also in its folder src."""
-        if not plan.solvers:
-            return str(self.root)
-        folders = [self.root / self.place, self.root / "src", self.root]
-        return os.pathsep.join([*map(str, folders), os.environ.get("PYTHONPATH", "")])
 
 
 @contextlib.contextmanager
@@ -143,14 +124,21 @@ def _check_out(root: Path, revision: str, folder: Path) -> None:
 
 
 class Revision:
-    """A process that measures blocks of a revision, by its sources."""
+    """A process that measures blocks of a revision, by the sources in a folder.
 
-    def __init__(self, sources: _Sources, plan: Plan) -> None:
-        self._name = plan.revision if sources.root.name == "old" else "the working copy"
-        command = [sys.executable, "-P", revision_process.__file__, *sources.command(plan)]
-        environment = {**one_thread(), "PYTHONPATH": sources.path(plan)}
-        folder = sources.root.parent
-        self._process = ChildProcess(command, folder=folder, environment=environment)
+    Modules of the user's are searched at the place of their address, in `src` and in the root.
+    """
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        self._name = plan.revision if folder.name == "old" else "the working copy"
+        place, path = folder / plan.place, [str(folder)]
+        command = [sys.executable, "-P", revision_process.__file__]
+        command += [str(place), plan.scale, json.dumps(plan.suites)]
+        if plan.solvers:
+            command.append(json.dumps(plan.solvers))
+            path = [str(place), str(folder / "src"), *path, os.environ.get("PYTHONPATH", "")]
+        environment = {**one_thread(), "PYTHONPATH": os.pathsep.join(path)}
+        self._process = ChildProcess(command, folder=folder.parent, environment=environment)
 
     def blocks(self) -> list[list[str]]:
         """Return the keys of all blocks: suite, problem, solver, settings."""
@@ -175,9 +163,9 @@ class Revision:
 
 
 class _Bench(NamedTuple):
-    """The sources of both revisions, the plan, and a function that shows progress."""
+    """The folders of both revisions, the plan, and a function that shows progress."""
 
-    sources: tuple[_Sources, ...]
+    folders: tuple[Path, Path]
     plan: Plan
     tell: Callable[[str], None]
 
@@ -187,7 +175,7 @@ class _Bench(NamedTuple):
         with contextlib.ExitStack() as stack:
             revisions = {}
             for i in order:
-                revisions[i] = Revision(self.sources[i], self.plan)
+                revisions[i] = Revision(self.folders[i], self.plan)
                 stack.callback(revisions[i].close)
             yield revisions[0], revisions[1]
 

@@ -18,8 +18,6 @@ Floats = NDArray[np.float64]
 MAX_LABELLED = 6
 LINE, MARKS, SPAN = "line", "marks", "span"
 LESS, GREATER = "less", "greater"
-# Places along the axis at which curves are compared.
-_PLACES = 64
 
 
 class Look(NamedTuple):
@@ -167,62 +165,25 @@ class Chart:
         return self.shows + grey * bool(self.unlabelled)
 
     def costs(self) -> dict[str, float]:
-        """Return the distance of each solver's curve from the best, summed over the panels.
-
-        It is the area under the best value reached so far, on the axes as drawn, from 0 (best from
-        the start) to 1 (absent, or worst throughout).
-        """
+        """Return the places of each solver, added over the panels, by the mean of its curve."""
         totals = dict.fromkeys(self.solvers, 0.0)
         for panel in self.panels:
-            costs = self._row_costs(panel) if self.rows else self._curve_costs(panel)
+            means = {curve.solver: self._mean(curve) for curve in panel.series}
+            finite = [name for name in means if np.isfinite(means[name])]
+            order = sorted(finite, key=lambda name: means[name])
+            places = dict(zip(order, range(len(order)), strict=True))
             for name in totals:
-                totals[name] += costs.get(name, 1.0)
+                totals[name] += places.get(name, len(totals))
         return totals
 
-    def _curve_costs(self, panel: Panel) -> dict[str, float]:
+    def _mean(self, curve: Series) -> float:
+        """Return the mean of a curve as it is drawn, lower for better; NaN without points."""
+        numbers, axis = (curve.x, self.x) if self.rows else (curve.y, self.y)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scaled = np.log10(numbers) if axis.log else numbers
+        finite = scaled[np.isfinite(scaled)]
         sign = -1.0 if self.better == GREATER else 1.0
-        points = {}
-        for curve in panel.series:
-            xy = np.stack([_scaled(curve.x, self.x), sign * _scaled(curve.y, self.y)])
-            points[curve.solver] = xy[:, np.isfinite(xy).all(axis=0)]
-        points = {name: xy for name, xy in points.items() if xy.size}
-        if not points:
-            return {}
-        every = np.concatenate(list(points.values()), axis=1)
-        low, high = every.min(axis=1, keepdims=True), every.max(axis=1, keepdims=True)
-        size = np.where(high > low, high - low, 1.0)
-        return {name: _area((xy - low) / size) for name, xy in points.items()}
-
-    def _row_costs(self, panel: Panel) -> dict[str, float]:
-        """Return the distance of each solver from the best of each row, from 0 to 1, on average."""
-        marks = {
-            (curve.solver, int(row)): x
-            for curve in panel.series
-            for x, row in zip(_scaled(curve.x, self.x), curve.y, strict=True)
-            if np.isfinite(x)
-        }
-        costs = {curve.solver: 0.0 for curve in panel.series}
-        for row in range(len(self.rows)):
-            xs = [x for (_, number), x in marks.items() if number == row]
-            low, high = min(xs, default=0.0), max(xs, default=0.0)
-            for name in costs:
-                x = marks.get((name, row))
-                costs[name] += 1.0 if x is None else (x - low) / ((high - low) or 1.0)
-        return {name: float(cost) / max(1, len(self.rows)) for name, cost in costs.items()}
-
-
-def _scaled(numbers: Any, axis: Axis) -> Any:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.log10(numbers) if axis.log else np.asarray(numbers, dtype=float)
-
-
-def _area(points: Floats) -> float:
-    """Return the mean of the lowest y so far over x from 0 to 1; 1 before the first point."""
-    x, y = points
-    order = np.argsort(x, kind="stable")
-    lowest = np.minimum.accumulate(y[order])
-    reached = np.searchsorted(x[order], np.linspace(0.0, 1.0, _PLACES), side="right") - 1
-    return float(np.where(reached < 0, 1.0, lowest[np.maximum(reached, 0)]).mean())
+        return sign * float(finite.mean()) if finite.size else np.nan
 
 
 def looks(names: Sequence[str]) -> Mapping[str, Look]:

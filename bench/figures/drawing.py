@@ -23,8 +23,8 @@ from ..text import shortened
 from .chart import GREY, LINE, SPAN, Axis, Chart, Look, Panel, Series, looks
 from .style import COLOURS, plain_label
 
-# Width of a figure [inch], at least 38 rem on the page, where letters stay above 7 points.
-WIDTH = 7.0
+# Width of a figure [inch], at least 48 rem on the page, where letters stay above 7 points.
+WIDTH = 9.0
 SMALLEST = 8.0
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -61,7 +61,9 @@ for _axis in ("xtick", "ytick"):
     STYLE |= {f"{_axis}.color": COLOURS["faint"], f"{_axis}.labelcolor": COLOURS["ink"]}
     STYLE[f"{_axis}.labelsize"] = SMALLEST
 # Heights [inch] of a panel, of a row of marks, of a line of the legend.
-PANEL, ROW, LEGEND = 2.05, 0.3, 0.19
+PANEL, ROW, LEGEND = 2.3, 0.3, 0.19
+# Distance of the names of curves, in heights of a panel.
+_NAME = 0.11
 # Letters per inch of bold and of plain type; letters of the name of a row.
 _BOLD, _PLAIN, _ROW_NAME = 11.0, 13.0, 34
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -110,11 +112,11 @@ def pdf_of(figure: Figure, title: str, mark: str = "") -> bytes:
 
 
 def draw_chart(chart: Chart) -> Figure:
-    """Return a chart drawn: panels, and a legend below them."""
+    """Return a chart drawn: panels, with names at the ends of curves, or a legend of marks."""
     columns = max(1, min(chart.columns, len(chart.panels)))
     rows = -(-len(chart.panels) // columns)
     drawer = _ChartDrawer(chart, columns)
-    handles, names = drawer.legend()
+    handles, names = drawer.legend() if chart.rows else ([], [])
     legend_columns = max(1, int(WIDTH / (max(map(len, names), default=0) / _PLAIN + 0.6)))
     panel_height = ROW * len(chart.rows) + 0.7 if chart.rows else PANEL
     height = panel_height * rows + 0.25 + LEGEND * -(-len(names) // legend_columns)
@@ -131,6 +133,9 @@ def draw_chart(chart: Chart) -> Figure:
         drawer.scale(ax)
     for ax in axes[len(chart.panels) :]:
         ax.remove()
+    if not chart.rows:
+        for i in range(columns - 1, len(chart.panels), columns):
+            drawer.name_curves(axes[i], chart.panels[i], all_solvers=i < columns)
     if names:
         figure.legend(handles, names, loc="outside lower left", ncols=legend_columns)
     figure.series_names = chart.solvers  # type: ignore[attr-defined]
@@ -191,6 +196,37 @@ class _ChartDrawer:
                 artist.set_gid(f"series-{self._numbers[curve.solver]}")
         if panel.across is not None:
             ax.axhline(panel.across, color=COLOURS["faint"], linewidth=0.8, dashes=(2, 2))
+
+    def name_curves(self, ax: Axes, panel: Panel, all_solvers: bool) -> None:
+        """Write the names of labelled curves beside a panel, in the order of their ends.
+
+        With all solvers, those without a curve in the panel follow.
+        """
+        curves = {c.solver: (c.x[-1], c.y[-1]) for c in panel.series if c.x.size}
+        to_axes = ax.transData + ax.transAxes.inverted()
+        heights = {
+            name: to_axes.transform(curves[name])[1] if name in curves else 0.0
+            for name in self._order
+            if all_solvers or name in curves
+        }
+        place, lowest = 1.0 + _NAME, _NAME * (len(heights) - 1)
+        for name in sorted(heights, key=lambda name: -heights[name]):
+            place = min(place - _NAME, max(heights[name], lowest))
+            lowest -= _NAME
+            colour, end = COLOURS[self._looks[name].colour], curves.get(name, (1.0, place))
+            arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "alpha": 0.6}
+            is_drawn = name in curves
+            ax.annotate(
+                plain_label(label(name)),
+                end,
+                (1.06, place),
+                "data" if is_drawn else "axes fraction",
+                "axes fraction",
+                arrowprops=arrow if is_drawn else None,
+                color=colour,
+                va="center",
+                annotation_clip=False,
+            )
 
     def scale(self, ax: Axes) -> None:
         """Set up the axes of a panel, when all panels that share them have their curves."""

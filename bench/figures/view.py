@@ -7,7 +7,7 @@ Floats = NDArray[np.float64]
 
 # Azimuth about the vertical and height above the floor [rad]. An arm draws on the floor, which is
 # seen almost face-on, with z up.
-ARM_VIEW = (np.radians(180.0), np.radians(68.0))
+ARM_VIEW = (np.radians(180.0), np.radians(75.0))
 CLOTH_VIEW = (np.radians(-38.0), np.radians(18.0))
 
 

@@ -21,7 +21,7 @@ from plumbob.reference import IK_SOLVERS, STEP_SOLVERS
 
 from .entrant import CHAIN_TASK, ROBOT_TASK, Entrant
 
-PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
+PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton engine"
 
 
 class Style(NamedTuple):

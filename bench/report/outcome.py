@@ -8,7 +8,6 @@ from ..tables.results import Results, counted, grouped
 from ..tables.table import is_blank, words
 from ..text import visible
 from .headlines import ClaimCount, Overview, overview
-from .page.page_tables import gist
 from .report import BenchReport
 from .sections import tables
 from .standings import Headline
@@ -40,7 +39,7 @@ def ending(results: Results, suites: Sequence[str], width: int) -> list[str]:
     sentences += remarks_of_entrants(results, suites)
     if not sentences:
         full = [table for table in tables(results, suites) if not is_blank(table)]
-        gists = {table.title: gist(table.summary) for table in full[:TABLES]}
+        gists = {table.title: table.summary.sentence for table in full[:TABLES]}
         sentences = [f"{title}: {text}" if text else title for title, text in gists.items()]
     return _lines([*sentences, *_scale_and_absent(answers, width)], width)
 

@@ -55,10 +55,8 @@ def standings(results: Results) -> list[Headline]:
     motions = [point for point in points(results, cloth_peers.MOTION) if point.is_whole]
     ranks += _cloth_ranks("step", "error", "error {}", steps)
     ranks += _cloth_ranks("motion", "error", "error {}", motions)
-    is_ranked = [" ranks " in headline.sentence for headline in ranks]
-    first = [rank for rank, flag in zip(ranks, is_ranked, strict=True) if flag]
-    others = [rank for rank, flag in zip(ranks, is_ranked, strict=True) if not flag]
-    return [*first, *_failures(results, "ik"), *_failures(results, "cloth"), *others]
+    headlines = [*_failures(results, "ik"), *_failures(results, "cloth"), *ranks]
+    return sorted(headlines, key=lambda headline: " ranks " not in headline.sentence)
 
 
 def _failures(results: Results, suite: str) -> Iterator[Headline]:

@@ -123,7 +123,9 @@ def counted(count: int, noun: str) -> str:
 
 
 def most_often(firsts: Sequence[str], noun: str) -> str:
-    """Return the name that is first most often: "pink on 3 of 5 robots"."""
+    """Return the name that is first most often, "nobody" if there is none: "A on 3 of 5 robots"."""
+    if not firsts:
+        return "nobody"
     name, count = Counter(firsts).most_common(1)[0]
     return f"{name} on {count} of {counted(len(firsts), noun)}"
 

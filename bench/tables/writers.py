@@ -1,10 +1,13 @@
 """Write a table as Markdown, CSV, or a fragment of HTML."""
 
 import csv
-import html
 import io
 import re
+from pathlib import Path
 from typing import Any
+
+from jinja2 import Environment, FileSystemLoader
+from markupsafe import Markup, escape
 
 from ..harness.metrics import Share
 from .table import Cell, Table, best_cells, words
@@ -15,7 +18,6 @@ POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?!\w)")
 _FORMULA = re.compile(r"'|[=@＝＠]|[-+－＋](?![\d.]*$|[\d.]+e[-+]?\d+$)", re.IGNORECASE)
 # Marks anywhere, and the start of a list, a rule or a heading; no number is one of these.
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=](?=[-+=\s]|$)|(?<=^\d)[.)](?=\s|$))")
-_CELL_STYLE = "padding:0.15em 0.6em"
 
 
 def markdown(table: Table) -> str:
@@ -76,37 +78,24 @@ def _csv_text(text: str) -> str:
 def html_fragment(table: Table) -> str:
     """Return a table as HTML with title and explanation, without style sheet or script."""
     best = best_cells(table)
-    aligned = [
-        f"text-align:{'left' if column.words else 'right'};{_CELL_STYLE}"
-        for column in table.columns
+    rows = [
+        [(words(cell), (i, j) in best) for j, cell in enumerate(row)]
+        for i, row in enumerate(table.rows)
     ]
-    heads = [
-        f'<th scope="col" style="{style};border-bottom:1px solid currentColor">'
-        f"{_html(column.heading)}</th>"
-        for column, style in zip(table.columns, aligned, strict=True)
-    ]
-    rows = []
-    for i, row in enumerate(table.rows):
-        texts = [_html(words(cell)) for cell in row]
-        texts = [f"<b>{text}</b>" if (i, j) in best else text for j, text in enumerate(texts)]
-        tags = [
-            f'<td style="{style}">{text}</td>' for style, text in zip(aligned, texts, strict=True)
-        ]
-        tags[0] = f'<th scope="row" style="{aligned[0]};font-weight:normal">{texts[0]}</th>'
-        rows.append(f"<tr>{''.join(tags)}</tr>")
     about = " ".join(filter(None, (table.shows, table.measured, table.provenance)))
-    lines = [
-        '<figure class="plumbob" style="overflow-x:auto;margin:1em 0">',
-        '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums">',
-        f'<caption style="text-align:left"><b>{_html(table.title)}.</b></caption>',
-        f"<thead><tr>{''.join(heads)}</tr></thead>",
-        *("<tbody>", *rows, "</tbody>", "</table>"),
-        f"<figcaption>{_html(about)}</figcaption>",
-        "</figure>",
-    ]
-    return "\n".join(lines) + "\n"
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["powers"] = _powers
+    template = environment.get_template("fragment.html")
+    return template.render(table=table, rows=rows, about=about) + "\n"
 
 
-def _html(text: str) -> str:
-    escaped = html.escape(" ".join(text.split()))
-    return POWER.sub(lambda m: f"{m[1]}·10<sup>{m[2]}</sup>".replace("-", "−"), escaped)
+def _powers(text: str) -> Markup:
+    """Return escaped text on one line with powers of ten as superscripts."""
+    escaped = str(escape(" ".join(text.split())))
+    power = POWER.sub(lambda m: f"{m[1]}·10<sup>{m[2]}</sup>".replace("-", "−"), escaped)
+    return Markup(power)

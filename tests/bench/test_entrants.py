@@ -79,7 +79,7 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
     assert near.arrays["solved"].all()
     for solver in ("My FABRIK", "ccd", "fabrik"):  # so that its time can stand beside ours
         (record,) = [one for one in records(solver) if one.problem == "chain/near"]
-        assert record.arrays["seconds"].shape == record.arrays["solved"].shape == (2,), solver
+        assert record.arrays["seconds"].shape == (3, 2), solver
         assert (record.arrays["seconds"] > 0.0).all()
     shown = made("ik")
     for name in ("accuracy", "q1_beyond_reach", "published_ik", "entered"):
@@ -93,7 +93,7 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
     shows = iterations_chart(Results(records())).shows
     assert shows.endswith("Entrants claim their iterations.")
     printed = capsys.readouterr().out
-    assert re.search(r"^My FABRIK, chain of balls: rank \d of 3 solvers", printed, re.MULTILINE)
+    assert re.search(r"My FABRIK ranks \d of 3", " ".join(printed.split()))
 
 
 def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
@@ -318,7 +318,7 @@ def test_a_solver_is_closed_after_its_greeting(folder, monkeypatch):
         (["--solver", "levenberg"], "did you mean 'levenberg_marquardt'?"),
         (["--problem", "chain/naer"], "did you mean 'chain/near'?"),
         (["--robot", "ur6"], "did you mean 'ur5'?"),
-        (["--solver", "qqq"], "expected one of 'DART', 'DART, 20 restarts', 'Drake', 'Drake, I"),
+        (["--solver", "qqq"], "expected one of 'DART', 'DART, "),
         (["--problem", "qqq"], "'Fetch', 'Franka Panda', 'KUKA iiwa14'"),
         (["--robot", "qqq"], "expected one of baxter, character, fetch"),
         (["--targets", "0"], "targets: expected 1 or more, got 0"),

@@ -1,5 +1,9 @@
 """Robots as problems: the same text for everyone, true strata, a fair evaluation."""
 
+import importlib.util
+import re
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -7,7 +11,17 @@ import pytest
 from plumbob.bench.experiments import SCALES
 from plumbob.bench.experiments.robots import UNREACHABLE, measurement
 from plumbob.bench.peers import registry
-from plumbob.bench.problems.evaluate import Targets, Tolerance, angle_between, evaluator_of
+from plumbob.bench.problems.evaluate import (
+    AGREEMENT,
+    MUJOCO,
+    PINOCCHIO,
+    Evaluator,
+    Targets,
+    Tolerance,
+    angle_between,
+    arbiter_of,
+    evaluator_of,
+)
 from plumbob.bench.problems.robot_targets import (
     STRATA,
     farthest,
@@ -182,6 +196,39 @@ def asked(rng):
     return evaluator, q, Targets(*evaluator.forward(q), starts, np.zeros(5, dtype=int))
 
 
+def test_both_engines_place_every_robot_alike(name, rng):
+    evaluator, targets = evaluator_of(name), robot_targets(name, 2)
+    evaluation = evaluator.evaluate(targets, evaluator.robot.draw(rng, 12), TOLERANCE)
+    assert evaluation.difference.max() <= AGREEMENT
+
+
+def test_a_wrong_arbiter_is_noticed_and_judges_only_its_own_solvers(asked, monkeypatch):
+    """Answers that the engines place differently are known, whoever evaluates them."""
+    evaluator, q, targets = asked
+    exact, right = Tolerance(1e-10, 1e-7), Evaluator.forward_by_pinocchio
+    assert evaluator.evaluate(targets, q, exact).difference.max() <= AGREEMENT
+
+    def wrong(self, q):
+        positions, rotations = right(self, q)
+        return positions + 1e-9, rotations
+
+    monkeypatch.setattr(Evaluator, "forward_by_pinocchio", wrong)
+    for engine, is_solved in ((PINOCCHIO, False), (MUJOCO, True)):
+        evaluation = evaluator.evaluate(targets, q, exact, engine)
+        assert (evaluation.solved == is_solved).all()
+        assert (evaluation.difference > AGREEMENT).all()
+
+
+def test_no_solver_is_evaluated_by_the_engine_that_it_is_built_on():
+    on_pinocchio = r"^(?:import|from) (?:pink|pinocchio|roboplan|\.closed_loop|\.placo)"
+    for peer in registry.PEERS:
+        source = Path(importlib.util.find_spec(peer.module).origin).read_text("utf-8")
+        is_on_pinocchio = bool(re.search(on_pinocchio, source, re.MULTILINE))
+        assert arbiter_of(peer.built_on) == MUJOCO or not is_on_pinocchio, peer.title
+        assert arbiter_of(peer.built_on) != peer.built_on
+    assert arbiter_of(registry.PLUMBOB) == PINOCCHIO
+
+
 def test_every_robot_is_in_one_list():
     """No setting has seen a robot held out; a user's robot is in a list of its own."""
     groups = {name: group_of(name) for name in ROBOTS}
@@ -245,11 +292,11 @@ def test_the_bound_of_unreachable_targets_is_a_bound(name, rng):
 
 
 @pytest.mark.parametrize("scale", SCALES.values())
-def test_at_least_a_hundred_targets_are_out_of_reach_at_every_scale(scale):
+def test_at_least_forty_targets_are_out_of_reach_at_every_scale(scale):
     beyond = [block for block in measurement.blocks(scale) if block.facts["task"] == UNREACHABLE]
     sizes = {block.problem: block.size for block in beyond}
     assert f"unreachable/{CHARACTER}" in sizes
-    assert sum(sizes.values()) >= 100
+    assert sum(sizes.values()) >= 40
 
 
 def test_the_solvers_of_a_robot_are_in_random_order(monkeypatch):

@@ -45,9 +45,9 @@ MARGINS = (1.1, 2.0, 4.0)
 PARTS = (1, 4, 16)
 # Residual of solvers that converge, in motions.
 RESIDUAL, RESIDUAL_LABEL = 1e-6, "1e-6"
-# Passes over all solvers, in alternating order, so that the drift of the machine affects all of
-# them; repetitions of one step in each, of which the last counts.
-SWEEPS, REPEATS, LIU_REPEATS = 3, 2, 5
+# Passes over all solvers at a full and at a quick scale, in alternating order, so that the drift of
+# the machine affects all of them; repetitions of one step in each, of which the last counts.
+SWEEPS, QUICK_SWEEPS, REPEATS, LIU_REPEATS = 3, 2, 2, 5
 # A solver that is silent for so long [s] over a frame, or over its set-up, has not finished: far
 # more than any solver takes on any machine in use.
 _PATIENCE, _START_PATIENCE = 120.0, 600.0
@@ -71,7 +71,7 @@ class Level(NamedTuple):
     frames: int
 
 
-QUICK = (Level(20, 3),)
+QUICK = (Level(20, 2),)
 FULL = (Level(20, 10), Level(40, 5), Level(100, 1))
 QUICK_STIFFNESS = STIFFNESSES[1:2]
 # The shortest benchmarks of a full scale [s].
@@ -105,7 +105,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for package in dict.fromkeys(peer.package for peer in peers if not peer.is_installed):
         yield _block(MISSING, "all", package, partial(not_installed, package), {})
     installed = [peer for peer in peers if peer.is_installed]
-    for sweep in range(1, SWEEPS + 1):
+    sweeps = SWEEPS if levels(scale) == FULL else QUICK_SWEEPS
+    for sweep in range(1, sweeps + 1):
         order = installed[:: 1 if sweep % 2 else -1]
         for cloth in _cloths(scale):
             yield from (block for peer in order for block in _works(peer, cloth, sweep))

@@ -25,6 +25,7 @@ class Point(NamedTuple):
     record: Record  # of the first sweep
     spread: float = 0.0  # largest difference between the errors of two sweeps
     drift: float = 1.0  # the longest of the sweeps' times over the shortest
+    sweeps: int = 1
 
     @property
     def own(self) -> str:
@@ -84,7 +85,7 @@ def _points_of(sweeps: Sequence[Record]) -> Iterator[Point]:
         drift = float(seconds.max() / seconds.min()) if seconds.min() > 0.0 else 1.0
         values["seconds"] = float(np.median(seconds))
         point = (details.stiffness, particles, record.solver, rung, values, record)
-        yield Point(*point, spread, drift)
+        yield Point(*point, spread, drift, len(same))
 
 
 def _rungs(record: Record) -> Iterator[tuple[tuple[int, str], dict[str, float]]]:

@@ -19,11 +19,11 @@ from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Layout
-from ...tables.results import Results, grouped, label, listed, most_often
+from ...tables.results import Results, counted, grouped, label, listed, most_often
 from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, MOTION_TARGETS, NEAR, ONE_STEP, SOLVED, STABILITY, TARGETS
-from .measurement import AMPLITUDE, BISECTION, GROWTH, STABILITY_SIZE, STABILITY_STEPS, SWEEPS
+from .measurement import AMPLITUDE, BISECTION, GROWTH, STABILITY_SIZE, STABILITY_STEPS
 from .readings import Point, points
 
 # The cells of a row by the titles of their columns, and its records.
@@ -35,7 +35,6 @@ CAPTIONS = Captions(
     gravity=f"{GRAVITY:g}",
     fall=f"{FALLING * FRAME:g}",
     frame=words_in(FRAME, "ms"),
-    sweeps=str(SWEEPS),
     solved=SOLVED,
     near=NEAR,
     stability_size=str(STABILITY_SIZE),
@@ -107,20 +106,10 @@ def _missing(results: Results) -> list[Row]:
 def _rows(
     results: Results, task: str, targets: Mapping[str, float], limits: Mapping[Any, Row]
 ) -> list[Row]:
-    """Return a row for each solver and cloth, those that come nearest to the goal first.
-
-    Solvers that reach the last target are ranked by its time, others by their smallest error.
-    """
-    *_, last = targets
+    """Return a row for each solver on each cloth, and for each missing engine."""
     solvers = grouped(points(results, task), lambda point: (point.cloth, point.solver))
     rows = [_row(settings, targets, limits) for settings in solvers.values()]
-    cloths = grouped(rows, lambda row: str(row["cloth"])).values()
-    ranked = [sorted(cloth, key=lambda row: _rank(row, last)) for cloth in cloths]
-    return [*(row for cloth in ranked for row in cloth), *_missing(results)]
-
-
-def _rank(row: Row, target: str) -> tuple[float, float]:
-    return row.get(f"time to {target}", np.inf), row["best"].error
+    return [*rows, *_missing(results)]
 
 
 def _row(settings: Sequence[Point], targets: Mapping[str, float], limits: Mapping[Any, Row]) -> Row:
@@ -175,8 +164,9 @@ def _agreement(rows: Sequence[Row]) -> dict[str, str]:
     differing = {row["solver"]: 0 for row in measured if row["difference between sweeps"] > 0.0}
     drift = words(max([1.0, *(row["slowest over fastest sweep"] for row in measured)]))
     errors = f"equal to the bit but for {listed(list(differing))}" if differing else "the same bits"
-    sentence = f"Of equal runs the times differ by a factor of at most {drift}; the errors are"
-    return {"agreement": f"{sentence} {errors}."}
+    sweeps = max([1, *(point.sweeps for row in measured for point in row["points"])])
+    sentence = f"The times of {counted(sweeps, 'sweep')} differ by a factor of at most {drift}"
+    return {"agreement": f"{sentence}; the errors are {errors}."}
 
 
 def _summary(title: str, targets: Mapping[str, float], rows: Sequence[Row]) -> Summary:

@@ -9,7 +9,7 @@ from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
 from ...tables.layout import Layout, Row
-from ...tables.results import Results, grouped, label
+from ...tables.results import Results, counted, grouped, label
 from ...tables.table import Summary, listing, words
 from ..robots.readings import Score
 from ..robots.tables import RULE
@@ -107,8 +107,9 @@ def _percent(score: Score, hits: np.ndarray) -> list[float]:
 
 
 def _summary(rows: Sequence[Row]) -> Summary:
-    complete = (r for r in rows if None not in (r["published"], r.get("measured")))
-    return listing("Here, and as published:", map(_point, complete))
+    complete = [r for r in rows if None not in (r["published"], r.get("measured"))]
+    sentence = f"{counted(len(complete), 'published figure')} can be compared with ours."
+    return listing(sentence, map(_point, complete))
 
 
 def _point(row: Row) -> str:

@@ -14,14 +14,14 @@ from ...peers.registry import Peer, PeerEntry
 from ...tables.columns import words_in
 from ...tables.entered import entrant_table
 from ...tables.layout import Layout, Row
-from ...tables.results import Results, counted, grouped, leaders, listed
+from ...tables.results import Results, counted, grouped, leaders, listed, most_often
 from ...tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from . import REACHABLE, readings
 from .figures import CAPTIONS, FIGURES
 from .readings import OUTCOMES, STARTS, Score, title_of
 from .values import RobotDetails
 
-# The rule for solvers that a budget of time cut short.
+# The rule for solvers that are not ranked.
 RULE = CAPTIONS.shared["rule"]
 MEAN = "time, geometric mean"
 
@@ -88,8 +88,8 @@ def _participant_summary(rows: Sequence[Row]) -> Summary:
     count = sum(row["version"] != "not installed" for row in rows)
     robots = rows[0]["robot_records"].values()
     return Summary(
-        f"{count} of {len(rows)} selected solvers took part{not_asked}; "
-        f"{counted(len(robots), 'robot')}:",
+        f"{count} of {len(rows)} selected solvers took part, on "
+        f"{counted(len(robots), 'robot')}{not_asked}.",
         tuple(map(_robot, robots)),
     )
 
@@ -239,7 +239,12 @@ def _fields(rows: Sequence[Row]) -> dict[tuple[str, str], list[Row]]:
 
 
 def _summary(rows: Sequence[Row]) -> Summary:
-    sentence = "Solvers with the most targets solved within reach, and with the shortest time:"
+    scores = [field[0]["score"] for field in _fields(rows).values()]
+    solved, fastest = (
+        most_often([ranking.order[0] for ranking in rankings if ranking.order], "comparison")
+        for rankings in ([s.success for s in scores], [s.time for s in scores])
+    )
+    sentence = f"Most targets are solved by {solved}, and {fastest} is the fastest."
     return listing(sentence, _points(rows))
 
 
@@ -270,6 +275,7 @@ def _outcome_columns(rows: Sequence[Row]) -> list[Column]:
         *CAPTIONS.columns("robots_outcomes"),
         *(column(name, folded=not any(row[name] for row in rows)) for name in OUTCOMES),
         column("targets"),
+        column("disputed answers"),
         *(column(title, note=INTERVAL, best="greatest", folded=True) for title in strata),
     ]
 
@@ -290,7 +296,11 @@ def _outcome_summary(rows: Sequence[Row]) -> Summary:
         strata = [f"{name} {words(shares[name])}" for name in hardest if shares[name].total]
         if strata:
             points.append(f"{start}, strata from the hardest: {', '.join(strata)}")
-    return listing("Outcomes of unsolved targets, and the hardest strata:", points)
+    counts = sum((row["score"].outcomes for row in rows), Counter())
+    unsolved = Counter({name: counts[name] for name in OUTCOMES[1:]})
+    name, count = unsolved.most_common(1)[0]
+    sentence = f"Of {words(unsolved.total())} unsolved targets {words(count)} count as “{name}”."
+    return listing(sentence, points)
 
 
 outcomes = _layout(

@@ -43,11 +43,10 @@ class Executor:
         for name, members in groupby(blocks, lambda block: block.group and block.group.name):
             group = list(members)
             if name:
-                yield group[0]
-                for block, record in zip(group, measure_together(group), strict=True):
-                    yield block
-                    yield record
-            for block in () if name else group:
+                yield from group
+                yield from measure_together(group)
+                continue
+            for block in group:
                 yield block
                 yield measure(block)
 

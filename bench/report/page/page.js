@@ -37,6 +37,8 @@
       this.heads = [...[...this.table.tHead.rows].at(-1).cells];
       this.titles = this.heads.map(plain);
       this.usual = this.heads.map(head => !head.classList.contains("folded"));
+      this.heads.forEach((head, j) => ["words", "who"].forEach(name =>
+        head.classList.contains(name) && this.rows.forEach(row => row.cells[j].classList.add(name))));
       this.menus = [];
       this.limit = +box.dataset.limit || Infinity;
       this.reset();

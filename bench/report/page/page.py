@@ -29,9 +29,10 @@ from .page_tables import PageTable, page_table, rich
 _FOLDER = Path(__file__).parent
 SCRIPT = motion.squeezed((_FOLDER / "page.js").read_text(encoding="utf-8"))
 # Unfolded columns of a chapter's main table, and its rows until a reader asks for more.
-MAX_COLUMNS, MAX_ROWS = 7, 8
-# Sentences on the first screen: of chapters, your solver's ranks, wins of others, absent peers.
+MAX_COLUMNS, MAX_ROWS = 7, 6
+# Sentences on the first screen, and in a chapter before a fold.
 MAX_SENTENCES = {"kinematics": 4, "cloth": 1, "speed": 1, "yours": 3, "wins": 2, "absent": 5}
+MAX_SENTENCES |= {"chapter": 4}
 
 
 class Contents(NamedTuple):

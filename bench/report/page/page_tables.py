@@ -15,7 +15,6 @@ from ...tables.results import label
 from ...tables.table import (
     Cell,
     Source,
-    Summary,
     Table,
     best_cells,
     number_of,
@@ -47,7 +46,6 @@ class PageHead(NamedTuple):
 class PageCell(NamedTuple):
     """A cell as markup; numbers and shares also as digits for sorting, and as a bar [%]."""
 
-    tag: str
     text: Markup
     classes: str
     digits: str
@@ -68,7 +66,6 @@ class PageTable(NamedTuple):
 
     name: str  # its address within the page
     question: str  # that it answers
-    answer: str  # to the question, in a sentence
     table: Table  # whose cells it shows
     # name and span of headings above several columns; empty if there are none
     groups: list[tuple[str, int]]
@@ -86,23 +83,13 @@ def page_table(
     is_folded = [column.folded or column.title == STARTS for column in table.columns]
     visible = [j for j, folded in enumerate(is_folded) if not folded][:unfolded]
     heads = [_head(table, j, j not in visible, j == solver) for j in range(len(table.columns))]
-    rows = _rows(table, heads)
+    rows = _rows(table)
     groups: list[tuple[str, int]] = []
     if any(column.group for column in table.columns):
         runs = itertools.groupby(table.columns, key=lambda column: column.group)
         groups = [(name, len(list(columns))) for name, columns in runs]
     marks = {mark for row in rows for cell in row.cells for mark in cell.classes.split()}
-    answer = gist(table.summary)
-    return PageTable(
-        table.name, question, answer, table, groups, heads, rows, marks, list(drawings)
-    )
-
-
-def gist(summary: Summary) -> str:
-    """Return a summary in a line: of a list only the first point."""
-    if not summary.sentence.endswith(":") or not summary.points:
-        return summary.sentence
-    return f"{summary.sentence} {summary.points[0]}" + ("; …" if len(summary.points) > 1 else "")
+    return PageTable(table.name, question, table, groups, heads, rows, marks, list(drawings))
 
 
 def _head(table: Table, j: int, folded: bool, names_solver: bool) -> PageHead:
@@ -134,11 +121,11 @@ def _names_solvers(table: Table, j: int) -> bool:
     )
 
 
-def _rows(table: Table, heads: Sequence[PageHead]) -> list[PageRow]:
+def _rows(table: Table) -> list[PageRow]:
     """Return the rows; a first cell that repeats the cell above it is marked."""
     best = best_cells(table)
     ties = Counter((table.rows[i][: table.compared], j) for i, j in best)
-    columns = range(len(table.columns))
+    columns, titles = range(len(table.columns)), [column.title for column in table.columns]
     texts, bars = [_texts(table, j) for j in columns], [_bars(table, j) for j in columns]
     rows: list[PageRow] = []
     addresses = Counter[str]()
@@ -147,16 +134,15 @@ def _rows(table: Table, heads: Sequence[PageHead]) -> list[PageRow]:
         for j, cell in enumerate(row):
             is_tie = (i, j) in best and ties[row[: table.compared], j] > 1
             is_same = j == 0 and i > 0 and cell == table.rows[i - 1][0]
-            marks = [heads[j].classes, "best" * ((i, j) in best), "tie" * is_tie, "same" * is_same]
-            if table.columns[j].title == "verdict":
+            marks = ["best" * ((i, j) in best), "tie" * is_tie, "same" * is_same]
+            if titles[j] == "verdict":
                 marks.append("held" if cell == "held" else "missed")
-            tag, classes = "td" if j else "th", " ".join(filter(None, marks))
-            cells.append(PageCell(tag, texts[j][i], classes, _digits(cell), bars[j][i]))
+            classes = " ".join(filter(None, marks))
+            cells.append(PageCell(texts[j][i], classes, _digits(cell), bars[j][i]))
         address = _address(table, row)
         addresses[address] += 1
         number = f":{addresses[address]}" if addresses[address] > 1 else ""
-        start = next((words(c) for c, k in zip(row, table.columns, strict=True)
-                      if k.title == STARTS), "")  # fmt: skip
+        start = words(row[titles.index(STARTS)]) if STARTS in titles else ""
         source = table.sources[i] if table.sources else Source()
         rows.append(PageRow(f"{address}{number}", cells, start, source.command))
     return rows
