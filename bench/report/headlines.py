@@ -166,28 +166,41 @@ def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> 
     if len(rows) < 2:
         return
     row = next(iter(rows.values()))
-    place = f"{_place(group, row, len(fields))} {_FROM[start]}"
+    place = f"On {_place(group, row, len(fields))} {_FROM[start]}"
+    times = [solver for solver in row.time.order if rows[solver].share.hits]
     order = [solver for solver in row.success.order if rows[solver].share.hits]
+    untimed = [solver for solver in order if solver not in times]
+    order.sort(key=lambda s: (-rows[s].share.hits, [*times, *untimed].index(s)))
     if first := _first(order):
-        sentence = f"On {place}, {named(first)} solves the most poses: {percent(rows[first].share)}"
-        sentence += f" of {words(rows[first].share.total)}"
-        if rival := best_rival(first, order):
-            sentence += f"; the best other solver is {named(rival)} with "
-            sentence += percent(rows[rival].share)
-            ties = len({*row.success.first} & {*order})
-            sentence += f", and {ties} solvers tie within chance" * (ties > 2)
-            sentence += ", a tie within chance" * (ties == 2)
-        yield _headline("Most poses solved", group, start, f"{sentence}.")
-    order = [solver for solver in row.time.order if rows[solver].share.hits]
-    first = _first(order)
-    if first and (rival := best_rival(first, order)):
+        sentence = _most_solved(rows, first, best_rival(first, order))
+        yield _headline("Most poses solved", group, start, f"{place}, {sentence}.")
+    first = _first(times)
+    if first and (rival := best_rival(first, times)):
         ratio = ratio_of_times(rows[rival], rows[first])
-        sentence = f"On {place}, {named(first)} is the fastest, {MISSES}: it is "
-        sentence += f"{speed(ratio, rival)}, the best other solver."
+        sentence = (
+            f"{named(first)} is the fastest, {MISSES}: it is {speed(ratio, rival)}, the best "
+        )
+        sentence += "other solver"
         if ratio.low < 1.0 < ratio.high:
             names = f"{named(first)} and {named(rival)}"
-            sentence = f"On {place}, {names} are the fastest and tie within chance, {MISSES}."
-        yield _headline("Fastest", group, start, sentence)
+            sentence = f"{names} are the fastest and tie within chance, {MISSES}"
+        yield _headline("Fastest", group, start, f"{place}, {sentence}.")
+
+
+def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:
+    """Return who solves the most poses, the best other solver if any, and how many tie."""
+    share = rows[first].share
+    solved = f"{percent(share)} of {words(share.total)}"
+    if not rival:
+        return f"{named(first)} solves the most poses: {solved}"
+    ties = sum(rows[solver].share.hits > 0 for solver in rows[first].success.first)
+    chance = f", and {ties} solvers tie within chance" * (ties > 2)
+    chance += ", a tie within chance" * (ties == 2)
+    if rows[rival].share.hits == share.hits:
+        chance = chance.removesuffix(", a tie within chance")
+        return f"{named(first)} and {named(rival)} solve the most poses: each {solved}{chance}"
+    other = f"the best other solver is {named(rival)} with {percent(rows[rival].share)}"
+    return f"{named(first)} solves the most poses: {solved}; {other}{chance}"
 
 
 def _headline(question: str, group: str, start: str, sentence: str) -> Headline:

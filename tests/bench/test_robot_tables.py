@@ -303,7 +303,7 @@ def test_missing_and_refused_solvers_are_listed_with_the_reason(make):
     refused.settings["version"] = "1"
     results = Results([
         make.raced("Plumbob LM", ONE, overhead=2.5e-7),
-        make.raced("Plumbob LM, 100 restarts", AGAIN, robot="leg"),
+        make.raced("Plumbob LM, 20 restarts", AGAIN, robot="leg"),
         make.lacking("pink", ONE, "pink is not installed"), entrant, refused,
     ])  # fmt: skip
     table = participants(results)
@@ -321,7 +321,7 @@ def test_missing_and_refused_solvers_are_listed_with_the_reason(make):
         "the leg: 7 joints,",
     ]
     measured = column(robot_by_robot(results), "solver")
-    assert measured == ["Plumbob LM", "Mine", "Plumbob LM, 100 restarts"]
+    assert measured == ["Plumbob LM", "Mine", "Plumbob LM, 20 restarts"]
 
 
 def test_drift_between_turns_is_reported(make):

@@ -247,7 +247,7 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
     out, err = capsys.readouterr()
     why = "It raised ValueError in line 5 of raiser.py: too far"
     line = f"robots/ur5, My raiser: {why}\n"
-    assert printed_before[0].startswith(line)
+    assert printed_before[0].replace(", 20 restarts", "").startswith(line)
     assert err.count(why) == 1
     said = " ".join(out.split())
     rank = "My raiser had trouble on 2 of 2 problems"

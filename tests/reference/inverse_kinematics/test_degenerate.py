@@ -156,20 +156,23 @@ def test_no_iterations_leave_the_start_within_its_limits(
     np.testing.assert_allclose(solution.coordinates, expected, rtol=0, atol=1e-12)
 
 
-def test_tolerance_zero_ends(solver, chain_of_joints, rng):
-    for kind in ("ball", "hinge"):
-        model = chain_of_joints(kind, rng)
-        targets = forward_kinematics(model, model.random(rng, 20)).positions[:, -1]
-        solution = solve_ik(
-            model, model.random(rng), targets, solver, tolerance=0.0, max_iterations=300
-        )
-        limit = solution.outcome == Outcome.ITERATION_LIMIT
-        assert (solution.iterations[limit] >= 300).all()
-        reached = solution.outcome == Outcome.CONVERGED
-        assert (solution.residual[reached] == 0.0).all()
-        if solver == "levenberg_marquardt" and kind == "ball":
-            assert solution.residual.max() < 1e-13
-            assert not limit.any()
+@pytest.mark.parametrize("kind", ["skeleton", "ball", "hinge"])
+def test_tolerance_zero_ends(kind, solver, chain_of_joints, rng):
+    model = chain_of_joints("ball" if kind == "skeleton" else kind, rng)
+    poses, q = model.random(rng, 20), model.random(rng)
+    if kind == "skeleton":
+        model, poses, q = model.skeleton, poses.reshape(20, -1, 4), q.reshape(-1, 4)
+    targets = forward_kinematics(model, poses).positions[:, -1]
+    solution = solve_ik(model, q, targets, solver, tolerance=0.0, max_iterations=300)
+    limit = solution.outcome == Outcome.ITERATION_LIMIT
+    assert (solution.iterations[limit] >= 300).all()
+    reached = solution.outcome == Outcome.CONVERGED
+    assert (reached == (solution.residual == 0.0)).all()
+    if solver == "levenberg_marquardt" and kind != "hinge":
+        assert solution.residual.max() < 1e-13
+        assert not limit.any()
+        assert (solution.outcome[~reached] == Outcome.STALLED).all()
+        assert not reached.all()
 
 
 def test_what_only_rounding_keeps_from_its_target_is_stalled(rng):
