@@ -37,11 +37,6 @@ class Solved(NamedTuple):
     round_trip: float = 0.0  # duration of the request, 0 without a request [s]
     doubt: str = ""  # why the seconds that the solver counted cannot be right, else ""
 
-    @property
-    def overhead(self) -> float:
-        """Time of the request that the solver did not use [s]."""
-        return max(0.0, self.round_trip - self.seconds)
-
 
 class Lap(NamedTuple):
     """A part of the times of a solver in a round: it begins, unless there are times."""

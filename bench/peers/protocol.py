@@ -11,11 +11,6 @@ class OwnTime(NamedTuple):
     round_trip: float = 0.0  # of its requests, 0 without any [s]
     doubt: str = ""  # why its clock cannot be right, else ""
 
-    @property
-    def overhead(self) -> float:
-        """Time of requests that the solver did not use [s], which is charged to no budget."""
-        return max(0.0, self.round_trip - self.seconds)
-
 
 def total(times: Iterable[OwnTime | None]) -> OwnTime | None:
     """Return the time of several calls, None if none of them measured its own."""

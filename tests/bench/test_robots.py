@@ -292,11 +292,11 @@ def test_the_bound_of_unreachable_targets_is_a_bound(name, rng):
 
 
 @pytest.mark.parametrize("scale", SCALES.values())
-def test_at_least_a_hundred_targets_are_out_of_reach_at_every_scale(scale):
+def test_at_least_forty_targets_are_out_of_reach_at_every_scale(scale):
     beyond = [block for block in measurement.blocks(scale) if block.facts["task"] == UNREACHABLE]
     sizes = {block.problem: block.size for block in beyond}
     assert f"unreachable/{CHARACTER}" in sizes
-    assert sum(sizes.values()) >= 100
+    assert sum(sizes.values()) >= 40
 
 
 def test_the_solvers_of_a_robot_are_in_random_order(monkeypatch):

@@ -78,7 +78,7 @@ def test_beyond_reach_the_loop_on_an_engine_does_as_the_reference_does(engine):
     facts = {"task": CHAIN, "stratum": BEYOND}
     record = Record("ik", "chain/beyond", f"lm/{engine}", settings, 20, theirs, facts=facts)
     (sentence,) = beyond_reach(Results([record])).summary.points
-    assert sentence.startswith(f"LM, {engine}: 20/20 = 100 %")
+    assert sentence.startswith(f"LM, our loop on {engine}: 20/20 = 100 %")
 
 
 def test_targets_within_reach_stay_where_they_are(rng):

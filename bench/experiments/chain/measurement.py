@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from msgspec import structs
 
+from plumbob.crosscheck.engines import SKELETON_ENGINES
+from plumbob.crosscheck.engines.skeleton_engine import forward_kinematics_by
 from plumbob.reference import IK_SOLVERS, forward_kinematics, solve_ik
 from plumbob.reference.arguments import FloatArray
 
@@ -149,13 +151,14 @@ def job_of(
 def solve_targets(
     problem: TargetsForSkeleton, solver: str, limits: SolverLimits, record: bool = False
 ) -> Measured:
-    """Solve all targets with a solver of ours; recompute residuals from the solutions.
+    """Solve all targets with a solver of ours; Pinocchio recomputes residuals from the solutions.
 
     `record` keeps residuals by iteration.
     """
     options: dict[str, Any] = {**limits._asdict(), "record": record}
     solution = solve_ik(problem.skeleton, problem.starts, problem.targets, solver, **options)
-    positions = forward_kinematics(problem.skeleton, solution.local_rotations).positions
+    engine = SKELETON_ENGINES[registry.PINOCCHIO](problem.skeleton)
+    positions = forward_kinematics_by(engine, solution.local_rotations).positions
     arrays = _evaluated(problem, limits, positions, solution.iterations)
     arrays["outcome"] = np.asarray(solution.outcome)
     if record:

@@ -122,7 +122,7 @@ def heat_map(start: str, results: Results) -> Sketch | None:
         f"Robots, {start}: who is good at what",
         "Left: targets solved of all given. Right: the geometric mean of times over the "
         "least on that robot, unsolved targets with their penalty. Fuller is better; a star "
-        "where a budget of time cut the solver short, no field where it does not take the "
+        "where the solver is not ranked, no field where it does not take the "
         "robot.",
         RobotMaps(solvers, tuple(fields), panels),
         draw_map,

@@ -21,7 +21,7 @@ from .figures import CAPTIONS, FIGURES
 from .readings import OUTCOMES, STARTS, Score, title_of
 from .values import RobotDetails
 
-# The rule for solvers that a budget of time cut short.
+# The rule for solvers that are not ranked.
 RULE = CAPTIONS.shared["rule"]
 MEAN = "time, geometric mean"
 
@@ -275,6 +275,7 @@ def _outcome_columns(rows: Sequence[Row]) -> list[Column]:
         *CAPTIONS.columns("robots_outcomes"),
         *(column(name, folded=not any(row[name] for row in rows)) for name in OUTCOMES),
         column("targets"),
+        column("disputed answers"),
         *(column(title, note=INTERVAL, best="greatest", folded=True) for title in strata),
     ]
 

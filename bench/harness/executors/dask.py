@@ -22,7 +22,7 @@ from ..machine import stamp
 from ..measure import block_key, failure, record_of
 from ..progress import Progress, announce
 from ..record import Record, decode
-from ..stopwatch import Budget
+from ..stopwatch import Patience
 from . import DASK, Executor, NotMeasured, Step
 from .work import perform, place, unlike
 
@@ -146,13 +146,13 @@ class DaskExecutor(Executor):
 
     def _measure(self, queues: list[_Queue], scale: Scale) -> Iterator[Step]:
         """Measure the blocks of all queues, each queue in order."""
-        patience = Budget(self._patience)
+        patience = Patience(self._patience)
         while queues := [queue for queue in queues if queue.blocks]:
             yield from self._submit_first_blocks(queues, scale)
             future, addresses = self._next(), self._addresses()
             self._release_lost_workers(queues, addresses)
             if addresses and any(queue.future for queue in queues):
-                patience = Budget(self._patience)
+                patience = Patience(self._patience)
             elif patience.is_spent:
                 if not queues[0].is_pinned:
                     raise self._error(f"no worker is left for {self._patience:g} s")

@@ -1,8 +1,8 @@
 """ssik: closed forms for arms of six and seven hinges, in a module that `ssik build` writes.
 
-Its authors recommend that module for use. It filters all solutions by the limits and returns the
-first, checked by its forward kinematics. It needs no start and takes no tolerance: its answers are
-exact to rounding.
+Its authors recommend that module for use, and the call for one solution nearest to the start,
+within the limits. Without the start, a single solution takes seconds on arms whose axes do not meet
+(PR2). It takes no tolerance: its answers, checked by its forward kinematics, are exact to rounding.
 """
 
 import contextlib
@@ -35,7 +35,8 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, solutions: int = 1) -> Ask:
     run = built_solver(robot).solve
 
     def ask(request: PoseRequest) -> Solve:
-        return Solve(partial(run, request.matrix, max_solutions=solutions), _read)
+        options = {"max_solutions": solutions, "q_seed": request.start}
+        return Solve(partial(run, request.matrix, **options), _read)
 
     return ask
 
