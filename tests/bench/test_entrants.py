@@ -282,6 +282,21 @@ def test_a_robot_solver_is_run_with_one_start_and_with_restarts(folder):
     assert not (once.arrays["claimed"].astype(bool) & ~once.arrays["solved"]).any()
 
 
+def test_a_seed_draws_other_targets_and_is_on_record(folder):
+    words = ("--quick", "--targets", "3", "--problem", "chain/near", "--solver", "ccd",
+             "--problem", "robots/fetch", "--solver", "Plumbob LM")  # fmt: skip
+    distances = []
+    for seed in ((), ("--seed", "7"), ("--seed", "1986")):
+        assert bench("ik", *words, *seed) == 0
+        distances += [tuple(one.arrays["distance"]) for one in records("ccd")]
+    assert distances[0] == distances[2] != distances[1]
+    seeds = {one.settings["seed"]: one for one in records() if one.problem == "robots/fetch"}
+    assert set(seeds) == {7, 1986}
+    positions = [one.arrays["position"] for one in seeds.values()]
+    assert not np.array_equal(*positions)
+    assert bench("ik", *words, "--seed", "-1") == 2
+
+
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
 def test_the_link_of_the_tool_is_where_poses_are_evaluated(name):
     """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
