@@ -79,7 +79,10 @@ class Layout:
         return with_rows(self._with_leaders(table, subjects), ranked_rows(table))
 
     def _with_leaders(self, table: Table, subjects: Sequence[Any]) -> Table:
-        """Return a table whose best cells are those of the tests that decide, where there are."""
+        """Return a table whose best cells are those of the tests that decide, where there are.
+
+        Where all rows tie, none is best.
+        """
         titles = [column.title for column in table.columns]
         decided = {
             (i, titles.index(title)): is_best
@@ -89,8 +92,10 @@ class Layout:
         }
         if not decided:
             return table
-        best = {*best_cells(table), *decided}
-        return replace(table, best=frozenset(cell for cell in best if decided.get(cell, True)))
+        groups = [row[: table.compared] for row in table.rows]
+        lost = {(groups[i], j) for (i, j), is_best in decided.items() if not is_best}
+        won = {(i, j) for (i, j), is_best in decided.items() if is_best and (groups[i], j) in lost}
+        return replace(table, best=frozenset((best_cells(table) - {*decided}) | won))
 
 
 def source(subject: Any) -> Source:

@@ -85,8 +85,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 ) -> int:
     """Judge your solver: is it right, how large are its errors, what is the mistake?
 
-    Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 for a wrong command
-    or a file that could not be written.
+    Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 if a command or file is wrong.
     """
     # Solver and reference are timed on one thread each; NumPy is not imported yet.
     from plumbob.crosscheck.child_process import one_thread
@@ -99,29 +98,25 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 
     language = lang or language_of()
     question = Question(tuple(task or ()), rerun, thorough, seed)
-    if names:
-        template = export = None
     if names or template or export:
-        return _print(_listed(question, template, export, speaker(language)))
-    if self_test:
-        if task or solver or answers:
-            raise ValueError("--self-test: expected no task or solver with it: it tries the judge")
-        return _self_test(speaker(language))
+        return _print(_listed(question, names, template, export, speaker(language)))
     folder = [ANSWERS, str(answers)] if answers else []
     words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
+    if self_test:
+        return _self_test([*words, *question.tasks], speaker(language))
     files = Files(json, junit, html, card, output)
     return _judge(words, limits(time_limit, memory_limit), question, files, language)
 
 
 def _listed(
-    question: "Question", template: str | None, export: Path | None, say: "Say"
+    question: "Question", names: bool, template: str | None, export: Path | None, say: "Say"
 ) -> Iterable[str]:
     """Return lines on the tasks, or on the starter or cases that it writes."""
     from plumbob.crosscheck.verify.output import listings
 
-    if template:
+    if template and not names:
         return listings.starter(template, Path(), say)
-    if export:
+    if export and not names:
         return listings.exported(export, question.tasks, question.seed, question.thorough, say)
     return listings.described(question.tasks, say)
 
@@ -162,8 +157,10 @@ def _print(lines: Iterable[str]) -> int:
     return RIGHT
 
 
-def _self_test(say: "Say") -> int:
+def _self_test(words: list[str], say: "Say") -> int:
     """Check that every fault is found and named, and no right solver is accused."""
+    if words:
+        raise ValueError("--self-test: expected no task or solver with it: it tries the judge")
     from rich.console import Console
     from rich.progress import track
 

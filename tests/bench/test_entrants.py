@@ -109,7 +109,7 @@ def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
         next(one for one in records(name) if one.problem == "peers/motion/k1000")
         for name in ("Plumbob symplectic Euler", "My symplectic Euler")
     )
-    np.testing.assert_allclose(ours.arrays["true"], theirs.arrays["true"], rtol=1e-6)
+    np.testing.assert_allclose(ours.arrays["error"], theirs.arrays["error"], rtol=1e-6)
 
 
 @pytest.mark.slow
@@ -280,6 +280,21 @@ def test_a_robot_solver_is_run_with_one_start_and_with_restarts(folder):
     assert once.arrays["solved"].sum() >= 1
     assert again.arrays["solved"].sum() > once.arrays["solved"].sum()
     assert not (once.arrays["claimed"].astype(bool) & ~once.arrays["solved"]).any()
+
+
+def test_a_seed_draws_other_targets_and_is_on_record(folder):
+    words = ("--quick", "--targets", "3", "--problem", "chain/near", "--solver", "ccd",
+             "--problem", "robots/fetch", "--solver", "Plumbob LM")  # fmt: skip
+    distances = []
+    for seed in ((), ("--seed", "7"), ("--seed", "1986")):
+        assert bench("ik", *words, *seed) == 0
+        distances += [tuple(one.arrays["distance"]) for one in records("ccd")]
+    assert distances[0] == distances[2] != distances[1]
+    seeds = {one.settings["seed"]: one for one in records() if one.problem == "robots/fetch"}
+    assert set(seeds) == {7, 1986}
+    positions = [one.arrays["position"] for one in seeds.values()]
+    assert not np.array_equal(*positions)
+    assert bench("ik", *words, "--seed", "-1") == 2
 
 
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])

@@ -22,7 +22,14 @@ from ...peers import registry
 from ...peers.entrant import CHAIN_TASK
 from ...peers.ik import chain_loops
 from ...peers.protocol import NoAnswerError, describe
-from ...problems.chains import BEYOND, STRATA, ChainRequests, TargetsForSkeleton, chain_targets
+from ...problems.chains import (
+    BEYOND,
+    SEED,
+    STRATA,
+    ChainRequests,
+    TargetsForSkeleton,
+    chain_targets,
+)
 from . import CHAIN
 from .values import ChainSolves
 
@@ -53,7 +60,9 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for stratum in STRATA:
         problem = chain_targets(stratum, scale.targets, scale.seed)
         tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
-        yield from _blocks_on(problem, stratum, SolverLimits(tolerance, MAX_ITERATIONS), scale)
+        digest = {} if scale.seed == SEED else {"problem_digest": f"seed {scale.seed}"}
+        for block in _blocks_on(problem, stratum, SolverLimits(tolerance, MAX_ITERATIONS), scale):
+            yield replace(block, facts={**block.facts, **digest})
     limits = SolverLimits(TOLERANCE, MAX_ITERATIONS)
     for own in scale.problems:
         if own.targets is not None:
