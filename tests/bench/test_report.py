@@ -108,7 +108,7 @@ def test_a_complete_report_misses_only_the_package_and_the_peers_that_are_not_th
     assert package == "cholespy is not installed."
     assert absent.startswith("Absent peers: pink and PyBullet (cloth). `make peers` ")
     assert others.startswith("Not selected: our closed loop on Pinocchio, mink, ")
-    assert "Newton (cloth)" in others
+    assert "Newton engine (cloth)" in others
     assert "Nothing: every suite" not in "".join(page.texts)
 
 
