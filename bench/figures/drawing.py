@@ -202,7 +202,8 @@ class _ChartDrawer:
 
         With all solvers, those without a curve in the panel follow.
         """
-        curves = {c.solver: (c.x[-1], c.y[-1]) for c in panel.series if c.x.size}
+        limits = sorted(ax.get_ylim())
+        curves = {c.solver: (c.x[-1], np.clip(c.y[-1], *limits)) for c in panel.series if c.x.size}
         to_axes = ax.transData + ax.transAxes.inverted()
         heights = {
             name: to_axes.transform(curves[name])[1] if name in curves else 0.0

@@ -34,7 +34,7 @@ COMPARE_EXAMPLES = block(
     "plumbob compare before after --fail accuracy,time:10% --markdown comment.md",
     ("plumbob compare report --save v1", "keep a run as a baseline,"),
     ("plumbob compare v1 report", "and compare with it"),
-    ("plumbob compare --rerun v1.0 --with my_ik.py", "your solver then and now"),
+    ("plumbob compare --rerun v1 --with my.py", "your solver then and now"),
     ("plumbob compare --rerun main --only ccd", "two revisions of Plumbob"),
 )
 HISTORY_EXAMPLES = block(

