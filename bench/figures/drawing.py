@@ -202,8 +202,10 @@ class _ChartDrawer:
 
         With all solvers, those without a curve in the panel follow.
         """
-        limits = sorted(ax.get_ylim())
-        curves = {c.solver: (c.x[-1], np.clip(c.y[-1], *limits)) for c in panel.series if c.x.size}
+        low, high = sorted(ax.get_ylim())
+        curves = {
+            c.solver: (c.x[-1], min(max(c.y[-1], low), high)) for c in panel.series if c.x.size
+        }
         to_axes = ax.transData + ax.transAxes.inverted()
         heights = {
             name: to_axes.transform(curves[name])[1] if name in curves else 0.0

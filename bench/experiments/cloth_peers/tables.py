@@ -48,7 +48,7 @@ CAPTIONS = Captions(
 )
 # Larger errors are those of motions that diverged, and are not drawn.
 MAX_ERROR = 10.0
-ERRORS = {ONE_STEP: "error |x − x*| / |y − x*|", MOTION: "distance from the truth / distance moved"}
+ERRORS = {ONE_STEP: "error |x − x*| / |y − x*|", MOTION: "error of the motion / distance moved"}
 
 
 def work_precision(name: str, task: str, results: Results) -> Sketch | None:
