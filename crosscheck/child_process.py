@@ -243,7 +243,10 @@ class ChildProcess:
                 elif key.fileobj is self._process.stdout:
                     self.partial += chunk
                 else:
-                    self.last_words = (self.last_words + chunk)[-STDERR_LENGTH:]
+                    self.last_words += chunk
+                    if len(self.last_words) > STDERR_LENGTH:  # from the first whole line on
+                        self.last_words = self.last_words[-STDERR_LENGTH:]
+                        self.last_words = self.last_words.partition(b"\n")[2] or self.last_words
         return is_open
 
     def _write(self) -> None:

@@ -61,7 +61,7 @@ def failure_of(
     }
     message = Sentence(entry["sentence"], values)
     if entry.get("last_words", True):
-        lines = [shown(line) for line in bytes(process.last_words).splitlines()]
+        lines = list(dict.fromkeys(map(shown, bytes(process.last_words).splitlines())))
         lines = [line for line in lines if line and not any(text in line for text in _HIDDEN)]
         if lines:
             message = sentence(
