@@ -62,7 +62,8 @@ def track(
         curve: the effector's global position in each frame [m], shape (frame, 3); or a Target whose
             position is that, and its rotation (frame, 4), or several for several effectors.
         solver: a name in IK_SOLVERS; by default CCD for one position on a Skeleton, and else
-            Levenberg-Marquardt. There are no restarts from random poses: the motion would jump.
+            Levenberg-Marquardt. There are no restarts from random poses, nor phases after the first
+            of Levenberg-Marquardt: the motion would jump.
         start: the first pose: local rotations, shape (joint, 4), identities if None; of an
             Articulation coordinates, (coordinate,), neutral ones if None.
         effector: the joint that follows, by index or name; by default as for `solve_ik`.
@@ -96,6 +97,7 @@ def track(
     settings = checked_settings(
         solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, chained
     )
+    settings = replace(settings, limits=settings.limits._replace(phased=False))
     motion = solve_checked(model, _start(model, start), targets, settings)
     if not coherent:
         return motion

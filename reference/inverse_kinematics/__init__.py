@@ -47,12 +47,22 @@ def solve_ik(
     says how the solve ended. A start that is stuck, like a straight chain collinear with its
     target, is first bent, always alike. Limits are kept; a start outside of them is brought within.
 
+    On limited joints Levenberg-Marquardt from one start most often fails where a limit stops it.
+    It is therefore a portfolio (Huberman, Lukose & Hogg 1997) of phases, always the same, without
+    random numbers. The first is the plain method. If its error has not been halved in 50
+    iterations, a phase begins anew from the same start, and after 10 such iterations the next: each
+    turns effectors the long way round at first (a rotation has two quaternions), uses the null
+    space to stay near mid-range (Liegeois 1977), and has a damping of its own (Chan & Lawrence
+    1988), down to 0.001 of the squared error. At last the best of them goes on.
+
     Restarts never make a solution worse: a target reached with fewer is reached with more, else the
-    merit is no greater than with fewer, or than that of a single attempt of (1 + restarts)
-    `max_iterations`. An attempt that was given up early is finished if no other reaches the target,
-    and the first goes on for as many iterations as all may make: up to (1 + 2 restarts)
-    `max_iterations` in all, for one position on a Skeleton (2 + 3 restarts). Attempts at a target
-    proven out of reach end at the least distance that geometry allows.
+    merit is no greater than with fewer, or than that of a single attempt; of solvers without phases
+    even of one of (1 + restarts) `max_iterations`, which the first makes in the end. With several
+    effectors each restart of Levenberg-Marquardt redraws only the limbs whose effectors fail, and
+    joints that others share every other time. Otherwise an attempt that was given up early is
+    finished if no other reaches the target. All make up to (1 + 2 restarts) `max_iterations`, for
+    one position on a Skeleton (2 + 3 restarts). Attempts at a target proven out of reach end at the
+    least distance that geometry allows.
 
     Args:
         skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot
@@ -67,10 +77,11 @@ def solve_ik(
             default the last joint of a Skeleton, and the only tip of an Articulation.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
-        max_iterations: of each attempt; by default 100, but 2,000 where geometry proves the target
-            out of reach, so that most solves settle.
+        max_iterations: of each attempt, of all its phases together; by default 100, but 2,000 where
+            geometry proves the target out of reach, so that most solves settle.
         restarts: how many further attempts to make from random poses, until one reaches the target.
-            By default 20 where the solver is the default Levenberg-Marquardt, else 0.
+            By default 20 where the solver is the default Levenberg-Marquardt, 100 with several
+            effectors, else 0.
         seed: of the random poses.
         record: keep the residuals of all iterations in `history`.
 

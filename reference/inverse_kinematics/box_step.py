@@ -27,6 +27,8 @@ from .mechanism import (
 )
 
 FULL_CIRCLE = 2.0 * math.pi
+# A rotation by less [rad] has no axis to be made the long way round.
+LEAST_TURN = 1e-3
 # Where J J' is singular, a damping of so much of its trace keeps its factors above rounding.
 ROUNDING_DAMPING = 1e-14
 # The damping towards a target out of reach, over the reach times the error: of the first step, the
@@ -119,6 +121,39 @@ def far_damping(mechanism, target, data, system, damping):
         factor = FAR_DAMPING
     data.far_step[0], data.far_step[1] = factor, square
     return factor * mechanism.reach * math.sqrt(square)
+
+
+def turn_the_long_way(mechanism, target, system):
+    """Replace the rotation errors by those the other way round, of 2 pi less the angle.
+
+    A rotation has two quaternions, Q and -Q; the solvers otherwise turn by the nearer one.
+    """
+    for i in range(len(mechanism.effectors)):
+        if mechanism.effectors["oriented"][i]:
+            row, root = mechanism.effectors["row"][i] + 3, math.sqrt(target["weight"][i])
+            e = system.e[row : row + 3]
+            unit = root * LEVER * mechanism.reach
+            length = math.sqrt(inner(e, e))
+            if length > LEAST_TURN * unit:
+                for k in range(3):
+                    e[k] *= 1.0 - FULL_CIRCLE * unit / length
+
+
+def lean(mechanism, data, system):
+    """Put hinges and slides amid their limits, and leave in e what the step has to make up for.
+
+    Of the poses that bring the effectors alike to their targets, the step then finds the nearest to
+    mid-range, not to the present pose. Joints without two limits, or with a full circle, stay.
+    """
+    joints = mechanism.joints
+    for j in range(len(joints)):
+        lower, upper = joints["lower"][j], joints["upper"][j]
+        if has_bounds(joints, j) and not covers_circle(joints, j) and math.isfinite(upper - lower):
+            at, k, middle = joints["coordinate"][j], joints["freedom"][j], 0.5 * (lower + upper)
+            shift = (middle - data.q[at]) / freedom_unit(mechanism, j)
+            data.q[at] = middle
+            for i in range(len(system.e)):
+                system.e[i] -= shift * system.J[k, i]
 
 
 def activate_limits(mechanism, data, system):

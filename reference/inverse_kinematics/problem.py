@@ -19,8 +19,9 @@ from .solve_chain import ON_CHAINS
 from .solve_mechanism import ON_MECHANISMS
 
 # The defaults of `solve_ik`: iterations of an attempt, the same towards a target out of reach, and
-# restarts where the solver is left to us and is not FABRIK.
-MAX_ITERATIONS, FAR_ITERATIONS, RESTARTS = 100, 2000, 20
+# restarts where the solver is left to us and is not FABRIK, with one effector and with several, of
+# which a restart redraws the limbs that fail.
+MAX_ITERATIONS, FAR_ITERATIONS, RESTARTS, LIMB_RESTARTS = 100, 2000, 20, 100
 # All integers up to this are floats.
 LARGEST_COUNT = 2**53
 
@@ -202,7 +203,7 @@ def default_solver(model: Any, target: Any) -> tuple[str, int]:
     oriented = isinstance(target, Target) and target.rotation is not None
     if isinstance(model, Skeleton) and not (oriented or are_targets(target)):
         return "fabrik", 0
-    return "levenberg_marquardt", RESTARTS
+    return "levenberg_marquardt", LIMB_RESTARTS if are_targets(target) else RESTARTS
 
 
 def checked_settings(*arguments: Any) -> Settings:
@@ -229,6 +230,7 @@ def _settings(
         out_of_reach,
         arguments.count("restarts", restarts, minimum=0),
         chained,
+        kernels.name == "levenberg_marquardt",
     )
     seed = arguments.integer("seed", seed, minimum=0)
     return Settings(kernels, limits, seed, arguments.boolean("record", record))

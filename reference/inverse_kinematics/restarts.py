@@ -1,4 +1,4 @@
-"""The two loops of every solver: iterations of an attempt, and attempts from further starts.
+"""The loops of every solver: iterations of an attempt, attempts from further starts, and phases.
 
 They work on the state of a chain of unlimited balls (`solve_chain.py`) or of a mechanism
 (`solve_mechanism.py`), through its `Operations`. Both states have a `row` of numbers that an
@@ -16,11 +16,20 @@ from ..outcome import Outcome
 # to this share of what it was. If no other reaches the target it goes on, MORE_PATIENT times as
 # patient each time.
 PATIENCE, PROGRESS, MORE_PATIENT = 3, 0.5, 4
+# The patience of the phases of a single start: of the first, which then still reaches all but 1 or
+# 2 in 1,000 of the targets that it ever would, and of each further one.
+FIRST_PATIENCE, FURTHER_PATIENCE = 50.0, 10.0
 # How an attempt ended: within the tolerances, or of the nearest point that geometry allows; with no
 # more progress; with its iterations used; given up early.
 REACHED, STALLED, LIMITED, GIVEN_UP = range(4)
-# Columns of progress: iterations made, how the attempt ended, its merit [m], and its patience.
-COUNT, STATE, COST, WAIT = range(4)
+# Columns of progress: iterations made, how the attempt ended, its merit [m], its patience, the
+# error of which a share is its next progress [m], infinite at first, the iterations since then, and
+# how many it may make.
+COUNT, STATE, COST, WAIT, MILESTONE, SINCE, LIMIT = range(7)
+# Rows behind those of the attempts, of progress and of saved states: the best end of a phase, the
+# start, and the best attempt, where iterations are those of all attempts.
+BEST_PHASE, START, BEST = -3, -2, -1
+SPARE_ROWS = 3
 INFINITY = math.inf
 # Columns of Result.figures: the largest distance from effector to target [m], the largest angle
 # between them [rad], the number of iterations, the value of the outcome, the merit [m], and the
@@ -41,7 +50,10 @@ class Operations(NamedTuple):
     # it is stuck, and return whether it was
     perturb: PythonKernel
     place: PythonKernel  # (state): bring the state to what has been copied to its row
-    draw: PythonKernel  # (state, target, n): take the configuration of random restart n = 1, 2 ...
+    # (state, target, criteria, n): take from the configuration of random restart n = 1, 2 ...
+    draw: PythonKernel
+    # (state, n): begin phase n = 0, 1 ... of the solver; return whether there is one
+    begin: PythonKernel
 
 
 class Limits(NamedTuple):
@@ -53,6 +65,7 @@ class Limits(NamedTuple):
     far_iterations: int  # the same where geometry proves a target out of reach
     restarts: int  # further attempts
     chained: bool  # whether each target but the first starts from the solution before it
+    phased: bool  # whether a start that stalls is solved again in further phases of the solver
 
 
 class Criteria(NamedTuple):
@@ -64,6 +77,7 @@ class Criteria(NamedTuple):
     angle: float  # the same for rotations [rad]
     margin: float  # an error that changes by no more has stalled [m]
     max_iterations: int  # of each attempt
+    redraws_limbs: bool  # whether a restart leaves the limbs whose effectors reach their targets
 
 
 class Result(NamedTuple):
@@ -82,64 +96,162 @@ class Result(NamedTuple):
 def limits_of(numbers):
     """Return Limits from an array of their numbers, which comes in faster from Python."""
     return Limits(
-        numbers[0], numbers[1], int(numbers[2]), int(numbers[3]), int(numbers[4]), numbers[5] > 0.0
-    )
+        numbers[0], numbers[1], int(numbers[2]), int(numbers[3]), int(numbers[4]),
+        numbers[5] > 0.0, numbers[6] > 0.0,
+    )  # fmt: skip
 
 
 def solve_with_restarts(operations, state, saved, progress, target, limits, criteria, history):
     """Attempt from the start, then from random configurations, until the target is reached.
 
     While others may follow, an attempt at a target in reach is given up early. If none reaches it,
-    all are finished, and the first makes as many iterations as all of them may: its ends after each
-    attempt's number of iterations count as attempts too. So the result is no worse than
-    from a single start, or with fewer restarts.
+    all are finished, unless each has redrawn the failing limbs of the one before. At last a solver
+    of several phases goes through them as from a single start; another one's first attempt makes as
+    many iterations as all of them may, and its ends after each attempt's number of iterations count
+    as attempts too. So the result is no worse than from a single start, or with fewer restarts.
 
     The rows of `saved`, a row of the state each, and of `progress`, see the columns above, are of
-    attempts; their last rows are spare. The best attempt is saved in the last row.
+    attempts and then the spare ones. The best attempt is saved in the last row.
 
     Returns:
         The iterations of all attempts, and whether the best of them stalled.
     """
-    random = len(progress) - 2
-    patience = PATIENCE if random > 0 and criteria.distance <= limits.tolerance else INFINITY
-    for i in range(random + 1):
-        row = progress[i]
-        row[COUNT], row[STATE], row[COST], row[WAIT] = 0.0, LIMITED, INFINITY, patience
+    total, in_reach = progress[BEST], criteria.distance <= limits.tolerance
+    phased = limits.phased and in_reach and operations.begin(state, 1)
+    operations.begin(state, 0)
+    begin_rows(progress, criteria, in_reach, phased)
     distance, _, _, _ = operations.error(state, target)
     store_if_inside(history, 0, distance)
-    perturbed = operations.perturb(state, target, criteria, progress[0])
-    best, ending, count, drawn, periods = INFINITY, LIMITED, 0, 0, 1
-    k, limit = 0, criteria.max_iterations
-    while k >= 0:
-        count += solve_once(operations, state, target, criteria, progress[k], limit, history, count)
-        progress[k, COST] = operations.merit(state, target)
-        copy_row(state.row, saved[k])
-        if is_better(progress[k], best):
-            best, ending = progress[k, COST], int(progress[k, STATE])
-            copy_row(state.row, saved[-1])
-        if ending == REACHED:
+    copy_row(state.row, saved[START])
+    perturb(operations, state, saved, progress, target, criteria)
+    k, turn, drawing = 0, 0, len(progress) > SPARE_ROWS + 1
+    while True:
+        go_on(operations, state, saved, progress, k, target, criteria, history)
+        if total[STATE] == REACHED:
             break
-        if k == 0 and not perturbed:
-            perturbed = operations.perturb(state, target, criteria, progress[0])
-            if perturbed:
-                continue
-        if drawn < random:
-            drawn += 1
-            k, limit = drawn, criteria.max_iterations
-            operations.draw(state, target, drawn)
+        if perturb(operations, state, saved, progress, target, criteria):
             continue
-        k = most_promising(progress)
-        if k < 0 and periods <= limits.restarts and progress[0, STATE] == LIMITED:
-            k, periods = 0, periods + 1
-        if k >= 0:
-            limit = periods * criteria.max_iterations
-            copy_row(saved[k], state.row)
-            operations.place(state)
-    return count, ending <= STALLED
+        if drawing:
+            k = begin_attempt(operations, state, saved, progress, target, criteria, k)
+            if k < 0:
+                begin_start(operations, state, saved, progress, phased)
+                k, drawing = 0, False
+            if drawing or phased:
+                continue
+        turn += 1
+        if phased and not begin_phase(operations, state, saved, progress, turn):
+            break
+        if not phased and not extend_first(progress, criteria, limits, turn):
+            break
+    return int(total[COUNT]), total[STATE] <= STALLED
 
 
-def solve_once(operations, state, target, criteria, attempt, limit, history, earlier):
-    """Update until the target is reached, the error stalls, or `limit` iterations are made.
+def begin_rows(progress, criteria, in_reach, phased):
+    """Fill the rows of attempts that are yet to be made; the start has the patience of its phases.
+
+    Towards a target out of reach no attempt is given up.
+    """
+    others_follow = len(progress) > SPARE_ROWS + 1
+    for i in range(len(progress)):
+        reset(progress[i], PATIENCE if others_follow and in_reach else INFINITY)
+        progress[i, LIMIT] = criteria.max_iterations
+    progress[START, WAIT] = FIRST_PATIENCE if phased else INFINITY
+    if not others_follow:
+        progress[0, WAIT] = progress[START, WAIT]
+
+
+def perturb(operations, state, saved, progress, target, criteria):
+    """Move the first attempt, and so the start, if it is stuck, once; return whether it was."""
+    start, first = progress[START], progress[0]
+    if start[STATE] != LIMITED or progress[BEST, COUNT] != first[COUNT]:
+        return False
+    if not operations.perturb(state, target, criteria, first):
+        return False
+    start[STATE], start[COUNT] = STALLED, first[COUNT]
+    copy_row(state.row, saved[START])
+    return True
+
+
+def begin_attempt(operations, state, saved, progress, target, criteria, k):
+    """Begin the attempt after attempt k, or one that was given up; return which, -1 if none."""
+    if k + 1 < len(progress) - SPARE_ROWS and progress[k + 1, COST] == INFINITY:
+        operations.draw(state, target, criteria, k + 1)
+        return k + 1
+    k = -1 if criteria.redraws_limbs else most_promising(progress)
+    if k >= 0:
+        attempt = progress[k]
+        attempt[WAIT], attempt[MILESTONE], attempt[SINCE] = (
+            MORE_PATIENT * attempt[WAIT],
+            INFINITY,
+            0,
+        )
+        copy_row(saved[k], state.row)
+        operations.place(state)
+    return k
+
+
+def begin_start(operations, state, saved, progress, phased):
+    """Begin at the start again, for all phases; of a single phase go on with the first attempt."""
+    copy_row(saved[START] if phased else saved[0], state.row)
+    if phased:
+        copy_row(progress[START], progress[0])
+    operations.place(state)
+
+
+def extend_first(progress, criteria, limits, n):
+    """Give the first attempt the iterations of another, the n-th; return whether it needs them."""
+    progress[0, LIMIT] = (n + 1) * criteria.max_iterations
+    progress[0, WAIT] = INFINITY
+    return n <= limits.restarts and progress[0, STATE] == LIMITED
+
+
+def begin_phase(operations, state, saved, progress, n):
+    """Begin phase n, behind the last go on with the best; return whether there is anything to do.
+
+    The phase before it has just ended, and all have the iterations of one attempt together.
+    """
+    first, best = progress[0], progress[BEST_PHASE]
+    left = first[LIMIT] - first[COUNT]
+    if first[WAIT] == INFINITY or left <= 0.0:
+        return False
+    if first[COST] < best[COST]:
+        copy_row(first, best)
+        copy_row(saved[0], saved[BEST_PHASE])
+    copy_row(saved[START], state.row)
+    patience = FURTHER_PATIENCE
+    if not operations.begin(state, n):
+        if best[STATE] == STALLED:
+            return False
+        copy_row(saved[BEST_PHASE], state.row)
+        patience = INFINITY
+    reset(first, patience)
+    first[LIMIT] = left
+    operations.place(state)
+    return True
+
+
+def reset(attempt, patience):
+    """Make a row of progress that of an attempt not yet made."""
+    attempt[COUNT], attempt[STATE], attempt[COST], attempt[WAIT] = 0.0, LIMITED, INFINITY, patience
+    attempt[MILESTONE], attempt[SINCE] = INFINITY, 0.0
+
+
+def go_on(operations, state, saved, progress, k, target, criteria, history):
+    """Continue attempt k; save its end, and once more if it is the best."""
+    attempt, total = progress[k], progress[BEST]
+    total[COUNT] += solve_once(
+        operations, state, target, criteria, attempt, history, int(total[COUNT])
+    )
+    attempt[COST] = operations.merit(state, target)
+    copy_row(state.row, saved[k])
+    is_settled = attempt[COST] == total[COST] and total[STATE] == GIVEN_UP
+    if attempt[STATE] == REACHED or attempt[COST] < total[COST] or is_settled:
+        total[STATE], total[COST] = attempt[STATE], attempt[COST]
+        copy_row(state.row, saved[BEST])
+
+
+def solve_once(operations, state, target, criteria, attempt, history, earlier):
+    """Update until the target is reached, the error stalls, or the limit of iterations is met.
 
     `attempt` is the row of progress, where its end is noted; all attempts have made `earlier`
     iterations so far.
@@ -148,13 +260,13 @@ def solve_once(operations, state, target, criteria, attempt, limit, history, ear
         The iterations made.
     """
     _, angle, total, bound = operations.error(state, target)
-    milestone, since = total, 0
+    milestone, since = min(attempt[MILESTONE], total), attempt[SINCE]
     first, ending = int(attempt[COUNT]), LIMITED
     count = first
     while ending == LIMITED:
         if bound <= criteria.distance and angle <= criteria.angle:
             ending = REACHED
-        if ending == REACHED or count >= limit:
+        if ending == REACHED or count >= attempt[LIMIT]:
             break
         before = total
         operations.update(state, target)
@@ -171,24 +283,14 @@ def solve_once(operations, state, target, criteria, attempt, limit, history, ear
     if ending != LIMITED and bound <= criteria.distance and angle <= criteria.angle:
         ending = REACHED
     attempt[COUNT], attempt[STATE] = count, ending
+    attempt[MILESTONE], attempt[SINCE] = milestone, since
     return count - first
-
-
-def is_better(attempt, best):
-    """Return whether an attempt is finished and better than the best [m].
-
-    An attempt that was given up becomes more patient.
-    """
-    if attempt[STATE] == GIVEN_UP:
-        attempt[WAIT] *= MORE_PATIENT
-        return False
-    return attempt[STATE] == REACHED or attempt[COST] < best
 
 
 def most_promising(progress):
     """Return the attempt given up to go on with: the least patient, then the best; -1 if none."""
-    best, row = -1, progress[-1]
-    for k in range(len(progress) - 1):
+    best, row = -1, progress[0]
+    for k in range(len(progress) - SPARE_ROWS):
         attempt = progress[k]
         if attempt[STATE] == GIVEN_UP:
             sooner = best < 0 or attempt[WAIT] < row[WAIT]

@@ -31,8 +31,9 @@ from .jacobian_methods import (
 )
 from .restarts import (
     COUNT,
+    LIMIT,
     OUTCOME,
-    WAIT,
+    SPARE_ROWS,
     Criteria,
     Operations,
     copy_row,
@@ -55,7 +56,8 @@ def solve_chains(
     """
     limits = limits_of(numbers)
     chain = new_chain(offsets, path)
-    saved, progress = np.empty((2, len(chain.row))), np.empty((2, WAIT + 1))
+    count = 1 + SPARE_ROWS
+    saved, progress = np.empty((count, len(chain.row))), np.empty((count, LIMIT + 1))
     rotations = np.empty((len(parents), 4))
     for i in range(len(targets)):
         pose, target = local[i], load_vector(targets, i)
@@ -92,7 +94,8 @@ def chain_criteria(chain, d, limits):
     bound, margin = least_distance(chain, d), rounding(chain, d)
     slack = min(8.0 * margin, 0.5 * limits.tolerance)
     count = limits.far_iterations if bound > limits.tolerance else limits.max_iterations
-    return Criteria(bound + limits.tolerance - slack, limits.tolerance_rotation, margin, count)
+    distance = bound + limits.tolerance - slack
+    return Criteria(distance, limits.tolerance_rotation, margin, count, False)
 
 
 def chain_error(chain, target):
@@ -115,12 +118,17 @@ def place_chain(_chain):
     """Leave a chain as it is: its row holds its positions and rotations themselves."""
 
 
-def draw_chain(_chain, _target, _n):
+def draw_chain(_chain, _target, _criteria, _n):
     """Leave a chain as it is: its random restarts are made on a mechanism."""
 
 
+def begin_sweeps(_chain, n):
+    """Return whether phase n is the only one."""
+    return n == 0
+
+
 operations = Operations(
-    ccd_sweep, chain_error, effector_error, perturb_chain, place_chain, draw_chain
+    ccd_sweep, chain_error, effector_error, perturb_chain, place_chain, draw_chain, begin_sweeps
 )
 SWEEPS = {
     "ccd": ccd_sweep,

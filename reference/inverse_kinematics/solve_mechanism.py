@@ -11,6 +11,7 @@ from ..articulation import (
     FIXED,
     FREE,
     HINGE,
+    WIDTHS,
     articulated_pose,
     clamp_joint,
     joint_transform,
@@ -35,12 +36,15 @@ from .fabrik import BACKWARD, fabrik_update
 from .jacobian_methods import (
     damped_least_squares_update,
     jacobian_transpose_update,
+    levenberg_marquardt_phase,
     levenberg_marquardt_update,
+    only_phase,
 )
 from .mechanism import (
     LEVER,
     ConfigurationData,
     Mechanism,
+    errors,
     gather,
     least_residual,
     load_ball,
@@ -57,10 +61,11 @@ from .restarts import (
     COST,
     COUNT,
     INFINITY,
+    LIMIT,
     OUTCOME,
+    SPARE_ROWS,
     STALLED,
     STATE,
-    WAIT,
     Criteria,
     Operations,
     copy_row,
@@ -122,8 +127,8 @@ def solve_mechanisms(
         mechanism, data, data.state, new_workspace(mechanism), restarts, restart_frames,
         np.empty(len(restarts)),
     )  # fmt: skip
-    count = len(restarts) + 2
-    saved, progress = np.empty((count, len(state.row))), np.empty((count, WAIT + 1))
+    count = len(restarts) + 1 + SPARE_ROWS
+    saved, progress = np.empty((count, len(state.row))), np.empty((count, LIMIT + 1))
     rotations = np.empty((len(joints), 4))
     for i in range(len(targets)):
         q, target = coordinates[i], targets[i]
@@ -190,6 +195,7 @@ def mechanism_criteria(mechanism, bound, limits):
         limits.tolerance_rotation - slack_rotation,
         max(margin, FAR_MARGIN * limits.tolerance) if unreachable else margin,
         limits.far_iterations if unreachable else limits.max_iterations,
+        limits.phased and not unreachable and len(mechanism.effectors) > 1,
     )
 
 
@@ -224,13 +230,47 @@ def place_mechanism(state):
     update_forward_kinematics(state.mechanism, state.data)
 
 
-def draw_mechanism(state, target, n):
-    """Bring the mechanism to the random configuration with the n-th nearest effectors."""
-    if n == 1:
-        rank_restarts(state, target)
-    take_nearest(state, state.data.q)
+def draw_mechanism(state, target, criteria, n):
+    """Bring the mechanism to the random configuration with the n-th nearest effectors.
+
+    Where there are several limbs, only those whose effectors fail go to a random configuration, the
+    n-th; joints that they share with others do so every other time.
+    """
+    if criteria.redraws_limbs:
+        redraw_limbs(state, target, criteria, n)
+    else:
+        if n == 1:
+            rank_restarts(state, target)
+        take_nearest(state, state.data.q)
     clear(state.data.far_step)
     update_forward_kinematics(state.mechanism, state.data)
+
+
+def redraw_limbs(state, target, criteria, n):
+    """Copy the coordinates of joints that move effectors away from their targets from restart n."""
+    mechanism, q, restart = state.mechanism, state.data.q, state.restarts[n - 1]
+    joints = mechanism.joints
+    for j in range(len(joints)):
+        if joints["leader"][j] != j:
+            continue
+        misses, holds = False, False
+        for e in range(len(mechanism.effectors)):
+            if moves_effector(mechanism, j, e):
+                distance, angle = errors(mechanism, target, state.data, e)
+                missed = distance > criteria.distance or angle > criteria.angle
+                misses, holds = misses or missed, holds or not missed
+        if misses and not (holds and n % 2 == 0):
+            at = joints["coordinate"][j]
+            for k in range(at, at + WIDTHS[joints["kind"][j]]):
+                q[k] = restart[k]
+
+
+def moves_effector(mechanism, j, e):
+    """Return whether a joint, or one that follows it, moves an effector."""
+    moves = False
+    for i in range(len(mechanism.joints)):
+        moves |= mechanism.joints["leader"][i] == j and mechanism.moves[i, e]
+    return moves
 
 
 def rank_restarts(state, target):
@@ -266,20 +306,21 @@ def take_nearest(state, q):
 
 
 operations = Operations(
-    ccd_update, residuals, merit_of, perturb_mechanism, place_mechanism, draw_mechanism
+    ccd_update, residuals, merit_of, perturb_mechanism, place_mechanism, draw_mechanism, only_phase
 )
+# The update of each solver, and what begins its phases.
 UPDATES = {
-    "ccd": ccd_update,
-    "fabrik": fabrik_update,
-    "levenberg_marquardt": levenberg_marquardt_update,
-    "damped_least_squares": damped_least_squares_update,
-    "jacobian_transpose": jacobian_transpose_update,
+    "ccd": (ccd_update, only_phase),
+    "fabrik": (fabrik_update, only_phase),
+    "levenberg_marquardt": (levenberg_marquardt_update, levenberg_marquardt_phase),
+    "damped_least_squares": (damped_least_squares_update, only_phase),
+    "jacobian_transpose": (jacobian_transpose_update, only_phase),
 }
 # The kernel that solves mechanisms by the update of each solver.
 ON_MECHANISMS = {
     name: Kernel(
-        bind(solve_mechanisms, operations=operations._replace(update=update)),
+        bind(solve_mechanisms, operations=operations._replace(update=update, begin=begin)),
         label=f"{name} for mechanisms",
     )
-    for name, update in UPDATES.items()
+    for name, (update, begin) in UPDATES.items()
 }

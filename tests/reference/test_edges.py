@@ -21,6 +21,8 @@ from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.restarts import (
     COST,
     GIVEN_UP,
+    LIMIT,
+    SPARE_ROWS,
     STALLED,
     STATE,
     WAIT,
@@ -54,10 +56,11 @@ def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_ci
 
 
 def test_of_attempts_given_up_the_least_patient_goes_on_and_then_the_nearest():
-    progress = np.empty((6, WAIT + 1))
-    progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, STALLED, GIVEN_UP, GIVEN_UP
-    progress[:, WAIT] = 12.0, 3.0, 3.0, 3.0, 3.0, 0.0
-    progress[:, COST] = 0.1, 0.5, 0.3, 0.2, 0.4, 0.0
+    progress = np.zeros((5 + SPARE_ROWS, LIMIT + 1))
+    progress[:, STATE] = GIVEN_UP
+    progress[3, STATE] = STALLED
+    progress[:5, WAIT] = 12.0, 3.0, 3.0, 3.0, 3.0
+    progress[:5, COST] = 0.1, 0.5, 0.3, 0.2, 0.4
     order = []
     while (k := most_promising(progress)) >= 0:
         order.append(k)
@@ -69,7 +72,7 @@ def test_of_attempts_given_up_the_least_patient_goes_on_and_then_the_nearest():
 def test_a_target_further_out_than_the_tolerance_has_iterations_of_its_own(least, iterations):
     arm = Articulation(Skeleton([-1, 0], np.eye(2, 3)), ["hinge", "fixed"])
     mechanism = prepare(arm, (1,), (False,)).mechanism
-    criteria = mechanism_criteria(mechanism, least, Limits(1e-3, 1e-3, 7, 3, 0, False))
+    criteria = mechanism_criteria(mechanism, least, Limits(1e-3, 1e-3, 7, 3, 0, False, True))
     assert criteria.max_iterations == iterations
     assert least < criteria.distance <= least + 1e-3
 

@@ -59,12 +59,7 @@ IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
 
 def rotation_about(axis, degrees):
-    """The matrix of a rotation about X, Y or Z, from its definition."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    i, j = [(1, 2), (2, 0), (0, 1)]["XYZ".index(axis)]
-    matrix = np.eye(3)
-    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, -s, s, c
-    return matrix
+    return Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
 
 
 def positions_by_a_second_reader(text):

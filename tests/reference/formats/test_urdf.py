@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import FormatWarning, urdf
@@ -35,12 +36,7 @@ def pose(found, link, **coordinates):
 
 
 def rotation_about(axis, angle):
-    """The matrix of a rotation about x, y or z, from its definition."""
-    c, s = np.cos(angle), np.sin(angle)
-    i, j = [(1, 2), (2, 0), (0, 1)]["xyz".index(axis)]
-    matrix = np.eye(3)
-    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, -s, s, c
-    return matrix
+    return Rotation.from_euler(axis, angle).as_matrix()
 
 
 ORIGIN = '<origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/>'  # x points along y, y along -x

@@ -119,13 +119,15 @@ def badness(solution, settings):
 
 
 def rises(name, solver, seed, counts, settings):
-    """Return how many answers are worse with more restarts, or than one start with all of it."""
+    """Return how many answers are worse with more restarts, or than from one start."""
     model, q, targets = problem(name, seed)
     found, worse = np.inf, []
     for restarts in counts:
         answer = solve_ik(model, q, targets, solver, restarts=restarts, seed=seed, **settings)
         last = badness(answer, settings)
-        longer = dict(settings, max_iterations=(restarts + 1) * settings["max_iterations"])
+        longer = dict(settings)
+        if solver != "levenberg_marquardt":  # whose phases make the iterations of one attempt
+            longer["max_iterations"] *= restarts + 1
         once = badness(solve_ik(model, q, targets, solver, **longer), settings)
         limit = min(found, once)
         if last > limit + ROUNDING:

@@ -1,0 +1,175 @@
+"""The phases of Levenberg-Marquardt from one start."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plumbob.reference import (
+    IK_SOLVERS,
+    Articulation,
+    Mimic,
+    Outcome,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+    solve_ik,
+    track,
+)
+from plumbob.reference.inverse_kinematics.box_step import (
+    damped_step,
+    lean,
+    linearise_task,
+    take_step,
+    turn_the_long_way,
+)
+from plumbob.reference.inverse_kinematics.mechanism import LEVER
+from plumbob.reference.inverse_kinematics.problem import checked_settings, checked_targets
+from plumbob.reference.inverse_kinematics.restarts import FIRST_PATIENCE
+from plumbob.reference.inverse_kinematics.solve import solve_checked
+
+COUNT = 150
+
+
+@pytest.fixture
+def arm(chain_of_joints, rng):
+    """Return seven hinges with limits, of which a single start often fails."""
+    return chain_of_joints("hinge", rng, links=6, lower=-2.0, upper=2.0)
+
+
+@pytest.fixture
+def task(arm, rng):
+    """Return starts, and poses that the arm can take."""
+    pose = forward_kinematics(arm, arm.random(rng, COUNT))
+    return arm.random(rng, COUNT), Target(pose.positions[:, -1], pose.rotations[:, -1])
+
+
+def first_phase(model, start, target, solver="levenberg_marquardt", most=200):
+    """Return what the first phase alone answers."""
+    settings = checked_settings(solver, 1e-4, 1e-4, most, 0, 0, False)
+    alone = replace(settings, limits=settings.limits._replace(phased=False))
+    return solve_checked(model, start, checked_targets(model, target, None), alone)
+
+
+def test_phases_reach_most_of_what_the_first_does_not(arm, task):
+    start, target = task
+    alone = first_phase(arm, start, target).outcome == Outcome.CONVERGED
+    settings = {"solver": "levenberg_marquardt", "max_iterations": 200}
+    phased = solve_ik(arm, start, target, **settings).outcome == Outcome.CONVERGED
+    assert alone.mean() < 0.7
+    assert phased.mean() > 0.9
+    assert not (alone & ~phased).any()
+
+
+def test_what_the_first_phase_reaches_is_the_same_to_the_bit(arm, task):
+    start, target = task
+    alone = first_phase(arm, start, target)
+    phased = solve_ik(arm, start, target, "levenberg_marquardt", max_iterations=200)
+    early = (alone.outcome == Outcome.CONVERGED) & (alone.iterations < FIRST_PATIENCE)
+    assert np.count_nonzero(early) > COUNT // 4
+    np.testing.assert_array_equal(phased.coordinates[early], alone.coordinates[early])
+    np.testing.assert_array_equal(phased.iterations[early], alone.iterations[early])
+
+
+@pytest.mark.parametrize("most", [0, 1, 49, 50, 51, 60, 75, 200])
+def test_phases_keep_the_limits_and_the_number_of_iterations(arm, task, most):
+    start, target = task
+    phased = solve_ik(arm, start, target, "levenberg_marquardt", max_iterations=most)
+    assert (phased.iterations <= most).all()
+    assert arm.within_limits(phased.coordinates, 0.0).all()
+    alone = first_phase(arm, start, target, most=most)
+    assert np.count_nonzero(phased.outcome == Outcome.CONVERGED) >= np.count_nonzero(
+        alone.outcome == Outcome.CONVERGED
+    )
+
+
+def test_phases_give_a_batch_the_answers_of_single_calls_and_repeat_them(arm, task):
+    start, (position, Q, effector, weight) = task
+    batch = solve_ik(arm, start, task[1], "levenberg_marquardt", record=True)
+    again = solve_ik(arm, start, task[1], "levenberg_marquardt", seed=7)
+    np.testing.assert_array_equal(batch.coordinates, again.coordinates)
+    for i in range(0, COUNT, 5):
+        target = Target(position[i], Q[i], effector, weight)
+        single = solve_ik(arm, start[i], target, "levenberg_marquardt", record=True)
+        np.testing.assert_array_equal(single.coordinates, batch.coordinates[i])
+        assert single.iterations == batch.iterations[i]
+        np.testing.assert_array_equal(single.history, batch.history[i, : single.iterations + 1])
+
+
+def test_phases_come_nearer_to_targets_just_out_of_reach(arm, task):
+    """No bound knows them to be so: the best of all phases goes on."""
+    start, target = task
+    far = target._replace(position=1.3 * target.position)
+    phased = solve_ik(arm, start, far, "levenberg_marquardt", max_iterations=300)
+    alone = first_phase(arm, start, far, most=300)
+    missed = phased.outcome != Outcome.CONVERGED
+    assert np.count_nonzero(missed) > COUNT // 4
+    assert np.mean(phased.merit[missed]) < 0.9 * np.mean(alone.merit[missed])
+
+
+def test_only_levenberg_marquardt_has_phases_and_a_track_has_none(arm, task):
+    start, target = task
+    for solver in IK_SOLVERS:
+        settings = {"solver": solver, "max_iterations": 100}
+        alone = first_phase(arm, start, target, solver, most=100)
+        same = solve_ik(arm, start, target, **settings).coordinates == alone.coordinates
+        assert same.all() == (solver != "levenberg_marquardt")
+    stuck = np.flatnonzero(first_phase(arm, start, target).outcome != Outcome.CONVERGED)[:5]
+    for i in stuck:
+        frame = Target(target.position[i : i + 1], target.rotation[i : i + 1])
+        motion = track(arm, frame, "levenberg_marquardt", start[i], max_iterations=200)
+        alone = first_phase(arm, start[i : i + 1], frame)
+        np.testing.assert_allclose(motion.coordinates, alone.coordinates, rtol=0, atol=1e-9)
+
+
+# ---- what the phases are made of
+
+
+def test_the_long_way_round_is_two_pi_less_the_angle_about_the_same_axis(arm, rng, machine):
+    pose = forward_kinematics(arm, arm.random(rng))
+    for _ in range(20):
+        target = Target(pose.positions[-1], pose.rotations[-1], 6, rng.uniform(0.5, 2.0))
+        mechanism, row, data, workspace = machine(arm, arm.random(rng), [target])
+        linearise_task(mechanism, row, data, workspace.system)
+        short = workspace.system.e.copy()
+        turn_the_long_way(mechanism, row, workspace.system)
+        unit = LEVER * mechanism.reach * np.sqrt(target.weight)
+        before, after = short[3:] / unit, workspace.system.e[3:] / unit
+        np.testing.assert_array_equal(workspace.system.e[:3], short[:3])
+        assert np.linalg.norm(before) + np.linalg.norm(after) == pytest.approx(2.0 * np.pi)
+        both = rotation.exponential(np.stack([before, after]))
+        assert rotation.angle(*both) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_leaning_step_comes_nearest_to_mid_range(rng, machine):
+    """Of all steps J q = e: hinges, a slide, a follower; a ball and a full circle stay in place."""
+    kinds = ["hinge", "slide", "hinge", "hinge", "ball", "hinge", "hinge"]
+    lower, upper = np.full(7, -9.0), np.full(7, 11.0)
+    links = Skeleton(range(-1, 6), 0.4 * rng.standard_normal((7, 3)))
+    axes = rotation.rotate(rotation.random(rng, 7), [0.0, 0.0, 1.0])
+    lower[[2, 3]], upper[[2, 3]] = [-2.0, -np.inf], [2.5, np.inf]
+    model = Articulation(
+        links, kinds, axes, lower=lower, upper=upper, mimics={6: Mimic(0, 0.5)}, cones=3.0
+    )
+    q = model.random(rng)
+    near = forward_kinematics(model, q)
+    target = Target(near.positions[-1] + 0.01, near.rotations[-1], 6)
+    mechanism, row, data, workspace = machine(model, q, [target])
+    linearise_task(mechanism, row, data, workspace.system)
+    J, e, own = workspace.system.J.T.copy(), workspace.system.e.copy(), data.q.copy()
+    lean(mechanism, data, workspace.system)
+    moved = np.flatnonzero(data.q != own)
+    joints = mechanism.joints
+    leads = joints["leader"] == np.arange(len(joints))
+    centred = np.flatnonzero(leads & np.isin(joints["coordinate"], moved))
+    assert {kinds[j] for j in centred} == {"hinge", "slide"}
+    unit = np.array([mechanism.reach if kinds[j] == "slide" else 1.0 for j in centred])
+    shift = np.zeros(J.shape[1])
+    shift[joints["freedom"][centred]] = (data.q - own)[moved] / unit
+    np.testing.assert_allclose(workspace.system.e, e - J @ shift, rtol=0, atol=1e-12)
+    damped_step(mechanism, data, workspace.system, 1e-12)
+    whole = shift + workspace.system.step
+    expected = shift + np.linalg.lstsq(J, e - J @ shift, rcond=None)[0]
+    np.testing.assert_allclose(whole, expected, rtol=0, atol=1e-6)
+    take_step(mechanism, data, workspace.system)
