@@ -2,11 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from .sentence import Sentence
+
+# What a solver owes a case: a right answer; an answer or a failure, since textbooks divide by zero
+# there; or any of several answers that the laws allow, or a failure.
+Requirement = Literal["must", "may", "implementation-defined"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +28,7 @@ class Case:
     about: Sentence  # its purpose, for the reader of a failure
     follows: str = ""  # the case that must be asked just before it, if any
     facts: Mapping[str, Any] = field(default_factory=dict)  # for its laws, besides the inputs
+    requirement: Requirement = "must"
 
     @property
     def size(self) -> int:

@@ -65,7 +65,7 @@ class System(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         masses, stiffnesses, dampings: one for all, or one each.
-        rest_lengths: given, or measured by the solver in `rest_positions`.
+        rest_lengths: given, one for all, or measured by the solver in `rest_positions`.
         gravity: any vector, or a single number g, downwards along y.
         external_forces: whether it takes them.
         tension_only: whether it knows springs that resist no compression.
@@ -78,7 +78,7 @@ class System(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     masses: Literal["one", "each"] = "each"
     stiffnesses: Literal["one", "each"] = "each"
     dampings: Literal["one", "each"] = "each"
-    rest_lengths: Literal["given", "measured"] = "given"
+    rest_lengths: Literal["given", "one", "measured"] = "given"
     gravity: Literal["vector", "number"] = "vector"
     external_forces: bool = False
     tension_only: bool = False
@@ -97,10 +97,15 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         precision: of its numbers.
         chains_only: whether it takes no skeletons with branches.
         max_joints: the most joints that it takes.
+        effector: whether any joint may be the effector, or only the last one.
+        rotations: whether poses have rotations; else all are the identity, as for a solver that
+            moves points.
+        planar: whether everything lies in the plane z = 0.
         methods: of inverse kinematics, in its own words; "ccd" and "fabrik" are understood. Each
             is asked for by the request's `method`.
         system: which mass-spring systems it takes.
         step: the time step that it declares.
+        velocity_limits: whether its robots keep the greatest speeds of a request.
     """
 
     protocol: int
@@ -111,9 +116,13 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     precision: Precision = "double"
     chains_only: bool = False
     max_joints: Joints | None = None
+    effector: Literal["any", "last"] = "any"
+    rotations: bool = True
+    planar: bool = False
     methods: Methods = ("",)
     system: System = System()
     step: Step = Step()
+    velocity_limits: bool = False
 
     @property
     def epsilon(self) -> float:

@@ -1,0 +1,238 @@
+"""Infer what a solver takes from its answers: many take less than a request may hold.
+
+A solver whose answers are wrong may be right on chains, with one mass for all particles or in a
+plane. It is asked whether its answers change with an input, or come at all. If they do not, it is
+judged by requests that do not need the input, and the report says so.
+"""
+
+import json
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from .case import Case
+from .contestant import Answer, Contestant, Failure
+from .explain import largest_gap
+from .greeting import Greeting, System
+from .judgement import Explanation, TaskReport, Verdict
+from .sentence import Sentence, sentence
+from .task import TASKS
+
+# The largest requests in which an input is changed; all answers must stay the same.
+TRIALS = 3
+# Answers that differ by less are the same, in any unit.
+SAME = 1e-12
+UNRELATED = sentence("it gives no answer otherwise")
+# Methods of inverse kinematics that a program may know without declaring them.
+METHODS = ("ccd", "fabrik")
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+
+class Restriction(NamedTuple):
+    """An input that a solver does not take, and the greeting that says so."""
+
+    input: str  # its name
+    greeting: Mapping[str, Any]  # the fields that declare it
+    about: Sentence  # what it is judged on
+    sentence: Sentence  # how its answers show that
+
+
+# Restrictions, each with how answers show it.
+Evidence = Sequence[tuple[Restriction, Sentence]]
+RESTRICTIONS = tuple(
+    Restriction(
+        entry["input"], entry["greeting"], Sentence(entry["about"], {}),
+        Sentence(entry.get("sentence", ""), {}),
+    )
+    for entry in _TABLE["restriction"]
+)  # fmt: skip
+_SHARED = ("masses", "stiffnesses", "dampings", "rest_lengths")
+
+
+def _first_for_all(name: str, inputs: Mapping[str, Any]) -> Any:
+    return np.resize(inputs[name][:1], len(inputs[name]))
+
+
+# What a solver that does not take an input sees in its place, given all inputs.
+_REPLACEMENTS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
+    "parents": lambda inputs: np.arange(-1, len(inputs["parents"]) - 1),
+    "effector": lambda inputs: len(inputs["parents"]) - 1,
+    "gravity": lambda inputs: inputs["gravity"] * [0.0, 1.0, 0.0],
+    "pinned": lambda inputs: inputs["pinned"][:0],
+    "rest_positions": lambda inputs: inputs["positions"],
+    "previous_positions": lambda inputs: inputs["positions"] - inputs["h"] * inputs["velocities"],
+    **{name: partial(_first_for_all, name) for name in _SHARED},
+}
+# Inputs that are sent only if the greeting asks for them.
+_ADDED = ("rest_positions", "previous_positions")
+
+
+def inferred(
+    contestant: Contestant, report: TaskReport, judge: Callable[[Greeting], TaskReport]
+) -> TaskReport:
+    """Return the report on what a solver takes, the same report if it takes all or is wrong in it.
+
+    `judge` returns the report by another greeting. A report on a restricted solver says so in its
+    assumptions, and keeps the faults that explain the other answers.
+    """
+    greeting = contestant.greeting
+    if report.verdict <= Verdict.RIGHT_EXCEPT or greeting.system.continues:
+        return report
+    evidence = [(r, why) for r in RESTRICTIONS if (why := _evidence(contestant, report, r))]
+    if not evidence:
+        return report
+    best = judge(restricted(greeting, evidence))
+    if best.verdict > Verdict.RIGHT_EXCEPT and _share(best) <= _share(report):
+        return report
+    for item in tuple(evidence) if best.verdict <= Verdict.RIGHT_EXCEPT else ():
+        fewer = [other for other in evidence if other is not item]
+        if fewer and (trial := judge(restricted(greeting, fewer))).verdict <= Verdict.RIGHT_EXCEPT:
+            evidence, best = fewer, trial
+    return _restricted_report(report, best, evidence)
+
+
+def restricted(greeting: Greeting, evidence: Evidence) -> Greeting:
+    """Return a greeting that declares restrictions as well."""
+    fields = _fields(evidence)
+    system = msgspec.structs.asdict(greeting.system) | fields.pop("system", {})
+    return msgspec.structs.replace(greeting, system=System(**system), **fields)
+
+
+def _fields(evidence: Evidence) -> dict[str, Any]:
+    """Return the fields of a greeting that declare restrictions."""
+    fields: dict[str, Any] = {}
+    for restriction, _ in evidence:
+        for name, field in restriction.greeting.items():
+            fields[name] = {**fields.get(name, {}), **field} if name == "system" else field
+    return fields
+
+
+def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence) -> TaskReport:
+    """Return the report on a restricted solver with what it assumes, and the faults elsewhere."""
+    notes = [
+        sentence("{about}: {why}.", about=restriction.about, why=why)
+        for restriction, why in evidence
+    ]
+    declaration = json.dumps(_fields(evidence))[1:-1]
+    notes.append(sentence("Declare it with {declaration}.", declaration=declaration))
+    if best.verdict <= Verdict.RIGHT_EXCEPT and report.diagnosis.explained:
+        explanations = tuple(
+            replace(found, sentence=sentence("Of other requests: {what}", what=found.sentence))
+            for found in report.diagnosis.explanations
+        )
+        best = replace(best, diagnosis=replace(best.diagnosis, explanations=explanations))
+    return replace(best, assumptions=(*best.assumptions, *notes))
+
+
+def _share(report: TaskReport) -> float:
+    """Return the share of the answers that the best explanation reproduces."""
+    explanations: Sequence[Explanation] = report.diagnosis.explanations
+    return max((explanation.share for explanation in explanations), default=0.0)
+
+
+def _evidence(
+    contestant: Contestant, report: TaskReport, restriction: Restriction
+) -> Sentence | None:
+    """Return how answers show that a solver does not take an input, None if they do not."""
+    answers = [j.answer.values for j in report.judgements if isinstance(j.answer, Answer)]
+    names = [field.name for field in TASKS[report.task].inputs]
+    if restriction.input in _REPLACEMENTS:
+        is_input = restriction.input in names
+        return _unchanged(contestant, report, restriction) if is_input else None
+    if restriction.input == "local_rotations":
+        are_points = bool(answers) and all("local_rotations" not in values for values in answers)
+        return restriction.sentence if "target" in names and are_points else None
+    if not {"offsets", "positions"} & set(names):
+        return None
+    if not answers:
+        return UNRELATED
+    cases = [j.case for j in report.judgements if isinstance(j.answer, Answer)]
+    return restriction.sentence if all(map(_is_flat, cases, answers)) else None
+
+
+def _is_flat(case: Case, outputs: Mapping[str, Any]) -> bool:
+    """Return whether answered vectors have z = 0, one z or z as it was; rotations are about z."""
+    before = case.inputs["positions" if "positions" in case.inputs else "offsets"][:, 2]
+    vectors = [np.asarray(x)[..., 2] for x in outputs.values() if np.shape(x)[-1:] == (3,)]
+    rotations = [np.asarray(x) for x in outputs.values() if np.shape(x)[-1:] == (4,)]
+    is_flat = all((z == 0.0).all() or (z == before).all() or np.ptp(z) == 0.0 for z in vectors)
+    if not vectors:
+        return bool(rotations) and not any(q[..., 1:3].any() for q in rotations)
+    return is_flat
+
+
+def _unchanged(
+    contestant: Contestant, report: TaskReport, restriction: Restriction
+) -> Sentence | None:
+    """Return how an input does not change answers, None if it does; the other inputs are plain."""
+    name, names = restriction.input, {field.name for field in TASKS[report.task].inputs}
+    pairs = []
+    for case in sorted((j.case for j in report.judgements), key=lambda case: -case.size):
+        plain = _plain(case, names)
+        full = {key: value for key, value in plain.items() if key != name or name not in _ADDED}
+        full |= {name: case.inputs[name]} if name in case.inputs else {}
+        if largest_gap(full.get(name, np.nan), plain.get(name, np.nan)) != 0.0:
+            pairs.append((replace(case, inputs=plain), replace(case, inputs=full)))
+    reason = None
+    for plain_case, full_case in pairs[:TRIALS]:
+        answer = contestant.answer(plain_case)
+        reason = _reason(answer, contestant.answer(full_case), restriction)
+        if reason is None:
+            return None
+    return reason
+
+
+def _plain(case: Case, names: set[str]) -> dict[str, Any]:
+    """Return a request without the inputs that some solvers do not take."""
+    inputs = dict(case.inputs)
+    for name, replacement in _REPLACEMENTS.items():
+        if name in names:
+            inputs[name] = replacement(case.inputs)
+    return inputs
+
+
+def _reason(
+    plain: Answer | Failure, full: Answer | Failure, restriction: Restriction
+) -> Sentence | None:
+    """Return how two answers show that an input is not taken."""
+    if not isinstance(plain, Answer):
+        return None
+    if not isinstance(full, Answer):
+        return UNRELATED
+    is_added = restriction.input in _ADDED
+    return restriction.sentence if _are_same(plain, full) and not is_added else None
+
+
+def _are_same(first: Answer, second: Answer) -> bool:
+    names = first.values.keys()
+    return names == second.values.keys() and all(
+        largest_gap(first.values[name], second.values[name]) <= SAME for name in names
+    )
+
+
+def methods_of(contestant: Contestant, cases: Sequence[Case]) -> tuple[str, ...]:
+    """Return the methods of inverse kinematics that a solver declares, or that its answers show.
+
+    Methods show where an answer to one of the cases differs by the request's method, or only comes
+    if it names one.
+    """
+    declared = contestant.greeting.methods
+    for case in cases if declared == ("",) else ():
+        answers = {
+            method: contestant.answer(replace(case, inputs={**case.inputs, "method": method}))
+            for method in ("", *METHODS)
+        }
+        offered = {m: answer for m, answer in answers.items() if isinstance(answer, Answer)}
+        default, named = offered.pop("", None), list(offered.values())
+        if default is None and named:
+            return tuple(offered)
+        if len(named) == len(METHODS) and not _are_same(*named):
+            is_either = default and any(_are_same(default, answer) for answer in named)
+            return METHODS if is_either else declared
+    return declared
