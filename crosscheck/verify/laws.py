@@ -93,14 +93,17 @@ def judge_case(
 
 
 def equal_answers(exchange: Exchange, allowed: float | Mapping[str, float]) -> Finding:
-    """Return how far two answers to a request differ, in the worst of the outputs."""
+    """Return how far two answers to a request differ, in the worst of the outputs.
+
+    NaN equals NaN, of which no difference is allowed.
+    """
     answer, repeat = exchange.answer, exchange.repeat
     if not isinstance(answer, Answer) or not isinstance(repeat, Answer):
         return finding("equal answers, none")
     bounds = allowed if isinstance(allowed, Mapping) else dict.fromkeys(answer.values, allowed)
     findings = [
-        finding("equal answers", largest_gap(output, repeat.values.get(name)), bounds[name],
-                output=name)
+        finding("equal answers", largest_gap(output, repeat.values.get(name)),
+                float(np.nan_to_num(bounds[name])), output=name)
         for name, output in answer.values.items()
         if name in bounds
     ]  # fmt: skip
@@ -116,8 +119,19 @@ def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
     return tuple(Sentence(entry["sentence"], {}) for entry in hints)
 
 
+def laws_that_hold(judgements: Sequence[CaseJudgement]) -> Sentence:
+    """Return the laws that no answer breaks."""
+    verdicts: dict[str, Verdict] = {}
+    for found in chain.from_iterable(judgement.findings for judgement in judgements):
+        verdicts[found.law] = max(found.verdict, verdicts.get(found.law, Verdict.RIGHT))
+    names = ", ".join(law for law, verdict in verdicts.items() if not verdict)
+    return sentence("Laws that hold in every case: {laws}.", laws=names or "–")
+
+
 def _remark(remark: Sentence) -> Finding:
     """Return the finding of an oddity; a changed skeleton spoils every later request."""
     spoils = remark.values.get("name") in ("offsets", "parents")
-    law, verdict = ("untouched inputs", Verdict.WRONG) if spoils else ("remarks", Verdict.RIGHT_BUT)
+    law, verdict = (
+        ("untouched inputs", Verdict.WRONG) if spoils else ("remarks", Verdict.RIGHT_EXCEPT)
+    )
     return Finding(law, verdict, 1.0, 0.0, "", remark)

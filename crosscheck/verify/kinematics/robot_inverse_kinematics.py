@@ -17,7 +17,7 @@ from ..explain import either
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from ..sentence import Sentence
+from ..sentence import Sentence, with_code
 from . import robot_models, rounding
 from .faults import TABLE
 from .report import report
@@ -41,6 +41,7 @@ class Misreading(NamedTuple):
     misread: Callable[[Inputs], Inputs] = dict  # returns the inputs with another meaning
     scale: float = 1.0  # of the coordinates of hinges, in radians
     relative: bool = False  # whether coordinates count from the start
+    reversed: bool = False  # whether the last joint comes first
 
     def read(self, inputs: Inputs) -> Inputs:
         """Return the inputs as the solver understands them."""
@@ -48,13 +49,15 @@ class Misreading(NamedTuple):
 
     def coordinates(self, inputs: Inputs, q: FloatArray) -> FloatArray:
         """Return the coordinates that an answer q stands for."""
+        q = q[..., ::-1] if self.reversed else q
         scaled = np.where(inputs["slides"], q, self.scale * q)
         return inputs["start"] + scaled if self.relative else scaled
 
     def answer(self, inputs: Inputs, q: FloatArray) -> FloatArray:
         """Return the answer that stands for coordinates q."""
         scaled = np.where(inputs["slides"], q, q / self.scale)
-        return scaled - inputs["start"] if self.relative else scaled
+        answer = scaled - inputs["start"] if self.relative else scaled
+        return answer[::-1] if self.reversed else answer
 
 
 # The inputs that a fault reads otherwise.
@@ -66,13 +69,15 @@ MISREAD: Mapping[str, Callable[[Inputs], Inputs]] = {
     "axes of the parent": lambda inputs: {
         "axes": rotation.rotate(rotation.conjugate(inputs["orientations"]), inputs["axes"])
     },
-    "scalar last": lambda inputs: {"target_rotation": np.roll(inputs["target_rotation"], 1)},
+    "scalar last": lambda inputs: {
+        "target_rotation": np.roll(inputs["target_rotation"], 1, axis=-1)
+    },
     POSITION_ONLY: lambda inputs: {"target_rotation": None},
 }
 FAULTS = {
     key: Misreading(
-        Sentence(entry["sentence"], {}), MISREAD.get(key, dict), entry.get("scale", 1.0),
-        entry.get("relative", False),
+        with_code(entry["code"], Sentence(entry["sentence"], {})), MISREAD.get(key, dict),
+        entry.get("scale", 1.0), entry.get("relative", False), entry.get("reversed", False),
     )
     for key, entry in TABLE["robots"].items()
 }  # fmt: skip
@@ -106,7 +111,12 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
     joint = int(np.argmax(excess))
     largest = float(np.abs([case.inputs["lower"], case.inputs["upper"]]).max())
     bound = rounding.ROUNDINGS_A_JOINT * greeting.epsilon * largest
-    return finding("limits kept", excess[joint], bound, index=joint, value=float(q[joint]))
+    lower, upper = case.inputs["lower"][joint], case.inputs["upper"][joint]
+    turns = round(float(q[joint] - 0.5 * (lower + upper)) / (2.0 * np.pi))
+    angle = float(q[joint]) - turns * 2.0 * np.pi
+    is_wrappable = not case.inputs["slides"][joint] and lower - bound <= angle <= upper + bound
+    key = "limits kept, not wrapped" if is_wrappable else "limits kept"
+    return finding(key, excess[joint], bound, index=joint, value=float(q[joint]), angle=angle)
 
 
 def _target_laws(
@@ -118,7 +128,7 @@ def _target_laws(
     bound = judgement.tolerance + rounding.positions(greeting.epsilon, joints, size)
     angle_bound = judgement.tolerance_rotation + rounding.rotations(greeting.epsilon, joints)
     if case.family != BEYOND:
-        verdict = Verdict.RIGHT_BUT if case.family == ANYWHERE else None
+        verdict = Verdict.RIGHT_EXCEPT if case.family == ANYWHERE else None
         yield finding("target reached", distance, bound, verdict=verdict)
         yield finding("rotation reached", angle, angle_bound, verdict=verdict)
     # The larger of both errors, in multiples of its bound.

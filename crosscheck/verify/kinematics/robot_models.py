@@ -55,9 +55,14 @@ def mechanism(inputs: Mapping[str, Any]) -> Articulation:
 
 
 def tool_pose(inputs: Mapping[str, Any], q: FloatArray) -> Pose:
-    """Return the tool's position [m], (3,), and rotation, (4,), at coordinates q."""
-    pose = forward_kinematics(mechanism(inputs), q)
-    return Pose(pose.positions[-1], pose.rotations[-1])
+    """Return the tool's position [m], (..., 3), and rotation, (..., 4), at coordinates q."""
+    return tool_at(mechanism(inputs), q)
+
+
+def tool_at(robot: Articulation, q: FloatArray) -> Pose:
+    """Return the same of a `mechanism`."""
+    pose = forward_kinematics(robot, q)
+    return Pose(pose.positions[..., -1, :], pose.rotations[..., -1, :])
 
 
 def target_of(inputs: Mapping[str, Any]) -> Target:
@@ -125,7 +130,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     rng = np.random.default_rng([_SEED, seed])
     return [
         case
-        for name, robot in _robots(rng).items()
+        for name, robot in robots(rng).items()
         if suits(robot["parents"], greeting)
         for number in range(3 if thorough else 1)
         for case in _cases_of(f"{name}, pose {number + 1}", robot, rng, greeting)
@@ -161,9 +166,10 @@ def _cases_of(
         yield Case(f"{name}, {family}", TASK, inputs, family, about, facts={"size": size})
 
 
-def _robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
-    robots = {name: _robot(**entry) for name, entry in tomllib.loads(_TEXT).items()}
-    return robots | {
+def robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
+    """Return the robots of `robots.toml`, and three with random frames and axes, by name."""
+    tabulated = {name: _robot(**entry) for name, entry in tomllib.loads(_TEXT).items()}
+    return tabulated | {
         f"seven hinges in rotated frames {i}": _random_frames(rng) for i in range(1, 4)
     }
 

@@ -1,0 +1,208 @@
+"""Motions of a robot's tool, as cases: along a curve, in laps, across the boundary of the reach."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.reference import Target
+from plumbob.reference.arguments import BoolArray, FloatArray
+from plumbob.reference.jacobians import jacobian
+from plumbob.reference.skeleton import Pose
+from plumbob.reference.tracking import track
+
+from ..case import Case
+from ..greeting import Greeting
+from ..sentence import Sentence
+from .robot_models import TOLERANCES, mechanism, robots, tool_pose, urdf
+from .skeletons import suits
+
+TASK = "robot_track"
+CURVE, FLIPPED, STEPS = "curve", "opposite quaternions", "single steps"
+BOUNDARY = "boundary of the reach"
+FRAMES, ITERATIONS, H = 24, 40, 0.02
+# Angles of the robot of seven hinges, bent so that no singular value of its Jacobian is small.
+BENT = np.array([0.3, -0.6, 0.2, 1.2, -0.3, 0.9, 0.4])
+# The last joint of this robot may rotate so far [rad]: further than half a turn.
+WRIST = 5.0
+# How far a target goes along a ray from the bent arm; a sixth of a metre of it is beyond reach [m].
+EXCURSION = 0.3
+DRAWS = 20
+# The reference moves no joint farther in a frame of an easy motion [rad]; beyond reach it goes far.
+EASY = 2.0
+# The least singular value of the other joints' Jacobian that lets them do without a joint [m].
+SPARE = 0.1
+_SEED = 1961
+_TABLE = tomllib.loads(Path(__file__).with_name("motions.toml").read_text(encoding="utf-8"))
+
+
+class ToolMotion(NamedTuple):
+    """Targets of a tool, to be followed from a start."""
+
+    start: FloatArray  # (joint,)
+    tool: Pose  # in each frame, without the frames of rest
+    upper: FloatArray | None = None  # limits that are tighter than the robot's
+    is_reachable: BoolArray | bool = True  # in each frame
+
+
+def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
+    """Return motions of robots of seven hinges, with axes along their frames' and with others."""
+    rng = np.random.default_rng([_SEED, seed])
+    collection = robots(rng)
+    arm, twisted = collection["seven hinges"], collection["seven hinges in rotated frames 1"]
+    arm["upper"][-1], arm["lower"][-1] = WRIST, -WRIST
+    motions = []
+    for number in range(1, 4 if thorough else 2):
+        q = loop(rng.uniform(-0.6, 0.6, 7), rng)
+        curve = ToolMotion(q[0], tool_pose(twisted, q))
+        motions += [(f"rotated frames {number}", twisted, {CURVE: curve, STEPS: curve})]
+        middle = BENT + rng.uniform(-0.1, 0.1, 7)
+        motions += [(f"seven hinges {number}", arm, _motions(arm, middle, rng))]
+    return [
+        _case(name, family, arm, motion, greeting)
+        for name, arm, families in motions
+        for family, motion in families.items()
+        if suits(arm["parents"], greeting)
+        and (greeting.velocity_limits or "velocity_limit" not in _TABLE[family])
+    ]
+
+
+def _motions(
+    arm: Mapping[str, Any], middle: FloatArray, rng: np.random.Generator
+) -> dict[str, ToolMotion]:
+    """Return the motions of a robot about a configuration, by the names in `motions.toml`."""
+    q = loop(middle, rng)
+    tool, start = tool_pose(arm, q), q[0]
+    signs = np.where(np.arange(FRAMES) // 4 % 2, -1.0, 1.0)[:, None]
+    jump = np.stack([start, np.clip(middle + rng.uniform(-0.4, 0.4, 7), -2.0, 2.0)])
+    beyond, wrist, elbow = start.copy(), np.tile(start, (FRAMES, 1)), np.tile(start, (FRAMES, 1))
+    beyond[1] = arm["lower"][1] - 0.3
+    wrist[:, -1] += np.linspace(0.0, 4.0, FRAMES)
+    elbow[:, 3] = np.linspace(start[3], -start[3], FRAMES)
+    few = ToolMotion(start, Pose(*(part[:8] for part in tool)))
+    leap = ToolMotion(start, tool_pose(arm, jump))
+    return {
+        CURVE: ToolMotion(start, tool),
+        FLIPPED: ToolMotion(start, tool._replace(rotations=signs * tool.rotations)),
+        STEPS: ToolMotion(start, tool),
+        "long time step": few,
+        "rest": few,
+        "jump": leap,
+        "jump, limited speeds": leap,
+        "laps": ToolMotion(start, Pose(*(np.tile(part, (3, 1)) for part in tool))),
+        "start beyond a limit": ToolMotion(beyond, tool),
+        "more than half a turn": ToolMotion(start, tool_pose(arm, wrist)),
+        "singularity": ToolMotion(start, tool_pose(arm, elbow)),
+        BOUNDARY: _excursion(arm, rng),
+        "at a limit": _limited(arm, rng),
+    }
+
+
+def loop(middle: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return joint angles on a small closed curve through a configuration, (frame, joint)."""
+    u, w = 0.25 * rng.uniform(-1.0, 1.0, (2, len(middle)))
+    t = 2.0 * np.pi * np.arange(FRAMES)[:, None] / FRAMES
+    return middle + np.sin(t) * u + (1.0 - np.cos(t)) * w
+
+
+def _excursion(arm: Mapping[str, Any], rng: np.random.Generator) -> ToolMotion:
+    """Return a motion along a ray from the shoulder, beyond reach and back.
+
+    The tool points along the ray, so that the straight arm has its rotation as well. Coming back,
+    the arm may bend otherwise, and meet a limit: a motion is drawn where the reference does not.
+    """
+    return _easiest([_draw_excursion(arm, rng) for _ in range(DRAWS)], arm)
+
+
+def _easiest(motions: Sequence[ToolMotion], arm: Mapping[str, Any]) -> ToolMotion:
+    """Return the first easy motion, or the last."""
+    return next((motion for motion in motions if _is_easy(arm, motion)), motions[-1])
+
+
+def _draw_excursion(arm: Mapping[str, Any], rng: np.random.Generator) -> ToolMotion:
+    q = np.array([0.3, 0.0, 0.0, 1.2, 0.0, -0.6, 0.4])
+    q += rng.uniform(-1.0, 1.0, 7) * [0.2, 0.02, 0.02, 0.02, 0.02, 0.02, 0.2]
+    tool = tool_pose(arm, q)
+    direction = tool.positions - arm["origins"][:2].sum(axis=0)
+    direction /= np.linalg.norm(direction)
+    distances = EXCURSION * np.sin(np.linspace(0.0, np.pi, 2 * FRAMES))
+    positions = tool.positions + distances[:, None] * direction
+    rotations = np.tile(tool.rotations, (len(positions), 1))
+    return ToolMotion(q, Pose(positions, rotations), is_reachable=distances < 1e-9)
+
+
+def _is_easy(arm: Mapping[str, Any], motion: ToolMotion) -> bool:
+    """Return whether two of the reference's solvers end on the last target and do not jump."""
+    upper = arm["upper"] if motion.upper is None else motion.upper
+    for solver in ("levenberg_marquardt", "damped_least_squares"):
+        q = followed({**arm, "upper": upper}, motion.start, motion.tool, solver)
+        error = np.linalg.norm(tool_pose(arm, q[-1]).positions - motion.tool.positions[-1])
+        if error > 1e-3 or np.abs(np.diff(q, axis=0)).max() > EASY:
+            return False
+    return True
+
+
+def _limited(arm: Mapping[str, Any], rng: np.random.Generator) -> ToolMotion:
+    """Return a motion that leads a joint to a limit, and that the other joints can do alone."""
+    return _easiest([_draw_limited(arm, rng) for _ in range(DRAWS)], arm)
+
+
+def _draw_limited(arm: Mapping[str, Any], rng: np.random.Generator) -> ToolMotion:
+    q = loop(BENT + rng.uniform(-0.2, 0.2, 7), rng)
+    tool, start, upper = tool_pose(arm, q), q[0], arm["upper"].copy()
+    free = followed(arm, start, tool) - start
+    joint = max(range(7), key=lambda j: (_is_spare(arm, q, j), free[:, j].max()))
+    frame = int(np.argmax(free[:, joint]))
+    upper[joint] = start[joint] + 0.1 * free[frame, joint]
+    return ToolMotion(start, Pose(*(part[: frame + 1] for part in tool)), upper)
+
+
+def _is_spare(arm: Mapping[str, Any], q: FloatArray, joint: int) -> bool:
+    """Return whether the other joints alone move the tool in every direction."""
+    J = np.delete(jacobian(mechanism(arm), q, -1), joint, axis=-1)
+    return bool(np.linalg.svd(J, compute_uv=False).min() > SPARE)
+
+
+def followed(
+    inputs: Mapping[str, Any], start: FloatArray, tool: Pose, solver: str = "levenberg_marquardt"
+) -> FloatArray:
+    """Return the reference's coordinates in each frame, each from the one before."""
+    targets = Target(tool.positions, tool.rotations, -1)
+    return track(
+        mechanism(inputs), targets, solver, start, tolerance=1e-9, tolerance_rotation=1e-9,
+        max_iterations=ITERATIONS,
+    ).coordinates  # fmt: skip
+
+
+def _case(
+    name: str, family: str, arm: Mapping[str, Any], motion: ToolMotion, greeting: Greeting
+) -> Case:
+    entry = _TABLE[family]
+    robot = {**arm, "upper": arm["upper"] if motion.upper is None else motion.upper}
+    reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
+    tolerance, rest = TOLERANCES[greeting.precision], entry.get("rest", 0)
+    positions, rotations = (
+        np.concatenate([part, np.repeat(part[-1:], rest, axis=0)]) for part in motion.tool
+    )
+    inputs = {
+        **robot,
+        "start": motion.start,
+        "target_positions": positions,
+        "target_rotations": rotations,
+        "h": entry.get("h", H),
+        "tolerance": tolerance * max(reach, 1.0),
+        "tolerance_rotation": tolerance,
+        "max_iterations": entry.get("iterations", ITERATIONS),
+        "urdf": urdf(robot),
+    }
+    if "velocity_limit" in entry:
+        inputs["velocity_limits"] = np.full(len(motion.start), entry["velocity_limit"])
+    is_reachable = np.ones(len(positions), dtype=bool)
+    is_reachable[: len(motion.tool.positions)] = motion.is_reachable
+    facts = {"size": reach, "reachable": is_reachable, "rest": rest, "laps": entry.get("laps", 1)}
+    # Coming back from beyond reach there are several configurations.
+    facts["certain"] = FRAMES if family == BOUNDARY else len(positions)
+    return Case(f"{name}, {family}", TASK, inputs, family, Sentence(entry["about"], {}),
+                facts=facts)  # fmt: skip
