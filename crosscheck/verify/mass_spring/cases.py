@@ -22,6 +22,10 @@ from .faults import read_table
 # In place of the mass 1, which hides what is divided by it.
 ONE_MASS = 0.8
 MOTION_STEPS = 6
+# Families without sense in a plane: turned about an axis of it, or free to buckle within it.
+SPATIAL = ("symmetry", "compression")
+# Scenes of more particles are cloths, which lie level.
+MOST_IN_TRIANGLES = 5
 GRAVITY = np.array([0.0, -9.81, 0.0])
 _TABLE = read_table("scenes.toml")
 
@@ -57,9 +61,12 @@ class SpringScene:
 def task_cases(task: str, greeting: Greeting, seed: int, thorough: bool) -> list[Case]:
     """Return the cases of a task that suit the solver."""
     system = greeting.system
+    drawn = scenes(seed, thorough)
+    if greeting.planar:
+        drawn = [_in_plane(scene) for scene in drawn if scene.family not in SPATIAL]
     suitable = [
         _case(task, scene, system)
-        for scene in scenes(seed, thorough)
+        for scene in drawn
         if task in (scene.tasks or TASKS) and all(_has(system, need) for need in scene.needs)
     ]
     names = {"", *(case.name for case in suitable)}
@@ -73,22 +80,37 @@ def trace_of(family: str) -> Sentence:
 
 
 def _has(system: System, need: str) -> bool:
-    return system.gravity == "vector" if need == "gravity" else bool(getattr(system, need))
+    return bool(getattr(system, need))
+
+
+def _in_plane(scene: SpringScene) -> SpringScene:
+    """Return a scene projected onto the plane z = 0, a level cloth set upright before."""
+    axes = [0, 2, 1] if len(scene.rest) > MOST_IN_TRIANGLES else [0, 1, 2]
+    keep = np.array([1.0, 1.0, 0.0])
+    return replace(
+        scene, rest=scene.rest[:, axes] * keep, positions=scene.positions[:, axes] * keep,
+        velocities=scene.velocities[:, axes] * keep, gravity=scene.gravity * keep,
+        external_forces=scene.external_forces * keep,
+    )  # fmt: skip
 
 
 def _case(task: str, scene: SpringScene, system: System) -> Case:
     """Return the scene as a request, with equal numbers where the solver takes a single number."""
     springs = np.asarray(scene.springs, dtype=np.int64).reshape(-1, 2)
     x, v, g = scene.positions, scene.velocities, scene.gravity
-    measured = system.rest_lengths == "measured" or isinstance(scene.rest_lengths, str)
+    lengths = scene.rest_lengths
+    if system.rest_lengths == "measured" or isinstance(lengths, str):
+        lengths = _lengths(scene.rest, springs)
+    if system.rest_lengths == "one":  # the least, so that nothing buckles
+        lengths = np.full(len(springs), np.min(lengths))
     values: dict[str, Any] = {
         "masses": np.full(len(x), ONE_MASS) if system.masses == "one" else scene.masses,
         "springs": springs,
-        "rest_lengths": _lengths(scene.rest, springs) if measured else scene.rest_lengths,
+        "rest_lengths": lengths,
         "stiffnesses": _shared(scene.stiffnesses, system.stiffnesses),
         "dampings": _shared(scene.dampings, system.dampings),
         "pinned": np.array(scene.pinned if system.pinned else (), dtype=np.int64),
-        "gravity": g if system.gravity == "vector" else np.array([0.0, -np.linalg.norm(g), 0.0]),
+        "gravity": g if system.gravity == "vector" else g * [0.0, 1.0, 0.0],
         "positions": x,
         "velocities": v,
         "h": scene.h,

@@ -12,14 +12,14 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ..sentence import Sentence
+from ..sentence import Sentence, with_code
 from .model import Integrator, StepModel, SystemMatrix
 from .problem import SpringProblem, frames
 
 # Aspects of a step in the order of the computation.
 ASPECTS = (
     "time", "inertia", "masses", "gravity", "springs", "damping", "damper", "integrator",
-    "matrix", "substeps", "pins", "velocity", "scaling",
+    "matrix", "substeps", "pins", "velocity", "scaling", "factorisation",
 )  # fmt: skip
 # No solver is searched for more faults at once.
 MAX_FAULTS = 3
@@ -32,7 +32,7 @@ class Option(NamedTuple):
 
     key: str  # its name in reports
     aspect: str  # what it is a choice of; a solver makes one choice for each aspect
-    sentence: Sentence  # what it does, and for a fault what to do instead
+    sentence: Sentence  # what it does, and for a fault its code and what to do instead
     change: Change | None = None  # returns the fields that it replaces in a problem
     fields: Mapping[str, Any] = {}  # the fields that it replaces in a model
     parts: tuple[float, ...] = ()  # factors of the kinetic, elastic and gravitational energy
@@ -60,7 +60,7 @@ def _first_for_all(p: SpringProblem, name: str) -> dict[str, Any]:
 
 # What an entry of faults.toml may hold.
 FIELDS = {
-    *("key", "sentence", "tasks", "parts", "rare", "each"),
+    *("code", "program", "lines", "example", "key", "sentence", "tasks", "parts", "rare", "each"),
     *("scale", "set", "model", "integrator", "matrix", "value"),
 }
 # Faults that are no fixed factors or fields.
@@ -90,6 +90,18 @@ CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
     "damping times stiffness": lambda p: {"dampings": p.dampings * p.stiffnesses},
     "damping with h": lambda p: {"dampings": p.h * p.dampings},
     "damping without h": lambda p: {"dampings": p.dampings / p.h},
+    "stiffness and rest length swapped": lambda p: {
+        "stiffnesses": p.rest_lengths,
+        "rest_lengths": p.stiffnesses,
+    },
+    "stiffness and damping swapped": lambda p: {
+        "stiffnesses": p.dampings,
+        "dampings": p.stiffnesses,
+    },
+    "mass and h swapped": lambda p: (
+        _with_masses(p, np.full(p.count, p.h)) | {"h": float(p.masses[0])}
+    ),
+    "pins as a mask": lambda p: {"pinned": np.flatnonzero(p.pinned[: p.count])},
     "kinetic without mass": lambda p: {"masses": np.ones(p.count)},
 }
 
@@ -118,6 +130,7 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
         name = " ".join(map(str, fields.get("integrator", ()))) or f"{aspect} {entry.get('value')}"
         key = entry.get("key", name).format(**values)
         message, parts = Sentence(entry["sentence"], values), tuple(entry.get("parts", ()))
+        message = with_code(entry["code"], message) if "code" in entry else message
         rare = entry.get("rare", False)
         rare = any(x in rare for x in values.values()) if isinstance(rare, list) else rare
         yield Option(key, aspect, message, _change(entry, values), fields, parts, rare)

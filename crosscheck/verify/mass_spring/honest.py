@@ -107,6 +107,10 @@ def compatible(options: Mapping[str, Option]) -> bool:
     method = fields["integrator"].method
     if method in EXPLICIT and ("matrix" in fields or fields.get("time") == "before"):
         return False
+    matrix = fields.get("matrix")
+    is_linearised = fields["integrator"][:3] == ("newton", "x_n", 1)
+    if matrix and not is_linearised and (matrix.on_right or matrix.inverse != "exact"):
+        return False
     if damper in SYMPLECTIC_DAMPERS and method != "symplectic":
         return False
     if damper and damper not in (EXPLICIT_DAMPERS if method in EXPLICIT else IMPLICIT_DAMPERS):

@@ -121,7 +121,7 @@ class StepContext:
 def _graded(error: float, size: float, allowed: float) -> Verdict:
     """Return the verdict on a relative error that is not right, for a size with its rounding."""
     gap = error * (size + allowed / SOLVED)
-    return Verdict.RIGHT_BUT if gap <= IMPRECISE * size + ROUNDED * allowed else Verdict.WRONG
+    return Verdict.RIGHT_EXCEPT if gap <= IMPRECISE * size + ROUNDED * allowed else Verdict.WRONG
 
 
 def pins(context: StepContext) -> Finding | None:
@@ -136,7 +136,7 @@ def pins(context: StepContext) -> Finding | None:
         expected = (context.expected["positions"] - p.positions)[..., p.pinned, :]
         tolerance += 2.0 * float(np.abs(expected).max())
     is_exact = context.model.pins in ("eliminated", "overwritten") and context.pins_declared
-    verdict = Verdict.RIGHT_BUT if worst <= tolerance and not is_exact else Verdict.WRONG
+    verdict = Verdict.RIGHT_EXCEPT if worst <= tolerance and not is_exact else Verdict.WRONG
     index = int(p.pinned[offsets.max(axis=0).argmax()])
     return finding("pins", worst, strict, verdict=verdict, index=index)
 

@@ -46,6 +46,10 @@ class SystemMatrix(NamedTuple):
     sign: float = 1.0
     stiffness: bool = True  # whether the springs' part has its factor k
     off_diagonal: float = 1.0  # factor of the entries off the diagonal
+    # how often its springs' part, times h v, is added to the right-hand side of one Newton step:
+    # 1 if a step for the change of velocity lacks h² K v there, 2 if that has the other sign
+    on_right: float = 0.0
+    inverse: str = "exact"  # or "first order": multiplied by 1 - h²/m K instead of solved
 
 
 class StepModel(NamedTuple):
@@ -68,6 +72,10 @@ class StepModel(NamedTuple):
     # divided among substeps; undivided; before: of the last request, in the matrix only; or a
     # number of seconds instead of h
     time: str | float = "divided"
+    # of a matrix that is not positive definite: LU; or Cholesky's, unchecked. Eigen's dense LLT
+    # stops at a pivot and solves with what it has (LLT); its SimplicialLLT does not solve, so that
+    # the unknown, a displacement or a change of velocity, stays zero or what memory held
+    factorisation: str = "LU"
 
     @property
     def pin_kind(self) -> str:
@@ -144,12 +152,29 @@ def _step(
     if model.time != "undivided":
         h /= model.substeps
     pins = x[p.pinned]
+    if model.substeps > 1 and _falls_freely(p, model):
+        return _free_fall(Substep(p, model, x, v, h))
     for _ in range(model.substeps):
         x, v = substep(Substep(p, model, x, v, h))
     if model.pins == "at_the_end":
         x, v = x.copy(), v.copy()
         x[p.pinned], v[p.pinned] = pins, 0.0
     return x, v
+
+
+def _falls_freely(p: SpringProblem, model: StepModel) -> bool:
+    """Return whether the forces of all substeps of an explicit method are the same."""
+    usual = (model.velocity, model.scaling) == ("separate", 1.0)
+    coupled = p.stiff or p.damped or p.pinned.size
+    return bool(usual and not coupled and model.integrator.method in SHARES)
+
+
+def _free_fall(start: Substep) -> tuple[FloatArray, FloatArray]:
+    """Return the state after all substeps at once."""
+    p, model, x, v, h = start
+    n, a = model.substeps, accelerations(p, x, v)
+    parts = n * (n - 1) / 2 + n * SHARES[model.integrator.method]
+    return x + n * h * v + parts * h * h * a, v + n * h * a
 
 
 def substep(start: Substep) -> tuple[FloatArray, FloatArray]:
@@ -168,6 +193,13 @@ def substep(start: Substep) -> tuple[FloatArray, FloatArray]:
         x, v = x.copy(), v.copy()
         x[p.pinned], v[p.pinned] = x_n[p.pinned], 0.0
     return x, v
+
+
+def first_equation(p: SpringProblem, model: StepModel) -> "StepEquation":
+    """Return the equation of the first substep."""
+    p = _with_pins(p, model)
+    h = p.h / model.substeps
+    return StepEquation(Substep(p, model, p.positions, p.velocities, h))
 
 
 def _explicit_rates(start: Substep, x: FloatArray, v: FloatArray) -> FloatArray:
@@ -194,12 +226,15 @@ def _explicit_rates(start: Substep, x: FloatArray, v: FloatArray) -> FloatArray:
     return solution.reshape(a.shape)
 
 
+# The share of the new velocity, beside the old one, that moves positions.
+SHARES = {"explicit": 0.0, "taylor": 0.5, "symplectic": 1.0}
+
+
 def _by_one_rate(start: Substep) -> tuple[FloatArray, FloatArray]:
     """Step by the acceleration at the start: explicit or symplectic Euler, or x + h v + h²/2 a."""
     _, model, x, v, h = start
     a = _explicit_rates(start, x, v)
-    share = {"explicit": 0.0, "taylor": 0.5, "symplectic": 1.0}[model.integrator.method]
-    return x + h * (v + share * h * a), v + h * a
+    return x + h * (v + SHARES[model.integrator.method] * h * a), v + h * a
 
 
 def _runge_kutta(start: Substep) -> tuple[FloatArray, FloatArray]:
@@ -371,8 +406,62 @@ class StepEquation:
         free = np.repeat(self.free, len(A) // len(right))
         solution = np.zeros_like(right).reshape(len(A), -1)
         part = A if free.all() else A[np.ix_(free, free)]
+        kind = self.start.model.factorisation
+        if kind != "LU" and not is_positive_definite(part):
+            if kind == "change of velocity":
+                return np.where(self.free[:, None], self.start.h * self.start.v, 0.0)
+            if kind == "displacement":
+                return np.zeros_like(right)
+            L = stopped_cholesky(part)
+            part = L @ L.T
         solution[free] = np.linalg.solve(part, right.reshape(len(A), -1)[free])
         return solution.reshape(right.shape)
+
+    def newton_step(self, x: FloatArray, base: FloatArray, kind: str) -> FloatArray:
+        """Return the displacement of an iteration with the Hessian of a base."""
+        A, right = self.matrix(base, kind), -self.gradient(x)
+        p, rule = self.start.p, self.start.model.matrix
+        M = np.repeat(p.masses, 3)
+        springs = A - np.diag(M)
+        if rule.on_right:
+            more = springs @ (self.start.h * self.start.v).ravel()
+            right = right + rule.on_right * more.reshape(right.shape)
+        if rule.inverse == "first order":
+            step = np.where(self.free[:, None], right / p.masses[:, None], 0.0)
+            change = (springs @ step.ravel() / M).reshape(step.shape)
+            return np.where(self.free[:, None], step - change, 0.0)
+        return self.solve(A, right)
+
+
+def is_positive_definite(A: FloatArray) -> bool:
+    """Return whether Cholesky's method factorises a symmetric matrix."""
+    try:
+        np.linalg.cholesky(A)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def stopped_cholesky(A: FloatArray) -> FloatArray:
+    """Return the lower triangle that Eigen's dense LLT leaves where a pivot is not positive.
+
+    Columns before that pivot, or their part within its block, are those of L; the others are still
+    of A, less what earlier blocks have taken off. Matrices below 32 rows are one block.
+    """
+    L, n = np.tril(A), len(A)
+    block = n if n < 32 else min(max(n // 8 // 16 * 16, 8), 128)
+    for first in range(0, n, block):
+        end = min(first + block, n)
+        for j in range(first, end):
+            row = L[j, first:j]
+            pivot = L[j, j] - row @ row
+            if pivot <= 0.0:
+                return L
+            L[j, j] = np.sqrt(pivot)
+            L[j + 1 : end, j] = (L[j + 1 : end, j] - L[j + 1 : end, first:j] @ row) / L[j, j]
+        L[end:, first:end] = np.linalg.solve(L[first:end, first:end], L[end:, first:end].T).T
+        L[end:, end:] -= np.tril(L[end:, first:end] @ L[end:, first:end].T)
+    return L
 
 
 # What a kind of Hessian makes of 1 - r/l, the share of the stiffness that acts across a spring.
@@ -410,8 +499,7 @@ def _implicit(equation: StepEquation) -> FloatArray:
 def _newton(equation: StepEquation, x: FloatArray, integrator: Integrator) -> FloatArray:
     for _ in range(integrator.iterations):
         base = equation.start.x if integrator.hessian == "frozen" else x
-        A = equation.matrix(base, integrator.hessian)
-        x = x - integrator.rate * equation.solve(A, equation.gradient(x))
+        x = x + integrator.rate * equation.newton_step(x, base, integrator.hessian)
     return x
 
 
@@ -464,12 +552,9 @@ def _shifted(equation: StepEquation, A: FloatArray) -> FloatArray:
     M = np.diag(np.repeat(equation.start.p.masses, 3))
     shift = 0.0
     while shift < 1e12:
-        try:
-            np.linalg.cholesky((A + shift * M)[free])
-        except np.linalg.LinAlgError:
-            shift = max(1e-2, 4.0 * shift)
-        else:
+        if is_positive_definite((A + shift * M)[free]):
             break
+        shift = max(1e-2, 4.0 * shift)
     return A + shift * M
 
 

@@ -1,26 +1,35 @@
 """Find the model of a solver by assuming choices in turn along the probes.
 
-Each probe adds an aspect to the probes before it. Choices are therefore refuted where
-they first matter, so that combinations of three among some hundred faults and as many honest models
-are found without trying the millions that there are.
+Each probe adds an aspect to the probes before it. A hypothesis makes a choice for each aspect that
+has mattered so far. Where no honest choice of the aspects that a probe adds reproduces the answer,
+single faults are assumed, then pairs of which one alone brings the answer nearer and the other
+moves it. So every fault answers for evidence of its own, and few of the millions of combinations
+are tried. All is tried in a fixed order, within a fixed amount of work, on every machine.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..contestant import Answer, Exchange
 from ..greeting import Step
+from ..judgement import LEAST_SHARE
 from .faults import ASPECTS, MAX_FAULTS, STEP_FAULTS, Option, apply
 from .honest import compatible, domains
 from .laws import SOLVED, Rounding, relative_gap, rounding
-from .model import Integrator, StepModel, predicted
+from .model import Integrator, StepModel, first_equation, predicted
 from .problem import SpringProblem
 
-# The number of combinations that are tried, in a fixed order, with no fault, one, two and three: a
-# few seconds each, for a solver that none explains. On all machines the same faults are named.
-COMBINATIONS = (5_000, 12_000, 12_000, 20_000)
+# The number of iterations and substeps that predictions with single faults take at one stage, and
+# those with pairs: some seconds each.
+WORK = 40_000
+# The number of hypotheses that are kept from one probe to the next, and of those to which a second
+# fault is added: the nearest.
+HYPOTHESES, NEAREST = 32, 40
+# The share of the evidence that may stay unexplained beside a fault.
+UNEXPLAINED = 0.25
 # Integrators with more iterations are not combined with faults.
 MAX_ITERATIONS = 10
 # Matrices that are singular without pins, where they predict nothing.
@@ -29,20 +38,36 @@ SINGULAR = ("matrix L", "matrix L without h²")
 OF_MASSES = (*SINGULAR, "matrix 2M+h²L")
 # Positions beyond this [m] come from dividing by zero; those of the probes are some metres.
 LARGEST = 1e4
-# Aspects that matter in any step; the others where there are springs, dampers, pins.
+# Aspects that matter in any step; the others where there are dampers or pins.
 ALWAYS = (
     "time", "inertia", "masses", "gravity", "integrator", "matrix", "substeps", "velocity",
-    "scaling",
+    "scaling", "springs",
 )  # fmt: skip
 FAULTY = frozenset(map(id, STEP_FAULTS))
+FACTORISATIONS = [fault for fault in STEP_FAULTS if fault.aspect == "factorisation"]
 
 # An option for each aspect. Where no spring has acted yet, "flight" stands for "integrator": the
 # first of those that move free particles alike.
 Choices = dict[str, Option]
 
 
+class SingleFault(NamedTuple):
+    """A fault added to a hypothesis that does not explain a stage."""
+
+    branch: Choices
+    aspect: str
+    option: Option
+    gap: float  # between the answer and the prediction with the fault
+    before: float  # without the fault
+
+    @property
+    def choices(self) -> Choices:
+        """The hypothesis with the fault."""
+        return self.branch | {self.aspect: self.option}
+
+
 class ModelMatch(NamedTuple):
-    """Choices that reproduce the answers to all probes."""
+    """Choices that reproduce the answers to the probes."""
 
     # one for each aspect that matters in a probe, in the order of the computation
     options: tuple[Option, ...]
@@ -69,8 +94,14 @@ class Probe(NamedTuple):
     def aspects(self) -> list[str]:
         """Return the aspects that matter, in the order in which they are chosen."""
         p = self.problem
-        more = {"springs": p.stiff, "damper": p.damped, "damping": p.damped, "pins": p.pinned.size}
+        more = {"damper": p.damped, "damping": p.damped, "pins": p.pinned.size}
         return [*ALWAYS, *(aspect for aspect, matters in more.items() if matters)]
+
+    def stages(self) -> list["Probe"]:
+        """Return the probe with the positions alone, on which fewer aspects act, then with all."""
+        if self.problem.steps or len(self.answers) < 2 or "positions" not in self.answers:
+            return [self]
+        return [self._replace(answers={"positions": self.answers["positions"]}), self]
 
 
 class ModelSearch:
@@ -79,6 +110,7 @@ class ModelSearch:
     def __init__(self, probes: Sequence[Probe], step: Step, epsilon: float) -> None:
         """Set up the domains of all choices."""
         self.probes, self.step, self.epsilon = probes, step, epsilon
+        self.stages = [stage for probe in probes for stage in probe.stages()]
         self.domains = domains(step)
         # the integrators that each one of the domain "flight" stands for
         self.classes: dict[Integrator, list[tuple[Option, int]]] = {}
@@ -95,98 +127,179 @@ class ModelSearch:
             *(["substeps"] if step.substeps is not None else []),
         ]
         self.prediction_count = 0  # number of predictions
-        self._misplaced: set[tuple[Any, ...]] = set()  # choices whose positions are wrong
+        self._work = 0.0  # iterations and substeps that they took
+        self._skipped: set[int] = set()  # stages that no hypothesis explains
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
-        self._explained: dict[tuple[Any, ...], bool | None] = {}
-        self._matched_keys: set[tuple[str, ...]] = set()  # faults that explain all probes
-        self._remaining = 0  # number of combinations that may still be tried
+        self._gaps: dict[tuple[Any, ...], float | None] = {}
 
     def run(self) -> list[ModelMatch]:
-        """Return the matches of all probes with the fewest faults, none if there are none."""
-        for budget in range(MAX_FAULTS + 1) if self.probes else ():
-            self._remaining = COMBINATIONS[budget]
-            matches = [m for m in self._explanations({}, 0, budget) if len(m.faults) == budget]
-            if matches:
-                return matches
-        return []
+        """Return the matches of the probes with the fewest faults, none if there are none."""
+        hypotheses = [Choices()]
+        for index in range(len(self.stages)):
+            is_hopeless = index - 1 in self._skipped and self._is_complete(index)
+            explaining = [] if is_hopeless else self._explaining(hypotheses, index)
+            if not explaining:
+                self._skipped.add(index)
+            if len(self._skipped) > UNEXPLAINED * (index + 1):
+                return []
+            hypotheses = explaining or hypotheses
+        matches = [self._match(self._needed(h)) for h in hypotheses if self._explains_enough(h)]
+        if self._skipped:
+            matches = [match for match in matches if match.faults]
+        fewest = min((len(match.faults) for match in matches), default=0)
+        first = {match.keys: match for match in reversed(matches) if len(match.faults) == fewest}
+        return list(reversed(first.values()))
 
-    def _explanations(self, choices: Choices, index: int, budget: int) -> Iterator[ModelMatch]:
-        """Yield the matches of the probes from an index on, given the choices made before."""
-        if index == len(self.probes):
-            if self._explains_enough(choices):
-                match = self._match(choices)
-                self._matched_keys.add(match.keys)
-                yield match
-            return
-        probe = self.probes[index]
-        aspects = probe.aspects()
-        if not probe.coupled and "integrator" not in choices:
-            aspects[aspects.index("integrator")] = "flight"
-        aspects = [aspect for aspect in aspects if aspect not in choices]
-        for extended in self._extensions(choices, aspects, budget):
-            if not self._remaining:
-                return
-            self._remaining -= 1
-            if not self._is_named(extended) and self._explains(extended, index) is not False:
-                yield from self._explanations(extended, index + 1, budget)
+    def _explaining(self, hypotheses: Sequence[Choices], index: int) -> list[Choices]:
+        """Return the hypotheses, extended by what a stage adds, that explain it, simplest first."""
+        branches = [branch for h in hypotheses for branch in self._branches(h, index)]
+        explaining = [branch for branch in branches if self._explains(branch, index)]
+        # Free flight alone does not tell some honest steps from others with a fault.
+        if not self._reproducing(explaining, index) or not self.stages[index].coupled:
+            failing = [branch for branch in branches if not self._explains(branch, index)]
+            singles = list(self._singles(failing, index))
+            explaining += [one.choices for one in singles if self._fits(one.choices, index)]
+            if not self._reproducing(explaining, index):
+                explaining += [
+                    pair for pair in self._pairs(singles, index) if self._fits(pair, index)
+                ]
+        unique = {frozenset(map(id, choices.values())): choices for choices in explaining}
+        ranked = sorted(unique.values(), key=lambda choices: self._rank(choices, index))
+        if not self._is_complete(index):
+            return ranked
+        reproducing = self._reproducing(ranked, index)
+        unpredicted = [choices for choices in ranked if self._gap(choices, index) is None]
+        return reproducing[:HYPOTHESES] + unpredicted[:HYPOTHESES]
 
-    def _is_named(self, choices: Choices) -> bool:
-        """Return whether the same faults explain all probes with other honest choices."""
-        if not self._matched_keys or "flight" in choices:
-            return False
-        return self._match(choices).keys in self._matched_keys
+    def _reproducing(self, hypotheses: Sequence[Choices], index: int) -> list[Choices]:
+        """Return the explaining hypotheses that do not merely predict nothing."""
+        return [choices for choices in hypotheses if self._gap(choices, index) is not None]
 
-    def _extensions(
-        self, choices: Choices, aspects: Sequence[str], budget: int
-    ) -> Iterator[Choices]:
-        """Yield the choices extended by options of more aspects, within a number of faults."""
-        remaining = budget - sum(self.costs[id(option)] for option in choices.values())
-        if remaining < 0 or not compatible(choices):
-            return
-        if not aspects:
-            yield choices
-            return
-        aspect, *later = aspects
-        domain = self.domains[aspect]
-        if aspect == "integrator" and "flight" in choices:
-            flight = choices["flight"]
-            domain, remaining = self.classes[flight.fields["integrator"]], budget
-            choices = {name: option for name, option in choices.items() if name != "flight"}
-        for option, cost in domain:
-            if cost <= remaining and not self._is_left_out(option, budget):
-                yield from self._extensions(choices | {aspect: option}, later, budget)
-
-    def _is_left_out(self, option: Option, budget: int) -> bool:
-        """Return whether a choice is not tried together with so many faults."""
+    def _is_complete(self, index: int) -> bool:
+        """Return whether a stage has all outputs of its probe."""
         return (
-            (budget > 0 and option.rare and option.aspect not in self.declared_aspects)
-            or (budget > 1 and self.costs[id(option)] > 0 and _takes_long(option))
-            or (budget > 2 and option.key in SINGULAR)
+            index + 1 == len(self.stages) or self.stages[index + 1].name != self.stages[index].name
         )
+
+    def _rank(self, choices: Choices, index: int) -> tuple[int, float]:
+        """Return the number of faults and the power of ten of the gap, which rounding leaves."""
+        gap = self._gap(choices, index) or 0.0
+        return self._cost(choices), float(np.round(np.log10(gap + 1e-12)))
+
+    def _branches(self, choices: Choices, index: int) -> Iterator[Choices]:
+        """Yield a hypothesis with each honest choice of the aspects that matter first here."""
+        stage, chosen = self.stages[index], {**choices}
+        flight = chosen.pop("flight", None) if stage.coupled else None
+        aspects = stage.aspects()
+        if not stage.coupled and "integrator" not in choices:
+            aspects[aspects.index("integrator")] = "flight"
+        aspects = [aspect for aspect in aspects if aspect not in chosen]
+        domains = []
+        for aspect in aspects:
+            domain, most = self.domains[aspect], 0
+            if aspect == "integrator" and flight is not None:
+                domain = self.classes[flight.fields["integrator"]]
+                most = self.costs[id(flight)]
+            domains.append([option for option, cost in domain if cost <= most])
+        for options in product(*domains):
+            branch = chosen | dict(zip(aspects, options, strict=True))
+            if compatible(branch) and not (self._cost(branch) and self._is_rare(branch)):
+                yield branch
+
+    def _singles(self, branches: Sequence[Choices], index: int) -> Iterator[SingleFault]:
+        """Yield what each single fault makes of each hypothesis that fails at a stage."""
+        limit = self._work + WORK
+        for branch in sorted(branches, key=_effort):
+            before = self._gap(branch, index) or 0.0
+            for aspect, option in self._faults(branch, index):
+                choices = branch | {aspect: option}
+                if self._work < limit and compatible(choices):
+                    gap = self._gap(choices, index) or 0.0
+                    if gap != before:
+                        yield SingleFault(branch, aspect, option, gap, before)
+
+    def _faults(self, branch: Choices, index: int) -> Iterator[tuple[str, Option]]:
+        """Yield the faults that may be added to a hypothesis, each with its aspect."""
+        if self._cost(branch) >= MAX_FAULTS or self._is_rare(branch):
+            return
+        for aspect in self.stages[index].aspects():
+            domain = self.domains[aspect]
+            if aspect == "integrator" and "flight" in branch:
+                aspect, domain = "flight", self.domains["flight"]
+            elif aspect == "integrator":
+                domain = self.classes[in_flight(branch[aspect].fields["integrator"])]
+            if not self.costs[id(branch[aspect])]:
+                yield from ((aspect, option) for option, cost in domain if cost)
+
+    def _pairs(self, singles: Sequence[SingleFault], index: int) -> Iterator[Choices]:
+        """Yield two faults at once: one brings the answer nearer, the other moves it.
+
+        Those of which the first brings it nearest come first.
+        """
+        limit = self._work + WORK
+        singles = [one for one in singles if not _takes_long(one.option)]
+        nearer = sorted((one for one in singles if one.gap < one.before), key=lambda one: one.gap)
+        for first in nearer[:NEAREST]:
+            for second in singles:
+                if second.branch is first.branch and second.aspect != first.aspect:
+                    if self._work >= limit:
+                        return
+                    yield first.choices | {second.aspect: second.option}
+
+    def _cost(self, choices: Choices) -> int:
+        return sum(self.costs[id(option)] for option in choices.values())
+
+    def _is_rare(self, choices: Choices) -> bool:
+        """Return whether choices are among those that are not tried together with faults."""
+        return any(
+            option.rare and option.aspect not in self.declared_aspects
+            for option in choices.values()
+        )
+
+    def _fits(self, choices: Choices, index: int) -> bool:
+        """Return whether choices explain the stages up to one, except those that nothing does."""
+        return (
+            self._cost(choices) <= MAX_FAULTS
+            and compatible(choices)
+            and all(
+                self._explains(choices, i) for i in range(index, -1, -1) if i not in self._skipped
+            )
+        )
+
+    def _needed(self, choices: Choices) -> Choices:
+        """Return the choices without faults that explain no more than the others do."""
+        for aspect, option in choices.items():
+            honest_option, cost = self.domains[aspect][0]
+            simpler = choices | {aspect: honest_option}
+            if self.costs[id(option)] and not cost and self._fits(simpler, len(self.stages) - 1):
+                return self._needed(simpler)
+        return choices
 
     def _explains_enough(self, choices: Choices) -> bool:
         """Return whether no more than a few answers are left out because of singular matrices."""
-        explained = [self._explains(choices, i) for i in range(len(self.probes))]
-        return 2 * explained.count(True) >= min(4, len(explained))
+        explained = [self._gap(choices, i) is not None for i in range(len(self.stages))]
+        return 2 * explained.count(True) >= min(8, len(explained))
 
-    def _explains(self, choices: Choices, index: int) -> bool | None:
-        """Return whether choices reproduce an answer; None where neither is a number of use."""
-        probe = self.probes[index]
-        relevant = choices if probe.coupled else _relevant_in_flight(choices)
-        if not probe.coupled and choices["matrix"].key.startswith("matrix without k"):
+    def _explains(self, choices: Choices, index: int) -> bool:
+        """Return whether choices reproduce an answer, or neither is a number of use."""
+        gap = self._gap(choices, index)
+        return gap is None or gap <= SOLVED
+
+    def _gap(self, choices: Choices, index: int) -> float | None:
+        """Return how far a prediction is from an answer, None where neither is a number of use."""
+        stage = self.stages[index]
+        relevant = choices if stage.coupled else _relevant_in_flight(choices)
+        if not stage.coupled and choices["matrix"].key.startswith("matrix without k"):
             return None  # it joins particles by springs without stiffness, each integrator its way
-        parts = sorted((name, id(option)) for name, option in relevant.items())
-        key = position_key = (index, *parts)
-        if relevant["substeps"].fields["substeps"] == 1:  # velocities do not enter positions
-            position_key = (index, *(part for part in parts if part[0] != "velocity"))
-        if position_key in self._misplaced:
-            return False
-        if key not in self._explained:
+        ignored: tuple[str, ...] = ()
+        if len(stage.answers) == 1 and relevant["substeps"].fields["substeps"] == 1:
+            ignored = ("velocity", "scaling")  # neither enters the positions
+        key = (index, *sorted((k, id(o)) for k, o in relevant.items() if k not in ignored))
+        if key not in self._gaps:
             self.prediction_count += 1
-            self._explained[key], is_placed = self._compare(tuple(relevant.values()), probe)
-            if not is_placed:
-                self._misplaced.add(position_key)
-        return self._explained[key]
+            self._work += _effort(relevant) if stage.coupled else 1.0
+            self._gaps[key] = self._compare(tuple(relevant.values()), stage)
+        return self._gaps[key]
 
     def _rounding(self, probe: Probe, model: StepModel) -> Rounding:
         key = probe.name, model.substeps, model.integrator.explicit
@@ -194,19 +307,17 @@ class ModelSearch:
             self._roundings[key] = rounding(probe.problem, model, self.epsilon)
         return self._roundings[key]
 
-    def _compare(self, options: tuple[Option, ...], probe: Probe) -> tuple[bool | None, bool]:
-        """Return whether an answer is reproduced, and whether its positions may be."""
+    def _compare(self, options: tuple[Option, ...], probe: Probe) -> float | None:
+        """Return how far the step with these options is from an answer."""
         problem, model = apply(options, probe.problem, StepModel(damper="none"))
-        prediction, answers = predicted(problem, model), probe.answers
+        plain = probe.problem
+        if problem.stiff > plain.stiff or problem.damped > plain.damped:
+            return None  # aspects matter of which nothing is assumed yet
+        prediction = predicted(problem, model)
         if _is_singular(prediction):
-            return (None if _is_singular(answers) else False), True
+            return None if _is_singular(probe.answers) else np.inf
         allowed = self._rounding(probe, model)
-        if relative_gap(probe.problem, prediction, answers, allowed) <= SOLVED:
-            return True, True
-        if problem.steps or "positions" not in answers:
-            return False, True
-        positions = {"positions": answers["positions"]}
-        return False, relative_gap(probe.problem, prediction, positions, allowed) <= SOLVED
+        return relative_gap(probe.problem, prediction, probe.answers, allowed)
 
     def _match(self, choices: Choices) -> ModelMatch:
         if "flight" in choices:
@@ -216,9 +327,75 @@ class ModelSearch:
         return ModelMatch(options, tuple(o for o in options if self.costs[id(o)]))
 
 
+def gaps_of(options: Sequence[Option], probes: Sequence[Probe], epsilon: float) -> list[float]:
+    """Return how far answers are from a step with these options, relative to displacements."""
+    gaps = []
+    for plain, answers, _ in probes:
+        p, model = apply(options, plain, StepModel(damper="none"))
+        expected, allowed = predicted(p, model), rounding(plain, model, epsilon)
+        gaps.append(relative_gap(plain, expected, answers, allowed) if expected else np.inf)
+    return gaps
+
+
+def with_factorisation(
+    matches: Sequence[ModelMatch], cases: Sequence[Probe], epsilon: float
+) -> list[ModelMatch]:
+    """Return the matches, with Cholesky's factorisation unchecked where that explains cases.
+
+    The probes have positive definite matrices. It is to blame if a step is right in all such cases,
+    wrong in all others, and there what Eigen's factorisations leave, or no descent of g.
+    """
+    refined = [_factorised(match, cases, epsilon) for match in matches]
+    return [match for match in refined if match] or list(matches)
+
+
+def _factorised(match: ModelMatch, cases: Sequence[Probe], epsilon: float) -> ModelMatch | None:
+    gaps = np.array(gaps_of(match.options, cases, epsilon))
+    is_indefinite = np.array([_is_indefinite(match, case) for case in cases], dtype=bool)
+    if not is_indefinite.any() or ((gaps > SOLVED) != is_indefinite).any():
+        return None
+    indefinite = [case for case, is_one in zip(cases, is_indefinite, strict=True) if is_one]
+    for fault in FACTORISATIONS:
+        options = (*match.options, fault)
+        gaps = np.array(gaps_of(options, indefinite, epsilon))
+        if np.mean(gaps <= SOLVED) >= LEAST_SHARE:
+            return ModelMatch(options, (*match.faults, fault))
+    if any(_ascends(match, case) for case in indefinite):
+        return ModelMatch(match.options, (*match.faults, FACTORISATIONS[0]))
+    return None
+
+
+def _is_indefinite(match: ModelMatch, case: Probe) -> bool:
+    """Return whether a step meets a matrix that Cholesky's method cannot factorise."""
+    p, model = apply(match.options, case.problem, StepModel(damper="none"))
+    if model.integrator.method != "newton" or p.steps:
+        return False
+    solved = predicted(p, model)
+    unsolved = predicted(p, model._replace(factorisation="displacement"))
+    return bool(solved) and not np.array_equal(solved["positions"], unsolved["positions"])
+
+
+def _ascends(match: ModelMatch, case: Probe) -> bool:
+    """Return whether a Newton step, however its matrix was corrected, could not go that way."""
+    p, model = apply(match.options, case.problem, StepModel(damper="none"))
+    if (model.integrator.iterations, model.substeps) != (1, 1) or "positions" not in case.answers:
+        return False
+    equation = first_equation(p, model)
+    start = equation.y if model.integrator.start == "y" else equation.start.x
+    step = case.answers["positions"] - start
+    return not float((equation.free_gradient(start) * step).sum()) < 0.0
+
+
 def _is_singular(values: Mapping[str, Any]) -> bool:
     """Return whether positions are missing or huge, as from a singular matrix."""
     return "positions" not in values or not np.abs(values["positions"]).max() < LARGEST
+
+
+def _effort(choices: Choices) -> float:
+    """Return how many iterations, or a few substeps of explicit methods, a prediction takes."""
+    fields = {k: value for option in choices.values() for k, value in option.fields.items()}
+    integrator, substeps = fields["integrator"], fields["substeps"]
+    return float(1.0 + substeps * (0.3 if integrator.explicit else integrator.iterations))
 
 
 def _takes_long(option: Option) -> bool:
@@ -246,6 +423,8 @@ def _relevant_in_flight(choices: Choices) -> Choices:
 
 def in_flight(integrator: Integrator) -> Integrator:
     """Return an integrator that moves free particles alike: without springs g is quadratic."""
+    if integrator.method == "in_place":
+        return integrator._replace(method="symplectic")
     if integrator.explicit or integrator.method == "descent":
         return integrator
     if integrator.method == "newton" and integrator.rate != 1.0:

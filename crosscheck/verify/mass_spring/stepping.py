@@ -1,11 +1,13 @@
 """Judge steps and motions by the declared or inferred model and by laws."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain, product
+from itertools import product
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from plumbob.reference.explicit import symplectic_euler
@@ -17,16 +19,16 @@ from ..contestant import Answer, Exchange
 from ..explain import either, first_broken
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
-from ..laws import digits, finding, hints_of, judge_case
+from ..laws import digits, finding, hints_of, judge_case, laws_that_hold
 from ..sentence import Sentence, sentence
 from . import laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
 from .honest import compatible, domains, honest
-from .laws import SOLVED, StepContext, relative_gap, rounding
+from .laws import SOLVED, StepContext, rounding
 from .model import StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
-from .search import ModelMatch, ModelSearch, Probe, probes_of
+from .search import ModelMatch, ModelSearch, Probe, gaps_of, probes_of, with_factorisation
 
 MAX_EXPLANATIONS = 3
 LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
@@ -47,18 +49,19 @@ class Stepping(NamedTuple):
         """Hold answers against the step that is declared, or inferred, and name the faults."""
         problems = problems_of(exchanges, greeting)
         search = ModelSearch(probes_of(exchanges, problems), greeting.step, greeting.epsilon)
-        matches = search.run()
+        probes = probes_of(exchanges, problems, every=True)
+        matches = with_factorisation(search.run(), probes, greeting.epsilon)
         options = honest_options(matches, greeting.step)
-        recognised = greeting.step.method is not None or bool(matches and not matches[0].faults)
+        faults = {fault.aspect for fault in matches[0].faults} if matches else {"unknown"}
+        recognised = greeting.step.method is not None or faults <= {"factorisation"}
         judgements = [
             _judge_case(
                 exchange, exchanges, problems[exchange.case.name], greeting, options, recognised
             )
             for exchange in exchanges
         ]
-        probes = probes_of(exchanges, problems, every=True)
         diagnosis = _diagnose(judgements, search, matches, probes)
-        if diagnosis.explained and not recognised:
+        if diagnosis.explained and (not recognised or "factorisation" in faults):
             judgements = list(map(_with_wrong_step, judgements))
         return TaskReport(self.task, "", judgements, diagnosis)
 
@@ -103,6 +106,32 @@ def describe_model(options: Sequence[Option]) -> Sentence:
         "{integrator} ({substeps}, {damper}, {pins}, {velocity})",
         **{name: parts[name] for name in names},
     )
+
+
+def declaration_of(options: Sequence[Option]) -> str:
+    """Return the field of a greeting that declares a model, "" if the protocol has none for it."""
+    fields = {name: value for option in options for name, value in option.fields.items()}
+    integrator, pins = fields["integrator"], fields["pins"].split()[0]
+    method, is_iterative = integrator.method, integrator.method in ("newton", "local_global")
+    if method == "newton" and integrator.iterations == 1:
+        method = "linearised"
+    step = {
+        "method": method,
+        "start": integrator.start if is_iterative else None,
+        "iterations": integrator.iterations if is_iterative else None,
+        "substeps": fields["substeps"],
+        "damper": fields["damper"],
+        "pins": {"springs": "penalty", "falling": "heavy"}.get(pins, pins),
+        "velocity": fields["velocity"],
+    }
+    if fields["scaling"] != 1.0:
+        step |= {"damper": "global_factor", "damping_factor": fields["scaling"]}
+    step = {name: value for name, value in step.items() if value is not None}
+    try:
+        msgspec.convert(step, Step)
+    except msgspec.ValidationError:
+        return ""
+    return json.dumps({"step": step})[1:-1]
 
 
 def _judge_case(
@@ -179,18 +208,27 @@ def _diagnose(
     if matches and matches[0].faults:
         explanations = (_explanation(matches, probes, search.epsilon),)
     elif matches and any(getattr(step, name) is None for name in _DECLARED):
+        options = honest_options(matches, step)
+        is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
+        declaration = "" if is_wrong else declaration_of(options)
         behaviour = sentence(
             "In small cases it behaves like {model}, with which it is compared."
-            if any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
+            if is_wrong
+            else "It behaves like {model}. Declare it with {declaration}."
+            if declaration
             else "It behaves like {model}.",
-            model=describe_model(honest_options(matches, step)),
+            model=describe_model(options),
+            declaration=declaration,
         )
     hints = hints_of(judgements)
     diagnosis = Diagnosis(explanations, behaviour, None, hints, search.prediction_count)
     if diagnosis.explained:
         return diagnosis
-    if search.probes and behaviour is None and step.method is None:
-        hints += (_nearest(search), _laws_that_hold(judgements))
+    is_undecided = (
+        max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED
+    )
+    if search.probes and behaviour is None and (step.method is None or is_undecided):
+        hints += (_nearest(search), laws_that_hold(judgements))
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
 
 
@@ -207,7 +245,7 @@ def _nearest(search: ModelSearch) -> Sentence:
         velocity = choices["velocity"][integrator.fields["integrator"].explicit]
         step = usual | {"integrator": integrator, "damper": damper, "velocity": velocity}
         if compatible(step):
-            gaps = _gaps(tuple(step.values()), search.probes, search.epsilon)
+            gaps = gaps_of(tuple(step.values()), search.probes, search.epsilon)
             steps.append((float(np.median(gaps)), max(gaps), tuple(step.values())))
     median, worst, options = min(steps, key=lambda step: step[0])
     return sentence(
@@ -219,22 +257,13 @@ def _nearest(search: ModelSearch) -> Sentence:
     )
 
 
-def _laws_that_hold(judgements: Sequence[CaseJudgement]) -> Sentence:
-    """Return the laws that no answer breaks."""
-    verdicts: dict[str, Verdict] = {}
-    for found in chain.from_iterable(judgement.findings for judgement in judgements):
-        verdicts[found.law] = max(found.verdict, verdicts.get(found.law, Verdict.RIGHT))
-    names = ", ".join(law for law, verdict in verdicts.items() if not verdict)
-    return sentence("Laws that hold in every case: {laws}.", laws=names or "–")
-
-
 def _explanation(
     matches: Sequence[ModelMatch], probes: Sequence[Probe], epsilon: float
 ) -> Explanation:
     """Return the faults found with the share of all answers that they reproduce, in classes."""
     scores = []
     for match in matches:
-        gaps = _gaps(match.options, probes, epsilon)
+        gaps = gaps_of(match.options, probes, epsilon)
         hits = [gap for gap in gaps if gap <= SOLVED]
         scores.append((-len(hits) / max(len(gaps), 1), max(hits, default=0.0), match))
     scores.sort(key=lambda score: score[:2])
@@ -243,16 +272,6 @@ def _explanation(
     keys = tuple(classes)[:MAX_EXPLANATIONS]
     message = either([list(map(_fault_sentence, classes[key])) for key in keys])
     return Explanation(keys, message, -best, distance)
-
-
-def _gaps(options: tuple[Option, ...], probes: Sequence[Probe], epsilon: float) -> list[float]:
-    """Return how far answers are from a step with these options, relative to displacements."""
-    gaps = []
-    for plain, answers, _ in probes:
-        p, model = apply(options, plain, StepModel(damper="none"))
-        expected, allowed = predicted(p, model), rounding(plain, model, epsilon)
-        gaps.append(relative_gap(plain, expected, answers, allowed) if expected else np.inf)
-    return gaps
 
 
 def _fault_sentence(option: Option) -> Sentence:
@@ -270,7 +289,7 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
     Each case adds an aspect to the cases before it.
     """
     law = first_broken(judgements)
-    case = next((j.case for j in judgements if j.verdict > Verdict.RIGHT_BUT), None)
+    case = next((j.case for j in judgements if j.verdict > Verdict.RIGHT_EXCEPT), None)
     if law is None or case is None or case.name != law.values["case"]:
         return law
     return sentence("{law} {trace}", law=law, trace=trace_of(case.family))
