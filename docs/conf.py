@@ -1,7 +1,12 @@
 """Settings of the documentation, which `make docs` builds with Sphinx into build/docs."""
 
 import re
+import sys
 from importlib.metadata import version as installed_version
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+import write_faults
 
 project = "Plumbob"
 author = copyright = "The Plumbob authors"
@@ -38,5 +43,6 @@ def shorten_types(app, what, name, object_, options, signature, returns):
 
 def setup(app):
     """Connect the hooks; napoleon turns sections into markup at priority 500."""
+    app.connect("builder-inited", lambda app: write_faults.write())
     app.connect("autodoc-process-docstring", escape_marks, priority=400)
     app.connect("autodoc-process-signature", shorten_types)

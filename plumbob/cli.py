@@ -16,14 +16,15 @@ from plumbob.bench.text import visible
 from . import compile_notice, entry_point
 from .commands import bench, check, records, report, show, which
 from .commands import compare as comparison
+from .commands import explain as explain
 from .commands import verify as verify
 from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh, flag, option
-from .help_text import Command, Group, block
+from .help_text import Command, FittingGroup, block
 
 _UsageError: Any = typer.BadParameter.__base__
 
 app = typer.Typer(
-    cls=Group, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+    cls=FittingGroup, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
 )
 
 
@@ -95,6 +96,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         "Examples",
         ("plumbob", "check, measure quickly and write a report"),
         ("plumbob verify my_solver.py", "judge your solver"),
+        ("plumbob explain PB-CCD-003", "explain a mistake that verify names"),
         ("plumbob which robot.urdf", "find the best solver for your robot"),
         ("plumbob check", "check the reference"),
         ("plumbob bench ik cloth", "measure two suites at full length"),
@@ -128,9 +130,10 @@ def plumbob(
 
 
 app.command(cls=verify.SolverCommand, epilog=block("Examples", *verify.EXAMPLES))(verify.verify)
+app.command(cls=Command, epilog=explain.EXAMPLES)(explain.explain)
 app.command(cls=Command, epilog=check.EXAMPLES)(check.check)
 app.command(cls=verify.SolverCommand, epilog=bench.EXAMPLES)(bench.bench)
-app.command(cls=Command, epilog=which.EXAMPLES)(which.which)
+app.command("which", cls=Command, epilog=which.EXAMPLES)(which.robot_solvers)
 app.command(cls=Command, epilog=report.EXAMPLES)(report.report)
 app.command(cls=verify.SolverCommand, epilog=show.EXAMPLES)(show.show)
 app.command(cls=Command, epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)

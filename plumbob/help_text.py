@@ -89,7 +89,7 @@ class Command(TyperCommand):
         return super().get_short_help_str(1000)
 
 
-class Group(TyperGroup):
+class FittingGroup(TyperGroup):
     """A group of commands with help that fits the terminal."""
 
     context_class = FittingContext

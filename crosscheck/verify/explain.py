@@ -17,6 +17,9 @@ from .sentence import Sentence, sentence
 
 # A variant is compared with all answers only if it reproduces one of the first, most telling ones.
 TRIAL = 4
+# A combination of faults that leaves answers unexplained reproduces at least this share, and so
+# much more than any of its parts: else chance may explain it.
+MOST_ANSWERS, MORE = 0.7, 0.2
 # The number of explanations to report.
 EXPLANATIONS = 3
 
@@ -57,7 +60,7 @@ def explain(
         for variant in same_size:
             count += 1
             match = _match(variant, answers, tolerance)
-            if match is not None and match.share >= LEAST_SHARE:
+            if match is not None:
                 matches.append(match)
         if any(match.share == 1.0 for match in matches):
             break
@@ -71,16 +74,20 @@ def explain(
 
 
 def _telling(matches: Sequence[Match]) -> list[Match]:
-    """Return the perfect or else the faulty matches that explain more than any of their parts."""
+    """Return the perfect or else the faulty matches that explain more than any of their parts.
+
+    A combination that leaves answers unexplained has to explain many, and many more than its parts.
+    """
 
     def is_needless(match: Match) -> bool:
-        faults = set(match.variant.faults)
-        return any(
-            set(part.variant.faults) < faults and part.share >= match.share for part in matches
-        )
+        faults, is_vague = set(match.variant.faults), match.share < 1.0
+        is_vague &= len(faults) > 1
+        share = match.share - MORE * is_vague
+        parts = [part.share for part in matches if set(part.variant.faults) < faults]
+        return (is_vague and match.share < MOST_ANSWERS) or any(part >= share for part in parts)
 
     perfect = [match for match in matches if match.share == 1.0]
-    faulty = [match for match in matches if match.variant.faults]
+    faulty = [m for m in matches if m.variant.faults and m.share >= LEAST_SHARE]
     return [match for match in perfect or faulty if not is_needless(match)]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from .case import Case
 from .contestant import Answer, Failure
 from .greeting import Greeting
-from .sentence import Sentence, sentence
+from .sentence import Sentence, codes_in, sentence
 
 # The least share of the answers that a likely fault reproduces.
 LEAST_SHARE = 0.5
@@ -19,7 +19,7 @@ class Verdict(IntEnum):
     """How good answers are, from best to worst; the worst law decides."""
 
     RIGHT = 0
-    RIGHT_BUT = 1  # another honest model, stalls, slow, not unit, prints
+    RIGHT_EXCEPT = 1  # another honest model, stalls, slow, not unit, prints
     UNDECIDED = 2  # too small for the rounding
     WRONG = 3
     BROKEN = 4  # a crash, a hang, garbage, NaN where numbers exist
@@ -51,15 +51,15 @@ class CaseJudgement:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of the findings."""
-        if isinstance(self.answer, Failure):
+        """The worst of the findings; a failure has none unless the case allows it."""
+        if isinstance(self.answer, Failure) and not self.findings:
             return Verdict.BROKEN
         return max((finding.verdict for finding in self.findings), default=Verdict.UNDECIDED)
 
     @property
     def complaints(self) -> list[Sentence]:
         """The sentences about a failure, or about laws that are not kept, the worst first."""
-        if isinstance(self.answer, Failure):
+        if isinstance(self.answer, Failure) and not self.findings:
             return [self.answer.sentence]
         broken = [finding for finding in self.findings if finding.verdict is not Verdict.RIGHT]
         return [
@@ -79,6 +79,11 @@ class Explanation:
     sentence: Sentence  # the mistake in the solver, and its correction
     share: float  # of the compared answers that it reproduces, 0 to 1
     distance: float  # the largest relative difference from the answers that it reproduces
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """The codes of the faults that the sentence names, in its order."""
+        return codes_in(self.sentence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +111,16 @@ def smallest_failure(judgements: Sequence[CaseJudgement], explained: bool) -> Ca
     return min(failing, key=lambda judgement: judgement.case.size, default=None)
 
 
+def smallest_failures(judgements: Sequence[CaseJudgement], explained: bool) -> list[CaseJudgement]:
+    """Return the smallest failure, then the smallest of the other verdict of WRONG and BROKEN."""
+    first = smallest_failure(judgements, explained)
+    if first is None:
+        return []
+    others = [judgement for judgement in judgements if judgement.verdict != first.verdict]
+    other = smallest_failure(others, explained)
+    return [first] if other is None else [first, other]
+
+
 @dataclass(frozen=True, eq=False)
 class TaskReport:
     """The judgements of a task, or of one method of inverse kinematics."""
@@ -114,7 +129,8 @@ class TaskReport:
     method: str  # of inverse kinematics and tracking, else ""
     judgements: Sequence[CaseJudgement]
     diagnosis: Diagnosis
-    precision: Sentence | None = None  # why it is judged by another than the greeting's
+    # what it is judged by instead of the greeting: another precision, chains only, one mass
+    assumptions: tuple[Sentence, ...] = ()
 
     @property
     def smallest_failure(self) -> CaseJudgement | None:
@@ -123,10 +139,10 @@ class TaskReport:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of all cases, with a reservation if the precision is another."""
+        """The worst of all cases, with a reservation if something is assumed."""
         verdicts = (judgement.verdict for judgement in self.judgements)
         worst = max(verdicts, default=Verdict.UNDECIDED)
-        return max(worst, Verdict.RIGHT_BUT) if self.precision else worst
+        return max(worst, Verdict.RIGHT_EXCEPT) if self.assumptions else worst
 
     @property
     def digits(self) -> float | None:

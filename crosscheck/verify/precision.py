@@ -20,7 +20,7 @@ MIN_DIGITS, MAX_DIGITS = 4, 14
 # The digits that single precision is printed with, and those that it leaves correct in most cases.
 SINGLE, CORRECT = (8, 9), (5.0, 9.0)
 AS_SINGLE = sentence(
-    "The answers are single-precision numbers and are judged as such. Declare it: "
+    "Judged in single precision: all its numbers are single-precision values. Declare it with "
     '"precision": "single" in the greeting (of a Python file, in PLUMBOB).'
 )
 INEXACT = sentence(

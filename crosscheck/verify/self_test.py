@@ -1,6 +1,7 @@
 """Test the judge: laws catch every known fault, the search names it, honest solvers are right.
 
-A fault is caught if a law calls an answer wrong; a mere reservation (RIGHT BUT) does not count.
+A fault is caught if a law calls an answer wrong, or if the solver is judged by less than what it is
+sent; a mere reservation (RIGHT EXCEPT) does not count.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,10 +13,12 @@ import numpy as np
 from plumbob.reference import Skeleton, forward_kinematics, solve_ik
 from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.skeleton import Pose
 
 from ..engines import SKELETON_ENGINES, forward_kinematics_by
 from ..engines.mujoco_mass_spring import MujocoMassSpring
 from .case import Case
+from .fault_programs import coded_faults
 from .functions import FunctionContestant
 from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
 from .judgement import Verdict
@@ -24,6 +27,9 @@ from .kinematics.predictions import predict_forward, predict_track, solve
 from .kinematics.robot_inverse_kinematics import FAULTS as ROBOT_FAULTS
 from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
 from .kinematics.robot_inverse_kinematics import solve_by_reference, solve_wrongly
+from .kinematics.robot_jacobian import TASK as ROBOT_JACOBIAN
+from .kinematics.robot_motions import TASK as ROBOT_TRACK
+from .kinematics.robot_motions import followed
 from .kinematics.textbook import Switches
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
 from .mass_spring.model import Integrator, StepModel, simulate
@@ -74,7 +80,7 @@ class Trial(NamedTuple):
         """Whether the fault is caught and named, or the honest solver is not accused."""
         if self.subject.fault:
             return self.caught and self.named
-        return self.verdict <= Verdict.RIGHT_BUT and self.named
+        return self.verdict <= Verdict.RIGHT_EXCEPT and self.named
 
 
 def attempt(subject: Subject) -> Trial:
@@ -87,6 +93,8 @@ def attempt(subject: Subject) -> Trial:
         for finding in judgement.findings
         if finding.verdict >= Verdict.WRONG
     )
+    if report.assumptions and report.verdict is Verdict.RIGHT_EXCEPT:
+        laws |= {"takes what is sent"}
     explanations = report.diagnosis.explanations
     keys = explanations[0].faults if explanations else ()
     is_named = subject.fault in keys if subject.fault else not keys
@@ -119,10 +127,29 @@ def _kinematic_faults() -> Iterator[Subject]:
 def _robots() -> Iterator[Subject]:
     faults = {key: partial(solve_wrongly, fault) for key, fault in ROBOT_FAULTS.items()}
     yield from _subjects("robots", ROBOTS, faults)
+    for task in (ROBOT_TRACK, ROBOT_JACOBIAN):
+        programs = [fault for fault in coded_faults().values() if fault.task == task]
+        wrong = {fault.name: _function(task, fault.wrong_program) for fault in programs}
+        yield from _subjects("robots", task, wrong)
+        right = {f"program, {task}": _function(task, programs[0].right_program)}
+        yield from _subjects(HONEST, task, right)
+    yield from _subjects(HONEST, ROBOT_TRACK, {"reference, tracking": _followed})
     yield from _subjects(HONEST, ROBOTS, {
         "damped least squares, robots": partial(solve_wrongly, None),
         "reference, robots": solve_by_reference,
     })  # fmt: skip
+
+
+def _function(task: str, program: str) -> Callable[..., Any]:
+    """Return the function of a program."""
+    names: dict[str, Any] = {}
+    exec(compile(program, "program", "exec"), names)
+    return names[task]
+
+
+def _followed(**inputs: Any) -> Mapping[str, Any]:
+    tool = Pose(inputs["target_positions"], inputs["target_rotations"])
+    return {"q": followed(inputs, inputs["start"], tool)}
 
 
 def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str, Any]:

@@ -31,6 +31,19 @@ def sentence(template: str, /, **values: object) -> Sentence:
     return Sentence(template, values)
 
 
+def with_code(code: str, words: Sentence) -> Sentence:
+    """Return the sentence of a fault behind the fault's code."""
+    return sentence("[{code}] {what}", code=code, what=words)
+
+
+def codes_in(words: Sentence) -> tuple[str, ...]:
+    """Return the codes of the faults that a sentence names, each once, in the order of the text."""
+    codes = [code for key, code in words.values.items() if key == "code" and isinstance(code, str)]
+    for part in words.values.values():
+        codes += codes_in(part) if isinstance(part, Sentence) else ()
+    return tuple(dict.fromkeys(codes))
+
+
 def did_you_mean(value: object, options: Iterable[str]) -> str:
     """Return a question after the nearest option, or "" if none is near."""
     simple = {option.replace("_", "").lower(): option for option in options}

@@ -11,16 +11,22 @@ from . import precision
 from .case import Case
 from .contestant import Contestant, Exchange, Failure, FailureKind
 from .greeting import Greeting
+from .inference import inferred, methods_of
 from .judgement import Report, TaskReport, Verdict
 from .kinematics import (
+    faults,
     forward_kinematics,
     inverse_kinematics,
     resample,
     robot_inverse_kinematics,
+    robot_jacobian,
+    robot_track,
     track,
 )
+from .kinematics.faults import SwitchFault
 from .mass_spring import energy, forces
 from .mass_spring.stepping import Stepping
+from .sentence import Sentence, sentence
 from .timing import with_lesser_time
 
 # After so many timeouts in a task its other cases are not asked.
@@ -50,6 +56,8 @@ DISCIPLINES: Mapping[str, Discipline] = {
     "mass_spring_step": Stepping("mass_spring_step"),
     "mass_spring_motion": Stepping("mass_spring_motion"),
     "robot_inverse_kinematics": robot_inverse_kinematics,
+    "robot_track": robot_track,
+    "robot_jacobian": robot_jacobian,
 }
 
 
@@ -65,12 +73,41 @@ def verify(
     The cases are random by the seed; there are more if `thorough`. `notify` is called before each
     with the task, the number of cases done, and of all. Raise ValueError if a task is not offered.
     """
-    greeting = contestant.greeting
-    reports = []
+    greeting, remarks = _with_methods(contestant, tasks, seed)
+    reports, forward_faults = list[TaskReport](), tuple[SwitchFault, ...]()
     for task, method in trials(greeting, tasks):
-        cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
-        reports.append(judge_cases(contestant, task, method, cases, notify))
-    return Report(greeting, reports, seed)
+
+        def judge(
+            greeting: Greeting,
+            task: str = task,
+            method: str = method,
+            known: Sequence[SwitchFault] = forward_faults,
+        ) -> TaskReport:
+            cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
+            return judge_cases(contestant, task, method, cases, notify, greeting, known)
+
+        reports.append(inferred(contestant, judge(contestant.greeting), judge))
+        if task == forward_kinematics.TASK:
+            forward_faults = faults.explaining(reports[-1].diagnosis)
+    return Report(contestant.greeting, reports, seed, remarks)
+
+
+def _with_methods(
+    contestant: Contestant, tasks: Sequence[str] | None, seed: int
+) -> tuple[Greeting, tuple[Sentence, ...]]:
+    """Return the greeting with the methods that answers show, and remarks on them."""
+    greeting = contestant.greeting
+    task = next((task for task in WITH_METHODS if task in (tasks or greeting.tasks)), None)
+    if task is None or task not in greeting.tasks:
+        return greeting, ()
+    methods = methods_of(contestant, DISCIPLINES[task].cases(greeting, "", seed, False)[2:3])
+    if methods == greeting.methods:
+        return greeting, ()
+    remark = sentence(
+        'Judged by the methods that it answers: declare "methods": [{methods}].',
+        methods=", ".join(f'"{method}"' for method in methods),
+    )
+    return msgspec.structs.replace(greeting, methods=methods), (remark,)
 
 
 def judge_cases(
@@ -79,19 +116,27 @@ def judge_cases(
     method: str,
     cases: Sequence[Case],
     notify: Notify = lambda task, count, total: None,
+    declared: Greeting | None = None,
+    forward_faults: Sequence[SwitchFault] = (),
 ) -> TaskReport:
-    """Ask a solver some cases of a task and judge its answers; arguments as of `verify`."""
+    """Ask a solver some cases of a task and judge its answers; arguments as of `verify`.
+
+    They are judged by what its greeting declares, or by another greeting. Its forward kinematics is
+    known to have the `forward_faults`.
+    """
     exchanges = list(_ask(contestant, cases, partial(notify, task)))
     judge = DISCIPLINES[task].judge
-    greeting, reason = precision.judging_greeting(exchanges, contestant.greeting)
+    if forward_faults and task == inverse_kinematics.TASK:
+        judge = partial(inverse_kinematics.judge, base=forward_faults)
+    greeting, reason = precision.judging_greeting(exchanges, declared or contestant.greeting)
     report = judge(exchanges, greeting, method)
     unexplained = report.verdict is Verdict.WRONG and not report.diagnosis.explained
     if unexplained and greeting.precision == "double":
         single = judge(exchanges, msgspec.structs.replace(greeting, precision="single"), method)
-        is_right = single.verdict <= Verdict.RIGHT_BUT and precision.is_off_by_single(report)
+        is_right = single.verdict <= Verdict.RIGHT_EXCEPT and precision.is_off_by_single(report)
         if is_right or single.diagnosis.explained:
             report, reason = single, precision.INEXACT
-    return replace(report, precision=reason)
+    return replace(report, assumptions=(reason,) if reason else ())
 
 
 def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple[str, str]]:

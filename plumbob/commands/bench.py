@@ -163,9 +163,8 @@ def _measure(
         print_tables(names, output)
     print_ending(names, output)
     folder = "" if output == REPORT else f" -o {shlex.quote(str(output))}"
-    print_filled(
-        visible(f"Read on: `plumbob report{folder}` writes the page; --verbose prints all tables.")
-    )
+    tables = "" if verbose else f" `plumbob bench --verbose{folder}` prints all tables."
+    print_filled(visible(f"Read on: `plumbob report{folder}` writes the page.{tables}"))
     return code
 
 

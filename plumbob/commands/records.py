@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..help_text import Command, Group, block
+from ..help_text import Command, FittingGroup, block
 from .options import REPORT, SUCCESS, Texts, argument, flag, option
 
 if TYPE_CHECKING:
     from plumbob.bench.harness.record import Key, Record
     from plumbob.bench.tables.table import Table
 
-app = typer.Typer(cls=Group, rich_markup_mode=None)
+app = typer.Typer(cls=FittingGroup, rich_markup_mode=None)
 LIST = "plumbob records list report"
 MERGE = "plumbob records merge laptop desktop --into both"
 DROP = 'plumbob records drop --solver "My solver"'

@@ -31,7 +31,9 @@ Scene = Annotated[Text, argument("SCENE", "arm, cloth, a curve that the arm draw
 Picture = Annotated[
     File, option("FILE", "File in .gif, .svg, .html or .bvh, or a folder.", "--output", "-o")
 ]
-Yours = Annotated[Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")]
+OwnSolver = Annotated[
+    Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")
+]
 Solver = Annotated[
     Text, option("NAME", "Plumbob's solver: fabrik, ccd ...; for the cloth: newton ...")
 ]
@@ -45,7 +47,7 @@ def show(
     file: Picture = None,
     solver: Solver = None,
     coherent: Coherent = False,
-    yours: Yours = None,
+    own_solver: OwnSolver = None,
 ) -> int:
     """Write an animation, a picture or a page of the arm or the cloth.
 
@@ -57,9 +59,9 @@ def show(
     from plumbob.bench.show.your_solver import YourSolver
 
     program = program_of(context)
-    if yours is not None and program:
+    if own_solver is not None and program:
         raise ValueError("with: expected one solver, got --with and a program behind --")
-    words = program if yours is None else [yours]
+    words = program if own_solver is None else [own_solver]
     if scene == GALLERY and not (words or solver or coherent):
         return _show_gallery(file or REPORT / GALLERY)
     if scene is None and not words:

@@ -85,7 +85,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 ) -> int:
     """Judge your solver: is it right, how large are its errors, what is the mistake?
 
-    Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 if a command or file is wrong.
+    Exit code 0 if every task is RIGHT or RIGHT EXCEPT, 1 if not, 2 if a command or file is wrong.
     """
     # Solver and reference are timed on one thread each; NumPy is not imported yet.
     from plumbob.crosscheck.child_process import one_thread

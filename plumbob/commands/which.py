@@ -23,7 +23,7 @@ EXAMPLES = block(
 SUFFIXES = (".urdf", ".xml", ".mjcf")
 
 
-def which(
+def robot_solvers(
     robot: Annotated[Path, argument("ROBOT", "Your robot: .urdf, or .xml or .mjcf of MuJoCo.")],
     *,
     link: Annotated[Text, option("NAME", "Link or body that must reach the targets.")] = None,

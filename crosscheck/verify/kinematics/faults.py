@@ -2,16 +2,23 @@
 
 import itertools
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..explain import either
-from ..sentence import Sentence, sentence
-from .textbook import Switches
+from ..judgement import Diagnosis
+from ..sentence import Sentence, sentence, with_code
+from .textbook import DROPPED, Switches
 
 TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+# The orders in which a rotation is split into Euler angles, and put together: X, Y and Z in another
+# order, or with an axis twice in the reverse one. As in SciPy, small letters are extrinsic orders.
+EULER_ORDERS = (
+    *itertools.permutations(map("".join, itertools.permutations("XYZ")), 2),
+    *((f"{a}{b}{a}", f"{a}{b}{a}".lower()) for a, b in itertools.permutations("XYZ", 2)),
+)
 AS_THE_TEXTBOOK = sentence("It does what the textbook does.")
 
 
@@ -22,37 +29,52 @@ class SwitchFault(NamedTuple):
     key: str  # its short name
     switch: str  # the field of Switches
     number: int  # of the faulty setting
-    sentence: Sentence  # the mistake, and its correction
+    sentence: Sentence  # the code, the mistake, and its correction
     honest: bool  # whether it may be on purpose: the answers still obey every law
+    is_rare: bool = False  # whether it is not tried together with others
 
 
 def _load() -> dict[str, tuple[SwitchFault, ...]]:
     """Return the faults that each method may have, the most frequent first."""
     parts = {
-        part: tuple(
-            SwitchFault(part, key, switch, number, Sentence(entry["sentence"], {}),
-                        entry.get("honest", False))
-            for key, entry in entries.items()
-            for switch, number in entry.get("switch", {}).items()
-        )
+        part: tuple(itertools.chain.from_iterable(_faults(part, *item) for item in entries.items()))
         for part, entries in TABLE.items()
-    }  # fmt: skip
+    }
     forward, stop, follow = parts["forward"], parts["stop"], parts["follow"]
+    common = tuple(fault for fault in forward if not fault.is_rare)
     faults = {
         "forward": forward,
-        "ccd": (*parts["ccd"], *forward, *stop),
-        "fabrik": (*parts["fabrik"], *forward, *stop[:-1]),  # the last is CCD's own
+        "ccd": (*parts["ccd"], *common, *stop),
+        "fabrik": (*parts["fabrik"], *common, *stop[:-1]),  # the last is CCD's own
     }
     return faults | {f"track {method}": (*follow, *faults[method]) for method in ("ccd", "fabrik")}
 
 
+def _faults(part: str, key: str, entry: Mapping[str, Any]) -> Iterator[SwitchFault]:
+    """Yield the faults of an entry: one, or one for each number of its range."""
+    for switch, numbers in entry.get("switch", {}).items():
+        is_range = isinstance(numbers, list)
+        for number in range(numbers[0], numbers[1] + 1) if is_range else (numbers,):
+            values = VALUES[switch](number) if is_range else {}
+            words = with_code(entry["code"], Sentence(entry["sentence"], values))
+            is_honest = entry.get("honest", False)
+            yield SwitchFault(
+                part, key.format_map(values), switch, number, words, is_honest, is_range
+            )
+
+
+# What the numbers of a switch stand for in keys and sentences.
+VALUES: Mapping[str, Callable[[int], Mapping[str, Any]]] = {
+    "euler": lambda number: dict(zip(("order", "other"), EULER_ORDERS[number - 1], strict=True)),
+    "dropped": lambda number: {"angle": DROPPED[number]},
+}
 FAULTS = _load()
 
 
 @cache
 def by_key(method: str) -> dict[str, SwitchFault]:
     """Return the faults of a method by their keys."""
-    return {fault.key: fault for fault in FAULTS[method]}
+    return {fault.key: fault for fault in (*FAULTS["forward"], *FAULTS[method])}
 
 
 def switches(faults: Sequence[SwitchFault]) -> Switches:
@@ -60,11 +82,21 @@ def switches(faults: Sequence[SwitchFault]) -> Switches:
     return Switches(**{fault.switch: fault.number for fault in faults})
 
 
-def combinations(method: str) -> Iterator[tuple[SwitchFault, ...]]:
-    """Yield no fault, single faults, pairs and likely triples, no two of the same switch."""
+def combinations(
+    method: str, base: Sequence[SwitchFault] = ()
+) -> Iterator[tuple[SwitchFault, ...]]:
+    """Yield no fault, single faults, pairs and likely triples, no two of the same switch.
+
+    With a `base`, yield it alone, and with each of the method's own faults.
+    """
     faults = FAULTS[method]
+    if base:
+        own = ((fault,) for fault in faults if fault.part != "forward")
+        yield from ((*base, *extra) for extra in ((), *own))
+        return
     yield ()
     yield from ((fault,) for fault in faults)
+    faults = tuple(fault for fault in faults if not fault.is_rare)
     pairs = filter(_are_independent, itertools.combinations(faults, 2))
     if method.startswith("track "):  # other faults show in single solves
         yield from (pair for pair in pairs if pair[0].part == "follow")
@@ -90,6 +122,20 @@ def _is_likely(triple: Sequence[SwitchFault]) -> bool:
 
 def describe(method: str, keys: Sequence[str]) -> Sentence:
     """Return the sentences of a class of faults that no answer tells apart."""
-    sentences = {key: fault.sentence for key, fault in by_key(method).items()}
-    sentences[""] = AS_THE_TEXTBOOK
-    return either([[sentences[name] for name in key.split(" + ")] for key in keys])
+    faults = by_key(method)
+    sentences = {key: fault.sentence for key, fault in faults.items()} | {"": AS_THE_TEXTBOOK}
+    names = [key.split(" + ") for key in keys]
+    what = either([[sentences[name] for name in group] for group in names])
+    parts = {faults[name].part for group in names for name in group if name}
+    if method == "forward" or parts != {"forward"}:
+        return what
+    return sentence("Its own steps are right, but not its forward kinematics: {what}", what=what)
+
+
+def explaining(diagnosis: Diagnosis) -> tuple[SwitchFault, ...]:
+    """Return the faults of forward kinematics that explain all answers, () if none do."""
+    for explanation in diagnosis.explanations[:1]:
+        if explanation.share == 1.0:
+            faults = by_key("forward")
+            return tuple(faults[k] for k in explanation.faults[0].split(" + ") if k in faults)
+    return ()

@@ -27,7 +27,9 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return [
         Case(name, TASK, skeleton._asdict(), family.name, family.about,
              facts={"size": skeletons.extent(skeleton.offsets)})
-        for name, family, skeleton in drawn(TASK, CaseFamily.pose, seed, 10 if thorough else 1)
+        for name, family, skeleton in drawn(
+            TASK, CaseFamily.pose, seed, 10 if thorough else 1, greeting.planar
+        )
         if skeletons.suits(skeleton.parents, greeting)
     ]  # fmt: skip
 
@@ -38,7 +40,7 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     wrong = [
         exchange
         for exchange, judgement in zip(exchanges, judgements, strict=True)
-        if judgement.verdict > Verdict.RIGHT_BUT
+        if judgement.verdict > Verdict.RIGHT_EXCEPT
     ]
     diagnosis = diagnosis_of("forward", exchanges, wrong, partial(_prediction_bound, greeting))
     return report(TASK, method, judgements, diagnosis)

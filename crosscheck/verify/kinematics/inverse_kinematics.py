@@ -13,11 +13,13 @@ from plumbob.reference.inverse_kinematics import solve_ik
 from plumbob.reference.skeleton import Skeleton
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..contestant import Answer, Exchange, Failure, FailureKind
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case
-from . import pose_laws, problems, rounding, sweeps
+from ..sentence import sentence
+from . import degenerate, pose_laws, problems, rounding, sweeps
+from .faults import SwitchFault
 from .pose_laws import AnsweredPose
 from .predictions import solve
 from .report import diagnosis_of, report
@@ -28,17 +30,39 @@ cases = problems.cases
 STOPS, SLOW = "sweeps made", "target reached, slow"
 # The methods of the textbook.
 METHODS = ("ccd", "fabrik")
+MAX_FAULTS = 3
+# The verdict on a solver of its own method that answers otherwise in another world: the origin is
+# arbitrary, angles about fixed axes and dampings with a unit are choices.
+WORLDS = {
+    "shifted": Verdict.WRONG,
+    "rotated": Verdict.UNDECIDED,
+    "in other units": Verdict.RIGHT_EXCEPT,
+}
 # Beyond reach the textbook's solvers need many sweeps: an honest solver may be so many times as far
 # from the nearest point as they are.
 AS_SLOW = 1.5
+# What may come of a division by zero: numbers without a meaning, or an exception.
+NO_NUMBER = sentence("the answer is not a number, or too large")
+EXCEPTIONS = (FailureKind.RAISED, FailureKind.REFUSED)
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-    """Judge poses by the laws, and sweeps by the textbook's; name the faults."""
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    base: Sequence[SwitchFault] = (),
+) -> TaskReport:
+    """Judge poses by the laws, and sweeps by the textbook's; name the faults.
+
+    `base` are the faults that the solver's forward kinematics is known to have.
+    """
     declared = method.lower() if method.lower() in METHODS else ""
     trials = [PoseTrial(exchange) for exchange in exchanges]
     sweep_trials = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
-    textbook = declared if method else sweeps.recognise_method(sweep_trials, greeting)
+    idle = sweeps.idle(trials)
+    textbook = declared
+    if not method and not idle:
+        textbook = sweeps.recognise_method(sweep_trials, greeting, base)
     for trial in trials:
         trial.judgement = _judge(trial, textbook, greeting)
     others_hold = not any(trial.is_wrong for trial in trials)
@@ -48,12 +72,12 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         trial.add(comparison.findings.get(trial.case.name, ()))
         if comparison.honest:
             trial.correct(partial(_forgive, trial.case))
-        base = by_name.get(trial.case.facts.get("like", ""))
-        if base and trial.pose.finite and base.pose.finite:
-            is_wrong = comparison.method and not comparison.honest
-            verdict = Verdict.WRONG if is_wrong else Verdict.RIGHT_BUT
-            trial.add([_equal_worlds(trial, base, verdict, greeting)])
-    diagnosis = _diagnosis(trials, comparison, greeting)
+        original = by_name.get(trial.case.facts.get("like", ""))
+        if original and trial.pose.finite and original.pose.finite:
+            trial.add([_equal_worlds(trial, original, comparison, greeting)])
+    # what repeats its start is explained by chance by several faults at once
+    diagnosis = _diagnosis(trials, comparison, greeting, 1 if idle else MAX_FAULTS, base)
+    diagnosis = replace(diagnosis, hints=tuple(filter(None, [idle])))
     if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
             trial.correct(_aggravate)
@@ -71,7 +95,7 @@ def _forgive(case: Case, broken: Finding) -> Finding:
 
 def _aggravate(broken: Finding) -> Finding:
     """Return a forgiven sweep as a wrong one: a fault reproduces it."""
-    is_forgiven = broken.law == sweeps.LAW and broken.verdict is Verdict.RIGHT_BUT
+    is_forgiven = broken.law == sweeps.LAW and broken.verdict is Verdict.RIGHT_EXCEPT
     return replace(broken, verdict=Verdict.WRONG) if is_forgiven else broken
 
 
@@ -80,7 +104,12 @@ def _judge(trial: PoseTrial, method: str, greeting: Greeting) -> CaseJudgement:
 
     def findings(outputs: Mapping[str, Any]) -> list[Finding]:
         findings = pose_laws.all_of(pose, case, greeting)
-        if any(finding.verdict is Verdict.BROKEN for finding in findings):
+        worst = max(findings, key=lambda finding: finding.verdict)
+        if case.requirement != "must" and worst.verdict >= Verdict.WRONG:
+            is_number = worst.verdict is Verdict.WRONG and not pose.is_huge(case.facts["size"])
+            failure = worst.sentence if is_number else NO_NUMBER
+            return [degenerate.forgiven(case, method, failure)]
+        if worst.verdict is Verdict.BROKEN:
             return findings
         return findings + target_laws(pose, outputs, case, method, greeting)
 
@@ -96,7 +125,11 @@ def _judge(trial: PoseTrial, method: str, greeting: Greeting) -> CaseJudgement:
         if pose.finite:
             correct_digits = digits(pose.distance_to(x), case.facts["size"])
     allowed = rounding.repeats(greeting.epsilon, case.facts["size"])
-    return judge_case(trial.exchange, findings, allowed, reference, expected, correct_digits)
+    judged = judge_case(trial.exchange, findings, allowed, reference, expected, correct_digits)
+    failure = trial.exchange.answer
+    if isinstance(failure, Failure) and case.requirement != "must" and failure.kind in EXCEPTIONS:
+        return replace(judged, findings=(degenerate.forgiven(case, method, failure.sentence),))
+    return judged
 
 
 def target_laws(
@@ -130,7 +163,7 @@ def reached(distance: float, slack: float, case: Case, method: str, greeting: Gr
 def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> str:
     """Return the law that an excess [m] of the distance breaks."""
     nearest, reach, before = (case.facts[name] for name in ("least", "reach", "before"))
-    is_degenerate, is_beyond = case.family in problems.DEGENERATE, nearest > 0.0
+    is_degenerate, is_beyond = case.requirement != "must", nearest > 0.0
     is_nearer = excess < 0.5 * (before - nearest)
     if is_degenerate and excess + nearest <= before + 1e-6 * reach:
         return "target reached, undetermined"
@@ -177,7 +210,7 @@ def claims(
 
 
 def _equal_worlds(
-    trial: PoseTrial, base: PoseTrial, verdict: Verdict, greeting: Greeting
+    trial: PoseTrial, base: PoseTrial, comparison: SweepComparison, greeting: Greeting
 ) -> Finding:
     """Return whether an answer is the base's, transformed into another world."""
     Q, scale, shift = trial.case.facts["world"]
@@ -185,11 +218,19 @@ def _equal_worlds(
     x[path] = scale * rotation.rotate(Q, x[path]) + shift
     size, amplification = trial.case.facts["size"], trial.case.facts["amplification"]
     tolerance = 2.0 * rounding.sweep(greeting.epsilon, len(x), size, amplification)
-    return finding("equal worlds", trial.pose.distance_to(x), tolerance, verdict=verdict)
+    error, verdict = trial.pose.distance_to(x), Verdict.WRONG
+    if not comparison.method or comparison.honest:
+        is_small = error <= rounding.STALL[greeting.precision] * trial.case.facts["reach"]
+        verdict = Verdict.RIGHT_EXCEPT if is_small else WORLDS[trial.case.facts["how"]]
+    return finding("equal worlds", error, tolerance, verdict=verdict)
 
 
 def _diagnosis(
-    trials: Sequence[PoseTrial], comparison: SweepComparison, greeting: Greeting
+    trials: Sequence[PoseTrial],
+    comparison: SweepComparison,
+    greeting: Greeting,
+    max_faults: int,
+    base: Sequence[SwitchFault],
 ) -> Diagnosis:
     """Return the faults of the declared or inferred method that reproduce the answers."""
     posed_trials = [trial for trial in trials if trial.pose.outputs]
@@ -197,15 +238,17 @@ def _diagnosis(
     names = comparison.wrong
     wrong = [trial for trial in sweep_trials if trial.is_wrong or trial.case.name in names]
     if wrong:
-        return sweeps.explained(comparison, sweep_trials, wrong, greeting)
+        return sweeps.explained(comparison, sweep_trials, wrong, greeting, max_faults, base)
     solves = [
         trial.comparable
         for trial in posed_trials
         if not trial.is_sweep
-        and trial.case.family not in problems.DEGENERATE
+        and trial.case.requirement == "must"
         and (trial.is_wrong or any(f.law == STOPS and f.verdict for f in trial.judgement.findings))
     ]
     if solves and comparison.method:
         bound = partial(sweeps.prediction_bound, greeting)
-        return diagnosis_of(comparison.method, solves, solves, bound, comparison.behaviour)
+        return diagnosis_of(
+            comparison.method, solves, solves, bound, comparison.behaviour, base=base
+        )
     return Diagnosis(behaviour=comparison.behaviour)

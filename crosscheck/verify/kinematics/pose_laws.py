@@ -23,6 +23,8 @@ from .predictions import with_effector_of
 DEAD_JOINTS = 4.0
 # Larger positions are clipped to this [m]: `judge_pose` takes none beyond 1e75.
 FARTHEST = 1e74
+# Coordinates beyond this share of the skeleton's size come from a division by nearly zero.
+HUGE = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,11 @@ class AnsweredPose:
     def finite(self) -> bool:
         """Whether the joints of the path have positions."""
         return bool(np.isfinite(self.positions[self.path]).all())
+
+    def is_huge(self, size: float) -> bool:
+        """Return whether positions are far beyond a skeleton of this size [m]."""
+        x = self.answered_positions
+        return x is not None and float(np.abs(x).max()) > HUGE * size
 
     @cached_property
     def drift(self) -> float:
@@ -121,11 +128,13 @@ def rotation_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Fi
     effector, bound = case.inputs["effector"], rounding.rotations(greeting.epsilon, len(pose.raw))
     lengths = np.linalg.norm(pose.raw, axis=-1)
     usable = np.isfinite(lengths) & (lengths > 0.0)
-    findings, is_finite = [], bool(np.isfinite(pose.local).all())
+    findings, is_finite = list[Finding](), bool(np.isfinite(pose.local).all())
     if not usable.all():
         joint = int(np.argmin(usable))
-        verdict = Verdict.RIGHT_BUT if joint == effector and is_finite else None
-        findings.append(finding("numbers, of a local rotation", verdict=verdict, index=joint))
+        verdict = Verdict.RIGHT_EXCEPT if joint == effector and is_finite else None
+        is_zero = lengths[joint] == 0.0
+        key = "numbers, of a zero rotation" if is_zero else "numbers, of a local rotation"
+        findings.append(finding(key, verdict=verdict, index=joint))
     if not is_finite:
         return findings
     lengths = np.where(usable, lengths, 1.0)
@@ -178,5 +187,5 @@ def _agreement(pose: AnsweredPose, case: Case, bound: float, greeting: Greeting)
     if errors is None or pose.local is None or not np.isfinite(pose.local[carriers]).all():
         return []
     dead = DEAD_JOINTS * rounding.DEAD_ANGLE[greeting.precision] * case.facts["reach"]
-    verdict = Verdict.RIGHT_BUT if errors.max() <= dead else None
+    verdict = Verdict.RIGHT_EXCEPT if errors.max() <= dead else None
     return [of_joints("rotations agree with positions", errors, bound, verdict)]

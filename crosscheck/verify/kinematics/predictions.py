@@ -1,17 +1,19 @@
 """Answers of the textbook's solvers, right or with faults."""
 
-from collections.abc import Callable, Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray, IndexArray
 
 from ..case import Case
 from ..explain import Variant
-from .faults import combinations, switches
+from .faults import EULER_ORDERS, SwitchFault, combinations, switches
 from .textbook import SOLVERS, Ending, Switches, TextbookChain, TextbookPose, place_all
 
 RIGHT = Switches()
@@ -40,7 +42,7 @@ def solve(
     parents = inputs["parents"]
     pose = _read(inputs, switched)
     effector = len(parents) - 1 if switched.effector == 1 else inputs["effector"]
-    chain = TextbookChain(parents, inputs["offsets"], path_to(parents, effector))
+    chain = TextbookChain(parents, np.array(inputs["offsets"]), path_to(parents, effector))
     target = tuple(inputs["target"].tolist())
     ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]))
     sweeps = SOLVERS[method](chain, target, ending, switched, pose)
@@ -52,7 +54,21 @@ def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
     local = np.array(inputs["local_rotations"])
     if switched.numbers in (1, 2):
         local = np.roll(local, 1, axis=-1)
+    elif switched.numbers == 4:  # w is computed as a square root
+        local[:, 0] = np.abs(local[:, 0])
+    if switched.euler:
+        local = _through_euler_angles(local, *EULER_ORDERS[switched.euler - 1])
     return TextbookPose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
+
+
+def _through_euler_angles(local: FloatArray, order: str, other_order: str) -> FloatArray:
+    """Return rotations whose Euler angles of one order are put together in another."""
+    angles = Rotation.from_quat(local, scalar_first=True).as_euler(order, suppress_warnings=True)
+    columns = [order.upper().index(axis) for axis in other_order.upper()]
+    if order[0] == order[2]:
+        columns = [0, 1, 2]
+    rotations = Rotation.from_euler(other_order, angles[:, columns])
+    return np.array(rotations.as_quat(scalar_first=True))
 
 
 def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:
@@ -60,14 +76,20 @@ def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:
     return np.roll(rotations, -1, axis=-1) if switched.numbers in (2, 3) else rotations
 
 
-def variants(method: str, max_faults: int = 3) -> Iterator[Variant]:
-    """Yield the textbook's method with all combinations of its faults, the fewest first."""
+def variants(
+    method: str, max_faults: int = 3, base: Sequence[SwitchFault] = ()
+) -> Iterator[Variant]:
+    """Yield the textbook's method with all combinations of its faults, the fewest first.
+
+    Before them come those with the faults in `base`, which its forward kinematics is known to have.
+    """
     task, _, solver = method.rpartition(" ")
     predict: Callable[[Switches, Case], Mapping[str, Any]] = predict_forward
     if method != "forward":
         predict = partial(predict_track if task else predict_inverse, solver)
-    for faults in combinations(method):
-        if len(faults) > max_faults:
+    with_base = combinations(method, base) if base else ()
+    for faults in itertools.chain(with_base, combinations(method)):
+        if len(faults) > max_faults + len(base):
             return
         keys = tuple(fault.key for fault in faults)
         yield Variant(keys, partial(predict, switches(faults)))

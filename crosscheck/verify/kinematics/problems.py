@@ -78,21 +78,27 @@ def _candidate(family: CaseFamily, rng: np.random.Generator) -> TargetProblem:
     kind, *arguments = family.target
     if kind == "circle":
         target = curves["circle"](150)[rng.integers(150)]
+        target = target[[0, 2, 1]] if family.planar else target
         return TargetProblem(family.pose(rng), 4, target)
     skeleton = family.pose(rng)
     offsets, effector = skeleton.offsets, len(skeleton.parents) - 1
     match kind:
         case "point":
-            target = np.array(arguments)
+            target = np.array(arguments) * (skeletons.IN_PLANE if family.planar else 1.0)
         case "joint":
             target = forward(skeleton._asdict())[0][arguments[0]]
+        case "behind":  # on the line from the effector through a joint
+            x, _ = forward(skeleton._asdict())
+            target = x[arguments[0]] + 0.75 * (x[arguments[0]] - x[effector])
         case "distance":  # as a share of the reach
             reach = float(np.linalg.norm(offsets[1:], axis=-1).sum())
             direction = rotation.rotate(rotation.random(rng), [1.0, 0.0, 0.0])
+            direction = skeletons.onto_plane(direction) if family.planar else direction
             target = offsets[0] + arguments[0] * reach * direction
         case _:  # well within reach
             effector = arguments[0] if arguments and kind != "stop test" else effector
             moved = skeleton._replace(local_rotations=rotation.random(rng, len(offsets)))
+            moved = skeletons.in_plane(moved) if family.planar else moved
             target = forward(moved._asdict())[0][effector]
     return TargetProblem(skeleton, effector, target)
 
@@ -101,7 +107,7 @@ def _is_suitable(family: CaseFamily, problem: TargetProblem) -> bool:
     match family.target[0]:
         case "telling":
             return is_telling(family.sweeps, problem)
-        case "easy" | "circle":
+        case "easy" | "circle" | "behind":
             return is_easy(family.tolerance, problem)
         case "stop test":
             return shows_stop(family.target[1], problem)
@@ -161,18 +167,16 @@ def shows_stop(test: int, problem: TargetProblem) -> bool:
     return True
 
 
-# Families in which a start or a target leaves a direction undefined.
-DEGENERATE = ("collinear", "opposite", "straight beyond", "at the root", "at a joint", "arrived")
-
-
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return single sweeps, then closed forms, whole solves and hostile targets."""
     problems = [
         _case(name, family, problem, greeting, method)
-        for name, family, problem in skeletons.drawn(TASK, draw, seed, 5 if thorough else 1)
-        if skeletons.suits(problem.skeleton.parents, greeting)
+        for name, family, problem in skeletons.drawn(
+            TASK, draw, seed, 5 if thorough else 1, greeting.planar
+        )
+        if skeletons.suits(problem.skeleton.parents, greeting, problem.effector)
     ]
-    return [*problems, *_transformed(problems)]
+    return [*problems, *_transformed(problems, greeting)]
 
 
 def _case(
@@ -181,19 +185,24 @@ def _case(
     tolerance = family.tolerance
     if greeting.precision == "single" and family.name == "tight":
         tolerance = 3e-5
+    if not greeting.rotations:
+        problem = problem._replace(skeleton=skeletons.without_rotations(problem.skeleton))
     inputs = request(problem, tolerance, family.sweeps, method)
     geometry = facts(inputs)
     if tolerance == 0.0:
         geometry |= {"amplification": amplification(inputs), "sweeps": family.sweeps}
-    return Case(name, TASK, inputs, family.name, family.about, facts=geometry)
+    return Case(name, TASK, inputs, family.name, family.about, facts=geometry,
+                requirement=family.requirement)  # fmt: skip
 
 
-def _transformed(cases: list[Case]) -> Iterator[Case]:
+def _transformed(cases: list[Case], greeting: Greeting) -> Iterator[Case]:
     """Yield three of the first sweeps again in a rotated, scaled and shifted world."""
+    plane = skeletons.IN_PLANE if greeting.planar else np.ones(3)
+    axis = 1.0 - plane if greeting.planar else plane
     worlds = (
-        ("rotated", rotation.exponential([0.5, -0.8, 1.1]), 1.0, np.zeros(3)),
+        ("rotated", rotation.exponential([0.5, -0.8, 1.1] * axis), 1.0, np.zeros(3)),
         ("in other units", rotation.identity(), 1000.0, np.zeros(3)),
-        ("shifted", rotation.identity(), 1.0, np.array([2.0, -1.0, 0.5])),
+        ("shifted", rotation.identity(), 1.0, np.array([2.0, -1.0, 0.5]) * plane),
     )
     sweep_cases = [case for case in cases[2 : 2 + len(worlds)] if "sweeps" in case.facts]
     for case, (name, Q, scale, shift) in zip(sweep_cases, worlds, strict=False):
@@ -202,8 +211,11 @@ def _transformed(cases: list[Case]) -> Iterator[Case]:
         offsets[0] = scale * rotation.rotate(Q, inputs["offsets"][0]) + shift
         local[0] = rotation.multiply(Q, local[0])
         target = scale * rotation.rotate(Q, inputs["target"]) + shift
-        inputs |= {"offsets": offsets, "local_rotations": local, "target": target}
-        world = {"like": case.name, "world": (Q, scale, shift)}
+        skeleton = PosedSkeleton(inputs["parents"], offsets, local)
+        if not greeting.rotations:
+            skeleton = skeletons.without_rotations(skeleton)
+        inputs |= {**skeleton._asdict(), "target": target}
+        world = {"like": case.name, "world": (Q, scale, shift), "how": name}
         about = sentence(
             "The case '{case}', {how}: the answer must be the same in that frame.",
             case=case.name,

@@ -7,10 +7,10 @@ from functools import partial
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import explain, first_broken
-from ..judgement import CaseJudgement, Diagnosis, TaskReport, smallest_failure
-from ..laws import hints_of
+from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict, smallest_failures
+from ..laws import hints_of, laws_that_hold
 from ..sentence import Sentence
-from .faults import describe
+from .faults import SwitchFault, describe
 from .predictions import variants
 
 # The most cases that are compared with every variant, small and wrong ones first.
@@ -25,6 +25,7 @@ def diagnosis_of(
     behaviour: Sentence | None = None,
     *,
     max_faults: int = 3,
+    base: Sequence[SwitchFault] = (),
 ) -> Diagnosis:
     """Return the faults of a method that reproduce the answers, if some answers are wrong."""
     compared: list[Exchange] = []
@@ -34,7 +35,10 @@ def diagnosis_of(
             return Diagnosis(behaviour=behaviour)
         compared += sorted(with_answers, key=lambda exchange: exchange.case.size)
     explanations, count = explain(
-        variants(method, max_faults), compared[:COMPARED], tolerance, partial(describe, method)
+        variants(method, max_faults, base),
+        compared[:COMPARED],
+        tolerance,
+        partial(describe, method),
     )
     faulty = tuple(explanation for explanation in explanations if explanation.faults != ("",))
     return Diagnosis(faulty, behaviour, variant_count=count)
@@ -44,9 +48,12 @@ def report(
     task: str, method: str, judgements: Sequence[CaseJudgement], diagnosis: Diagnosis
 ) -> TaskReport:
     """Return the report, with hints and the first broken law where no fault explains answers."""
-    smallest = smallest_failure(judgements, diagnosis.explained)
+    failures = smallest_failures(judgements, diagnosis.explained)
     broken = None
-    if smallest is not None and not diagnosis.explained:
-        broken = first_broken([smallest], at_joints=True)
-    diagnosis = replace(diagnosis, first_broken=broken, hints=hints_of(judgements))
+    if len(failures) == 1 and not diagnosis.explained:
+        broken = first_broken(failures, at_joints=True)
+    hints = (*diagnosis.hints, *hints_of(judgements))
+    if max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED:
+        hints += (laws_that_hold(judgements),)
+    diagnosis = replace(diagnosis, first_broken=broken, hints=hints)
     return TaskReport(task, method, judgements, diagnosis)

@@ -15,7 +15,7 @@ from ..explain import Variant, explain
 from ..greeting import Greeting
 from ..judgement import Diagnosis, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case
-from ..sentence import Sentence, sentence
+from ..sentence import Sentence, sentence, with_code
 from . import rounding
 from .faults import AS_THE_TEXTBOOK, TABLE
 from .polylines import Polyline
@@ -143,7 +143,7 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
         is_start_repeated = inputs["closed"] and excess == 1
         findings.append(finding(
             "count", abs(excess), asked=inputs["count"], came=len(points),
-            verdict=Verdict.RIGHT_BUT if is_start_repeated else None,
+            verdict=Verdict.RIGHT_EXCEPT if is_start_repeated else None,
         ))  # fmt: skip
     if distances.max() <= bound:
         arc = line.arc_lengths(points, bound)
@@ -176,7 +176,7 @@ def _gaps(points: FloatArray, arc: FloatArray, case: Case, bound: float) -> Find
     if "count" not in case.inputs:
         return _gaps_by_spacing(measures, case, bound)
     error = min(_spread(gaps) for gaps in measures)
-    verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else None
+    verdict = Verdict.RIGHT_EXCEPT if len(case.inputs["strokes"]) > 1 else None
     tolerance = UNEVEN + 4.0 * bound / max(float(measures[2].mean()), bound)
     return finding("spacing", error, tolerance, verdict=verdict)
 
@@ -255,7 +255,10 @@ def _diagnosis(
     wrong_first: Sequence[Exchange], greeting: Greeting, behaviour: Sentence | None
 ) -> Diagnosis:
     """Return the faults that reproduce the answers."""
-    sentences = {key: Sentence(entry["sentence"], {}) for key, entry in TABLE[TASK].items()}
+    sentences = {
+        key: with_code(entry["code"], Sentence(entry["sentence"], {}))
+        for key, entry in TABLE[TASK].items()
+    }
     sentences[""] = AS_THE_TEXTBOOK
 
     def variant(key: str, points: Callable[[Case], FloatArray]) -> Variant:

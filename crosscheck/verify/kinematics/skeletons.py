@@ -11,13 +11,16 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from plumbob.reference import rotation, scenes
+from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes
 from plumbob.reference.arguments import FloatArray, IndexArray
 
+from ..case import Requirement
 from ..greeting import Greeting
 from ..sentence import Sentence
 
 FILE = Path(__file__).with_name("cases.toml")
+# Projects onto the plane z = 0.
+IN_PLANE = np.array([1.0, 1.0, 0.0])
 
 
 class PosedSkeleton(NamedTuple):
@@ -38,11 +41,14 @@ class CaseFamily(NamedTuple):
     copies: int
     tolerance: float  # [m]
     sweeps: int
+    requirement: Requirement
+    planar: bool = False  # whether all is projected onto the plane z = 0
 
     def pose(self, rng: np.random.Generator) -> PosedSkeleton:
         """Return a random skeleton of the family in a random pose."""
         name, *arguments = self.skeleton
-        return SKELETONS[name](rng, *arguments)
+        skeleton = SKELETONS[name](rng, *arguments)
+        return in_plane(skeleton) if self.planar else skeleton
 
 
 Problem = TypeVar("Problem")
@@ -50,7 +56,7 @@ Draw = Callable[[CaseFamily, np.random.Generator], Problem]
 
 
 def drawn(
-    task: str, draw: Draw[Problem], seed: int, repeats: int
+    task: str, draw: Draw[Problem], seed: int, repeats: int, planar: bool = False
 ) -> Iterator[tuple[str, CaseFamily, Problem]]:
     """Yield the name of each case of a task, its family and its random problem."""
     for name, entry in tomllib.loads(FILE.read_text(encoding="utf-8"))[task].items():
@@ -58,6 +64,7 @@ def drawn(
         family = CaseFamily(
             name, Sentence(entry["about"], {}), entry["skeleton"], target, entry.get("copies", 1),
             entry.get("tolerance", 1e-4), entry.get("sweeps", 60),
+            entry.get("requirement", "must"), planar,
         )  # fmt: skip
         for i in range(family.copies * repeats):
             case = f"{name} {i + 1}"
@@ -145,11 +152,19 @@ def slight_rotations(rng: np.random.Generator) -> PosedSkeleton:
     return skeleton._replace(local_rotations=rotation.exponential(v))
 
 
-def link_of_no_length(rng: np.random.Generator) -> PosedSkeleton:
+def link_of_no_length(rng: np.random.Generator, joint: int = 2) -> PosedSkeleton:
     """Return a chain with an offset of zero."""
     skeleton = chain(rng, 4)
-    skeleton.offsets[2] = 0.0
+    skeleton.offsets[joint] = 0.0
     return skeleton
+
+
+def staircase(rng: np.random.Generator) -> PosedSkeleton:
+    """Return a chain along the axes whose positions no solver rounds."""
+    offsets = np.array([
+        [0.5, -0.25, 0.75], [0.75, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.625], [0.875, 0.0, 0.0],
+    ])  # fmt: skip
+    return PosedSkeleton(np.arange(-1, 4), offsets, rotation.identity(5))
 
 
 def right_angle(rng: np.random.Generator) -> PosedSkeleton:
@@ -172,11 +187,39 @@ SKELETONS: dict[str, Callable[..., PosedSkeleton]] = {
     "slight rotations": slight_rotations,
     "link of no length": link_of_no_length,
     "right angle": right_angle,
+    "staircase": staircase,
 }
 
 
-def suits(parents: IndexArray, greeting: Greeting) -> bool:
-    """Return whether a solver takes joints with these parents."""
+def in_plane(skeleton: PosedSkeleton) -> PosedSkeleton:
+    """Return a skeleton turned into the plane z = 0, its links as long, its root projected."""
+    offsets, local = onto_plane(skeleton.offsets), skeleton.local_rotations * [1.0, 0.0, 0.0, 1.0]
+    offsets[0] = skeleton.offsets[0] * IN_PLANE
+    norms = np.linalg.norm(local, axis=-1, keepdims=True)
+    local = np.where(norms > 0.0, local / np.maximum(norms, 1e-300), rotation.identity())
+    return skeleton._replace(offsets=offsets, local_rotations=local)
+
+
+def onto_plane(vectors: FloatArray) -> FloatArray:
+    """Return vectors turned into the plane z = 0, as long as before."""
+    shadows = vectors * IN_PLANE
+    lengths, widths = (np.linalg.norm(x, axis=-1, keepdims=True) for x in (vectors, shadows))
+    return np.asarray(shadows * (lengths / np.maximum(widths, 1e-300)))
+
+
+def without_rotations(skeleton: PosedSkeleton) -> PosedSkeleton:
+    """Return a skeleton whose joints have the same positions without any rotation."""
+    joints = Skeleton(skeleton.parents, skeleton.offsets)
+    x = forward_kinematics(joints, skeleton.local_rotations).positions
+    offsets = x.copy()
+    offsets[1:] -= x[skeleton.parents[1:]]
+    return skeleton._replace(offsets=offsets, local_rotations=rotation.identity(len(x)))
+
+
+def suits(parents: IndexArray, greeting: Greeting, effector: int | None = None) -> bool:
+    """Return whether a solver takes joints with these parents, and this effector."""
     joints = len(parents)
     is_chain = bool((parents == np.arange(-1, joints - 1)).all())
-    return (is_chain or not greeting.chains_only) and joints <= (greeting.max_joints or joints)
+    is_last = effector in (None, joints - 1) or greeting.effector == "any"
+    is_small = joints <= (greeting.max_joints or joints)
+    return (is_chain or not greeting.chains_only) and is_small and is_last

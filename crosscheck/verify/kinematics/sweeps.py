@@ -21,7 +21,7 @@ from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
 from ..laws import LAWS, finding
 from ..sentence import Sentence, sentence
 from . import pose_laws, rounding
-from .faults import FAULTS, by_key, describe, switches
+from .faults import FAULTS, SwitchFault, by_key, describe, switches
 from .predictions import predict_inverse, solve
 from .report import diagnosis_of
 from .textbook import Switches
@@ -34,6 +34,8 @@ SMALLEST = 1e-3
 # The number of faults at once that the recognition of a method allows.
 RECOGNISED_FAULTS = 2
 LAW = "one sweep"
+# Quaternions whose numbers differ by less are alike, in single precision too.
+ROUNDED = 1e-6
 
 
 class PoseTrial:
@@ -97,8 +99,9 @@ def compare(
     behaviour = sentence(
         "Its sweeps resemble those of {method}, with which it is compared."
         if wrong
-        else "Its sweeps are those of {method}.",
+        else 'Its sweeps are those of {method}. Declare it with "methods": ["{key}"].',
         method=NAMES[method],
+        key=method,
     )
     key, damped, choice = LAW, None, None
     if wrong:
@@ -110,13 +113,33 @@ def compare(
         name: [finding(key, error, bound, method=NAMES[method], choice=choice)]
         for name, (error, bound) in errors.items()
     }
-    is_honest = LAWS[key].get("verdict") == "RIGHT_BUT"
+    is_honest = LAWS[key].get("verdict") == "RIGHT_EXCEPT"
     return SweepComparison(
         method, None if declared else behaviour, wrong, findings, is_honest, damped
     )
 
 
-def recognise_method(trials: Sequence[PoseTrial], greeting: Greeting) -> str:
+def idle(trials: Sequence[PoseTrial]) -> Sentence | None:
+    """Return how local rotations are always the identity or those of the start, None if not so."""
+    poses = [(t.pose.raw, t.case.inputs["local_rotations"]) for t in trials]
+    answers = [(local, start) for local, start in poses if local is not None]
+    if not answers:
+        return None
+    if all((np.abs(local[:, 0]) > 1.0 - ROUNDED).all() for local, _ in answers):
+        return sentence(
+            "All local rotations of its answers are the identity: is the result written into them?"
+        )
+    if all((np.abs(local - start) < ROUNDED).all() for local, start in answers):
+        return sentence(
+            "All its answers repeat the local rotations of the start: is the result written into "
+            "them?"
+        )
+    return None
+
+
+def recognise_method(
+    trials: Sequence[PoseTrial], greeting: Greeting, base: Sequence[SwitchFault] = ()
+) -> str:
     """Return the method of most of the sweeps, right or with a fault, or ""."""
     for method in NAMES:
         errors = [_error(trial, method, greeting) for trial in trials]
@@ -127,7 +150,7 @@ def recognise_method(trials: Sequence[PoseTrial], greeting: Greeting) -> str:
         return ""
     if honest_variant(trials, "ccd", greeting) is None and damping_of(trials, greeting) is not None:
         return "ccd"
-    fits = {method: _best_fit(trials, method, greeting) for method in NAMES}
+    fits = {method: _best_fit(trials, method, greeting, base) for method in NAMES}
     best = max(fits, key=lambda method: fits[method])
     return best if fits[best][0] >= MIN_SHARE else ""
 
@@ -139,11 +162,15 @@ def _is_other_solver(trial: PoseTrial, greeting: Greeting) -> bool:
     return keeps and _has_arrived(trial, greeting)
 
 
-def _best_fit(trials: Sequence[PoseTrial], method: str, greeting: Greeting) -> tuple[float, int]:
+def _best_fit(
+    trials: Sequence[PoseTrial], method: str, greeting: Greeting, base: Sequence[SwitchFault]
+) -> tuple[float, int]:
     """Return the share of the sweeps that a faulty textbook reproduces, and minus its faults."""
     exchanges = [trial.comparable for trial in trials]
     bound = partial(prediction_bound, greeting)
-    diagnosis = diagnosis_of(method, exchanges, exchanges, bound, max_faults=RECOGNISED_FAULTS)
+    diagnosis = diagnosis_of(
+        method, exchanges, exchanges, bound, max_faults=RECOGNISED_FAULTS, base=base
+    )
     for explanation in diagnosis.explanations[:1]:
         return explanation.share, -len(explanation.faults[0].split(" + "))
     return 0.0, 0
@@ -239,8 +266,10 @@ def explained(
     trials: Sequence[PoseTrial],
     wrong: Sequence[PoseTrial],
     greeting: Greeting,
+    max_faults: int,
+    base: Sequence[SwitchFault] = (),
 ) -> Diagnosis:
-    """Return the faults that reproduce the wrong sweeps among all."""
+    """Return the faults, up to so many at once, that reproduce the wrong sweeps among all."""
     if not comparison.method or comparison.damped is not None:
         return Diagnosis(behaviour=comparison.damped)
     exchanges = {trial.case.name: trial.comparable for trial in trials}
@@ -250,6 +279,8 @@ def explained(
         [exchanges[trial.case.name] for trial in wrong],
         partial(prediction_bound, greeting),
         comparison.behaviour,
+        max_faults=max_faults,
+        base=base,
     )
 
 

@@ -36,6 +36,9 @@ from plumbob.reference.quaternion import (
 ORIGIN = (0.0, 0.0, 0.0)
 # Numbers of `applied` from this one on rotate the child on the path.
 GIVEN_TO_CHILD = 10
+# CCD drops rotations smaller than these, by the number of `dropped` [rad]; among them are a degree,
+# and the angles with the cosines 0.99999, 0.9999 and 0.999.
+DROPPED = (0.0, 1e-4, 1e-3, 4.4721e-3, 1e-2, 1.41421e-2, 1.745329e-2, 4.47214e-2, 0.1)
 UNCAPPED = 10.0  # an angle that no rotation has [rad]
 
 
@@ -43,6 +46,7 @@ class Switches(NamedTuple):
     """The number of the fault in each rule of a solver; 0 is right."""
 
     numbers: int = 0  # the order of a quaternion's numbers
+    euler: int = 0  # the orders in which rotations are split and put together
     frame: int = 0  # forward kinematics: what rotates an offset
     product: int = 0  # R of R_parent and Q
     base: int = 0  # what an offset is added to
@@ -54,6 +58,8 @@ class Switches(NamedTuple):
     joints: int = 0  # which joints a sweep leaves out
     update: int = 0  # when joints are placed anew
     aim: int = 0  # the two directions that d joins
+    offsets: int = 0  # what becomes of a child's offset
+    dropped: int = 0  # which angle is too small to rotate by
     passes: int = 0  # FABRIK: which passes there are
     base_joint: int = 0  # where the root goes back to
     lengths: int = 0  # of links
@@ -127,8 +133,12 @@ def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: in
     R_above = load_quaternion(pose.rotations, above) if above >= 0 else IDENTITY
     frames = (
         R_parent, IDENTITY, R, conjugate(R_parent), R_above, load_quaternion(pose.local, p), Q,
+        R_parent,
     )  # fmt: skip
-    offset = rotate(frames[faults.frame], load_vector(chain.offsets, j))
+    offset = load_vector(chain.offsets, j)
+    if faults.frame == 7:
+        offset = subtract(offset, load_vector(chain.offsets, p))
+    offset = rotate(frames[faults.frame], offset)
     return add(base_of(chain, pose, p, faults.base), offset), R
 
 
@@ -151,7 +161,8 @@ def solve(
         for j in range(len(chain.parents)):
             store_quaternion(pose.local, j, IDENTITY)
     place(chain, faults, pose)
-    allowed = (ending.sweeps, ending.sweeps + 1, ending.sweeps - 1, ending.sweeps)
+    n = ending.sweeps
+    allowed = (n, n + 1, n - 1, n, min(n, 1), 0)
     before, i = math.inf, 0
     while i < allowed[faults.budget]:
         distance = norm(subtract(load_vector(pose.positions, chain.path[-1]), target))
@@ -190,7 +201,8 @@ def sweep_ccd(
         left_out = (-1, 0, links - 1)
         if k != left_out[faults.joints]:
             rotate_joint(chain, k, target, faults, pose)
-    place(chain, faults, pose)
+    if faults.update < 2:
+        place(chain, faults, pose)
 
 
 def rotate_joint(
@@ -200,17 +212,47 @@ def rotate_joint(
     joint = load_vector(pose.positions, chain.path[k])
     effector = load_vector(pose.positions, chain.path[-1])
     arm, direction = subtract(effector, joint), subtract(target, joint)
+    parent = load_vector(pose.positions, chain.path[max(k - 1, 0)])
+    child = load_vector(pose.positions, chain.path[k + 1])
     directions = (
         (arm, direction),
         (arm, target),
         (effector, direction),
         (arm, add(direction, load_vector(pose.positions, 0))),
         (arm, subtract(target, effector)),
+        (subtract(effector, parent), subtract(target, parent)),
+        (subtract(effector, child), subtract(target, child)),
     )
     a, b = directions[faults.aim]
-    apply_rotation(chain, k, damped(between(a, b), faults), faults.applied, pose)
+    d = damped(between(a, b), faults)
+    if faults.dropped > 0 and norm(logarithm(d)) < DROPPED[faults.dropped]:
+        return
+    turn_offset(chain, k, d, faults.offsets, pose)
+    if faults.update < 3:
+        apply_rotation(chain, k, d, faults.applied, pose)
     if faults.update == 0:
         place(chain, faults, pose)
+    elif faults.update >= 2:
+        follow_by_hand(chain, k, d, faults.update, pose)
+
+
+def turn_offset(chain: TextbookChain, k: int, d: Any, fault: int, pose: TextbookPose) -> None:
+    """Rotate the offset of the next joint too: in the joint's frame (1), in the world's (2)."""
+    if fault == 0:
+        return
+    R = load_quaternion(pose.rotations, chain.path[k])
+    rotations = (IDENTITY, multiply(multiply(conjugate(R), d), R), d)
+    offset = rotate(rotations[fault], load_vector(chain.offsets, chain.path[k + 1]))
+    store_vector(chain.offsets, chain.path[k + 1], offset)
+
+
+def follow_by_hand(chain: TextbookChain, k: int, d: Any, fault: int, pose: TextbookPose) -> None:
+    """Rotate the effector about joint k, or (3) every joint after it on the path."""
+    last = len(chain.path) - 1
+    joint = load_vector(pose.positions, chain.path[k])
+    for m in range(last if fault == 2 else k + 1, last + 1):
+        arm = subtract(load_vector(pose.positions, chain.path[m]), joint)
+        store_vector(pose.positions, chain.path[m], add(joint, rotate(d, arm)))
 
 
 def damped(d: Any, faults: Switches) -> Any:
@@ -253,13 +295,17 @@ def apply_rotation(chain: TextbookChain, k: int, d: Any, fault: int, pose: Textb
         (Q, P_inverse, d, P),
         (unit, unit, d, Q),
         (R_inverse, d, R, Q),
+        (P_inverse, d, P, Q),
+        (unit, unit, Q, d),
     )
     a, b, c, e = products[fault]
     store_quaternion(pose.local, j, renormalised(multiply(multiply(multiply(a, b), c), e)))
 
 
 def keep(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
-    """Leave a pose of CCD as it is: its sweeps keep rotations and positions together."""
+    """Leave a pose of CCD as it is, unless only its effector was followed by hand."""
+    if faults.update == 2:
+        place(chain, faults, pose)
 
 
 def sweep_fabrik(

@@ -48,14 +48,21 @@ class CurveProblem(NamedTuple):
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return short curves for chains, the lab's arm on its curves, and a tree."""
     return [
-        _case(name, family, problem, method)
-        for name, family, problem in skeletons.drawn(TASK, _draw, seed, 5 if thorough else 1)
-        if skeletons.suits(problem.start.skeleton.parents, greeting)
+        _case(name, family, problem, greeting, method)
+        for name, family, problem in skeletons.drawn(
+            TASK, _draw, seed, 5 if thorough else 1, greeting.planar
+        )
+        if skeletons.suits(problem.start.skeleton.parents, greeting, problem.start.effector)
     ]
 
 
-def _case(name: str, family: CaseFamily, problem: CurveProblem, method: str) -> Case:
-    inputs = problems.request(problem.start, TOLERANCE, SWEEPS, method)
+def _case(
+    name: str, family: CaseFamily, problem: CurveProblem, greeting: Greeting, method: str
+) -> Case:
+    start = problem.start
+    if not greeting.rotations:
+        start = start._replace(skeleton=skeletons.without_rotations(start.skeleton))
+    inputs = problems.request(start, TOLERANCE, SWEEPS, method)
     frames = [problems.facts({**inputs, "target": target}) for target in problem.curve]
     del inputs["target"]
     inputs["curve"] = problem.curve
@@ -92,10 +99,14 @@ def _candidate(family: CaseFamily, rng: np.random.Generator) -> CurveProblem:
         x, _ = forward(skeleton._asdict())
         t = 2.0 * np.pi * np.arange(FRAMES) / FRAMES
         circle = 0.15 * np.stack([np.cos(t), np.sin(t), 0.5 * np.sin(2.0 * t)], axis=-1)
-        curve = x[effector] + rotation.rotate(rotation.random(rng), circle)
+        curve = x[effector] + (
+            circle * skeletons.IN_PLANE
+            if family.planar
+            else rotation.rotate(rotation.random(rng), circle)
+        )
         return CurveProblem(TargetProblem(skeleton, effector, x[effector]), curve)
     name, step = arguments
-    points = curves[name](150)
+    points = curves[name](150)[:, [0, 2, 1] if family.planar else [0, 1, 2]]
     first = int(rng.integers(len(points)))
     part = np.roll(points, -first, axis=0)[: step * FRAMES : step]
     return CurveProblem(TargetProblem(family.pose(rng), 4, part[0]), part)
@@ -210,7 +221,7 @@ def _on_target(pose: AnsweredPose, case: Case, greeting: Greeting) -> Finding:
     joints, size, error = len(pose.positions), case.facts["size"], pose.distance
     slack = rounding.positions(greeting.epsilon, joints, size, pose.drift)
     share = rounding.STALL[greeting.precision] if case.inputs["method"] in METHODS else SLOW
-    verdict = Verdict.RIGHT_BUT if error <= share * case.facts["reach"] else None
+    verdict = Verdict.RIGHT_EXCEPT if error <= share * case.facts["reach"] else None
     return finding("target reached", error, case.inputs["tolerance"] + slack, verdict=verdict)
 
 

@@ -11,7 +11,7 @@ from ..sentence import all_visible
 from .words import GOOD, Say, advice, remarks
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"
-VERSION: Literal[1] = 1
+VERSION: Literal[2] = 2
 Record = dict[str, Any]
 
 
@@ -40,11 +40,13 @@ def _task(task: TaskReport, say: Say) -> Record:
     diagnosis = task.diagnosis
     behaviour, first_broken = diagnosis.behaviour, diagnosis.first_broken
     return {
-        "task": task.task, "method": task.method, "verdict": _name(task), "digits": task.digits,
+        "task": task.task, "method": task.method, "verdict": _name(task),
+        "assumptions": list(map(say, task.assumptions)), "digits": task.digits,
         "slowdown": task.slowdown,
         "passed": sum(judgement.verdict in GOOD for judgement in task.judgements),
         "explanations": [
-            {"faults": explanation.faults, "text": say(explanation.sentence),
+            {"faults": explanation.faults, "codes": explanation.codes,
+             "text": say(explanation.sentence),
              "share": explanation.share, "distance": explanation.distance}
             for explanation in diagnosis.explanations
         ],
@@ -63,6 +65,7 @@ def _case(judgement: CaseJudgement, say: Say) -> Record:
     failure = answer if isinstance(answer, Failure) else None
     return {
         "name": case.name, "family": case.family, "about": say(case.about),
+        "class": case.requirement,
         "verdict": _name(judgement), "digits": judgement.digits,
         "seconds": own.seconds if own and not own.untimed else None,
         "reference_seconds": judgement.reference_seconds,

@@ -26,7 +26,7 @@ def _suite(task: TaskReport, say: Say) -> ElementTree.Element:
     _count(suite, task.judgements)
     for judgement in task.judgements:
         suite.append(_case(judgement, title(task), say))
-    if lines := list(map(say, filter(None, (task.precision, *explanations(task))))):
+    if lines := list(map(say, (*task.assumptions, *explanations(task)))):
         ElementTree.SubElement(suite, "system-out").text = "\n".join(lines)
     return suite
 

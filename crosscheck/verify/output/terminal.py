@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..judgement import CaseJudgement, Report, TaskReport, Verdict
+from ..judgement import CaseJudgement, Report, TaskReport, Verdict, smallest_failures
 from ..sentence import Sentence, sentence, visible
 from . import comparison
 from .words import (
@@ -22,6 +22,7 @@ from .words import (
     digits,
     explanations,
     introduction,
+    is_unwritten,
     passed,
     remarks,
     speed,
@@ -49,7 +50,7 @@ _PAPER = Console(**_PLAIN, width=_WIDEST, color_system=None, force_terminal=Fals
 def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[str]:
     """Return the screen, at most 80 columns wide and cut to about so many lines."""
     say = context.say
-    bad = [task for task in report.tasks if task.verdict not in GOOD]
+    bad = [task for task in report.tasks if task.verdict not in GOOD and not is_unwritten(task)]
     screen = [*wrapped(say(introduction(report))), *_table(report.tasks, say)]
     screen += paragraphs(remarks(report), say)
     end = wrapped(say(advice(report.tasks)))
@@ -93,9 +94,14 @@ def _grid(rows: Sequence[Sequence[str]], sides: str, size: int = _WIDEST) -> lis
 
 
 def _reservations(task: TaskReport) -> list[Sentence]:
-    """Return the worst complaint about answers that are not wrong, and the inferred behaviour."""
-    worst = max(task.judgements, key=lambda judgement: judgement.verdict, default=None)
-    return [*(worst.complaints[:1] if worst is not None else ()), *explanations(task)]
+    """Return each kind of the worst complaints about right answers, and the inferred behaviour."""
+    kinds: dict[tuple[str, str], Sentence] = {}
+    for judgement in task.judgements:
+        for complaint in judgement.complaints[:1] if judgement.verdict is task.verdict else ():
+            cause = complaint.values.get("cause")
+            kind = complaint.template, cause.template if isinstance(cause, Sentence) else ""
+            kinds.setdefault(kind, complaint)
+    return [*kinds.values(), *explanations(task)]
 
 
 def _summary(task: TaskReport, say: Say, indent: str = "") -> list[str]:
@@ -112,28 +118,47 @@ def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:
     heading, why_limit = f"{title(task)}:", max(_EXPLANATION, room // 3)
     if failure is None:
         return [heading, *_shorten(paragraphs(_reservations(task), say, "  "), why_limit)]
-    case = _shorten(_failing(task, failure, say), max(_COMPLAINT, room // 8))
+    failures = smallest_failures(task.judgements, task.diagnosis.explained)
+    case = [
+        line
+        for other in failures
+        for line in _shorten(_failing(task, other, len(failures), say), max(_COMPLAINT, room // 8))
+    ]
     rerun = []
     if command:
         rerun = [f"  {say(sentence('The case is saved. To run it again:'))}", f"    {say(command)}"]
     room -= 1 + len(case) + len(rerun)
     why = paragraphs(explanations(task), say, "  ")
     why = _shorten(why, max(2, min(why_limit, room - 3)))
-    return [heading, *why, *case, *_numbers(failure, say, room - len(why) - 1), *rerun]
+    # what is BROKEN has no numbers: then those of the WRONG case stand below its complaint
+    rows = numbers(failures[-1], say, room - len(why) - 1)
+    return [heading, *why, *case, *rows, *rerun]
 
 
-def _failing(task: TaskReport, failure: CaseJudgement, say: Say) -> list[str]:
-    """Return the smallest failing case and its complaint, unless the first law includes both."""
+def _failing(task: TaskReport, failure: CaseJudgement, kinds: int, say: Say) -> list[str]:
+    """Return the smallest failing case and its complaint, unless the first law includes both.
+
+    If there are two kinds of failures, the number of cases of its kind is added.
+    """
     complaint, law = " ".join(map(say, failure.complaints[:1])), task.diagnosis.first_broken
-    if law is not None and say(law).endswith(complaint) and failure.case.name in say(law):
+    name, verdict = f'"{failure.case.name}"', failure.verdict
+    is_told = law is not None and say(law).endswith(complaint) and failure.case.name in say(law)
+    if kinds > 1:
+        count = sum(judgement.verdict == verdict for judgement in task.judgements)
+        fields: dict[str, Any] = {"verdict": say(VERDICTS[verdict]), "count": count, "name": name}
+        short = sentence("{verdict} cases: {count}; the smallest is {name}.", **fields)
+        what = sentence(
+            "{verdict} cases: {count}; the smallest, {name}: {what}", what=complaint, **fields
+        )
+        return wrapped(say(short if is_told else what), "  ")
+    if is_told:
         return []
-    name = f'"{failure.case.name}"'
     return wrapped(
         say(sentence("Smallest failing case, {name}: {what}", name=name, what=complaint)), "  "
     )
 
 
-def _numbers(failure: CaseJudgement, say: Say, limit: int) -> list[str]:
+def numbers(failure: CaseJudgement, say: Say, limit: int) -> list[str]:
     """Return a heading and rows of numbers side by side, in so many lines."""
     rows = comparison.rows(failure, min(limit, 3))
     if limit < 1 or not rows:

@@ -4,16 +4,20 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from ..contestant import Failure
 from ..judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
 from ..language import translator
 from ..sentence import Sentence, sentence, visible
 from . import saved
 
 Say = Callable[[Sentence], str]
-GOOD = (Verdict.RIGHT, Verdict.RIGHT_BUT)
+GOOD = (Verdict.RIGHT, Verdict.RIGHT_EXCEPT)
+# In the answers of starters that nobody has filled in.
+UNWRITTEN = "is not written yet"
+STEPS = ("mass_spring_step", "mass_spring_motion")
 VERDICTS = {
     Verdict.RIGHT: sentence("RIGHT"),
-    Verdict.RIGHT_BUT: sentence("RIGHT BUT"),
+    Verdict.RIGHT_EXCEPT: sentence("RIGHT EXCEPT"),
     Verdict.UNDECIDED: sentence("UNDECIDED"),
     Verdict.WRONG: sentence("WRONG"),
     Verdict.BROKEN: sentence("BROKEN"),
@@ -47,7 +51,7 @@ def title(report: TaskReport) -> str:
 
 
 def passed(report: TaskReport) -> str:
-    """Return the number of cases that are RIGHT or RIGHT BUT, and of all."""
+    """Return the number of cases that are RIGHT or RIGHT EXCEPT, and of all."""
     count = sum(judgement.verdict in GOOD for judgement in report.judgements)
     return f"{count}/{len(report.judgements)}"
 
@@ -78,7 +82,7 @@ def introduction(report: Report) -> Sentence:
     greeting = report.greeting
     name = " ".join(filter(None, (greeting.name, greeting.version)))
     language = sentence(", {language}", language=greeting.language) if greeting.language else ""
-    if any(task.precision for task in report.tasks):
+    if any(task.assumptions for task in report.tasks):
         return sentence("{name}{language}", name=name, language=language)
     return sentence(
         "{name}{language}, single precision"
@@ -90,14 +94,28 @@ def introduction(report: Report) -> Sentence:
 
 
 def remarks(report: Report) -> Iterator[Sentence]:
-    """Yield reasons for a precision, with their tasks if not all, and for the lack of a time."""
-    reasons = {str(task.precision): task.precision for task in report.tasks if task.precision}
+    """Yield what is assumed, with its tasks if not all, and reasons for the lack of a time."""
+    reasons = {str(reason): reason for task in report.tasks for reason in task.assumptions}
     for text, reason in reasons.items():
-        tasks = [title(task) for task in report.tasks if str(task.precision) == text]
+        tasks = [title(task) for task in report.tasks if text in map(str, task.assumptions)]
         partial = sentence("{tasks}: {reason}", tasks=", ".join(tasks), reason=reason)
         yield partial if len(tasks) < len(report.tasks) else reason
+    if unwritten := [title(task) for task in report.tasks if is_unwritten(task)]:
+        yield sentence(
+            "Not written yet: {tasks}. Put your code into the starter, and delete what you do not "
+            "have from its tasks.",
+            tasks=", ".join(unwritten),
+        )
     yield from [task.untimed for task in report.tasks if task.untimed][:1]
     yield from report.remarks
+
+
+def is_unwritten(task: TaskReport) -> bool:
+    """Return whether all answers to a task are those of a starter that nobody has filled in."""
+    return bool(task.judgements) and all(
+        isinstance(judgement.answer, Failure) and UNWRITTEN in str(judgement.answer.sentence)
+        for judgement in task.judgements
+    )
 
 
 def explanations(report: TaskReport) -> Iterator[Sentence]:
@@ -124,12 +142,15 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
             "Next: --junit FILE for your CI, plumbob.testing for your pytest, --thorough for "
             "more cases."
         )
+    if is_unwritten(bad[0]):
+        template = sentence("Next: write {task}, then run this again.")
+        return Sentence(template.template, {"task": title(bad[0])})
     first = bad[0]
     if first.verdict is Verdict.UNDECIDED:
         return (
-            sentence('Next: declare the step that you make, by "step" in the greeting '
-                     "(docs/protocol.md).")
-            if first.diagnosis.hints
+            sentence("Next: compare your step with the nearest known one; if it is meant to be "
+                     'another, declare it by "step" in the greeting (docs/protocol.md).')
+            if first.task in STEPS and first.diagnosis.hints
             else sentence("Next: run more cases with --thorough.")
         )  # fmt: skip
     template = sentence("Next: correct {task}, rerun the saved case, then run all cases again.")
@@ -139,4 +160,11 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
         template = sentence(
             "Next: correct {task} first, since other tasks may depend on it; then run this again."
         )
-    return Sentence(template.template, {"task": title(first)})
+    step = Sentence(template.template, {"task": title(first)})
+    codes = [code for cause in first.diagnosis.explanations[:1] for code in cause.codes]
+    if not codes:
+        return step
+    pointer = sentence(
+        "plumbob explain {code} shows the mistake in a short program.", code=codes[0]
+    )
+    return sentence("{step} {pointer}", step=step, pointer=pointer)

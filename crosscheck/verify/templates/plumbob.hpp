@@ -108,6 +108,31 @@ inline void read(const Value& from, float& to) { to = static_cast<float>(from.nu
 inline void read(const Value& from, int& to) { to = static_cast<int>(from.number); }
 inline void read(const Value& from, bool& to) { to = from.number == 1.0; }
 inline void read(const Value& from, std::string& to) { to = from.text; }
+// Vectors x, y, z and quaternions w, x, y, z of glm and Eigen, if included above this file.
+template <class To> void read_vector(const Value& from, To& to) {
+    for (int i = 0; i < 3; ++i) read(from.items.at(i), to[i]);
+}
+template <class T> T number(const Value& from, int i) {
+    return static_cast<T>(from.items.at(i).number);
+}
+#ifdef GLM_VERSION
+template <class T, glm::qualifier Q> void read(const Value& from, glm::vec<3, T, Q>& to) {
+    read_vector(from, to);
+}
+template <class T, glm::qualifier Q> void read(const Value& from, glm::qua<T, Q>& to) {
+    to.w = number<T>(from, 0), to.x = number<T>(from, 1);
+    to.y = number<T>(from, 2), to.z = number<T>(from, 3);
+}
+#endif
+#ifdef EIGEN_WORLD_VERSION
+template <class T> void read(const Value& from, Eigen::Matrix<T, 3, 1>& to) {
+    read_vector(from, to);
+}
+template <class T> void read(const Value& from, Eigen::Quaternion<T>& to) {
+    to = Eigen::Quaternion<T>(number<T>(from, 0), number<T>(from, 1), number<T>(from, 2),
+                              number<T>(from, 3));
+}
+#endif
 template <class T, std::size_t n> void read(const Value& from, std::array<T, n>& to) {
     for (std::size_t i = 0; i < n; ++i) read(from.items.at(i), to[i]);
 }
@@ -138,6 +163,27 @@ inline std::string write(const std::string& text) {
     }
     return out + '"';
 }
+template <class T> std::string joined(const std::vector<T>& numbers) {
+    std::string out = "[";
+    for (T one : numbers) out += (out.size() > 1 ? "," : "") + write(one);
+    return out + ']';
+}
+#ifdef GLM_VERSION
+template <class T, glm::qualifier Q> std::string write(const glm::vec<3, T, Q>& v) {
+    return joined<T>({v.x, v.y, v.z});
+}
+template <class T, glm::qualifier Q> std::string write(const glm::qua<T, Q>& q) {
+    return joined<T>({q.w, q.x, q.y, q.z});
+}
+#endif
+#ifdef EIGEN_WORLD_VERSION
+template <class T> std::string write(const Eigen::Matrix<T, 3, 1>& v) {
+    return joined<T>({v.x(), v.y(), v.z()});
+}
+template <class T> std::string write(const Eigen::Quaternion<T>& q) {
+    return joined<T>({q.w(), q.x(), q.y(), q.z()});
+}
+#endif
 template <class List> std::string write(const List& list) {
     std::string out = "[";
     for (const auto& one : list) out += (out.size() > 1 ? "," : "") + write(one);

@@ -1,5 +1,9 @@
 // A starter for `plumbob verify -- ./solver`; plumbob.hpp speaks the protocol.
 // Build: g++ -std=c++17 -O2 solver.cpp -o solver     Offer only what you have: see main.
+// With glm, include it above plumbob.hpp: <glm/glm.hpp> and <glm/gtc/quaternion.hpp>; then
+//   using Vec3 = glm::vec3; using Quat = glm::quat;    and declare "precision": "single".
+// With Eigen likewise: <Eigen/Geometry>; then
+//   using Vec3 = Eigen::Vector3d; using Quat = Eigen::Quaterniond;
 #include "plumbob.hpp"
 using Vec3 = std::array<double, 3>;  // [m]
 using Quat = std::array<double, 4>;  // unit quaternion, w first
@@ -13,10 +17,11 @@ void forward_kinematics(const std::vector<int>& parents, const Positions& offset
     throw plumbob::missing("forward_kinematics");
 }
 
-// Change local_rotations so that the joint `effector` comes within `tolerance` of the target.
+// Change local_rotations so that the joint `effector` comes within `tolerance` of the target, by
+// the method "ccd", "fabrik" or another one of the "methods" that main declares, if any.
 void inverse_kinematics(const std::vector<int>& parents, const Positions& offsets,
                         Rotations& local_rotations, const Vec3& target, int effector,
-                        double tolerance, int max_iterations) {
+                        double tolerance, int max_iterations, const std::string& method) {
     throw plumbob::missing("inverse_kinematics");
 }
 
@@ -51,7 +56,10 @@ void solve(const plumbob::Request& in, plumbob::Answer& out) {
     Vec3 target = in["target"];
     double tolerance = in["tolerance"];
     int effector = in["effector"], limit = in["max_iterations"];
-    out.time([&] { inverse_kinematics(parents, offsets, q, target, effector, tolerance, limit); });
+    std::string method = in["method"];
+    out.time([&] {
+        inverse_kinematics(parents, offsets, q, target, effector, tolerance, limit, method);
+    });
     out.set("local_rotations", q);
 }
 

@@ -18,9 +18,11 @@ fn forward_kinematics(parents: &[i64], offsets: &[Vec3], local_rotations: &[Quat
     Err("forward_kinematics is not written yet".into())
 }
 
-// Return local rotations with which the joint `effector` is within `tolerance` of the target.
+// Return local rotations with which the joint `effector` is within `tolerance` of the target, by
+// the method "ccd", "fabrik" or another one of the "methods" in GREETING, if any.
 fn inverse_kinematics(parents: &[i64], offsets: &[Vec3], local_rotations: &[Quat], target: Vec3,
-    effector: usize, tolerance: f64, max_iterations: usize) -> Result<Vec<Quat>, String> {
+    effector: usize, tolerance: f64, max_iterations: usize, method: &str)
+    -> Result<Vec<Quat>, String> {
     Err("inverse_kinematics is not written yet".into())
 }
 
@@ -47,8 +49,9 @@ fn solve(task: &str, ask: &Request) -> Result<String, String> {
     }
     let (target, effector) = (ask.get("target")?, ask.get("effector")?);
     let (tolerance, max_iterations) = (ask.get("tolerance")?, ask.get("max_iterations")?);
+    let method: String = ask.get("method")?;
     let (local, seconds) = timed(|| inverse_kinematics(&parents, &offsets, &local, target,
-        effector, tolerance, max_iterations))?;
+        effector, tolerance, max_iterations, &method))?;
     Ok(member("local_rotations", &local) + &seconds)
 }
 

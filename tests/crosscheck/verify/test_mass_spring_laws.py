@@ -26,7 +26,7 @@ from plumbob.crosscheck.verify.sentence import sentence
 EPSILON = 2.0**-52
 LINEARISED = StepModel(Integrator("newton", "x_n", 1), damper="explicit")
 CONVERGED = StepModel(Integrator("converged", "y"))
-RIGHT, RIGHT_BUT, WRONG = Verdict.RIGHT, Verdict.RIGHT_BUT, Verdict.WRONG
+RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG
 
 
 def triangle(pinned=()):
@@ -102,7 +102,7 @@ def scale_of_acceleration(p):
 SMALL_STEP = triangle([0]).changed(h=1e-4)
 EDGE = [(0.5, RIGHT), (2.0, WRONG)]
 GRADES = [
-    (0.5 * SOLVED, RIGHT), (2.0 * SOLVED, RIGHT_BUT), (0.5 * IMPRECISE, RIGHT_BUT),
+    (0.5 * SOLVED, RIGHT), (2.0 * SOLVED, RIGHT_EXCEPT), (0.5 * IMPRECISE, RIGHT_EXCEPT),
     (2.0 * IMPRECISE, WRONG),
 ]  # fmt: skip
 # A law, a problem, what differs from a linearised step, a change of the step's outputs by some
@@ -114,7 +114,7 @@ EDGES = {
     "a pin that nothing is said of moves by what is imprecise": (
         laws.pins, triangle([0]), {"declares_pins": False},
         lambda p, share: {"positions": one_moved(0, share * IMPRECISE * displacement(p))},
-        [(0.5, RIGHT_BUT), (2.0, WRONG)]),
+        [(0.5, RIGHT_EXCEPT), (2.0, WRONG)]),
     "and a declared one does not": (
         laws.pins, triangle([0]), {},
         lambda p, share: {"positions": one_moved(0, share * IMPRECISE * displacement(p))},
@@ -145,7 +145,7 @@ EDGES = {
     "a converged step is the minimiser and another says so": (
         laws.minimiser, triangle(), {"model": CONVERGED},
         lambda p, share: {"positions": one_moved(1, share * displacement(p, CONVERGED))},
-        [(0.0, RIGHT), (0.5 * SOLVED, RIGHT), (0.01, RIGHT_BUT)]),
+        [(0.0, RIGHT), (0.5 * SOLVED, RIGHT), (0.01, RIGHT_EXCEPT)]),
     "nobody can tell of an unknown step": (
         laws.minimiser, triangle(), {"model": CONVERGED, "known": False},
         lambda p, share: {"positions": one_moved(1, share * displacement(p, CONVERGED))},
@@ -173,7 +173,7 @@ def test_a_penalty_s_pin_may_move_as_far_as_the_penalty_lets_it():
     yields = np.abs(predicted(p, model)["positions"] - p.positions)[0].max()
     assert yields > 1e3 * rounding(p, model, EPSILON).positions
     for axis, share, verdict in (
-        (2, 0.0, RIGHT_BUT),
+        (2, 0.0, RIGHT_EXCEPT),
         (1, -3.0 - 2e-3 * displacement(p) / yields, WRONG),
     ):
         change = one_moved(0, share * yields, axis)

@@ -69,8 +69,8 @@ def test_every_planted_fault_is_named_but_for_known_ones(language, program):
 RIGHT = {
     "cpp": Verdict.RIGHT,
     "single": Verdict.RIGHT,
-    "javascript": Verdict.RIGHT_BUT,
-    "python": Verdict.RIGHT_BUT,
+    "javascript": Verdict.RIGHT_EXCEPT,
+    "python": Verdict.RIGHT_EXCEPT,
 }
 
 

@@ -15,7 +15,7 @@ from plumbob.crosscheck.verify.sentence import sentence
 from plumbob.reference import Skeleton, forward_kinematics, rotation
 
 EPSILON = {"double": 2.0**-52, "single": 2.0**-23}
-RIGHT, RIGHT_BUT, WRONG = Verdict.RIGHT, Verdict.RIGHT_BUT, Verdict.WRONG
+RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG
 # Root, a fork at joint 1 with children 2 and 3, the effector 4 below 2.
 PARENTS = np.array([-1, 0, 1, 1, 2])
 PATH = np.array([0, 1, 2, 4])
@@ -92,9 +92,9 @@ CHANGES = {
              lambda case, bound: {"positions": np.full((5, 3), [0.0, SIZE * bound, 0.0])}),
     "link": ("link lengths", 4, WRONG, along_the_link),
     "branch": ("branches", 3, WRONG, round_its_parent),
-    "quaternion": ("unit quaternions", 2, RIGHT_BUT, stretched),
+    "quaternion": ("unit quaternions", 2, RIGHT_EXCEPT, stretched),
     "joint off the path": ("joints off the path", 3, WRONG, rotated(3)),
-    "effector": ("joints off the path", 4, RIGHT_BUT, rotated(4)),  # which does not move it
+    "effector": ("joints off the path", 4, RIGHT_EXCEPT, rotated(4)),  # which does not move it
 }  # fmt: skip
 
 
@@ -113,7 +113,7 @@ def test_law_is_kept_to_rounding(case, name, precision):
 @pytest.mark.parametrize("precision", EPSILON)
 @pytest.mark.parametrize(
     ("roundings", "dead_angles", "verdict"),
-    [(1.0, 0.0, RIGHT), (4.0, 0.0, RIGHT_BUT), (0.0, 2.0, RIGHT_BUT), (0.0, 8.0, WRONG)],
+    [(1.0, 0.0, RIGHT), (4.0, 0.0, RIGHT_EXCEPT), (0.0, 2.0, RIGHT_EXCEPT), (0.0, 8.0, WRONG)],
 )
 def test_positions_are_where_the_rotations_put_them_to_rounding(
     case, precision, roundings, dead_angles, verdict
@@ -148,7 +148,7 @@ STALL = {"double": 1e-5, "single": 4e-3}
     [
         ("ccd", 0.9e-4, RIGHT),
         ("ccd", 1.01e-4 + 1e-5 * REACH, WRONG),
-        ("", 0.49, RIGHT_BUT),
+        ("", 0.49, RIGHT_EXCEPT),
         ("ccd", 0.49, WRONG),
         ("", 0.51, WRONG),
     ],
@@ -164,7 +164,7 @@ def test_target_is_reached_to_the_tolerance(case, method, distance, verdict):
 def test_stall_near_the_target_is_right_with_a_reservation(case, precision):
     greeting = Greeting(1, ("inverse_kinematics",), precision=precision)
     case.inputs["tolerance"] = 0.0
-    for factor, verdict in ((0.9, RIGHT_BUT), (1.1, WRONG)):
+    for factor, verdict in ((0.9, RIGHT_EXCEPT), (1.1, WRONG)):
         excess = factor * STALL[precision] * REACH
         finding = inverse_kinematics.reached(excess, 1e-12, case, "ccd", greeting)
         assert finding.verdict is verdict
@@ -181,7 +181,7 @@ def test_a_sweep_takes_no_effector_farther_away(case, growth, verdict):
     [
         ({"converged": True}, 1e-4, [RIGHT]),
         ({"converged": True}, 1.1e-4, [WRONG]),
-        ({"converged": False}, 0.9e-4, [RIGHT_BUT]),
+        ({"converged": False}, 0.9e-4, [RIGHT_EXCEPT]),
         ({"converged": False}, 1.1e-4, []),
         ({"residual": 0.5 * (1 + 0.9e-3)}, 0.5, [RIGHT]),
         ({"residual": 0.5 * (1 - 0.9e-3)}, 0.5, [RIGHT]),

@@ -66,7 +66,7 @@ def as_float(x):
     return np.asarray(x, dtype=np.float32).astype(float)
 
 
-SINGLE = "are single-precision numbers"
+SINGLE = "are single-precision values"
 # The printed numbers of programs, and the remark about them.
 PRINTERS = {
     "float": (as_float, SINGLE),
@@ -109,9 +109,9 @@ def judged(*arguments, **greeting):
 def test_a_right_solver_is_right_to_the_digits_that_it_prints(task, printer):
     rounded, words = PRINTERS[printer]
     report = judged(task, TASKS[task][0](None), rounded)
-    assert words in str(report.precision)
-    assert report.verdict is Verdict.RIGHT_BUT
-    assert max(one.verdict for one in report.judgements) <= Verdict.RIGHT_BUT
+    assert words in str(report.assumptions[0])
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    assert max(one.verdict for one in report.judgements) <= Verdict.RIGHT_EXCEPT
     assert report.diagnosis.explanations == ()
 
 
@@ -120,7 +120,7 @@ def test_a_wrong_solver_stays_wrong_and_its_fault_is_named(task, printer):
     make, key, _ = TASKS[task]
     rounded, words = PRINTERS[printer]
     report = judged(task, make(key), rounded)
-    assert words in str(report.precision)
+    assert words in str(report.assumptions[0])
     assert report.verdict is Verdict.WRONG
     assert key in report.diagnosis.explanations[0].faults
 
@@ -131,7 +131,7 @@ def test_double_precision_is_believed_of_every_case_alone(task):
     door = contestant(task, TASKS[task][0](None))
     method = door.greeting.methods[0]
     for case in DISCIPLINES[task].cases(door.greeting, method, 0, False):
-        assert judge_cases(door, task, method, [case]).precision is None, case.name
+        assert not judge_cases(door, task, method, [case]).assumptions, case.name
 
 
 @pytest.fixture
@@ -156,7 +156,7 @@ def test_one_answer_of_few_digits_excuses_nothing(task, printer, few_variants):
         return {k: rounded(v) if len(asked) % 9 == 0 else v for k, v in make(**inputs).items()}
 
     report = judged(task, function)
-    assert report.precision is None
+    assert not report.assumptions
     assert report.verdict is Verdict.WRONG
 
 
@@ -168,7 +168,7 @@ def test_a_fault_as_small_as_single_precision_in_some_cases_is_no_precision(few_
         return answer | {"positions": answer["positions"] + 1e-7 * (len(inputs["parents"]) > 5)}
 
     report = judged("forward_kinematics", function)
-    assert report.precision is None
+    assert not report.assumptions
     assert report.verdict is Verdict.WRONG
 
 
@@ -195,9 +195,9 @@ def test_answers_of_inputs_in_single_precision_are_judged_so_and_a_float_is_hint
         return solver(**(inputs | arrays))
 
     report = judged(task, function)
-    assert "Look for a float" in str(report.precision)
+    assert "Look for a float" in str(report.assumptions[0])
     if is_right:
-        assert report.verdict is Verdict.RIGHT_BUT
+        assert report.verdict is Verdict.RIGHT_EXCEPT
         assert report.diagnosis.explanations == ()
     else:
         assert report.verdict is Verdict.WRONG
@@ -207,9 +207,9 @@ def test_answers_of_inputs_in_single_precision_are_judged_so_and_a_float_is_hint
 @EACH_TASK
 def test_declared_single_precision_is_right_without_a_word(task):
     report = judged(task, TASKS[task][0](None), as_float, precision="single")
-    assert report.precision is None
-    assert report.verdict <= Verdict.RIGHT_BUT
-    assert judged(task, TASKS[task][0](None), printed("%g"), precision="single").precision
+    assert not report.assumptions
+    assert report.verdict <= Verdict.RIGHT_EXCEPT
+    assert judged(task, TASKS[task][0](None), printed("%g"), precision="single").assumptions
 
 
 def test_residual_in_single_precision_is_no_evidence():
@@ -220,7 +220,7 @@ def test_residual_in_single_precision_is_no_evidence():
         distance = np.linalg.norm(answer["positions"][inputs["effector"]] - inputs["target"])
         return answer | {"residual": as_float(distance)}
 
-    assert judged("inverse_kinematics", function).precision is None
+    assert not judged("inverse_kinematics", function).assumptions
 
 
 @pytest.mark.parametrize("language", ["en", "zh"])
@@ -237,7 +237,7 @@ def test_the_precision_is_said_once_for_all_tasks_and_nothing_contradicts_it(lan
     report = verify(door)
     say = speaker(language)
     context = Presentation(say, language, ["my.py"])
-    told = say(report.tasks[0].precision)
+    told = say(report.tasks[0].assumptions[0])
     assert '"precision": "single"' in told
     screen = "".join(" ".join(terminal.lines(report, context)).split())
     assert screen.count("".join(told.split())) == 1
@@ -246,5 +246,5 @@ def test_the_precision_is_said_once_for_all_tasks_and_nothing_contradicts_it(lan
     assert told.replace('"', "&#34;") in page.render(report, context)
     assert junit.text(report, say).count(told) == 2
     one = Report(greeting, [report.tasks[0], verify(door, ["mass_spring_forces"]).tasks[0]], 0)
-    object.__setattr__(one.tasks[1], "precision", None)
+    object.__setattr__(one.tasks[1], "assumptions", ())
     assert f"forward_kinematics: {told}" in json.loads(json_file.text(one, say))["remarks"]

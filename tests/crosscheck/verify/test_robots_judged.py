@@ -32,7 +32,8 @@ FEW = [
 
 def misled(case, key):
     """The case with a target that a solver with this fault believes to have reached."""
-    q, inputs, fault = 0.7 * case.inputs["upper"] + 0.2, dict(case.inputs), FAULTS[key]
+    inputs, fault = dict(case.inputs), FAULTS[key]
+    q = 0.7 * inputs["upper"] + 0.2 - 0.1 * np.arange(len(inputs["upper"]))
     pose = tool_pose(fault.read(inputs), fault.coordinates(inputs, q))
     target = np.roll(pose.rotations, -1) if key == "scalar last" else pose.rotations
     if key == "position only":
@@ -52,7 +53,7 @@ def broken(report):
 
 def test_a_right_solver_is_right_or_stuck_somewhere():
     report = judged(lambda **inputs: solve_wrongly(None, **inputs))
-    assert report.verdict <= Verdict.RIGHT_BUT
+    assert report.verdict <= Verdict.RIGHT_EXCEPT
     assert broken(report) == set()
     assert len(report.judgements) == len(FEW) == 15
 
@@ -62,6 +63,19 @@ def test_a_fault_breaks_a_law_and_is_named(key):
     report = judge([misled(case, key) for case in FEW if case.family == CLOSE], GREETING, "")
     assert broken(report) & {"target reached", "rotation reached"}
     assert [one.faults for one in report.diagnosis.explanations] == [(key,)]
+
+
+@pytest.mark.parametrize(("turns", "is_wrapped"), [(1, True), (-2, True), (0.3, False)])
+def test_angle_beyond_its_limits_by_whole_turns_is_said_to_be(turns, is_wrapped):
+    case = next(case for case in FEW if case.family == CLOSE)
+    q = 0.5 * (case.inputs["lower"] + case.inputs["upper"])
+    joint = int(np.argmin(case.inputs["slides"]))
+    q[joint] = case.inputs["upper"][joint] + 0.1 if turns == 0.3 else q[joint] + turns * 2.0 * np.pi
+    answer = Answer({"q": q}, 0.0)
+    (judgement,) = judge([Exchange(case, answer, answer)], GREETING, "").judgements
+    limits = next(finding for finding in judgement.findings if finding.law == "limits kept")
+    assert limits.verdict is Verdict.WRONG
+    assert ("whole turns" in str(limits.sentence)) is is_wrapped
 
 
 @pytest.mark.parametrize("key", FAULTS)

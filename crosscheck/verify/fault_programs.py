@@ -1,0 +1,93 @@
+"""The known faults by code, each with a short wrong program and the right one.
+
+`programs.toml` has the right programs. The entry of a fault in a `faults.toml` has pairs of a right
+and a wrong text, `lines`: the right program with the first replaced by the second is the wrong one.
+"""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from itertools import chain
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from .functions import FunctionContestant
+from .message import decode_greeting
+from .sentence import Sentence
+from .solvers.host import PythonSolver
+
+FOLDER = Path(__file__).parent
+# The files with faults, those of kinematics first.
+FILES = sorted(FOLDER.rglob("faults.toml"))
+PROGRAMS: Mapping[str, Any] = tomllib.loads((FOLDER / "programs.toml").read_text(encoding="utf-8"))
+FAMILIES: Mapping[str, Any] = PROGRAMS["families"]
+
+
+class CodedFault(NamedTuple):
+    """A known fault, and how the right program becomes one that has it."""
+
+    code: str
+    name: str  # its key in the catalogue
+    sentence: Sentence  # the mistake, and its correction
+    program: str  # the name of the right program
+    lines: tuple[tuple[str, str], ...]  # texts of the right program, and what replaces them
+
+    @property
+    def family(self) -> str:
+        """The middle of the code: FK, CCD, STEP ..."""
+        return self.code.split("-")[1]
+
+    @property
+    def task(self) -> str:
+        """The task that its programs solve."""
+        return str(PROGRAMS[self.program]["task"])
+
+    @property
+    def right_program(self) -> str:
+        """The source of the right program."""
+        entry = PROGRAMS[self.program]
+        texts = [*(PROGRAMS["parts"][part] for part in entry["parts"]), entry["text"]]
+        return "\n\n\n".join(text.strip("\n") for text in texts) + "\n"
+
+    @property
+    def wrong_program(self) -> str:
+        """The source of the program with the fault; raise ValueError if a line is not replaced."""
+        text = self.right_program
+        for right, wrong in self.lines:
+            if text.count(right) != 1:
+                raise ValueError(
+                    f"{self.code}: expected {right!r} once in the program {self.program}, "
+                    f"got it {text.count(right)} times"
+                )
+            text = text.replace(right, wrong)
+        return text
+
+
+@cache
+def coded_faults() -> dict[str, CodedFault]:
+    """Return all known faults by code, sorted."""
+    tables = (tomllib.loads(path.read_text(encoding="utf-8")) for path in FILES)
+    parts = chain.from_iterable(table.values() for table in tables)
+    faults = {fault.code: fault for part in parts for fault in _faults_of(part)}
+    families = list(FAMILIES)
+    return dict(sorted(faults.items(), key=lambda item: (families.index(item[1].family), item[0])))
+
+
+def _faults_of(part: Any) -> Iterator[CodedFault]:
+    """Yield the faults in a table of a file: entries by their keys, or a list of entries."""
+    for key, entry in part.items() if isinstance(part, dict) else ((None, one) for one in part):
+        values = {name: numbers[0] for name, numbers in entry.get("each", {}).items()}
+        values |= entry.get("example", {})
+        family, name = entry["code"].split("-")[1], key or entry.get("key", entry.get("value", ""))
+        program = entry.get("program", FAMILIES[family]["program"])
+        lines = tuple((right, wrong) for right, wrong in entry.get("lines", ()))
+        words = Sentence(entry["sentence"], values)
+        yield CodedFault(entry["code"], name.format(**values), words, program, lines)
+
+
+def contestant_of(program: str, name: str = "program") -> FunctionContestant:
+    """Return the functions of a program's source as a contestant of this process."""
+    names: dict[str, Any] = {}
+    exec(compile(program, name, "exec"), names)
+    solver = PythonSolver(names, name, names.get("PLUMBOB", {}))
+    return FunctionContestant(solver.functions, decode_greeting(solver.greeting, name))

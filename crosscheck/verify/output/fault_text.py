@@ -1,0 +1,110 @@
+"""What `plumbob explain` prints: a fault's cause, remedy, lines of programs, and symptom."""
+
+import re
+from collections.abc import Iterator
+from difflib import get_close_matches, unified_diff
+from itertools import groupby
+
+from ..fault_programs import FAMILIES, CodedFault, coded_faults, contestant_of
+from ..judgement import CaseJudgement, Verdict
+from ..sentence import Sentence, sentence
+from ..verify import DISCIPLINES, judge_cases, trials
+from .saved import SavedCase, cases_of
+from .terminal import numbers, wrapped
+from .words import Say
+
+# The lines around a change, and of the numbers of a failing case.
+CONTEXT, ROWS = 2, 4
+# The end of the first sentence, in English and in Chinese.
+_FIRST_END = re.compile(r"(?<=\.) (?=\S)|(?<=。)")
+
+
+def find_fault(code: str) -> CodedFault:
+    """Return the fault of a code in any case; raise ValueError with the nearest code if none."""
+    faults = coded_faults()
+    if (name := code.upper()) not in faults:
+        near = get_close_matches(name, faults, n=1, cutoff=0.0)
+        raise ValueError(f"code: expected a code of a fault, got {code!r}; nearest: {near[0]}")
+    return faults[name]
+
+
+def listed(say: Say, width: int) -> Iterator[str]:
+    """Yield a line for each code, by family, in so many columns."""
+    for family, faults in groupby(coded_faults().values(), key=lambda fault: fault.family):
+        yield say(Sentence(FAMILIES[family]["about"], {}))
+        for fault in faults:
+            first, *more = wrapped(f"{fault.code}  {cause_and_remedy(fault, say)[0]}", "  ", width)
+            yield f"{first[: width - 2]} …" if more else first
+        yield ""
+    yield say(sentence("plumbob explain CODE shows a fault in a short program."))
+
+
+def explained(fault: CodedFault, say: Say) -> Iterator[str]:
+    """Yield the cause of a fault, its remedy, the lines that differ, and what goes wrong."""
+    cause, remedy = cause_and_remedy(fault, say)
+    yield f"{fault.code}  {say(Sentence(FAMILIES[fault.family]['about'], {}))}"
+    yield from _section(sentence("Cause"), wrapped(cause, "  "), say)
+    if remedy:
+        yield from _section(sentence("Remedy"), wrapped(remedy, "  "), say)
+    if not fault.lines:
+        return
+    heading = sentence("A wrong program in Python (-) and the right one (+)")
+    yield from _section(heading, (f"  {line}".rstrip() for line in changed_lines(fault)), say)
+    yield from _section(sentence("Symptom"), _symptom(fault, say), say)
+
+
+def _section(heading: Sentence, lines: Iterator[str] | list[str], say: Say) -> Iterator[str]:
+    yield from ("", say(heading), *lines)
+
+
+def cause_and_remedy(fault: CodedFault, say: Say) -> tuple[str, str]:
+    """Return the first of a fault's sentences, which is the mistake, and the others."""
+    cause, *remedy = _FIRST_END.split(say(fault.sentence), 1)
+    return cause, "".join(remedy)
+
+
+def changed_lines(fault: CodedFault) -> list[str]:
+    """Return the lines that differ between the wrong and the right program, as a diff."""
+    wrong, right = fault.wrong_program.splitlines(), fault.right_program.splitlines()
+    lines = []
+    for line in list(unified_diff(wrong, right, n=CONTEXT, lineterm=""))[2:]:
+        if hunk := re.match(r"@@ .*\+(\d+)", line):
+            above = right[: int(hunk[1]) - 1]
+            function = next((text for text in reversed(above) if text.startswith("def ")), None)
+            lines += [f" {function}", "     ..."] if function else []
+        else:
+            lines.append(line)
+    return lines
+
+
+def _symptom(fault: CodedFault, say: Say) -> Iterator[str]:
+    """Yield the smallest failing case of the wrong program."""
+    failure = failure_of(fault)
+    if failure is None:
+        text = sentence("No law breaks: a program may do this on purpose.")
+        yield from wrapped(say(text), "  ")
+    else:
+        (complaint, *_), name = failure.complaints, f'"{failure.case.name}"'
+        text = sentence("Smallest failing case, {name}: {what}", name=name, what=complaint)
+        yield from (*wrapped(say(text), "  "), *numbers(failure, say, ROWS))
+
+
+def failure_of(fault: CodedFault) -> CaseJudgement | None:
+    """Judge the wrong program on its cases until one fails; return that, or None.
+
+    A single sweep that only differs from the textbook's stands back behind a whole solve.
+    """
+    contestant, seed = contestant_of(fault.wrong_program), 0
+    ((task, method),) = trials(contestant.greeting, [fault.task])
+    cases = DISCIPLINES[task].cases(contestant.greeting, method, seed, False)
+    first = None
+    for case in cases:
+        asked = cases_of(SavedCase(task, method, seed, False, case.name), cases)
+        failure = judge_cases(contestant, task, method, asked).smallest_failure
+        if failure and any(
+            finding.verdict >= Verdict.WRONG and finding.law != "one sweep"
+            for finding in failure.findings
+        ):
+            return failure
+        first = first or failure
+    return first

@@ -1,0 +1,222 @@
+"""Every fault has a code of its own, and the code stands in each form of a report."""
+
+import json
+import re
+import runpy
+import subprocess
+import sys
+import tomllib
+from itertools import groupby
+from pathlib import Path
+
+import pytest
+
+from plumbob.crosscheck import verify as package
+from plumbob.crosscheck.verify.fault_programs import coded_faults, contestant_of
+from plumbob.crosscheck.verify.functions import FunctionContestant
+from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
+from plumbob.crosscheck.verify.judgement import Verdict
+from plumbob.crosscheck.verify.kinematics.predictions import forward
+from plumbob.crosscheck.verify.kinematics.textbook import Switches
+from plumbob.crosscheck.verify.output import json_file, junit, page, terminal
+from plumbob.crosscheck.verify.output.fault_text import cause_and_remedy, explained, failure_of
+from plumbob.crosscheck.verify.output.words import Presentation, advice, speaker
+from plumbob.crosscheck.verify.sentence import codes_in, sentence
+from plumbob.crosscheck.verify.verify import verify
+
+DOCUMENTATION = runpy.run_path(str(Path(__file__).parents[3] / "docs/write_faults.py"))
+REMEDY = sentence("Remedy")
+FAMILIES = ("FK", "CCD", "FABRIK", "STOP", "TRACK", "RESAMPLE", "ROBOT", "STEP", "FORCE", "ENERGY")
+CODE = re.compile(rf"PB-({'|'.join(FAMILIES)})-(\d{{3}})")
+
+
+def entries():
+    """Yield the file, the table and the content of each fault."""
+    for path in sorted(Path(package.__file__).parent.rglob("faults.toml")):
+        for table, faults in tomllib.loads(path.read_text(encoding="utf-8")).items():
+            for entry in faults.values() if isinstance(faults, dict) else faults:
+                yield path, table, entry
+
+
+def complaints(found):
+    """Return what is wrong with the codes of faults."""
+    codes = [entry.get("code") for _, _, entry in found]
+    ill_formed = [code for code in codes if not code or not CODE.fullmatch(code)]
+    return ill_formed + [code for code in set(codes) if codes.count(code) > 1]
+
+
+def test_every_fault_has_a_code_of_its_own():
+    assert len(list(entries())) > 170
+    assert not complaints(list(entries()))
+
+
+@pytest.mark.parametrize("code", [None, "", "PB-CCD-1", "PB-IK-001", "CCD-001", "PB-CCD-0001"])
+def test_missing_and_ill_formed_codes_are_noticed(code):
+    assert complaints([("", "", {"code": code} if code is not None else {})]) == [code]
+
+
+def test_a_code_that_stands_twice_is_noticed():
+    assert complaints([("", "", {"code": "PB-FK-001"})] * 2) == ["PB-FK-001"]
+
+
+def report_of(**switches):
+    def solve(**inputs):
+        positions, rotations = forward(inputs, Switches(**switches))
+        return {"positions": positions, "rotations": rotations}
+
+    task = "forward_kinematics"
+    return verify(FunctionContestant({task: solve}, Greeting(PROTOCOL, (task,))))
+
+
+@pytest.mark.parametrize(
+    ("switches", "codes"),
+    [({"frame": 1}, ("PB-FK-001",)), ({"product": 3, "root": 1}, ("PB-FK-006", "PB-FK-013"))],
+)
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_the_code_stands_on_screen_on_the_page_in_json_and_in_junit(switches, codes, language):
+    report = report_of(**switches)
+    context = Presentation(speaker(language), language, ["solver.py"])
+    explanation = json.loads(json_file.text(report, context.say))["tasks"][0]["explanations"][0]
+    assert tuple(explanation["codes"]) == codes
+    texts = [
+        explanation["text"],
+        "\n".join(terminal.lines(report, context)),
+        junit.text(report, context.say),
+        page.render(report, context),
+    ]
+    assert all(f"[{code}]" in text for code in codes for text in texts)
+
+
+# ---- the short programs of each code
+
+
+# Faults without lines, which no `explain` can show; to be empty.
+OPEN_FAMILIES = ("STEP",)
+WITHOUT_LINES = {
+    code
+    for code, fault in coded_faults().items()
+    if fault.family in OPEN_FAMILIES and not fault.lines
+}
+# So many programs are judged for one that is quick to test; the others are slow tests.
+QUICK = 40
+
+
+def reports(program, task):
+    (report,) = verify(contestant_of(program), [task]).tasks
+    return report
+
+
+def samples():
+    for number, fault in enumerate(coded_faults().values()):
+        if fault.code not in WITHOUT_LINES:
+            is_quick = number % QUICK == 0 and fault.family != "ROBOT"
+            marks = () if is_quick else pytest.mark.slow
+            yield pytest.param(fault, id=fault.code, marks=marks)
+
+
+def test_every_fault_has_lines():
+    faults = coded_faults().items()
+    assert {code for code, fault in faults if not fault.lines} == WITHOUT_LINES
+
+
+@pytest.mark.parametrize("fault", list(samples()))
+def test_a_wrong_program_is_named_by_its_code(fault):
+    report = reports(fault.wrong_program, fault.task)
+    assert report.verdict > Verdict.RIGHT
+    names = [explanation.sentence for explanation in report.diagnosis.explanations[:1]]
+    if report.verdict == Verdict.RIGHT_EXCEPT:  # it may be on purpose
+        names += [words for judgement in report.judgements for words in judgement.complaints]
+    assert fault.code in {code for words in names for code in codes_in(words)}
+
+
+RIGHT_PROGRAMS = sorted({fault.program for fault in coded_faults().values()})
+SLOW = ("robot", "robot_track", "newton step", "local-global step")
+RESERVED = ("step", "substeps", "local-global step", "robot", "robot_track")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in RIGHT_PROGRAMS],
+)
+def test_a_right_program_is_right(name):
+    fault = next(fault for fault in coded_faults().values() if fault.program == name)
+    report = reports(fault.right_program, fault.task)
+    # Another model than converged implicit Euler, a start from which a robot finds no solution, or
+    # a single iteration in each frame.
+    has_reservation = name in RESERVED
+    assert report.verdict == (Verdict.RIGHT_EXCEPT if has_reservation else Verdict.RIGHT)
+    assert not report.diagnosis.explanations
+
+
+def test_a_line_that_the_program_lacks_is_refused():
+    fault = next(iter(coded_faults().values()))._replace(lines=(("no such line", ""),))
+    with pytest.raises(ValueError, match="expected 'no such line' once"):
+        _ = fault.wrong_program
+
+
+# ---- plumbob explain
+
+
+def printed(*words):
+    run = subprocess.run(
+        [sys.executable, "-m", "plumbob", "explain", *words], capture_output=True, text=True
+    )
+    return run.returncode, run.stdout + run.stderr
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_a_code_in_small_letters_is_explained_with_lines_and_a_failing_case(language):
+    fault, say = coded_faults()["PB-FK-003"], speaker(language)
+    code, text = printed("pb-fk-003", "--lang", language)
+    assert code == 0
+    flat = re.sub(r"\s+", "", text)
+    assert re.sub(r"\s+", "", say(fault.sentence)) in re.sub(f"{say(REMEDY)}", "", flat, count=1)
+    ((right, wrong),) = fault.lines
+    assert re.search(rf"^  -.*{re.escape(wrong)}", text, re.MULTILINE)
+    assert re.search(rf"^  \+.*{re.escape(right)}", text, re.MULTILINE)
+    assert "positions[" in text or "rotations[" in text
+
+
+def test_an_unknown_code_is_refused_with_the_nearest():
+    code, text = printed("PB-FORCE-999")
+    assert code == 2
+    assert text.count("\n") == 1
+    assert re.search(r"nearest: PB-FORCE-\d{3}$", text.strip())
+
+
+def test_without_a_code_each_has_a_line():
+    code, text = printed()
+    assert code == 0
+    lines = [line.split()[0] for line in text.splitlines() if line.startswith("  PB-")]
+    assert lines == list(coded_faults())
+
+
+def test_a_remedy_is_told_apart_from_its_cause_in_both_languages():
+    for fault in coded_faults().values():
+        english, chinese = (cause_and_remedy(fault, speaker(name)) for name in ("en", "zh"))
+        assert bool(english[1]) == bool(chinese[1]), (fault.code, english, chinese)
+
+
+def test_the_verdict_points_to_the_explanation():
+    report = report_of(frame=1)
+    assert "plumbob explain PB-FK-001" in str(advice(report.tasks))
+
+
+def test_a_fault_without_lines_claims_nothing_of_its_laws():
+    fault = coded_faults()["PB-FK-003"]._replace(lines=())
+    text = "\n".join(explained(fault, speaker("en")))
+    assert "Remedy" in text
+    assert "No law" not in text
+
+
+def test_a_fault_that_may_be_on_purpose_breaks_no_law():
+    assert failure_of(coded_faults()["PB-TRACK-001"]) is None
+
+
+def test_each_code_has_a_section_of_its_page():
+    pages = {
+        family: DOCUMENTATION["page"](family, list(faults))
+        for family, faults in groupby(coded_faults().values(), key=lambda fault: fault.family)
+    }
+    for code, fault in coded_faults().items():
+        assert pages[fault.family].count(f"## {code}\n") == 1
