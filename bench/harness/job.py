@@ -24,7 +24,7 @@ from .stopwatch import time_call
 from .worker import Finished, Lap, Message, Ready, Solved
 
 # Times of slow solves are sent whenever they add up to this [s], so that the worker is not silent.
-_SENT = 0.5
+_LAP_SECONDS = 0.5
 # A solver that hangs on so many targets does not finish.
 MAXIMUM_SILENCES = 3
 
@@ -130,7 +130,7 @@ class TimedTurns(NamedTuple):
     """Solvers of the same targets that take turns, round after round, while they are timed."""
 
     jobs: tuple[Job, ...]  # the solvers
-    timed: int  # the first targets are timed, so many
+    target_count: int  # the first targets are timed, so many
     rounds: int
 
     def perform(self) -> Iterator[Message]:
@@ -149,9 +149,9 @@ class TimedTurns(NamedTuple):
 
     def _laps(self, number: int, ask: Any) -> Iterator[Lap]:
         times: list[OwnTime] = []
-        for time in self.jobs[number].times(ask, self.timed):
+        for time in self.jobs[number].times(ask, self.target_count):
             times.append(time)
-            if sum(max(t.seconds, t.round_trip) for t in times) > _SENT:
+            if sum(max(t.seconds, t.round_trip) for t in times) > _LAP_SECONDS:
                 yield Lap(number, tuple(times))
                 times = []
         yield Lap(number, tuple(times))

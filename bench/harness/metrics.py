@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from plumbob.reference import rotation
-
 Floats = NDArray[np.float64]
 
 
@@ -30,14 +28,6 @@ class Spread(NamedTuple):
     median: float
     p95: float
     largest: float
-
-
-class Effort(NamedTuple):
-    """Seconds over a sample, failures included; NaN throughout if it is empty."""
-
-    median: float
-    p95: float
-    mean: float
 
 
 class Interval(NamedTuple):
@@ -74,23 +64,6 @@ _NORMAL = 1.959963984540054
 _FEW = 12
 
 
-class PairedRatio(NamedTuple):
-    """The ratio of two paired samples, with its 95 % interval."""
-
-    mean: float
-    low: float
-    high: float
-    pairs: int
-
-
-class Convergence(NamedTuple):
-    """Quantiles over the targets of the residual before and after each iteration."""
-
-    low: Floats
-    median: Floats
-    high: Floats
-
-
 def share(hits: NDArray[np.bool_]) -> Share:
     """Return how many of the entries are true, with Wilson's interval (Wilson 1927)."""
     count, total = int(np.count_nonzero(hits)), int(np.size(hits))
@@ -117,12 +90,6 @@ def spread(values: Floats) -> Spread:
     method: Literal["higher", "linear"] = "higher" if np.isinf(values).any() else "linear"
     median, p95 = np.quantile(values, [0.5, 0.95], method=method)
     return Spread(float(median), float(p95), float(values.max()))
-
-
-def effort(seconds: Floats) -> Effort:
-    """Return median, 95th percentile and mean of all solves, failures included."""
-    median, p95, _ = spread(seconds)
-    return Effort(median, p95, mean(seconds))
 
 
 def median_interval(values: Floats) -> Interval:
@@ -263,17 +230,15 @@ def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Flo
     return np.array([np.searchsorted(row, ratios, side="right") for row in slower]) / len(best)
 
 
-def paired_ratio(a: Floats, b: Floats) -> PairedRatio:
+def paired_ratio(a: Floats, b: Floats) -> Interval:
     """Return the geometric mean of a / b over the pairs in which both are numbers.
 
     The interval is Student's, of the logarithms; a single pair leaves the factor open.
     """
     logs = np.log(np.asarray(a) / np.asarray(b))
     logs = logs[np.isfinite(logs)]
-    middle, low, high = np.exp(mean_interval(logs))
-    if len(logs) < 2:
-        low, high = 0.0, math.inf
-    return PairedRatio(float(middle), float(low), float(high), len(logs))
+    middle, low, high = np.exp(mean_interval(logs)).tolist()
+    return Interval(middle, low, high) if len(logs) > 1 else Interval(middle, 0.0, math.inf)
 
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
@@ -314,14 +279,6 @@ def excess(residual: Floats, distance: Floats, reach: float) -> Floats:
     return residual - np.maximum(distance - reach, 0.0)
 
 
-def rotation_angles(local_rotations: Floats) -> Floats:
-    """Return the angle by which each joint rotates between frames [rad], (frame - 1, joint).
-
-    These are geodesic angles. The last frame and the first are no neighbours.
-    """
-    return rotation.angle(local_rotations[:-1], local_rotations[1:])
-
-
 def relative_error(x: Floats, exact: Floats, start: Floats) -> float:
     """Return |x - exact| / |start - exact|."""
     return float(np.linalg.norm(x - exact) / np.linalg.norm(start - exact))
@@ -330,15 +287,6 @@ def relative_error(x: Floats, exact: Floats, start: Floats) -> float:
 def rms_distance(x: Floats, y: Floats) -> float:
     """Return the root mean square distance between the points of x and of y [m]."""
     return float(np.sqrt(np.mean(np.sum((x - y) ** 2, axis=-1))))
-
-
-def convergence(history: Floats) -> Convergence:
-    """Return the 10th, 50th and 90th percentile over targets, (iteration,).
-
-    `history` is (target, iteration); a target that is done keeps its last residual.
-    """
-    low, median, high = np.quantile(history, [0.1, 0.5, 0.9], axis=0)
-    return Convergence(low, median, high)
 
 
 def ratio(a: float, b: float) -> float:

@@ -89,8 +89,8 @@ def style_of(row: Mapping[str, str]) -> Style:
     """
     name = row.get("style", "other")
     if name not in STYLES:
-        known = ", ".join(STYLES)
-        raise ValueError(f"style of {row['name']!r}: expected one of {known}, got {name!r}")
+        names = ", ".join(STYLES)
+        raise ValueError(f"style of {row['name']!r}: expected one of {names}, got {name!r}")
     return STYLES[name]
 
 
@@ -99,7 +99,7 @@ LOOPS, FACTORS = (tuple(_rows(name, Solver).values()) for name in ("loops", "fac
 _BENCHMARKED = _rows("benchmarked", Solver)
 COMPILED, PLAIN, OUR_KINEMATICS, *_, LIMIT = _BENCHMARKED.values()
 LIMIT_NAME = LIMIT.name
-SUPERNODAL, CHOLMOD = FACTORS
+SUPERNODAL = FACTORS[0]
 
 
 def environment_python(name: str) -> Path:
@@ -209,10 +209,10 @@ class Peer(Adapter):
 
     def label_of(self, entry: PeerEntry) -> str:
         """Return how an entry is written."""
-        return f"{self.shown}, {entry.note}" if entry.note else self.shown
+        return f"{self.name}, {entry.note}" if entry.note else self.name
 
     @property
-    def shown(self) -> str:
+    def name(self) -> str:
         """How the solver is written."""
         return self.label or self.title
 

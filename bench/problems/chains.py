@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.reference import Skeleton, scenes
+from plumbob.reference import Skeleton, rotation, scenes
 from plumbob.reference.arguments import FloatArray, IndexArray, choice
 
 BALLS = 10
@@ -78,14 +78,9 @@ def chain_targets(stratum: str, count: int, seed: int = SEED) -> TargetsForSkele
         f"chain/{stratum}",
         f"chain, {stratum}",
         skeleton,
-        random_rotations(rng, count, skeleton.joint_count),
+        rotation.random(rng, count, skeleton.joint_count),
         distances[:, None] * unit(rng.standard_normal((count, 3))),
     )
-
-
-def random_rotations(rng: np.random.Generator, *shape: int) -> FloatArray:
-    """Return uniformly random unit quaternions, (..., 4)."""
-    return unit(rng.standard_normal((*shape, 4)))
 
 
 def unit(vectors: FloatArray) -> FloatArray:

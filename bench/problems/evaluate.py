@@ -133,6 +133,14 @@ def to_pinocchio(robot: BenchRobot, q: FloatArray) -> FloatArray:
     return permuted
 
 
+def from_pinocchio(robot: BenchRobot, q: FloatArray) -> FloatArray:
+    """Return coordinates, (coordinate,), with w at the start of quaternions."""
+    permuted = q.copy()
+    for i in robot.balls:
+        permuted[i : i + 4] = q[[i + 3, i, i + 1, i + 2]]
+    return permuted
+
+
 class Evaluator:
     """The kinematics of a robot in both engines."""
 
@@ -202,11 +210,11 @@ class Evaluator:
 
 
 def _distances(
-    poses: tuple[FloatArray, FloatArray], others: tuple[FloatArray, FloatArray]
+    poses: tuple[FloatArray, FloatArray], targets: tuple[FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest distance [m] and angle [rad] between the effectors' poses, (row,)."""
-    distance = np.linalg.norm(poses[0] - others[0], axis=-1).max(axis=-1)
-    return distance, angle_between(poses[1], others[1]).max(axis=-1)
+    distance = np.linalg.norm(poses[0] - targets[0], axis=-1).max(axis=-1)
+    return distance, angle_between(poses[1], targets[1]).max(axis=-1)
 
 
 def angle_between(A: FloatArray, B: FloatArray) -> FloatArray:

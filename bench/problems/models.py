@@ -18,7 +18,7 @@ from plumbob.reference import (
 from plumbob.reference.arguments import FloatArray, IndexArray, name_list
 from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
 
-from .chains import TargetsForSkeleton, random_rotations
+from .chains import TargetsForSkeleton
 from .robots import TWO_REVOLUTIONS, BenchRobot, chain_of
 
 # Springs [N/m] and mass [kg] of cloths from meshes.
@@ -95,7 +95,7 @@ def skeletons(
     tip = _effector(skeleton, skeleton.names, effector)
     chain = path_to(skeleton, tip)
     rng = np.random.default_rng(_SEED)
-    pool = random_rotations(rng, _POOL * count, chain.joint_count)
+    pool = rotation.random(rng, _POOL * count, chain.joint_count)
     reached = forward_kinematics(chain, pool).positions[:, -1]
     order = np.argsort(np.linalg.norm(reached - chain.offsets[0], axis=-1))
     few = max(count, round(_EXTREME * len(order)))
@@ -104,7 +104,7 @@ def skeletons(
         OUTER: rng.choice(order[-few:], count, replace=False),
         INNER: rng.choice(order[:few], count, replace=False),
     }
-    starts = random_rotations(rng, count, chain.joint_count)
+    starts = rotation.random(rng, count, chain.joint_count)
     return [
         TargetsForSkeleton(
             f"chain/{title}, {name}", f"{title}, {name}", chain, starts, reached[poses]

@@ -9,9 +9,10 @@ import functools
 
 import numpy as np
 
+from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
 
-from .chains import random_rotations, unit
+from .chains import unit
 from .evaluate import Evaluator, Targets, evaluator_of
 from .robots import seed_of
 
@@ -67,13 +68,7 @@ def unreachable_targets(name: str, count: int, seed: int = SEED) -> Targets:
     shape = (count, len(evaluator.robot.effectors))
     distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (*shape, 1))
     positions = evaluator.first_joint + distance * unit(rng.standard_normal((*shape, 3)))
-    w, x, y, z = np.moveaxis(random_rotations(rng, *shape), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    rotations = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    rotations = rotation.to_matrix(rotation.random(rng, *shape))
     starts = evaluator.robot.draw(rng, count)
     return Targets(positions, rotations, starts, np.zeros(count, dtype=int))
 

@@ -21,7 +21,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray, choice
+from plumbob.reference.formats import urdf
 
 PACKAGE = "example-robot-data"
 _FOLDER = "cmeel.prefix/share/example-robot-data/robots"
@@ -92,10 +94,7 @@ class BenchRobot:
         q = np.zeros((count, len(self.lower)))
         q[:, is_hinge] = rng.uniform(lower, upper, (count, len(lower)))
         for i in self.balls:
-            half = 0.3 * rng.standard_normal((count, 3))
-            angle = np.linalg.norm(half, axis=-1, keepdims=True)
-            q[:, i : i + 1] = np.cos(angle)
-            q[:, i + 1 : i + 4] = half * np.sinc(angle / np.pi)
+            q[:, i : i + 4] = rotation.exponential(0.6 * rng.standard_normal((count, 3)))
         return q
 
 
@@ -179,18 +178,15 @@ def _folder() -> Path:
 
 
 def links(chain: BenchRobot) -> list[Link]:
-    """Return the steps of an arm from its root to its effector."""
-    steps = []
-    for joint in ElementTree.fromstring(chain.text).findall("joint"):
-        transform, origin = np.eye(4), joint.find("origin")
-        if origin is not None:
-            transform[:3, 3] = _numbers(origin.get("xyz", "0 0 0"))
-            transform[:3, :3] = _from_roll_pitch_yaw(*_numbers(origin.get("rpy", "0 0 0")))
-        element = joint.find("axis")
-        axis = _numbers("1 0 0" if element is None else element.get("xyz", "1 0 0"))
-        is_fixed = joint.get("type") == "fixed"
-        steps.append(Link(transform, None if is_fixed else axis / np.linalg.norm(axis)))
-    return steps
+    """Return the steps of an arm from its root to its effector, the root's own first."""
+    model = urdf.parse(chain.text).articulation
+    transforms = np.tile(np.eye(4), (model.joint_count, 1, 1))
+    transforms[:, :3, :3], transforms[:, :3, 3] = (
+        rotation.to_matrix(model.frames),
+        model.skeleton.offsets,
+    )
+    axes = (None if kind == "fixed" else a for kind, a in zip(model.kinds, model.axes, strict=True))
+    return list(map(Link, transforms, axes))
 
 
 def chain_from(name: str, title: str, text: str, root: str, effector: str) -> BenchRobot:
@@ -297,19 +293,3 @@ def _body(parent: ElementTree.Element, name: str, offset: str) -> ElementTree.El
     # Some readers require a mass.
     ElementTree.SubElement(body, "inertial", mass="1", pos="0 0 0", diaginertia="0.01 0.01 0.01")
     return body
-
-
-def _numbers(text: str) -> FloatArray:
-    return np.array([float(word) for word in text.split()])
-
-
-def _from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> FloatArray:
-    """Return the rotation by roll about x, then pitch about y, then yaw about z, all fixed axes."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    return np.array(
-        [
-            [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-            [-sy, cy * sx, cy * cx],
-        ]
-    )

@@ -38,12 +38,15 @@ TOLERANCE = 1e-4
 # Beyond reach: of the distance from the closest pose; small, so that the chain must be straight.
 BEYOND_TOLERANCE = 1e-6
 MAX_ITERATIONS = 1000
+# Targets in a stratum, and out of reach, for those of a scale: a solver in Python may need seconds
+# for a target that takes it all iterations. And the least number.
+_TARGETS, _TARGETS_BEYOND, _LEAST_TARGETS = 0.25, 0.05, 3
 # The residuals of so many iterations are kept for the figure. A user's solver is followed over so
 # many targets and iterations, each by a solve from the start with that many at most.
 HISTORY = 200
-FOLLOWED_TARGETS, FOLLOWED_ITERATIONS = 20, 30
-# The first targets are timed, so many, in so many rounds.
-TIMED, ROUNDS = 20, 3
+FOLLOWED_TARGETS, FOLLOWED_ITERATIONS = 10, 20
+# Of so many targets one is timed, in so many rounds, but no more than so many.
+PER_TIMED, ROUNDS, MAX_TIMED = 4, 3, 20
 NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
 NOT_FOLLOWED = "not followed, for its answers do not depend on max_iterations"
 
@@ -58,7 +61,12 @@ class SolverLimits(NamedTuple):
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every stratum, and a user's targets, for every solver."""
     for stratum in STRATA:
-        problem = chain_targets(stratum, scale.targets, scale.seed)
+        share = _TARGETS_BEYOND if stratum == BEYOND else _TARGETS
+        problem = chain_targets(
+            stratum,
+            min(scale.targets, max(_LEAST_TARGETS, round(share * scale.targets))),
+            scale.seed,
+        )
         tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
         digest = {} if scale.seed == SEED else {"problem_digest": f"seed {scale.seed}"}
         for block in _blocks_on(problem, stratum, SolverLimits(tolerance, MAX_ITERATIONS), scale):
@@ -93,11 +101,11 @@ def solve_alone(job: ChainJob) -> Measured:
 
 def solve_together(jobs: Sequence[ChainJob]) -> list[Measured]:
     """Solve the targets of every solver; then time the first targets, the solvers in turns."""
-    results = [_answered(job) for job in jobs]
-    timed = [i for i, result in enumerate(results) if _has_answer(result)]
-    count = min(TIMED, jobs[0].job.targets.shape[0])
-    turns = times_in_turns([jobs[i].job for i in timed], count, ROUNDS)
-    for i, times in zip(timed, turns, strict=True):
+    results = [_answer_of(job) for job in jobs]
+    places = [i for i, result in enumerate(results) if _has_answer(result)]
+    count = min(MAX_TIMED, -(-jobs[0].job.targets.shape[0] // PER_TIMED))
+    turns = times_in_turns([jobs[i].job for i in places], count, ROUNDS)
+    for i, times in zip(places, turns, strict=True):
         if times is not None:
             values = structs.replace(results[i].values, **times._asdict())
             results[i] = results[i]._replace(values=values)
@@ -108,7 +116,7 @@ def _has_answer(measured: Measured) -> bool:
     return measured.values is not None and bool(np.isfinite(measured.values.residual).any())
 
 
-def _answered(job: ChainJob) -> Measured:
+def _answer_of(job: ChainJob) -> Measured:
     try:
         return job.answers()
     except NoAnswerError as error:
@@ -250,6 +258,9 @@ def _history(problem: TargetsForSkeleton, job: Job) -> dict[str, FloatArray]:
 
 
 def _quantiles(history: FloatArray) -> dict[str, FloatArray]:
-    """Return the quantiles of residuals, (target, iteration), by names in records."""
-    quantiles = metrics.convergence(history)._asdict()
-    return {f"history_{name}": residuals for name, residuals in quantiles.items()}
+    """Return the 10th, 50th and 90th percentile over targets of residuals, (target, iteration).
+
+    A target that is done keeps its last residual.
+    """
+    names = ("history_low", "history_median", "history_high")
+    return dict(zip(names, np.quantile(history, [0.1, 0.5, 0.9], axis=0), strict=True))

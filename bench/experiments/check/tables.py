@@ -23,7 +23,7 @@ def _row(record: Record) -> Row:
     return {
         "record": record,
         "claim": record.problem,
-        "verdict": "held" if claim.held else f"MISSED: {details.failure}{excess}",
+        "verdict": "held" if claim.holds else f"MISSED: {details.failure}{excess}",
         "our quantity": details.quantity,
         "compared with": record.solver,
         "cases": claim.cases,

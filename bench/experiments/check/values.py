@@ -12,7 +12,7 @@ class ClaimValues(Values, frozen=True):
     difference: float
     tolerance: float
     moved: float
-    held: bool
+    holds: bool = msgspec.field(name="held")
 
 
 class ClaimDetails(Details, frozen=True):

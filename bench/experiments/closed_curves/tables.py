@@ -93,7 +93,7 @@ def jitter_chart(results: Results) -> Sketch | None:
     spans = []
     for row, records in enumerate(curves.values()):
         for record in records:
-            warm = results.one("arm", record.problem, record.solver, warm=True)
+            warm = results.find("arm", record.problem, record.solver, warm=True)
             motions = [motion for motion in (record, warm) if motion is not None]
             angles = [in_unit(motion.values.largest_angle.max(), "°") for motion in motions]
             spans.append(series(record.solver, angles, [row] * len(angles), form=SPAN))

@@ -1,17 +1,16 @@
 """Convergence of the solvers of an implicit Euler step, and two laws of dampers."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
-from ...figures.chart import Axis, Chart, Panel, series
-from ...figures.sketch import Sketch, chart_sketch
+from ...figures.chart import Panel, declared_chart, series
+from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import words_in
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import (
     Results,
     by_problem,
@@ -31,9 +30,6 @@ from . import DAMPERS, FEW, ONE_STEP
 LISTED = (1, 10, 100, 1000)
 CAPTIONS = Captions(__file__)
 
-# The cells of a row by the titles of their columns, and its records.
-Row = dict[str, Any]
-
 
 def convergence_chart(results: Results) -> Sketch | None:
     """Show residual and error over the iterations of a step, a column for each stiffness."""
@@ -52,16 +48,8 @@ def convergence_chart(results: Results) -> Sketch | None:
         for quantity, title in rows.items()
         for records in cloths
     )
-    return chart_sketch(
-        Chart(
-            **CAPTIONS.figure("cloth_convergence"),
-            panels=tuple(panels),
-            x=Axis("iteration, log scale", log=True),
-            y=Axis(log=True, limits=(1e-14, 2)),
-            columns=len(cloths),
-            entrants=results.entrants,
-        )
-    )
+    chart = CAPTIONS.figure("cloth_convergence")
+    return declared_chart(chart, panels, results.entrants, columns=len(cloths))
 
 
 def _convergence_rows(results: Results) -> list[Row]:
@@ -159,9 +147,9 @@ def _damped_steps(results: Results) -> list[Row]:
 
 def _damper_summary(steps: Sequence[Row]) -> Summary:
     cloths = grouped(steps, lambda step: str(step["cloth"]))
-    least, greatest = (words(end(step["difference"] for step in steps)) for end in (min, max))
+    low, high = (words(end(step["difference"] for step in steps)) for end in (min, max))
     return Summary(
-        f"The forces of the two laws differ by {least} to {greatest} of their size, the less the "
+        f"The forces of the two laws differ by {low} to {high} of their size, the less the "
         "shorter the step.",
         tuple(f"{cloth}: {_at(of[0])}, {_at(of[-1])}" for cloth, of in cloths.items()),
     )

@@ -30,21 +30,13 @@ class DamperDifferences(Values, frozen=True):
 
 
 class StepDetails(Details, frozen=True):
-    """The length of a step [s], and its number of iterations where that is fixed."""
+    """The number of iterations of a step where that is fixed."""
 
-    h: float
     iterations: int = 0
-
-
-class DamperDetails(Details, frozen=True):
-    """The damping of every spring [N s/m], and the number of steps before the comparison."""
-
-    damping: float
-    first: int
 
 
 KINDS = {
     ONE_STEP: Kind(IterationErrors, StepDetails),
     FEW: Kind(TruncatedSteps, StepDetails),
-    DAMPERS: Kind(DamperDifferences, DamperDetails),
+    DAMPERS: Kind(DamperDifferences),
 }

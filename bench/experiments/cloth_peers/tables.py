@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from ...figures.chart import Axis, Chart, Panel, Series, series
-from ...figures.sketch import Sketch, chart_sketch
+from ...figures.chart import Panel, Series, declared_chart, series
+from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers.registry import LINEARISED
 from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, counted, grouped, label, listed, most_often
 from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
@@ -26,8 +26,6 @@ from . import LIU, MISSING, MOTION, MOTION_TARGETS, NEAR, ONE_STEP, SOLVED, STAB
 from .measurement import AMPLITUDE, BISECTION, GROWTH, STABILITY_SIZE, STABILITY_STEPS
 from .readings import Point, points
 
-# The cells of a row by the titles of their columns, and its records.
-Row = dict[str, Any]
 CAPTIONS = Captions(
     __file__,
     side=f"{SIDE:g}",
@@ -48,7 +46,6 @@ CAPTIONS = Captions(
 )
 # Larger errors are those of motions that diverged, and are not drawn.
 MAX_ERROR = 10.0
-ERRORS = {ONE_STEP: "error |x − x*| / |y − x*|", MOTION: "error of the motion / distance moved"}
 
 
 def work_precision(name: str, task: str, results: Results) -> Sketch | None:
@@ -69,16 +66,8 @@ def work_precision(name: str, task: str, results: Results) -> Sketch | None:
     ]
     own = grouped((point for point in visible if point.own), lambda point: point.own)
     panels += [Panel(cloth, _curves(group)) for cloth, group in own.items()]
-    return chart_sketch(
-        Chart(
-            **CAPTIONS.figure(name),
-            panels=tuple(panels),
-            x=Axis("time for a frame [ms]", log=True),
-            y=Axis(ERRORS[task], log=True),
-            columns=len(stiffnesses) or len(panels),
-            entrants=results.entrants,
-        )
-    )
+    columns = len(stiffnesses) or len(panels)
+    return declared_chart(CAPTIONS.figure(name), panels, results.entrants, columns=columns)
 
 
 def _curves(visible: Sequence[Point]) -> tuple[Series, ...]:
@@ -269,8 +258,8 @@ def _liu_summary(rows: Sequence[Row]) -> Summary:
         for row in rows
     )
     ratios = [row["published time"] / row["our time"] for row in rows]
-    least, greatest = map(words, metrics.extent(np.array(ratios)))
-    sentence = f"On another machine, our times are {least} to {greatest} times shorter."
+    low, high = map(words, metrics.extent(np.array(ratios)))
+    sentence = f"On another machine, our times are {low} to {high} times shorter."
     return Summary(sentence, tuple(sentences))
 
 

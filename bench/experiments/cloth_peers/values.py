@@ -40,14 +40,11 @@ class FallDetails(Details, frozen=True):
     """The falling cloth, and the settings of its solver."""
 
     stiffness: float  # of the springs [N/m]
-    frame: float  # its length [s]
-    size: int = 0  # particles along a side
     cloth: str = ""  # the name of a user's cloth
     rungs: tuple[str, ...] = ()  # the settings, (rung,)
     remarks: tuple[str, ...] = ()  # on each setting, (rung,)
     kind: str = ""  # how the solver's settings differ, see `registry`
     sweep: int = 1  # the pass over all solvers in which it was measured
-    arbiter: str = ""  # what the errors are measured against, and to how many digits
 
 
 class ClothDetails(Details, frozen=True):

@@ -1,20 +1,19 @@
 """The cost of factors and steps as cloths grow to a million particles."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.table import NO_SUMMARY, Summary, words
 
 CAPTIONS = Captions(__file__)
 LABELS = {library.name: library.label for library in registry.FACTORS}
 
 
-def _row(record: Record) -> dict[str, Any]:
+def _row(record: Record) -> Row:
     """Return medians and their ratios; a cell is None if it was not measured."""
     medians = {name: metrics.spread(array).median for name, array in record.arrays.items()}
     medians["particles"] = float(record.details.particles)
@@ -46,7 +45,7 @@ def _row(record: Record) -> dict[str, Any]:
     }
 
 
-def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+def _summary(rows: Sequence[Row]) -> Summary:
     steps = [row for row in rows if row["all iterations"] is not None]
     if not steps:
         return NO_SUMMARY

@@ -1,13 +1,12 @@
 """The energy of a swinging cloth by integrator."""
 
 from collections.abc import Sequence
-from typing import Any
 
-from ...figures.chart import GREATER, Axis, Chart, Panel, series
-from ...figures.sketch import Sketch, chart_sketch
+from ...figures.chart import Panel, declared_chart, series
+from ...figures.sketch import Sketch
 from ...tables.captions import Captions
 from ...tables.columns import words_in
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import Results, by_problem, label, settings
 from ...tables.table import Summary, words
 from . import DAMPINGS, SIZE
@@ -22,20 +21,10 @@ def energy_chart(results: Results) -> Sketch | None:
         Panel(group[0].title, tuple(series(r.solver, r.values.time, r.values.left) for r in group))
         for group in by_problem(results.all("energy")).values()
     )
-    return chart_sketch(
-        Chart(
-            **CAPTIONS.figure("energy"),
-            panels=tuple(panels),
-            x=Axis("time [s]", limits=(0, None)),
-            y=Axis("relative energy above rest", limits=(0, None)),
-            columns=2,
-            better=GREATER,
-            entrants=results.entrants,
-        )
-    )
+    return declared_chart(CAPTIONS.figure("energy"), panels, results.entrants)
 
 
-def _rows(results: Results) -> list[dict[str, Any]]:
+def _rows(results: Results) -> list[Row]:
     rows = []
     for record in results.all("energy"):
         left, every = record.values.left, record.details.every
@@ -46,7 +35,7 @@ def _rows(results: Results) -> list[dict[str, Any]]:
     return rows
 
 
-def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+def _summary(rows: Sequence[Row]) -> Summary:
     undamped = [row for row in rows if row["record"].details.damping == 0.0]
     if not undamped:
         return Summary()

@@ -11,14 +11,10 @@ class Swing(Values, frozen=True):
 
 
 class SwingDetails(Details, frozen=True):
-    """How the cloth swings."""
+    """The damping of every spring [N s/m]; of `every` steps, one is looked at."""
 
-    title: str
-    damping: float  # of every spring [N s/m]
-    h: float  # length of a step [s]
-    steps: int
-    every: int  # of so many steps, one is looked at
-    tolerance: float  # residual of the implicit steps
+    damping: float
+    every: int
 
 
 KINDS = {"": Kind(Swing, SwingDetails)}

@@ -1,13 +1,12 @@
 """Proven distances between the solutions of a step and its minimiser."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import counted, label, listed
 from ...tables.table import Summary, words
 from . import FRAME, FRAMES, GRAVITY
@@ -16,7 +15,7 @@ from .values import CertifiedDetails, CertifiedStep
 CAPTIONS = Captions(__file__, gravity=f"{GRAVITY:g}", time=f"{FRAMES * FRAME:g}")
 
 
-def _row(record: Record) -> dict[str, Any]:
+def _row(record: Record) -> Row:
     step: CertifiedStep = record.values
     details: CertifiedDetails = record.details
     minimiser = "yes" if step.same else "no" if step.different else "not proven"
@@ -37,7 +36,7 @@ def _row(record: Record) -> dict[str, Any]:
     }
 
 
-def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+def _summary(rows: Sequence[Row]) -> Summary:
     records = [row["record"] for row in rows]
     newton = [record for record in records if record.solver == "newton"]
     rivals = [record for record in records if record.solver != "newton"]
@@ -55,7 +54,7 @@ def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
     )
 
 
-def _sizes(rows: Sequence[dict[str, Any]]) -> dict[str, str]:
+def _sizes(rows: Sequence[Row]) -> dict[str, str]:
     sizes = sorted({int(row["record"].values.size) for row in rows})
     return {"sizes": listed([f"{size} × {size}" for size in sizes], "or")}
 

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import IK_SOLVERS, ImplicitEuler, scenes, track
+from plumbob.reference import IK_SOLVERS, ImplicitEuler, rotation, scenes, track
 
-from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
 from ..cloth.measurement import TOLERANCE, H, cloth_swing, converged_motion, motion
@@ -81,7 +80,8 @@ def drawing(solver: str, evened: bool) -> Measured:
     skeleton, rest = scenes.lab_arm()
     curve = evened_custom_curve() if evened else custom_curve()
     motion = track(skeleton, curve, solver, rest)
-    angles = metrics.rotation_angles(motion.local_rotations[:, :-1])
+    joints = motion.local_rotations[:, :-1]
+    angles = rotation.angle(joints[:-1], joints[1:])
     ghosts = np.linspace(0, len(curve) - 1, GHOSTS).round().astype(int)
     return Measured(
         ArmDrawing(

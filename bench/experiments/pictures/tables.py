@@ -1,13 +1,12 @@
 """The effect of resampling on the custom curve."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from ...harness.record import Record
 from ...tables.columns import words_in
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import label, listed, solvers
 from ...tables.table import Summary, words
 from . import ARM
@@ -15,7 +14,7 @@ from .figures import CAPTIONS, arm_draws
 from .values import ArmDrawing
 
 
-def _row(record: Record) -> dict[str, Any]:
+def _row(record: Record) -> Row:
     drawing: ArmDrawing = record.values
     return {
         "record": record,
@@ -31,7 +30,7 @@ def _row(record: Record) -> dict[str, Any]:
     }
 
 
-def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
+def _summary(rows: Sequence[Row]) -> Summary:
     points = (
         f"{row['curve']}: {words(row['points'])} points, {words(row['gap, smallest'])} to "
         f"{words(row['gap, largest'])} m apart; a joint rotates by up to "
@@ -45,7 +44,7 @@ def _summary(rows: Sequence[dict[str, Any]]) -> Summary:
     return Summary(sentence, tuple(points))
 
 
-def _solvers(rows: Sequence[dict[str, Any]]) -> dict[str, str]:
+def _solvers(rows: Sequence[Row]) -> dict[str, str]:
     return {"solvers": listed([label(name) for name in solvers(row["record"] for row in rows)])}
 
 

@@ -17,11 +17,9 @@ class ArmDrawing(Values, frozen=True):
 
 
 class ArmDetails(Details, frozen=True):
-    """Whether the curve was resampled, and between which spacings [m]."""
+    """Whether the curve was resampled."""
 
     evened: bool
-    min_spacing: float
-    max_spacing: float
 
 
 class ClothDrawing(Values, frozen=True):

@@ -25,7 +25,7 @@ from .values import FabrikSolves
 
 # Random targets for those of a scale, and how many of them are timed.
 _TARGETS = 5
-_TIMED = 200
+_TIMED_TARGETS = 200
 _SEED = 2011
 _LIMITS = SolverLimits(published.FABRIK.tolerance, published.FABRIK.iterations)
 # The solvers fast enough for 10,000 targets, with restarts as TRAC-IK has them.
@@ -71,7 +71,7 @@ def _job(
     targets: Callable[[], Targets],
     count: int,
 ) -> RobotJob:
-    return RobotJob(robot, peer, entry, tolerance, targets, count, min(count, _TIMED))
+    return RobotJob(robot, peer, entry, tolerance, targets, count, min(count, _TIMED_TARGETS))
 
 
 def _fabrik(stratum: str, distance: float, scale: Scale) -> Iterator[Block]:

@@ -44,7 +44,7 @@ def _about(score: Score) -> Row:
 
 def _of_trac_ik(records: Sequence[Record]) -> Iterator[Row]:
     """Yield success rates and mean times, robot by robot, the published solvers first."""
-    titles = {peer.label_of(entry): peer.shown for peer in registry.PEERS for entry in peer.entries}
+    titles = {peer.label_of(entry): peer.name for peer in registry.PEERS for entry in peer.entries}
     for robot, members in grouped(published.TRAC_IK.rates, lambda rate: rate.robot).items():
         rates = {rate.solver: rate for rate in members}
         measured = {titles.get(r.solver, r.solver): r for r in records if r.details.robot == robot}

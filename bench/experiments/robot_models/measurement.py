@@ -77,9 +77,9 @@ def effector_differences(module: str, name: str) -> Mapping[str, float]:
     effectors = [articulation.names.index(effector) for effector in model.effectors]
     q = model.draw(samples.generator(name, 0), ROBOT_CONFIGURATIONS)
     pose = forward_kinematics(articulation, q)
-    positions, rotations = map(np.array, zip(*map(kinematics, q), strict=True))
+    transforms = np.reshape([*map(kinematics, q)], (len(q), len(effectors), 4, 4))
     matrices = rotation.to_matrix(pose.rotations[:, effectors])
     return {
-        "positions": float(np.abs(positions - pose.positions[:, effectors]).max()),
-        "rotations": float(np.abs(rotations - matrices).max()),
+        "positions": float(np.abs(transforms[..., :3, 3] - pose.positions[:, effectors]).max()),
+        "rotations": float(np.abs(transforms[..., :3, :3] - matrices).max()),
     }

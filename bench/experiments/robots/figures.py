@@ -1,8 +1,9 @@
 """Shares of targets that solvers solve against time and the fastest, and a map of all robots."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Figure
-from ...tables.results import Results
+from ...tables.results import Results, grouped
 from ...tables.table import words
+from . import REPEATS
 from .readings import PENALTY, SHIFT, STARTS, Score, fields_of
 
 if TYPE_CHECKING:
@@ -31,9 +33,11 @@ CAPTIONS = Captions(
     resamples=str(metrics.RESAMPLES),
     limit_tolerance=words(LIMIT_TOLERANCE),
     agreement=words(AGREEMENT),
+    repeats=str(REPEATS),
 )
-# So many times the least time is drawn as the palest, and the least time as the fullest.
-SLOWEST = 1000.0
+# The quantities of a map; so many times the least time is drawn as the palest.
+SOLVED, TIME, SLOWEST = "poses solved", "time", 1000.0
+UNITS_OF_MAPS = {SOLVED: "solved [%]", TIME: "time relative to fastest"}
 # Maps of more robots than this are stacked.
 MAXIMUM_BESIDE = 5
 
@@ -80,10 +84,14 @@ def _chart(
         curves = zip(field, rates(field, x), strict=True)
         panels.append(Panel(robot, tuple(_share(score, x, curve) for score, curve in curves)))
     start = next((score.start for field in fields.values() for score in field), "")
+    return declared_chart(_declared(name, start), panels, results.entrants)
+
+
+def _declared(name: str, start: str) -> dict[str, Any]:
+    """Return the declared parts of a figure, its name and title with a start."""
     chart = CAPTIONS.figure(name)
-    chart["name"] = f"{name}_{start.replace(' ', '_')}"
-    chart["title"] = f"Robots, {start}: {chart['title']}"
-    return declared_chart(chart, panels, results.entrants)
+    title = f"Robots, {start}: {chart['title']}"
+    return {**chart, "name": f"{name}_{start.replace(' ', '_')}", "title": title}
 
 
 def _share(score: Score, x: Floats, rates: Floats) -> Series:
@@ -92,85 +100,105 @@ def _share(score: Score, x: Floats, rates: Floats) -> Series:
     return series(score.solver, x, 100 * rates, (100 * low, 100 * high))
 
 
-# A cell of a map: how full it is drawn, from 0 to 1, and its text.
-MapCell = tuple[float, str]
+class MapCell(NamedTuple):
+    """A solver on a robot: its text, and its shade from 0 (worst) to 100."""
+
+    text: str
+    shade: int
 
 
-class RobotMaps(NamedTuple):
-    """Maps of the same solvers and robots: by title a cell for each, None where it has none."""
+class MapRow(NamedTuple):
+    """A solver, and its cell for each robot, None where it does not take the robot."""
 
-    solvers: tuple[str, ...]
-    robots: tuple[str, ...]
-    panels: dict[str, list[list[MapCell | None]]]
+    solver: str
+    is_yours: bool
+    cells: list[MapCell | None]
+
+
+class RobotMap(NamedTuple):
+    """Solvers of a start and robots, by group with their number; the best solver first."""
+
+    start: str
+    quantity: str
+    groups: list[tuple[str, int]]
+    robots: list[str]
+    rows: list[MapRow]
+
+
+def robot_maps(results: Results, *starts: str) -> list[RobotMap]:
+    """Return a map of each start and quantity, as far as there are solvers."""
+    return [
+        _map(start, quantity, fields, results)
+        for start in starts or STARTS
+        if (fields := fields_of(results, start))
+        for quantity in (SOLVED, TIME)
+    ]
+
+
+def _map(start: str, quantity: str, fields: dict[str, list[Score]], results: Results) -> RobotMap:
+    by_group = grouped(fields, lambda robot: fields[robot][0].group)
+    robots = [robot for members in by_group.values() for robot in members]
+    scores = {(s.solver, robot): s for robot in robots for s in fields[robot]}
+    cell = _solved_cell if quantity == SOLVED else _time_cell
+    rows = []
+    for solver in dict.fromkeys(solver for solver, _ in scores):
+        pairs = (scores.get((solver, robot)) for robot in robots)
+        cells = [score and cell(score) for score in pairs]
+        rows.append(MapRow(solver, solver in results.entrants, cells))
+    rows.sort(key=lambda row: -sum(cell.shade for cell in row.cells if cell))
+    groups = [(group, len(members)) for group, members in by_group.items()]
+    return RobotMap(start, quantity, groups, robots, rows)
+
+
+def _solved_cell(score: Score) -> MapCell:
+    rate = score.share.hits / max(score.share.total, 1)
+    return _cell(score, f"{math.floor(100 * rate)}", rate)
+
+
+def _time_cell(score: Score) -> MapCell:
+    ratio = score.relative_time
+    if math.isnan(ratio):
+        return MapCell("–", 0)
+    size, unit = (ratio, "") if ratio < 999.5 else (ratio / 1e3, "k")
+    text = f"{size:.{1 if size < 10 else 0}f}{unit}"
+    return _cell(score, text, 1.0 - math.log(max(ratio, 1.0)) / math.log(SLOWEST))
+
+
+def _cell(score: Score, text: str, shade: float) -> MapCell:
+    """Return a cell; a star marks a solver that is not ranked."""
+    return MapCell(text + "*" * (not score.is_ranked), round(100 * min(1.0, max(0.0, shade))))
 
 
 def heat_map(start: str, results: Results) -> Sketch | None:
-    """Return the map of solvers of one start and robots, in two panels; None without solvers."""
-    fields = fields_of(results, start)
-    scores = {(s.solver, robot): s for robot, field in fields.items() for s in field}
-    solvers = tuple(dict.fromkeys(solver for solver, _ in scores))
-
-    def panel(read: Callable[[Score], MapCell]) -> list[list[MapCell | None]]:
-        rows = ([scores.get((solver, robot)) for robot in fields] for solver in solvers)
-        return [[score and read(score) for score in row] for row in rows]
-
-    if not scores:
-        return None
-    panels = {"solved [%]": panel(_success), "time relative to fastest": panel(_slowness)}
-    return Sketch(
-        f"robots_map_{start.replace(' ', '_')}",
-        f"Robots, {start}: who is good at what",
-        "Left: targets solved of all given. Right: the geometric mean of times over the "
-        "least on that robot, unsolved targets with their penalty. Fuller is better; a star "
-        "where the solver is not ranked, no field where it does not take the "
-        "robot.",
-        RobotMaps(solvers, tuple(fields), panels),
-        draw_map,
-    )
+    """Return both maps of one start beside each other; None without solvers."""
+    maps = robot_maps(results, start)
+    chart = _declared("robots_map", start)
+    return Sketch(**chart, data=maps, draw=draw_maps) if maps else None
 
 
-def _success(score: Score) -> MapCell:
-    rate = score.share.hits / max(score.share.total, 1)
-    return rate**2, f"{100 * rate:.3g}{_star(score)}"  # squared, for most rates are near to 1
-
-
-def _slowness(score: Score) -> MapCell:
-    ratio = score.relative_time
-    if np.isnan(ratio):
-        return 0.0, "–"
-    fullness = 1.0 - np.log(max(ratio, 1.0)) / np.log(SLOWEST)
-    size, unit = (ratio, "") if ratio < 999.5 else (ratio / 1e3, "k")  # as wide as a cell
-    text = f"{size:.{1 if size < 10 else 0}f}{unit}{_star(score)}"
-    return float(np.clip(fullness, 0.0, 1.0)), text
-
-
-def _star(score: Score) -> str:
-    return "" if score.is_ranked else "*"
-
-
-def draw_map(maps: RobotMaps) -> "Canvas":
-    """Return the maps as a figure of matplotlib's."""
+def draw_maps(maps: Sequence[RobotMap]) -> "Canvas":
+    """Return maps of the same solvers as a figure of matplotlib's, in the order of the first."""
     from ...figures.drawing import canvas
 
-    rows = 1 if len(maps.robots) <= MAXIMUM_BESIDE else len(maps.panels)
-    height = rows * (1.3 + 0.27 * len(maps.solvers))
-    figure, axes = canvas(height, len(maps.panels) // rows, rows, sharey=True)
-    for ax, (title, cells) in zip(axes, maps.panels.items(), strict=True):
-        _draw_panel(ax, title, cells, maps.robots)
-    axes[0].set_yticks(range(len(maps.solvers)), [plain_label(solver) for solver in maps.solvers])
+    solvers, robots = [row.solver for row in maps[0].rows], maps[0].robots
+    rows = 1 if len(robots) <= MAXIMUM_BESIDE else len(maps)
+    figure, axes = canvas(rows * (1.3 + 0.27 * len(solvers)), len(maps) // rows, rows, sharey=True)
+    for ax, robot_map in zip(axes, maps, strict=True):
+        cells = {row.solver: row.cells for row in robot_map.rows}
+        _draw_map(ax, [cells[solver] for solver in solvers], robots)
+        ax.set_title(UNITS_OF_MAPS[robot_map.quantity])
+    axes[0].set_yticks(range(len(solvers)), [plain_label(solver) for solver in solvers])
     axes[0].invert_yaxis()
     return figure
 
 
-def _draw_panel(
-    ax: "Axes", title: str, rows: Sequence[Sequence[MapCell | None]], robots: Sequence[str]
-) -> None:
+def _draw_map(ax: "Axes", rows: Sequence[Sequence[MapCell | None]], robots: Sequence[str]) -> None:
     cells = ((i, j, *cell) for i, row in enumerate(rows) for j, cell in enumerate(row) if cell)
-    for i, j, fullness, text in cells:
-        alpha = 0.06 + 0.5 * fullness
+    for i, j, text, shade in cells:
+        alpha = 0.06 + 0.005 * shade
         ax.barh(i, 0.96, 0.92, j - 0.48, color=COLOURS["blue"], alpha=alpha, linewidth=0)
         ax.text(j, i, text, ha="center", va="center", fontsize=8)
-    ax.set(title=title, xlim=(-0.5, len(robots) - 0.5), ylim=(-0.5, len(rows) - 0.5))
+    ax.set(xlim=(-0.5, len(robots) - 0.5), ylim=(-0.5, len(rows) - 0.5))
     names = [plain_label(robot) for robot in robots]
     ax.set_xticks(range(len(robots)), names, rotation=25, ha="right", rotation_mode="anchor")
     ax.tick_params(length=0)

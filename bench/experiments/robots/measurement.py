@@ -31,7 +31,7 @@ from ...problems.robot_targets import (
     unreachable_targets,
 )
 from ...problems.robots import HELD_OUT, PACKAGE, ROBOTS, enter, group_of, is_installed, title
-from . import REACHABLE, UNREACHABLE
+from . import REACHABLE, REPEATS, UNREACHABLE
 from .values import RobotSolves
 
 SUITE = "ik"
@@ -40,7 +40,9 @@ TOLERANCE = Tolerance(1e-3, 1e-3)
 # restarts on targets out of reach, which takes long, so that these are few.
 _TARGETS, _TARGETS_BEYOND = 0.05, 0.03
 # Of so many targets of a stratum one is timed, in rounds; of so many out of reach, in one round.
-_TIMED, _TIMED_BEYOND = 10, 3
+_PER_TIMED, _PER_TIMED_BEYOND = 10, 3
+# But at least so many of a stratum are timed, so that a clear difference is beyond chance.
+_LEAST_TIMED = 4
 ROUNDS, ROUNDS_BEYOND = 3, 1
 # Digits kept of times and residuals: more would fill the disk with noise.
 _DIGITS = 5
@@ -57,7 +59,7 @@ class RobotJob(NamedTuple):
     tolerance: Tolerance
     targets: Callable[[], Targets]
     size: int  # how many targets there are
-    timed: int  # so many of them, the first, are timed
+    timed_count: int  # so many of them, the first, are timed
     seed: int = SEED  # of the targets
     is_beyond: bool = False  # whether the targets are out of reach
 
@@ -123,23 +125,23 @@ def _blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
     count = max(1, round(_TARGETS * scale.targets))
     for entry in peer.entries:
         if not peer.is_installed:
-            nothing = partial(robot_targets, "", 0)
-            job = RobotJob("", peer, entry, TOLERANCE, nothing, 0, 0, scale.seed)
+            no_targets = partial(robot_targets, "", 0)
+            job = RobotJob("", peer, entry, TOLERANCE, no_targets, 0, 0, scale.seed)
             block = job.block("robots/all", _facts(REACHABLE, "every robot"))
             absent = partial(not_installed, peer.package)
             yield dataclasses.replace(block, measure=absent, group=None)
             continue
         for name in robots:
             targets = partial(robot_targets, name, count, scale.seed)
-            timed = len(STRATA) * -(-count // _TIMED)
-            sizes = (count * len(STRATA), timed, scale.seed)
+            timings = max(min(count, _LEAST_TIMED), -(-count // _PER_TIMED))
+            sizes = (count * len(STRATA), len(STRATA) * timings, scale.seed)
             job = RobotJob(name, peer, entry, TOLERANCE, targets, *sizes)
             yield job.block(f"robots/{name}", _facts(REACHABLE, title(name)))
             if name in HELD_OUT:
                 continue
             beyond = max(1, round(_TARGETS_BEYOND * scale.targets))
             targets = partial(unreachable_targets, name, beyond, scale.seed)
-            sizes = (beyond, -(-beyond // _TIMED_BEYOND), scale.seed)
+            sizes = (beyond, -(-beyond // _PER_TIMED_BEYOND), scale.seed)
             job = RobotJob(name, peer, entry, TOLERANCE, targets, *sizes, is_beyond=True)
             yield job.block(f"unreachable/{name}", _facts(UNREACHABLE, title(name)))
 
@@ -177,16 +179,24 @@ def solve_together(jobs: Sequence[RobotJob]) -> list[Measured]:
         announce("times, all solvers in turns")
         requests = [jobs[i].job for i in turns]
         rounds = ROUNDS_BEYOND if jobs[0].is_beyond else ROUNDS
-        times |= zip(turns, times_in_turns(requests, jobs[0].timed, rounds), strict=True)
+        times |= zip(turns, times_in_turns(requests, jobs[0].timed_count, rounds), strict=True)
     return [
         _measured(job, outcome, times.get(i))
         for i, (job, outcome) in enumerate(zip(jobs, outcomes, strict=True))
     ]
 
 
+def _repeats(job: RobotJob, outcome: JobOutcome) -> np.ndarray:
+    """Return how many targets are solved each time that all are solved."""
+    announce(f"{job.peer.label_of(job.entry)}: answers again")
+    outcomes = [outcome, *(answers(job.job) for _ in range(REPEATS - 1))]
+    engine = arbiter_of(job.peer.built_on)
+    return np.array([_evaluated(job, o.solved, engine)["solved"].sum() for o in outcomes])
+
+
 def _own_times(job: RobotJob, outcome: JobOutcome) -> Times:
     """Return the times that were taken with the answers, of a solver with a time limit."""
-    seconds = [answer.seconds for answer in outcome.solved[: job.timed]]
+    seconds = [answer.seconds for answer in outcome.solved[: job.timed_count]]
     return Times(np.array([seconds]), np.zeros(0))
 
 
@@ -200,6 +210,8 @@ def _measured(job: RobotJob, outcome: JobOutcome, times: Times | None) -> Measur
     arrays = _evaluated(job, outcome.solved, engine) if outcome.solved else {}
     if times is not None:
         arrays |= {"seconds": _rounded(times.seconds), "control": _rounded(times.control)}
+    if job.entry.has_time_limit and not job.is_beyond and outcome.solved:
+        arrays["repeats"] = _repeats(job, outcome)
     facts = {
         "strata": list(STRATA),
         "tips": list(robot.effectors),

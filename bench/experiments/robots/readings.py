@@ -143,10 +143,21 @@ class Score(NamedTuple):
         is_limited = any(record.facts.get("time_limited") for record in self.records)
         reasons = {
             "not finished": not self.is_finished,
-            "time-limited": is_limited,
+            f"time-limited{self._repeats}": is_limited,
             f"other targets, {words(self.total)}": not self.has_same_targets,
         }
         return "; ".join(reason for reason, applies in reasons.items() if applies)
+
+    @property
+    def _repeats(self) -> str:
+        """The least and the largest share that it solves when it is run again, "" if it is not."""
+        counts = [record.arrays["repeats"] for record in self.records if "repeats" in record.arrays]
+        if len(counts) < len(self.records):
+            return ""
+        shares = 100.0 * np.sum(counts, axis=0) / self.total
+        if not np.ptp(shares):
+            return f", {shares[0]:.1f} % in each of {shares.size} runs"
+        return f", {shares.min():.1f} to {shares.max():.1f} % in {shares.size} runs"
 
     @property
     def is_ranked(self) -> bool:
@@ -248,8 +259,8 @@ def _ranked(field: Sequence[Score]) -> list[Score]:
     ranked = [score for score in field if score.is_ranked]
     success = metrics.ranking({score.solver: score.solved for score in ranked})
     times = {s.solver: -np.log(s.penalised + SHIFT) for s in ranked if s.is_timed}
-    most = max(map(len, times.values()), default=0)
-    time = metrics.ranking({solver: logs for solver, logs in times.items() if len(logs) == most})
+    longest = max(map(len, times.values()), default=0)
+    time = metrics.ranking({solver: logs for solver, logs in times.items() if len(logs) == longest})
     mean_times = [score.mean_time for score in field if score.is_timed]
     least_time = min(mean_times, default=np.nan)
     return [s._replace(success=success, time=time, least_time=least_time) for s in field]
@@ -334,6 +345,6 @@ def out_of_reach(results: Results) -> list[Score]:
     return [s._replace(best_distances=best[s.robots, s.solved.size]) for s in beyond]
 
 
-def ratio_of_times(rival: Score, score: Score) -> metrics.PairedRatio:
+def ratio_of_times(rival: Score, score: Score) -> metrics.Interval:
     """Return by what factor a rival takes longer for the same targets, misses penalised."""
     return metrics.paired_ratio(rival.penalised + SHIFT, score.penalised + SHIFT)

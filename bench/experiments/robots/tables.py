@@ -62,7 +62,7 @@ def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Rec
     return {
         "records": records,
         "robot_records": robots,
-        "solver": peer.shown,
+        "solver": peer.name,
         "package": peer.package,
         "version": version or "not installed",
         "license": peer.license,
@@ -83,7 +83,7 @@ def _entry(entry: PeerEntry) -> str:
 
 def _participant_summary(rows: Sequence[Row]) -> Summary:
     titles = {row["solver"] for row in rows}
-    missing = [peer.shown for peer in registry.PEERS if peer.shown not in titles]
+    missing = [peer.name for peer in registry.PEERS if peer.name not in titles]
     not_asked = f"; not selected: {', '.join(missing)}" if missing else ""
     count = sum(row["version"] != "not installed" for row in rows)
     robots = rows[0]["robot_records"].values()
@@ -129,7 +129,7 @@ def _row(score: Score) -> Row:
         "false successes": false_successes.hits if (claims >= 0).any() else None,
         "mark": "; ".join(filter(None, (score.limits, score.leads, trouble))),
         **_interval("time, median", metrics.median_interval(seconds)),
-        "time, 95 %": _cell(metrics.effort(seconds).p95),
+        "time, 95 %": _cell(metrics.spread(seconds).p95),
         "time, mean": _cell(metrics.mean(seconds)),
         **{name: score.outcomes[name] for name in OUTCOMES},
     }

@@ -48,7 +48,7 @@ _PATIENCE = 3600.0
 Settings = dict[str, Any]
 
 
-class Search(NamedTuple):
+class SettingsSearch(NamedTuple):
     """The settings of a solver, from one start or with restarts."""
 
     solver: str
@@ -68,7 +68,7 @@ class Search(NamedTuple):
         return [*self.candidates, *([] if self.before in self.candidates else [self.before])]
 
 
-class Trial(msgspec.Struct, frozen=True):
+class SettingsTrial(msgspec.Struct, frozen=True):
     """A solver with settings on the first targets of each tuning robot."""
 
     solver: str
@@ -94,7 +94,7 @@ class Trial(msgspec.Struct, frozen=True):
         return float(np.mean(self.solved))
 
 
-def searches() -> list[Search]:
+def searches() -> list[SettingsSearch]:
     """Return the searches of `tuning.toml`."""
     text = Path(__file__).with_name("tuning.toml").read_text(encoding="utf-8")
     return [_search(**row) for row in tomllib.loads(text)["searches"]]
@@ -102,14 +102,14 @@ def searches() -> list[Search]:
 
 def _search(
     solver: str, start: str, default: Settings, before: Settings, axes: list[dict[str, list[Any]]]
-) -> Search:
+) -> SettingsSearch:
     points = [
         [dict(zip(axis, values, strict=True)) for values in zip(*axis.values(), strict=True)]
         for axis in axes
     ]
     products = [functools.reduce(dict.__or__, parts) for parts in itertools.product(*points)]
     candidates = [default, *(settings for settings in products if settings != default)]
-    return Search(solver, start, default, before, tuple(candidates))
+    return SettingsSearch(solver, start, default, before, tuple(candidates))
 
 
 def tuning_targets(name: str, count: int) -> Targets:
@@ -139,7 +139,9 @@ def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, 
     return {"q": q, "seconds": seconds, "errors": errors}
 
 
-def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int) -> Trial:
+def trial(
+    worker: WorkerProcess, search: SettingsSearch, settings: Settings, count: int
+) -> SettingsTrial:
     """Try settings in a worker's process; a robot over which that is lost is not solved."""
     solved = np.zeros((len(TUNING), count), dtype=bool)
     seconds, errors = list[float](), list[str]()
@@ -157,10 +159,12 @@ def trial(worker: WorkerProcess, search: Search, settings: Settings, count: int)
     time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else 0.0
     bits = np.packbits(solved).tobytes().hex()
     names = (*search[:2], settings, search.peer.version)
-    return Trial(*names, count, round(time, 1), bits, len(errors), errors[0] if errors else "")
+    return SettingsTrial(
+        *names, count, round(time, 1), bits, len(errors), errors[0] if errors else ""
+    )
 
 
-def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
+def finalists(search: SettingsSearch, trials: Sequence[SettingsTrial]) -> list[Settings]:
     """Return the settings to try on all targets, from their trials on the first."""
     candidates = [trial for trial in trials if trial.settings in search.candidates]
     order = sorted(candidates, key=lambda trial: -trial.share)[: math.ceil(len(candidates) / 4)]
@@ -168,7 +172,7 @@ def finalists(search: Search, trials: Sequence[Trial]) -> list[Settings]:
     return [settings for i, settings in enumerate(best) if settings not in best[:i]]
 
 
-def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
+def best_trial(search: SettingsSearch, trials: Sequence[SettingsTrial]) -> SettingsTrial:
     """Return the best of the trials on all targets.
 
     Trials tie with the greatest share that McNemar's paired test cannot tell from it. Of these,
@@ -188,32 +192,34 @@ def chosen(search: Search, trials: Sequence[Trial]) -> Trial:
     return max(fast, key=lambda trial: (trial.settings == search.default, trial.share))
 
 
-def read(path: Path) -> list[Trial]:
+def read(path: Path) -> list[SettingsTrial]:
     """Return the trials of a file of results, a line each; none if it does not exist."""
     lines = path.read_bytes().splitlines() if path.exists() else []
-    return [msgspec.json.decode(line, type=Trial) for line in lines]
+    return [msgspec.json.decode(line, type=SettingsTrial) for line in lines]
 
 
-def trials_of(search: Search, trials: Sequence[Trial], count: int) -> list[Trial]:
+def trials_of(
+    search: SettingsSearch, trials: Sequence[SettingsTrial], count: int
+) -> list[SettingsTrial]:
     """Return the trials of a search on so many targets of each robot, in its order."""
     trials = [
         trial
         for trial in trials
         if (trial.solver, trial.start, trial.targets) == (*search[:2], count)
     ]
-    known = [trial for trial in trials if trial.settings in search.settings]
-    return sorted(known, key=lambda trial: search.settings.index(trial.settings))
+    own_trials = [trial for trial in trials if trial.settings in search.settings]
+    return sorted(own_trials, key=lambda trial: search.settings.index(trial.settings))
 
 
-def perform(search: Search, path: Path) -> Iterator[Trial]:
+def perform(search: SettingsSearch, path: Path) -> Iterator[SettingsTrial]:
     """Perform the missing trials of a search; append each to the file and yield it."""
     with contextlib.closing(WorkerProcess(_PATIENCE)) as worker:
         for count in (SCREENED, COUNT):
             trials = read(path)
             first = trials_of(search, trials, SCREENED)
             settings = finalists(search, first) if count == COUNT else search.settings
-            done = [trial.settings for trial in trials_of(search, trials, count)]
-            for missing in (part for part in settings if part not in done):
+            finished = [trial.settings for trial in trials_of(search, trials, count)]
+            for missing in (part for part in settings if part not in finished):
                 result = trial(worker, search, missing, count)
                 with path.open("ab") as file:
                     file.write(msgspec.json.encode(result) + b"\n")
@@ -233,7 +239,7 @@ def main() -> None:
         for result in perform(search, arguments.results):
             figures = f"{100 * result.share:5.1f} %  {result.microseconds:8.0f} µs"
             print(figures, json.dumps(result.settings), result.trouble, flush=True)
-        best = chosen(search, trials_of(search, read(arguments.results), COUNT))
+        best = best_trial(search, trials_of(search, read(arguments.results), COUNT))
         print(f"{search.solver}, {search.start}: {json.dumps(best.settings)}", flush=True)
 
 

@@ -24,6 +24,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
         overhead: of the time of a solve, what the harness adds [s]; NaN if that is not known.
         bound: how near any pose may come to a target out of reach [m].
         disputed: the numbers of the targets whose answers the engines place differently.
+        repeats: how many targets a solver with a time limit solves each time, (repeat,).
     """
 
     solved: Booleans1 | None = None
@@ -39,6 +40,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
     overhead: float | None = None
     bound: Floats1 | None = None
     disputed: Integers1 | None = None
+    repeats: Integers1 | None = None
 
     def __post_init__(self) -> None:
         """Refuse records of which some arrays are missing, or of other lengths."""
@@ -63,9 +65,6 @@ class RobotDetails(Details, frozen=True):
     joints: int = 0
     freedom: int = 0
     target: str = msgspec.field(default="", name="wanted")
-    arbiter: str = ""  # the engine that evaluated the answers
-    group: str = ""  # the list that the robot is in
-    time_limited: bool = False  # whether the solver takes a time limit for each target
 
 
 KINDS = dict.fromkeys((REACHABLE, UNREACHABLE), Kind(RobotSolves, RobotDetails))

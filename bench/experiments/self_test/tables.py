@@ -17,7 +17,7 @@ def _row(record: Record) -> Row:
         "solvers": details.family,
         "fault or honest solver": record.title,
         "caught": trial.caught if details.faulty else None,
-        "named": trial.named if details.faulty else None,
+        "named": trial.is_named if details.faulty else None,
         "accused": None if details.faulty else not trial.passed,
         "violated laws": listed(details.laws),
     }

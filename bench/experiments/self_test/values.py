@@ -9,7 +9,7 @@ class TrialValues(Values, frozen=True):
     """Whether a law is violated, the fault (or none) named, and the verdict right."""
 
     caught: bool
-    named: bool
+    is_named: bool = msgspec.field(name="named")
     passed: bool
 
 

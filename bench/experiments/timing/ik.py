@@ -20,7 +20,7 @@ TARGETS, FEW_TARGETS = 50, 5
 LIMITS: dict[str, Any] = {"tolerance": TOLERANCE, "max_iterations": MAX_ITERATIONS}
 # The same method as one Python loop on three kinematics.
 LOOP = "levenberg_marquardt"
-KINEMATICS: dict[str, type[SkeletonEngine] | type[ReferenceKinematics]] = {
+KINEMATICS: dict[str, Callable[[Any], SkeletonEngine]] = {
     registry.OUR_KINEMATICS.name: ReferenceKinematics,
     **{loop.name: SKELETON_ENGINES[loop.engine] for loop in registry.LOOPS},
 }

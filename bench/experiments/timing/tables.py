@@ -4,17 +4,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from ...figures.chart import MARKS, Axis, Chart, Panel, Series, series
-from ...figures.sketch import Sketch, chart_sketch
+from ...figures.chart import MARKS, Panel, Series, declared_chart, series
+from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import words_in
-from ...tables.layout import Layout
+from ...tables.layout import Layout, Row
 from ...tables.results import (
     PRECISION,
     Results,
@@ -29,8 +28,6 @@ from ...tables.table import UNITS, Column, Summary, words
 from .case import COMPILED, LIMIT, PLAIN
 
 CAPTIONS = Captions(__file__)
-# The cells of a row by the titles of their columns, and its record.
-Row = dict[str, Any]
 
 
 def median_time(record: Record) -> float:
@@ -65,16 +62,9 @@ def timing_chart(subject: str, unit: str, results: Results) -> Sketch | None:
         _marks(solver, [r for r in records if r.solver == solver], list(works), UNITS[unit])
         for solver in solvers(records)
     )
-    return chart_sketch(
-        Chart(
-            **CAPTIONS.figure(f"timing_{subject}"),
-            panels=(Panel("", tuple(by_solver)),),
-            x=Axis(f"median [{unit}], log scale", log=True),
-            columns=1,
-            rows=tuple(group[0].title for group in works.values()),
-            entrants=results.entrants,
-        )
-    )
+    rows = tuple(group[0].title for group in works.values())
+    chart, panels = CAPTIONS.figure(f"timing_{subject}"), [Panel("", tuple(by_solver))]
+    return declared_chart(chart, panels, results.entrants, rows=rows)
 
 
 def _marks(solver: str, records: Sequence[Record], works: list[str], scale: float) -> Series:

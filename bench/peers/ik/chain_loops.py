@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.crosscheck.engines import SKELETON_ENGINES
+from plumbob.crosscheck.engines import SKELETON_ENGINES, forward_kinematics_by
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
-from plumbob.reference import Skeleton, forward_kinematics, solve_ik
+from plumbob.reference import Skeleton, solve_ik
 
 from ...problems.chains import ChainRequest
+from ...problems.evaluate import arbiter_of
 from .levenberg_marquardt import LoopOutput, levenberg_marquardt, within_reach
 from .protocol import FloatArray, Solve
 
@@ -20,7 +21,8 @@ def prepare(
 ) -> Callable[[ChainRequest], Solve]:
     """Return a solver of ours by its name, or the loop on an engine by the engine's name.
 
-    An output holds the number of iterations, and the joints' positions in a row.
+    An output holds the number of iterations, and the joints' positions in a row; those of a loop
+    come from another engine's kinematics.
     """
     if engine:
         return _loop(skeleton, tolerance, engine)
@@ -37,6 +39,7 @@ def prepare(
 
 def _loop(skeleton: Skeleton, tolerance: float, name: str) -> Callable[[ChainRequest], Solve]:
     engine: Any = SKELETON_ENGINES[name](skeleton)
+    arbiter = SKELETON_ENGINES[arbiter_of(name)](skeleton)
     effector, root = skeleton.joint_count - 1, skeleton.offsets[0]
 
     def ask(request: ChainRequest) -> Solve:
@@ -45,7 +48,7 @@ def _loop(skeleton: Skeleton, tolerance: float, name: str) -> Callable[[ChainReq
         limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": request.iterations}
 
         def read(answer: LoopOutput) -> tuple[FloatArray, None]:
-            positions = forward_kinematics(skeleton, answer.q[engine.columns]).positions
+            positions = forward_kinematics_by(arbiter, answer.q[engine.columns]).positions
             return np.append(answer.iterations, positions), None
 
         call = partial(levenberg_marquardt, engine, q, target, effector, **limits)

@@ -10,10 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio
 
-from ...problems.evaluate import pinocchio_model, to_pinocchio
+from ...problems.evaluate import from_pinocchio, pinocchio_model, to_pinocchio
 from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
-
-__all__ = ["from_pinocchio", "pinocchio_model", "prepare", "to_pinocchio"]
 
 
 def prepare(
@@ -70,11 +68,3 @@ def _error(
             errors.append(to_target.translation)
             slopes.append(-J[:3])
     return np.concatenate(errors), np.vstack(slopes)
-
-
-def from_pinocchio(robot: BenchRobot, q: FloatArray) -> FloatArray:
-    """Return coordinates with w at the start of quaternions."""
-    permuted = q.copy()
-    for i in robot.balls:
-        permuted[i : i + 4] = q[[i + 3, i, i + 1, i + 2]]
-    return permuted

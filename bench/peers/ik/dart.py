@@ -7,16 +7,7 @@ the joints' limits. DART's own restarts draw from a generator without a seed, so
 import dartpy
 import numpy as np
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    Tolerance,
-    forward_by,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 
 def prepare(
@@ -67,7 +58,7 @@ def kinematics(robot: BenchRobot) -> Forward:
         skeleton.setPositions(q)
         return effector.getWorldTransform().matrix()
 
-    return forward_by(pose)
+    return pose
 
 
 def dart_skeleton(robot: BenchRobot) -> dartpy.dynamics.Skeleton:

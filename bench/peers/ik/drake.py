@@ -50,21 +50,16 @@ def prepare(
     logging.getLogger("drake").setLevel(logging.ERROR)  # IPOPT gives advice at each failure
     plant, frames = drake_plant(robot)
     part = Tolerance(inside * tolerance.position, inside * tolerance.rotation)
-    ik, coordinates = _program(robot, plant, frames, part), _Coordinates(robot, plant)
+    ik, coordinates = _program(robot, plant, frames, part, centring), _Coordinates(robot, plant)
     kind, feasibility_name, iterations_name = SOLVERS[solver]
     engine, options = kind(), SolverOptions()
     options.SetOption(engine.solver_id(), feasibility_name, feasibility)
     options.SetOption(engine.solver_id(), iterations_name, iterations)
-    context, program, unknowns = ik.get_mutable_context(), ik.prog(), ik.q()
-    if centring:
-        bounds = plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()
-        middle = np.nan_to_num(np.mean(bounds, axis=0))  # balls have none
-        program.AddQuadraticErrorCost(centring * np.eye(len(middle)), middle, unknowns)
-    run = library(engine.Solve)
+    context, program, run = ik.get_mutable_context(), ik.prog(), library(engine.Solve)
     setters = [library(frame.SetPoseInParentFrame) for frame in frames]
 
     def read(solution: Any) -> tuple[FloatArray, bool]:
-        return coordinates.from_drake(solution.GetSolution(unknowns)), solution.is_success()
+        return coordinates.from_drake(solution.GetSolution(ik.q())), solution.is_success()
 
     def ask(request: PoseRequest) -> Solve:
         targets = [RigidTransform(RotationMatrix(R), x) for x, R in request.poses]
@@ -86,11 +81,9 @@ def kinematics(robot: BenchRobot) -> Forward:
     context, coordinates = plant.CreateDefaultContext(), _Coordinates(robot, plant)
     frames = [plant.GetFrameByName(effector) for effector in robot.effectors]
 
-    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def forward(q: FloatArray) -> FloatArray:
         plant.SetPositions(context, coordinates.to_drake(q))
-        poses = [frame.CalcPoseInWorld(context) for frame in frames]
-        positions = np.array([pose.translation() for pose in poses])
-        return positions, np.array([pose.rotation().matrix() for pose in poses])
+        return np.array([frame.CalcPoseInWorld(context).GetAsMatrix4() for frame in frames])
 
     return forward
 
@@ -110,7 +103,9 @@ def drake_plant(robot: BenchRobot) -> tuple[Any, list[Any]]:
     return plant, frames
 
 
-def _program(robot: BenchRobot, plant: Any, targets: list[Any], tolerance: Tolerance) -> Any:
+def _program(
+    robot: BenchRobot, plant: Any, targets: list[Any], tolerance: Tolerance, centring: float
+) -> Any:
     """Return the program, with positions bounded in a cube within the ball of tolerance."""
     ik, identity = InverseKinematics(plant, True), RotationMatrix()
     side = np.full(3, tolerance.position / np.sqrt(3.0))
@@ -118,6 +113,10 @@ def _program(robot: BenchRobot, plant: Any, targets: list[Any], tolerance: Toler
         ik.AddPositionConstraint(effector, np.zeros(3), target, -side, side)
         if robot.oriented:
             ik.AddOrientationConstraint(target, identity, effector, identity, tolerance.rotation)
+    if centring:
+        bounds = plant.GetPositionLowerLimits(), plant.GetPositionUpperLimits()
+        middle = np.nan_to_num(np.mean(bounds, axis=0))  # balls have none
+        ik.prog().AddQuadraticErrorCost(centring * np.eye(len(middle)), middle, ik.q())
     return ik
 
 

@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.crosscheck.engines import SKELETON_ENGINES, SkeletonEngine, forward_kinematics_by
+from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.arguments import FloatArray
 
 from ...problems.chains import ChainRequest
+from ...problems.evaluate import arbiter_of
 from ..contestant import opened, remark
 from ..entrant import CHAIN_TASK, Spec
 from .protocol import SolverOutput
@@ -29,7 +31,7 @@ def prepare(
     Raises:
         NoAnswerError: if it gives no answer when an iteration is allowed.
     """
-    solver = opened(spec)
+    solver, arbiter = opened(spec), SKELETON_ENGINES[arbiter_of("")](skeleton)
     constants = {"parents": skeleton.parents, "offsets": skeleton.offsets, "tolerance": tolerance}
     constants |= {"effector": skeleton.joint_count - 1, "method": method}
 
@@ -40,7 +42,7 @@ def prepare(
     def ask(request: ChainRequest) -> Callable[[], SolverOutput]:
         def solve() -> SolverOutput:
             answer, time = solver.answer(CHAIN_TASK, inputs(*request))
-            positions = joint_positions(skeleton, answer)
+            positions = joint_positions(skeleton, answer, arbiter)
             q = np.append(answer.get("iterations", np.nan), positions)
             return SolverOutput(q, answer.get("converged"), time)
 
@@ -52,14 +54,19 @@ def prepare(
     return ask
 
 
-def joint_positions(skeleton: Skeleton, answer: Mapping[str, Any]) -> FloatArray:
-    """Return where an answer puts the joints [m], (joint, 3): by its rotations if it has any.
+def joint_positions(
+    skeleton: Skeleton, answer: Mapping[str, Any], arbiter: SkeletonEngine
+) -> FloatArray:
+    """Return where an answer puts the joints [m], (joint, 3).
+
+    If it has rotations, an engine's kinematics of them counts.
 
     Raises:
         ValueError: if it has neither rotations nor positions, or positions that stretch links.
     """
     if "local_rotations" in answer:
-        return forward_kinematics(skeleton, answer["local_rotations"]).positions
+        local = rotation.unit("local_rotations", answer["local_rotations"])
+        return forward_kinematics_by(arbiter, local).positions
     if "positions" not in answer:
         raise ValueError("answered neither local_rotations nor positions")
     positions = np.asarray(answer["positions"], dtype=float)

@@ -5,25 +5,13 @@ follows the error, mu = |e|² / 2 (Sugihara 2011), so that it is large far from 
 vanishes at it. Three unknowns at a time, for any number of joints.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
+from plumbob.crosscheck.engines import SkeletonEngine
 from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.arguments import FloatArray
-
-
-class Kinematics(Protocol):
-    """An engine of the loop; q are the engine's own coordinates of ball joints."""
-
-    def position(self, joint: int) -> FloatArray:
-        """Return where `jacobian` has put a joint [m], (3,)."""
-
-    def jacobian(self, q: FloatArray, joint: int) -> FloatArray:
-        """Update forward kinematics; return the joint's velocity per velocity, (3, 3 joint)."""
-
-    def integrate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the coordinates reached from q by moving with the velocity v for 1 s."""
 
 
 class LoopOutput(NamedTuple):
@@ -43,7 +31,7 @@ def within_reach(targets: FloatArray, root: FloatArray, reach: float) -> FloatAr
 
 
 def levenberg_marquardt(
-    kinematics: Kinematics,
+    kinematics: SkeletonEngine,
     q: FloatArray,
     target: FloatArray,
     effector: int,
@@ -64,7 +52,7 @@ def levenberg_marquardt(
     return LoopOutput(q, residual, iteration)
 
 
-class ReferenceKinematics:
+class ReferenceKinematics(SkeletonEngine):
     """A skeleton in the reference: q are its local rotations in a row, velocities local."""
 
     def __init__(self, skeleton: Skeleton) -> None:

@@ -5,11 +5,14 @@ the part `limit_gain` of the way to a limit. With full steps, the damping of the
 zero: they then jump about.
 """
 
+from functools import partial
+from typing import Any
+
 import mink
 
 from ...problems.evaluate import mujoco_model
-from .overhead import library
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance, arrived, iterate
+from .differential import reaching
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 METERED = True
 
@@ -30,30 +33,16 @@ def prepare(
         mink.FrameTask(effector, "body", 1.0, cost, gain, lm_damping)
         for effector in robot.effectors
     ]
-
-    options = {"solver": "daqp", "damping": damping, "limits": limits}
-    solve_ik, integrate = library(mink.solve_ik), library(configuration.integrate_inplace)
-    compute_errors = [library(task.compute_error) for task in tasks]
-    setters, update = [library(task.set_target) for task in tasks], library(configuration.update)
-
-    def step() -> None:
-        integrate(solve_ik(configuration, tasks, 1.0, **options), 1.0)
-
-    def is_done() -> bool:
-        return arrived([compute(configuration) for compute in compute_errors], robot, tolerance)
+    goal = (robot, tolerance, iterations)
+    options: dict[str, Any] = {"damping": damping, "limits": limits}
+    reach = reaching(mink.solve_ik, configuration, tasks, *goal, **options)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [
             mink.SE3.from_rotation_and_translation(mink.SO3.from_matrix(R), x)
             for x, R in request.poses
         ]
-
-        def solve() -> bool:
-            for set_target, target in zip(setters, targets, strict=True):
-                set_target(target)
-            update(request.start)
-            return iterate(step, is_done, iterations)
-
+        solve = partial(reach, targets, request.start)
         return Solve(solve, lambda claim: (configuration.q.copy(), claim))
 
     return ask

@@ -8,12 +8,14 @@ beyond its limit; with 1e-6 it never is here.
 """
 
 import logging
+from functools import partial
+from typing import Any
 
 import pink
 
-from .closed_loop import from_pinocchio, pinocchio_model, to_pinocchio
-from .overhead import library
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance, arrived, iterate
+from ...problems.evaluate import from_pinocchio, pinocchio_model, to_pinocchio
+from .differential import reaching
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 METERED = True
 
@@ -34,27 +36,13 @@ def prepare(
     configuration = pink.Configuration(model, model.createData(), start, copy_data=False)
     limits = [pink.limits.ConfigurationLimit(model, limit_gain)]
     tasks = [pink.FrameTask(effector, 1.0, cost, lm_damping, gain) for effector in robot.effectors]
-    options = {"solver": "daqp", "damping": damping, "limits": limits, "safety_break": False}
-    solve_ik, integrate = library(pink.solve_ik), library(configuration.integrate_inplace)
-    compute_errors = [library(task.compute_error) for task in tasks]
-    setters, update = [library(task.set_target) for task in tasks], library(configuration.update)
-
-    def step() -> None:
-        integrate(solve_ik(configuration, tasks, 1.0, **options), 1.0)
-
-    def is_done() -> bool:
-        return arrived([compute(configuration) for compute in compute_errors], robot, tolerance)
+    goal = (robot, tolerance, iterations)
+    options: dict[str, Any] = {"damping": damping, "limits": limits, "safety_break": False}
+    reach = reaching(pink.solve_ik, configuration, tasks, *goal, **options)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [pink.configuration.pin.SE3(R, x) for x, R in request.poses]
-        q0 = to_pinocchio(robot, request.start)
-
-        def solve() -> bool:
-            for set_target, target in zip(setters, targets, strict=True):
-                set_target(target)
-            update(q0)
-            return iterate(step, is_done, iterations)
-
+        solve = partial(reach, targets, to_pinocchio(robot, request.start))
         return Solve(solve, lambda claim: (from_pinocchio(robot, configuration.q), claim))
 
     return ask

@@ -10,13 +10,10 @@ If the engine's kinematics is compared as well, its adapter has a function `kine
 which returns a `Forward`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot
 from time import perf_counter
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
@@ -58,18 +55,8 @@ class Solve:
 
 
 Ask = Callable[[PoseRequest], Callable[[], SolverOutput]]
-# Coordinates to the effectors' positions [m], (effector, 3), and rotations, (effector, 3, 3).
-Forward = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-
-
-def forward_by(pose: Callable[[FloatArray], FloatArray]) -> Forward:
-    """Return the forward kinematics of a chain from its effector's transform, (4, 4)."""
-
-    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        T = np.asarray(pose(q))
-        return T[None, :3, 3], T[None, :3, :3]
-
-    return forward
+# From coordinates to the transforms of the effectors, (effector, 4, 4), or of the only one, (4, 4).
+Forward = Callable[[FloatArray], FloatArray]
 
 
 def attempt(solve: Callable[[], SolverOutput]) -> SolverOutput:
@@ -79,23 +66,3 @@ def attempt(solve: Callable[[], SolverOutput]) -> SolverOutput:
         return solve()
     except Exception as error:  # an exception of an engine is its result
         return SolverOutput(None, False, OwnTime(perf_counter() - begin), describe(error))
-
-
-def arrived(errors: Sequence[FloatArray], robot: BenchRobot, tolerance: Tolerance) -> bool:
-    """Return whether the effectors' errors, (6,) each, position first, are within the tolerance."""
-    for error in errors:
-        x, y, z, *rotation_vector = error.tolist()
-        if hypot(x, y, z) > tolerance.position:
-            return False
-        if robot.oriented and hypot(*rotation_vector) > tolerance.rotation:
-            return False
-    return True
-
-
-def iterate(step: Callable[[], object], is_done: Callable[[], bool], iterations: int) -> bool:
-    """Step until `is_done`, at most so often; return whether it is."""
-    for _ in range(iterations):
-        if is_done():
-            return True
-        step()
-    return is_done()

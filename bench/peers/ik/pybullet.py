@@ -83,21 +83,23 @@ class BulletBody:
         self._joints = [fact[0] for fact in facts if fact[2] == pybullet.JOINT_REVOLUTE]
         self.effector = next(f[0] for f in facts if f[12].decode() == robot.effectors[0])
 
-    def forward(self, q: Sequence[float] | FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the effector's position [m], (1, 3), and rotation, (1, 3, 3)."""
+    def forward(self, q: Sequence[float] | FloatArray) -> FloatArray:
+        """Return the effector's transform, (4, 4)."""
         for joint, angle in zip(self._joints, q, strict=True):
             pybullet.resetJointState(self.number, joint, angle, physicsClientId=self.client)
         state = pybullet.getLinkState(
             self.number, self.effector, computeForwardKinematics=True, physicsClientId=self.client
         )
-        R = np.array(pybullet.getMatrixFromQuaternion(state[5])).reshape(1, 3, 3)
-        return np.array(state[4])[None], R
+        T = np.eye(4)
+        T[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+        T[:3, 3] = state[4]
+        return T
 
     def is_at(self, q: Sequence[float], request: PoseRequest, tolerance: Tolerance) -> bool:
         """Return whether these coordinates bring the effector to its target."""
-        position, rotation = self.forward(q)
-        distance = np.linalg.norm(position - request.positions)
-        angle = np.linalg.norm(rotation - request.rotations) / np.sqrt(2.0)  # where it is small
+        difference = self.forward(q) - request.matrix
+        distance = np.linalg.norm(difference[:3, 3])
+        angle = np.linalg.norm(difference[:3, :3]) / np.sqrt(2.0)  # where it is small
         return bool(distance <= tolerance.position and angle <= tolerance.rotation)
 
 

@@ -11,16 +11,7 @@ import numpy as np
 import pytorch_kinematics
 import torch
 
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    Tolerance,
-    forward_by,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 from .restarts import generator_of
 
 
@@ -74,7 +65,7 @@ def _read(output: Any) -> tuple[FloatArray, bool]:
 def kinematics(robot: BenchRobot) -> Forward:
     """Return the forward kinematics of the effector."""
     chain = torch_chain(robot)
-    return forward_by(lambda q: chain.forward_kinematics(torch.tensor(q)).get_matrix()[0].numpy())
+    return lambda q: chain.forward_kinematics(torch.tensor(q)).get_matrix()[0].numpy()
 
 
 def torch_chain(robot: BenchRobot) -> pytorch_kinematics.SerialChain:

@@ -6,7 +6,7 @@ which its user would do for answers that can be repeated. Its own default is two
 
 from roboplan import core, simple_ik
 
-from .protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance, forward_by
+from .protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance
 
 GROUP, SEED, UNLIMITED = "arm", 1986, 1e6
 
@@ -52,7 +52,7 @@ def prepare(
 def kinematics(robot: BenchRobot) -> Forward:
     """Return roboplan's forward kinematics of the effector."""
     scene, frames = scene_of(robot), (robot.effectors[0], robot.root)
-    return forward_by(lambda q: scene.forwardKinematics(q, *frames))
+    return lambda q: scene.forwardKinematics(q, *frames)
 
 
 def scene_of(robot: BenchRobot) -> core.Scene:

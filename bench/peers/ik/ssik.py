@@ -9,7 +9,7 @@ import contextlib
 import importlib.util
 import io
 import tempfile
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -18,16 +18,10 @@ from ssik import cli
 
 from ...problems.robots import UnableError
 from ..protocol import describe
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    Tolerance,
-    forward_by,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+
+# Arms for which it works on a module for more than seven minutes of processor time.
+LONG_BUILDS = ("baxter", "tiago_pro")
 
 
 def prepare(robot: BenchRobot, tolerance: Tolerance, solutions: int = 1) -> Ask:
@@ -47,7 +41,7 @@ def _read(solutions: list[Any]) -> tuple[FloatArray | None, bool]:
 
 def kinematics(robot: BenchRobot) -> Forward:
     """Return its forward kinematics of the effector."""
-    return forward_by(built_solver(robot).fk)
+    return built_solver(robot).fk
 
 
 def built_solver(robot: BenchRobot) -> ModuleType:
@@ -57,9 +51,17 @@ def built_solver(robot: BenchRobot) -> ModuleType:
         UnableError: if it builds none.
     """
     robot.require_chain()
-    with tempfile.TemporaryDirectory() as folder, robot.file() as urdf:
-        path = Path(folder, "arm_ik.py")
-        command = ["build", urdf, "--base", robot.root, "--ee", robot.effectors[0]]
+    if robot.name in LONG_BUILDS:
+        raise UnableError("builds no solver for this arm within seven minutes")
+    return _built(robot.text, robot.root, robot.effectors[0])
+
+
+@cache  # a build takes up to minutes, and a second one in a process may fail
+def _built(text: str, root: str, effector: str) -> ModuleType:
+    with tempfile.TemporaryDirectory() as folder:
+        path, urdf = Path(folder, "arm_ik.py"), Path(folder, "robot.urdf")
+        urdf.write_text(text, encoding="utf-8")
+        command = ["build", str(urdf), "--base", root, "--ee", effector]
         try:
             with contextlib.redirect_stdout(io.StringIO()):
                 cli.main([*command, "--no-validate", "--out", str(path)])

@@ -16,16 +16,7 @@ import ur_analytic_ik
 from ...problems.evaluate import Evaluator
 from ...problems.robots import UnableError
 from .axes import first_within
-from .protocol import (
-    Ask,
-    BenchRobot,
-    FloatArray,
-    Forward,
-    PoseRequest,
-    Solve,
-    Tolerance,
-    forward_by,
-)
+from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 HINGES, SAMPLES = 6, 20
 # Of positions [m] and of rotation matrices: a model whose lengths are rounded otherwise is another.
@@ -61,7 +52,7 @@ def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
 
 def kinematics(robot: BenchRobot) -> Forward:
     """Return its forward kinematics of the effector."""
-    return forward_by(model_of(robot).pose)
+    return model_of(robot).pose
 
 
 def model_of(robot: BenchRobot) -> RobotModel:
