@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..peers import registry
+from ..peers.registry import Style
 from .sketch import Sketch, chart_sketch
 
 Floats = NDArray[np.float64]
@@ -20,24 +21,16 @@ LINE, MARKS, SPAN = "line", "marks", "span"
 LESS, GREATER = "less", "greater"
 
 
-class Look(NamedTuple):
-    """A colour by its name in `style.COLOURS`, a line and a marker of matplotlib."""
-
-    colour: str
-    line: Any
-    marker: str
-
-
 # Any two differ in all three, and so without colour too.
 LOOKS = (
-    Look("orange", "-", "o"),
-    Look("blue", (0, (5, 1.6)), "s"),
-    Look("green", (0, (4, 1.2, 1, 1.2)), "^"),
-    Look("purple", (0, (1, 1.1)), "v"),
-    Look("brass", (0, (4, 1, 1, 1, 1, 1)), "D"),
-    Look("ink", (0, (9, 2)), "X"),
+    Style("orange", "-", "o"),
+    Style("blue", (0, (5, 1.6)), "s"),
+    Style("green", (0, (4, 1.2, 1, 1.2)), "^"),
+    Style("purple", (0, (1, 1.1)), "v"),
+    Style("brass", (0, (4, 1, 1, 1, 1, 1)), "D"),
+    Style("ink", (0, (9, 2)), "X"),
 )
-GREY = Look("faint", "-", ".")
+GREY = Style("faint", "-", ".")
 
 
 class Series(NamedTuple):
@@ -186,19 +179,19 @@ class Chart:
         return sign * float(finite.mean()) if finite.size else np.nan
 
 
-def looks(names: Sequence[str]) -> Mapping[str, Look]:
+def looks(names: Sequence[str]) -> Mapping[str, Style]:
     """Return the look of each of a few solvers, the same in every chart if it is free.
 
     Solvers with a style of their own choose first.
     """
     styled = [name for name in names if registry.find(name).style is not registry.OTHER]
-    assigned: dict[str, Look] = {}
+    assigned: dict[str, Style] = {}
     for name in dict.fromkeys([*styled, *names]):
         assigned[name] = next(look for look in _preferred(name) if look not in assigned.values())
     return assigned
 
 
-def _preferred(name: str) -> tuple[Look, ...]:
+def _preferred(name: str) -> tuple[Style, ...]:
     """Return all looks, first that of the solver's own colour, else by a hash of its name."""
     colours = [look.colour for look in LOOKS]
     own = registry.find(name).style.colour
@@ -215,6 +208,6 @@ def declared_chart(
     """
     chart = {"panels": tuple(panels), "entrants": entrants, **declared, **fields}
     for name in ("x", "y"):
-        axis = {"limits": (None, None), **chart.get(name, {})}
-        chart[name] = Axis(**{**axis, "limits": tuple(axis["limits"])})
+        axis = {"limits": (), **chart.get(name, {})}
+        chart[name] = Axis(**{**axis, "limits": (*axis["limits"], None, None)[:2]})
     return chart_sketch(Chart(**chart)) if chart["panels"] else None

@@ -18,9 +18,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ..peers.registry import Style
 from ..tables.results import label
 from ..text import shortened
-from .chart import GREY, LINE, SPAN, Axis, Chart, Look, Panel, Series, looks
+from .chart import GREY, LINE, SPAN, Axis, Chart, Panel, Series, looks
 from .style import COLOURS, plain_label
 
 # Width of a figure [inch], at least 48 rem on the page, where letters stay above 7 points.
@@ -150,7 +151,7 @@ def _two_lines(text: str, width: float) -> str:
     return "\n".join(map(plain_label, [*lines[:1], *second]))
 
 
-def _style(look: Look, marks: bool) -> dict[str, Any]:
+def _style(look: Style, marks: bool) -> dict[str, Any]:
     """Return the style of a line with marks, or of marks only."""
     colour = COLOURS[look.colour]
     style: dict[str, Any] = {"color": colour, "linestyle": "none" if marks else look.line}

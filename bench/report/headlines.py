@@ -36,7 +36,7 @@ from ..peers import registry
 from ..problems.robots import CHARACTER
 from ..tables.results import Results, by_problem, counted, grouped, listed
 from ..tables.table import words
-from .standings import MISSES, Headline, best_rival, factor, named, percent, speed, standings
+from .standings import MISSES, Headline, best_rival, factor, full_name, percent, speed, standings
 
 # The most robots or cases that a sentence names.
 MAX_NAMED = 3
@@ -88,7 +88,7 @@ def verdict(results: Results) -> ClaimCount | None:
         return None
     used = {r.title: metrics.ratio(r.values.difference, r.values.tolerance) for r in claims}
     narrowest = max(used, key=lambda name: used[name])
-    holding = sum(record.values.held for record in claims)
+    holding = sum(record.values.holds for record in claims)
     return ClaimCount(holding, len(claims), narrowest, used[narrowest])
 
 
@@ -148,7 +148,7 @@ def not_asked(results: Results) -> list[str]:
 
 def _recorded_names() -> dict[str, set[str]]:
     """Return the names of each peer's entries in records, by its title."""
-    return {peer.shown: set(map(peer.label_of, peer.entries)) for peer in registry.PEERS}
+    return {peer.name: set(map(peer.label_of, peer.entries)) for peer in registry.PEERS}
 
 
 def _robot_groups(results: Results) -> Iterator[tuple[str, str, dict[str, list[Score]]]]:
@@ -178,11 +178,11 @@ def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> 
     if first and (rival := best_rival(first, times)):
         ratio = ratio_of_times(rows[rival], rows[first])
         sentence = (
-            f"{named(first)} is the fastest, {MISSES}: it is {speed(ratio, rival)}, the best "
+            f"{full_name(first)} is the fastest, {MISSES}: it is {speed(ratio, rival)}, the best "
         )
         sentence += "other solver"
         if ratio.low < 1.0 < ratio.high:
-            names = f"{named(first)} and {named(rival)}"
+            names = f"{full_name(first)} and {full_name(rival)}"
             sentence = f"{names} are the fastest and tie within chance, {MISSES}"
         yield _headline("Fastest", group, start, f"{place}, {sentence}.")
 
@@ -192,15 +192,17 @@ def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:
     share = rows[first].share
     solved = f"{percent(share)} of {words(share.total)}"
     if not rival:
-        return f"{named(first)} solves the most poses: {solved}"
+        return f"{full_name(first)} solves the most poses: {solved}"
     ties = sum(rows[solver].share.hits > 0 for solver in rows[first].success.first)
     chance = f", and {ties} solvers tie within chance" * (ties > 2)
     chance += ", a tie within chance" * (ties == 2)
     if rows[rival].share.hits == share.hits:
         chance = chance.removesuffix(", a tie within chance")
-        return f"{named(first)} and {named(rival)} solve the most poses: each {solved}{chance}"
-    other = f"the best other solver is {named(rival)} with {percent(rows[rival].share)}"
-    return f"{named(first)} solves the most poses: {solved}; {other}{chance}"
+        return (
+            f"{full_name(first)} and {full_name(rival)} solve the most poses: each {solved}{chance}"
+        )
+    other = f"the best other solver is {full_name(rival)} with {percent(rows[rival].share)}"
+    return f"{full_name(first)} solves the most poses: {solved}; {other}{chance}"
 
 
 def _headline(question: str, group: str, start: str, sentence: str) -> Headline:
@@ -285,13 +287,13 @@ def _race_headline(race: Race) -> Headline | None:
     first = Counter(order[0][0] for order in decided).most_common(1)[0][0]
     orders_won = [dict(order) for order in decided if order[0][0] == first]
     rivals = [best_rival(first, list(times)) for times in orders_won]
-    sentence = f"In {race.task}, {named(first)} is the fastest on {len(orders_won)} of {total}"
+    sentence = f"In {race.task}, {full_name(first)} is the fastest on {len(orders_won)} of {total}"
     opposed = [
         (times[r] / times[first], r) for times, r in zip(orders_won, rivals, strict=True) if r
     ]
     if opposed:
         ratios, names = zip(*opposed, strict=True)
-        best = listed(list(map(named, dict.fromkeys(names))), "or")
+        best = listed(list(map(full_name, dict.fromkeys(names))), "or")
         sentence += f", {_span(ratios)} times faster than the best other engine, {best}"
     if alone := len(orders_won) - len(opposed):
         sentence += f"; no other engine solves {alone} of them"
@@ -330,7 +332,9 @@ def _win_headline(wins: Sequence[Win]) -> Headline:
     unit = "{} percentage points" if "solves" in win.result else "a factor of {}"
     size = unit.format(_span([win.size for win in wins]))
     cases = f" ({listed(names)})" if len(names) <= MAX_NAMED else ""
-    sentence = f"{named(win.solver)} {win.result} on {len(names)} of {win.cases}{cases}, by {size}."
+    sentence = (
+        f"{full_name(win.solver)} {win.result} on {len(names)} of {win.cases}{cases}, by {size}."
+    )
     return Headline(win.chapter, "Where others win", sentence, win.table)
 
 
@@ -340,15 +344,15 @@ def _robot_wins(group: str, start: str, fields: dict[str, list[Score]]) -> Itera
         rows = {row.solver: row for row in field}
         rankings = {"solves more poses": field[0].success, "is faster": field[0].time}
         for verb, ranking in rankings.items():
-            ours = next(filter(registry.is_ours, ranking.order), "")
+            own_solver = next(filter(registry.is_ours, ranking.order), "")
             first = _first(ranking.first)
-            if not ours or not first or ours in ranking.first:
+            if not own_solver or not first or own_solver in ranking.first:
                 continue
             if ranking is field[0].time:
-                size = ratio_of_times(rows[ours], rows[first]).mean
+                size = ratio_of_times(rows[own_solver], rows[first]).value
             else:
-                size = 100 * float(np.mean(rows[first].solved) - np.mean(rows[ours].solved))
-            result = f"{verb} than {named(ours)} {_FROM[start]}"
+                size = 100 * float(np.mean(rows[first].solved) - np.mean(rows[own_solver].solved))
+            result = f"{verb} than {full_name(own_solver)} {_FROM[start]}"
             cases = _robots(group, len(fields))
             yield Win("kinematics", first, result, robot, size, cases, "robots_by_robot")
 
@@ -359,6 +363,6 @@ def _race_wins(race: Race) -> Iterator[Win]:
         first = min(times, key=times.__getitem__, default="")
         if registry.PLUMBOB in times and first != registry.PLUMBOB and case not in race.ties:
             ratio = times[registry.PLUMBOB] / times[first]
-            result = f"is faster than {named(registry.PLUMBOB)} in {race.task}"
+            result = f"is faster than {full_name(registry.PLUMBOB)} in {race.task}"
             cases = counted(len(race.times), race.noun)
             yield Win(race.chapter, first, result, case, ratio, cases, race.table)

@@ -27,13 +27,13 @@ def outcome(report: BenchReport, width: int) -> list[str]:
     lines, last = _lines(sentences, width), _lines([page], width)
     missing = [text for text in report.missing if not text.startswith("Absent peers")]
     lines += _missing(missing, width, LINES - len(lines) - len(last))
-    return [*_lines(map(_yours, answers.standings), width), *lines, *last]
+    return [*_lines(map(_standing, answers.standings), width), *lines, *last]
 
 
 def ending(results: Results, suites: Sequence[str], width: int) -> list[str]:
     """Return a summary of a bench of some suites."""
     answers = overview(results)
-    sentences = [*map(_yours, answers.standings)]
+    sentences = [*map(_standing, answers.standings)]
     sentences += [_verdict(answers.verdict)] if "check" in suites else []
     sentences += leading(answers)
     sentences += remarks_of_entrants(results, suites)
@@ -100,5 +100,5 @@ def _task(headline: Headline) -> tuple[str, str]:
     return headline.question.partition(",")[0], headline.question.rpartition(", ")[2]
 
 
-def _yours(headline: Headline) -> str:
+def _standing(headline: Headline) -> str:
     return f"Yours: {headline.sentence}"

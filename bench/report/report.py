@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..experiments import SUITES
+from ..experiments.robots.figures import robot_maps
 from ..figures.sketch import Drawing, drawn
 from ..harness.record import FINISHED, Record, check_regular
 from ..tables.latex import latex
@@ -14,7 +15,6 @@ from ..tables.table import Table
 from ..tables.writers import comma_separated, markdown
 from ..text import shortened, visible
 from .headlines import Overview, absent, not_asked, overview
-from .page.first_screen import robot_maps
 from .page.page import Contents, render
 from .sections import MOTIONS, SECTIONS
 

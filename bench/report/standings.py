@@ -89,15 +89,15 @@ def _rank(row: Score, rows: Mapping[str, Score]) -> str:
         why = f"it is marked “{row.limits}”" if row.limits else "it solves no target"
         return f"{row.solver} is not ranked: {why}."
     if row.solver not in first:
-        share += f", the best solver, {named(order[0])}, {percent(rows[order[0]].share)}"
+        share += f", the best solver, {full_name(order[0])}, {percent(rows[order[0]].share)}"
     if len(order) > 1:
         rivals = _fastest([solver for solver in row.time.order if solver != row.solver])
         speeds = [speed(ratio_of_times(rows[rival], row), rival) for rival in rivals]
         share += f"; it is {listed(speeds)}, {MISSES}" if speeds else ""
     place = 1 if row.solver in first else order.index(row.solver) + 1
     tie = f", in a tie of {len(first)}" if row.solver in first and len(first) > 1 else ""
-    cut = len(rows) - len(order)
-    unranked = f" ({counted(cut, 'solver')} did not finish)" if cut else ""
+    unfinished = len(rows) - len(order)
+    unranked = f" ({counted(unfinished, 'solver')} did not finish)" if unfinished else ""
     return f"{row.solver} ranks {place} of {len(order)}{tie}{unranked}: {share}."
 
 
@@ -108,7 +108,7 @@ def percent(share: metrics.Share) -> str:
     return f"{rate:.{digits}g} %"
 
 
-def named(solver: str) -> str:
+def full_name(solver: str) -> str:
     """Return how a solver is written, with "(ours)" behind each of Plumbob's."""
     return f"{label(solver)} (ours)" if registry.is_ours(solver) else label(solver)
 
@@ -134,13 +134,13 @@ def factor(ratio: float) -> str:
     return f"{ratio:.{0 if ratio >= 10 else 1 if ratio >= 1.1 else 2}f}"
 
 
-def speed(ratio: metrics.PairedRatio, rival: str) -> str:
+def speed(ratio: metrics.Interval, rival: str) -> str:
     """Return how much faster a solver is than a rival, by the ratio of the rival's time to its."""
-    mean, low, high, _ = ratio
+    mean, low, high = ratio
     if low < 1.0 < high:
-        return f"as fast as {named(rival)} within chance"
+        return f"as fast as {full_name(rival)} within chance"
     adverb = "faster" if mean >= 1.0 else "slower"
-    return f"{factor(max(mean, 1.0 / mean))} times {adverb} than {named(rival)}"
+    return f"{factor(max(mean, 1.0 / mean))} times {adverb} than {full_name(rival)}"
 
 
 def _cloth_ranks(task: str, error: str, phrase: str, field: Sequence[Point]) -> Iterator[Headline]:
@@ -169,9 +169,7 @@ def _cloth_rank(field: Sequence[Point], solver: str, error: str, phrase: str) ->
     own_time = times.pop(solver)
     rivals = _fastest(sorted(times, key=lambda rival: times[rival]))
     ratios = [times[rival] / own_time for rival in rivals]
-    speeds = [
-        speed(metrics.PairedRatio(r, r, r, 1), s) for r, s in zip(ratios, rivals, strict=True)
-    ]
+    speeds = [speed(metrics.Interval(r, r, r), s) for r, s in zip(ratios, rivals, strict=True)]
     result = f"{phrase.format(words(own_error))} in {words_in(own_time, 'ms')}"
     detail = f"on {field[0].cloth} {result}, {listed(speeds) or 'no other solver as near'}"
     return 1 + len(set(solvers[errors < own_error])), detail

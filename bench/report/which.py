@@ -10,7 +10,7 @@ from ..peers import registry
 from ..tables.columns import text, words_in
 from ..tables.results import Results, counted, grouped, listed
 from ..tables.table import Column, Summary, Table, cells
-from .standings import named, percent
+from .standings import full_name, percent
 
 
 def solvers_on_robot(results: Results, name: str) -> Table:
@@ -31,7 +31,7 @@ def solvers_on_robot(results: Results, name: str) -> Table:
         text("solver", _title),
         Column("solved", "%", read=lambda score: score.share.hits / score.share.total),
         Column("median", "µs", read=_median),
-        Column("95 %", "µs", read=lambda score: _effort(score).p95),
+        Column("95 %", "µs", read=lambda score: metrics.spread(score.seconds).p95),
         text("choose it for", lambda score: _peers().get(score.solver, ("", ""))[1]),
         replace(text("settings", lambda score: score.solver), folded=True),
     )
@@ -54,17 +54,13 @@ def advice(entries: Sequence[Score]) -> str:
     time = f"with a median of {words_in(_median(best), 'µs')}"
     solvers = len(set(map(_title, first)))
     if solvers == 1:
-        return f"Choose {named(best.solver)}: {share}, more than any other, {time}."
+        return f"Choose {full_name(best.solver)}: {share}, more than any other, {time}."
     rivals = f"the fastest of {solvers} that solve the most within chance"
-    return f"Choose {named(best.solver)}: {share} {time}, {rivals}."
-
-
-def _effort(score: Score) -> metrics.Effort:
-    return metrics.effort(score.seconds)
+    return f"Choose {full_name(best.solver)}: {share} {time}, {rivals}."
 
 
 def _median(score: Score) -> float:
-    return _effort(score).median
+    return metrics.spread(score.seconds).median
 
 
 def _peers() -> dict[str, tuple[str, str]]:

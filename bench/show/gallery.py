@@ -10,7 +10,7 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel
 from plumbob.crosscheck.verify.self_test import STEP, Stepper, Subject, subjects
-from plumbob.reference import forward_kinematics, scenes, solve_ik
+from plumbob.reference import forward_kinematics, rotation, scenes, solve_ik
 from plumbob.reference.arguments import FloatArray
 
 from ..figures.view import ARM_VIEW
@@ -61,8 +61,8 @@ FAMOUS = (
                 mass=0.25),
 )  # fmt: skip
 # The faulty solvers beside good ones in the pictures that stand still.
-TWICE = FamousFault("", "Gravity twice", "steps", "gravity doubled", EXACT, CLOTH)
-BESIDE_CURVES, BESIDE_CLOTHS = FAMOUS[1:3], (FAMOUS[4], TWICE)
+DOUBLE_GRAVITY = FamousFault("", "Gravity twice", "steps", "gravity doubled", EXACT, CLOTH)
+BESIDE_CURVES, BESIDE_CLOTHS = FAMOUS[1:3], (FAMOUS[4], DOUBLE_GRAVITY)
 
 
 def write_gallery(folder: Path, progress: Progress) -> list[Path]:
@@ -109,8 +109,7 @@ def _reach(fault: FamousFault) -> Scene:
     """Return the scene of an arm that reaches for a point, sweep by sweep."""
     skeleton, rest = scenes.lab_arm()
     target, n = np.array(POINT), len(rest)
-    q = np.random.default_rng(SEED).standard_normal((n, 4))
-    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    q = rotation.random(np.random.default_rng(SEED), n)
     inputs = {"parents": skeleton.parents, "offsets": skeleton.offsets, "effector": n - 1,
               "local_rotations": q, "target": target, "tolerance": 1e-4}  # fmt: skip
     faulty = [

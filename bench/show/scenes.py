@@ -39,6 +39,8 @@ RATE = 20
 FRAMES = SECONDS * RATE
 # The solver of the exact implicit motion of a cloth, to which others are compared.
 EXACT = "newton"
+# The solvers of an arm and of a cloth, unless another is asked for.
+_DEFAULTS = ("fabrik", EXACT)
 Progress = Callable[[int, int], None]
 
 
@@ -65,7 +67,7 @@ def write(
     solver: str | None,
     progress: Progress,
     coherent: bool = False,
-    yours: YourSolver | None = None,
+    competitor: YourSolver | None = None,
 ) -> None:
     """Write a scene as an animated GIF or, by the file's suffix, an SVG, a page or a BVH motion.
 
@@ -75,44 +77,42 @@ def write(
         solver: of Plumbob; FABRIK or Newton's if None.
         progress: called with the frames done and their number.
         coherent: whether Plumbob's arm moves as smoothly as it can.
-        yours: a solver beside Plumbob's.
+        competitor: a solver beside Plumbob's.
 
     Raises:
         ValueError: if scene or solver are unknown, the suffix does not fit them, a cloth is to be
             coherent, or the user's solver does not answer.
     """
     is_cloth = choice("scene", name, SCENES) == CLOTH
-    pictures = (GIF, SVG, HTML)
-    has_bones = not is_cloth and yours is None
-    choice("suffix of the file", path.suffix, (*pictures, BVH) if has_bones else pictures)
+    bones = () if is_cloth or competitor else (BVH,)
+    choice("suffix of the file", path.suffix, (GIF, SVG, HTML, *bones))
     if is_cloth and coherent:
         raise ValueError("coherent: expected an arm that follows a curve, got a cloth")
-    if yours:
-        yours.offered("a cloth", CLOTH_TASKS) if is_cloth else yours.offered("an arm", ARM_TASKS)
-    competitors: list[tuple[str, FloatArray]] = []
+    if competitor:
+        competitor.offered(*(("a cloth", CLOTH_TASKS) if is_cloth else ("an arm", ARM_TASKS)))
+    solver = choice(
+        "solver", solver or _DEFAULTS[is_cloth], STEP_SOLVERS if is_cloth else IK_SOLVERS
+    )
     if is_cloth:
-        solver = choice("solver", solver or EXACT, STEP_SOLVERS)
         cloth = cloth_motion(solver)
-        if yours:
-            competitors = [(yours.name, step_like(cloth, yours, progress))]
-        scene = cloth_scene(cloth, solver, competitors)
-    else:
-        solver = choice("solver", solver or "fabrik", IK_SOLVERS)
-        arm = arm_motion(name, solver, coherent)
-        if path.suffix == BVH:
-            seconds = SECONDS / len(arm.curve)
-            return bvh.write(path, arm.skeleton, arm.motion.local_rotations, seconds)
-        if yours:
-            competitors = [(yours.name, draw_like(arm, yours, progress))]
-        scene = arm_scene(
-            name, arm, f"Plumbob {label(solver)}" + ", coherent" * coherent, competitors
-        )
+        moves = [(c.name, step_like(cloth, c, progress)) for c in [competitor] if c]
+        return _write_scene(cloth_scene(cloth, solver, moves), path, progress)
+    arm = arm_motion(name, solver, coherent)
+    if path.suffix == BVH:
+        seconds = SECONDS / len(arm.curve)
+        return bvh.write(path, arm.skeleton, arm.motion.local_rotations, seconds)
+    moves = [(c.name, draw_like(arm, c, progress)) for c in [competitor] if c]
+    title = f"Plumbob {label(solver)}" + ", coherent" * coherent
+    return _write_scene(arm_scene(name, arm, title, moves), path, progress)
+
+
+def _write_scene(scene: Scene, path: Path, progress: Progress) -> None:
     if path.suffix == HTML:
         path.write_text(motion.page(scene), encoding="utf-8")
-        return None
+        return
     from . import film
 
-    return (film.animate if path.suffix == GIF else film.picture)(scene, path, progress)
+    (film.animate if path.suffix == GIF else film.picture)(scene, path, progress)
 
 
 def arm_motion(name: str, solver: str, coherent: bool) -> ArmMotion:

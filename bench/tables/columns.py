@@ -16,16 +16,6 @@ def text(title: str, read: Callable[[Any], Cell]) -> Column:
     return Column(title, words=True, read=read)
 
 
-def titled(title: str) -> Column:
-    """Return the column of the problem's title."""
-    return text(title, lambda record: record.title)
-
-
-def number(title: str, name: str = "", unit: str = "") -> Column:
-    """Return the column of a number of a record, empty where a record has none."""
-    return Column(title, unit, read=lambda record: record.arrays.get(name or title))
-
-
 def quantile_cells(title: str, quantiles: Iterable[Cell]) -> dict[str, Cell]:
     """Return the cells of a median, a 95th percentile and a maximum by their titles."""
     names = ("median", "95 %", "largest")

@@ -249,14 +249,14 @@ class _TexPart:
         lines = [" & ".join(cells) + r" \\", " ".join(rules)] if rules else []
         return [*lines, " & ".join(titles) + r" \\"]
 
-    def rows(self, chosen: range) -> list[str]:
+    def rows(self, places: range) -> list[str]:
         """Return some rows; a first cell that repeats the cell above it is left empty."""
         lines: list[str] = []
         firsts = [row[0] for row in self.table.rows]
         is_grouped = len(set(firsts)) < len(firsts)
-        for i in chosen:
-            repeats = i > chosen.start and firsts[i] == firsts[i - 1]
-            if is_grouped and i > chosen.start and not repeats:
+        for i in places:
+            repeats = i > places.start and firsts[i] == firsts[i - 1]
+            if is_grouped and i > places.start and not repeats:
                 lines.append(r"\addlinespace")
             cells = [column.cell(i) for column in self.columns]
             lines.append(" & ".join(["" if repeats else cells[0], *cells[1:]]) + r" \\")

@@ -93,9 +93,11 @@ class Layout:
         if not decided:
             return table
         groups = [row[: table.compared] for row in table.rows]
-        lost = {(groups[i], j) for (i, j), is_best in decided.items() if not is_best}
-        won = {(i, j) for (i, j), is_best in decided.items() if is_best and (groups[i], j) in lost}
-        return replace(table, best=frozenset((best_cells(table) - {*decided}) | won))
+        losing = {(groups[i], j) for (i, j), is_best in decided.items() if not is_best}
+        winning = {
+            (i, j) for (i, j), is_best in decided.items() if is_best and (groups[i], j) in losing
+        }
+        return replace(table, best=frozenset((best_cells(table) - {*decided}) | winning))
 
 
 def source(subject: Any) -> Source:

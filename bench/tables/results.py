@@ -47,7 +47,7 @@ class Results:
         records = [*self.records, *self.failed] if failed else self.records
         return [record for record in records if record.suite == suite and _has(record, facts)]
 
-    def one(self, suite: str, problem: str, solver: str, **facts: Any) -> Record | None:
+    def find(self, suite: str, problem: str, solver: str, **facts: Any) -> Record | None:
         """Return the record of this problem and solver, or None."""
         records = self.all(suite, **facts)
         return next((r for r in records if (r.problem, r.solver) == (problem, solver)), None)
@@ -93,11 +93,6 @@ def grouped(subjects: Iterable[Subject], key: Callable[[Subject], Key]) -> dict[
 def by_problem(records: Iterable[Record]) -> dict[str, list[Record]]:
     """Return the records of each problem, in order."""
     return grouped(records, lambda record: record.problem)
-
-
-def problems(records: Iterable[Record]) -> list[str]:
-    """Return the distinct problems in the order of the records."""
-    return list(dict.fromkeys(record.problem for record in records))
 
 
 def solvers(records: Iterable[Record]) -> list[str]:

@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from plumbob.crosscheck.verify.output import BASE_STYLE
 
+from ...experiments.robots.figures import RobotMap
 from ...figures import svg
 from ...figures.sketch import Drawing
 from ...harness.record import Record
@@ -23,7 +24,7 @@ from ...tables.table import Table
 from ..headlines import Overview
 from ..sections import SECTIONS, Section, offered
 from ..standings import Headline
-from .first_screen import DECADES, ClaimDot, RobotMap, claim_dots
+from .claim_strip import DECADES, ClaimDot, claim_dots
 from .page_tables import PageTable, page_table, rich
 
 _FOLDER = Path(__file__).parent
@@ -116,16 +117,16 @@ def _chapter(section: Section, contents: Contents) -> Chapter:
     layouts = [layout for layout in section.layouts if contents.tables[layout].rows]
     drawings = {layout: [contents.drawings[f] for f in layout.figures if f in contents.drawings]
                 for layout in layouts}  # fmt: skip
-    shown = {layout.name: _page_table(layout, section, contents, drawings) for layout in layouts}
+    tables = {layout.name: _page_table(layout, section, contents, drawings) for layout in layouts}
     empty = [layout for layout in section.layouts if layout not in layouts and not layout.optional]
     suites = [e.suite for e in section.experiments if {*offered(e)} & {*empty}]
     return Chapter(
         section,
         [headline for headline in contents.answers.headlines if headline.chapter == section.name],
         [d for layout in layouts for d in drawings[layout] if d.name in section.figures],
-        claim_dots(shown["check"]) if "check" in shown else [],
-        shown.pop(section.main, None),
-        list(shown.values()),
+        claim_dots(tables["check"]) if "check" in tables else [],
+        tables.pop(section.main, None),
+        list(tables.values()),
         [layout.question for layout in empty],
         shlex.join(["plumbob", "bench", *dict.fromkeys(suites)]),
     )

@@ -153,10 +153,10 @@ def _texts(table: Table, j: int) -> list[Markup]:
     texts = [words(row[j]) for row in table.rows]
     plain = [not isinstance(row[j], str | Share) and "e" not in words(row[j]) for row in table.rows]
     decimals = [len(text.partition(".")[2]) for text in texts]
-    most = max(itertools.compress(decimals, plain), default=0)
+    places = max(itertools.compress(decimals, plain), default=0)
     markups = []
     for row, text, is_plain, count in zip(table.rows, texts, plain, decimals, strict=True):
-        padding = _POINT * (count == 0 < most) + _DIGIT * (most - count) if is_plain else ""
+        padding = _POINT * (count == 0 < places) + _DIGIT * (places - count) if is_plain else ""
         markup = _share(cell) if isinstance(cell := row[j], Share) else rich(text)
         markups.append(markup + padding)
     return markups
