@@ -144,15 +144,6 @@ def test_a_path_of_another_kind_exits_2_and_is_named(capsys, empty_folder, comma
     assert (code, err) == (2, f"plumbob: {path}: expected a {expected}, got a {kind}\n")
 
 
-def test_damaged_lines_cost_a_sentence_and_nothing_else(capsys, empty_folder):
-    file = RecordFile("out")
-    file.append([a_record()])
-    file.path.write_bytes(b"rubbish\n" + file.path.read_bytes() + b"[" * 10**5 + b"\n")
-    code, out, err = plumbob(capsys, "report", "-o", "out")
-    assert (code, err) == (0, "")
-    assert re.search(r"Left out of records.jsonl.*: line 1 \(.*; line 3 \(", " ".join(out.split()))
-
-
 DEEP = "[" * 10**5 + "]" * 10**5
 NESTED = {
     "setting": ('"operations": 1', f'"operations": {DEEP}'),
@@ -330,7 +321,18 @@ def test_files_that_differ_exit_1(capsys, robots):
     assert "Of 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
 
 
-EVERY_COMMAND = ("", "verify", "check", "bench", "which", "report", "show", "compare", "history")
+EVERY_COMMAND = (
+    "",
+    "verify",
+    "explain",
+    "check",
+    "bench",
+    "which",
+    "report",
+    "show",
+    "compare",
+    "history",
+)
 EVERY_COMMAND += ("records",)
 EVERY_COMMAND += ("records list", "records merge", "records drop")
 

@@ -85,10 +85,11 @@ def test_the_mistake_that_the_readme_shows_is_named(tmp_path):
     run, report = verified(README, tmp_path, change=line)
     assert run.returncode == 1
     (explanation,) = report["tasks"][1]["explanations"]
+    (code,), text = explanation["codes"], explanation["text"].partition("] ")[2]
     for page, language in [(README, "en"), (CHINESE, "zh")]:
-        text = translator(language)(explanation["text"])
-        assert flat(text) in flat(page.read_text(encoding="utf-8"))
-    assert explanation["text"] in catalogue.templates()
+        words = f"[{code}] {translator(language)(text)}"
+        assert flat(words) in flat(page.read_text(encoding="utf-8"))
+    assert text in catalogue.templates()
 
 
 @pytest.mark.parametrize("page", [README, CHINESE], ids=["en", "zh"])

@@ -19,7 +19,8 @@ enough soon ago yet still also once twice"""
 BARRED = {*PARTICIPLES.split(), *PRONOUNS.split(), *ADVERBS.split()}
 VAGUE = {"what", "one", "ones", "those", "whose", "nothing", "nobody", "such"}  # in docstrings
 # Well-kept code bases have shares of up to 0.6 % of barred names and 1.9 % of vague words.
-BARRED_SHARE, VAGUE_SHARE, SHARED_CLASS_NAMES = 0.005, 0.012, 4
+BARRED_SHARES = {"reference": 0.005, "crosscheck": 0.005, "bench": 0.0009, "plumbob": 0.0013}
+VAGUE_SHARE = 0.012
 
 
 def bound_names(tree):
@@ -70,7 +71,7 @@ def test_names_are_nouns(package):
     names = [(name, f"{path}:{line}") for path, tree in trees(package)
              for name, line in bound_names(tree)]  # fmt: skip
     barred = [f"{place} {name}" for name, place in names if is_barred(name)]
-    assert len(barred) <= BARRED_SHARE * len(names), "\n".join(barred)
+    assert len(barred) <= BARRED_SHARES[package] * len(names), "\n".join(barred)
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -87,7 +88,7 @@ def test_a_class_name_stands_for_one_class():
                 if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                     places[node.name].append(str(path))
     shared = {name: where for name, where in places.items() if len(where) > 1}
-    assert len(shared) <= SHARED_CLASS_NAMES, shared
+    assert not shared
 
 
 SLIPS = ["found = 1", "def told(): pass", "def f(given): pass", "x.most = 1", "import a as one"]

@@ -108,16 +108,6 @@ def entered(made):
     return replace(made, facts=facts, settings=settings, conditions=commit)
 
 
-def stepped(solver):
-    """One step of a cloth in three iterations."""
-    return sample("stepped", solver=solver)
-
-
-def few(iterations):
-    """Two steps of a few iterations."""
-    return sample("few", settings={"iterations": iterations})
-
-
 def two_dampers(apart=(0.04, 0.02)):
     """The distance of two laws of dampers in two steps."""
     arrays = {"h": 0.02 / 2.0 ** np.arange(len(apart)), "apart": apart}
@@ -191,16 +181,6 @@ def compared(engine, cause=""):
     return sample("compared", solver=engine, notes={"cause": cause})
 
 
-def read_by_a_peer(engine):
-    """One robot of the bench in the engine of a peer."""
-    return sample("read_by_a_peer", solver=engine)
-
-
-def scaled(solver):
-    """A cloth of a thousand particles: factored by one library, and stepped if by ours."""
-    return sample("scaled", solver=solver)
-
-
 def republished():
     """One record for each published table."""
     strata = ("reachable", "unreachable")
@@ -271,25 +251,15 @@ def fell(solver, stiffness=1e3, **changed):
     return sample("fell", **which, settings={"stiffness": stiffness}, arrays=changed)
 
 
-def missing_engine(package):
-    """A cloth engine that is not installed."""
-    return sample("missing_engine", solver=package)
-
-
 def bounded(solver, limit):
     """The longest stable step at a frequency of 100 rad/s."""
     return sample("bounded", solver=solver, arrays={"limit": [limit]})
 
 
-def as_liu(solver, seconds):
-    """A frame of as many vertices as in the paper."""
-    return sample("as_liu", solver=solver, arrays={"seconds": [seconds]})
-
-
 MAKERS = (
-    *(record, read_by_a_peer, compared, drawn, followed, drifted, beyond, claim, entered, reached),
-    *(timed, stepped, swung, two_dampers, certified, raced, solving, lacking),
-    *(republished, worked, fell, moved, bounded, as_liu),
+    *(record, sample, compared, drawn, followed, drifted, beyond, claim, entered, reached, timed),
+    *(swung, two_dampers, certified, raced, solving, lacking, republished, worked, fell, moved),
+    bounded,
 )
 
 
@@ -349,8 +319,8 @@ def records():
         *(reached("near", solver) for solver in ("ccd", "fabrik")),
         entered(reached("near", "My solver")),
         entered(worked("My cloth")),
-        *(stepped(solver) for solver in ("local_global", "newton")),
-        *(few(iterations) for iterations in (1, 10, 100)),
+        *(sample("stepped", solver=solver) for solver in ("local_global", "newton")),
+        *(sample("few", settings={"iterations": n}) for n in (1, 10, 100)),
         two_dampers(),
         certified(),
         *(swung(s, c) for c in ("undamped", "damped") for s in ("RK4", "discrete")),
@@ -363,15 +333,15 @@ def records():
         entrant("ik"),
         entered(bounded("mine", 0.02)),
         *republished(),
-        *(scaled(solver) for solver in ("supernodal", "cholespy")),
+        *(sample("scaled", solver=solver) for solver in ("supernodal", "cholespy")),
         compared("MuJoCo"),
         compared("Pinocchio", "it forgets the hand"),
-        read_by_a_peer("PyBullet"),
+        sample("read_by_a_peer", solver="PyBullet"),
         *(worked(solver) for solver in ("Plumbob Newton", "MuJoCo Euler")),
         fell("Plumbob Newton"),
-        missing_engine("pybullet"),
+        sample("missing_engine", solver="pybullet"),
         bounded("MuJoCo Euler", 0.02),
-        as_liu("local_global", 0.03),
+        sample("as_liu", solver="local_global", arrays={"seconds": [0.03]}),
         *pictured(),
         *moved(),
         timed("Plumbob, compiled", 1e-6),

@@ -609,7 +609,8 @@ def test_a_limit_of_stability_stands_beside_the_motions_in_units_of_the_theory(m
 
 
 def test_the_published_times_stand_beside_ours(make):
-    table = tables.liu_2013(Results([make.as_liu("local_global", 0.03)]))
+    record = make.sample("as_liu", solver="local_global", arrays={"seconds": [0.03]})
+    table = tables.liu_2013(Results([record]))
     assert table.rows == (("local/global", "10 iterations", 50.0, 30.0, 0.5),)
     assert "abstract" in table.measured
     (point,) = table.summary.points

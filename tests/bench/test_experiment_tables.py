@@ -23,7 +23,7 @@ from plumbob.bench.experiments.cloth import tables as cloth
 from plumbob.bench.experiments.cloth_peers import SOLVED
 from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.report.sections import SECTIONS, tables
-from plumbob.bench.tables.results import Results, grouped, label
+from plumbob.bench.tables.results import Results, label
 from plumbob.bench.tables.table import words
 from plumbob.bench.tables.tex_text import escaped
 from plumbob.bench.tables.writers import comma_separated, markdown
@@ -86,22 +86,6 @@ def phrases(path):
 def test_no_setting_is_typed_into_a_sentence(path):
     """A number in a text comes from the constant that the measurement uses, or is a fact."""
     assert [text for text in phrases(path) if re.search(r"\d", FACTS.sub("", text))] == []
-
-
-def test_every_declared_column_has_a_cell(records, make):
-    """A title in `tables.toml` that no row has would make an empty column."""
-    solved = make.worked("MuJoCo Euler", error=(0.5, 1e-7))
-    swing = make.swung("RK4", left=np.ones(11))
-    near = make.fell("MuJoCo Euler", error=[np.inf, 1e-3, 1e-3])
-    results = Results([*records, solved, near, swing])
-    for layout in (layout for section in SECTIONS for layout in section.layouts):
-        rows = [row for row in layout.subjects(results) if isinstance(row, dict)]
-        if rows and not callable(layout.columns):
-            groups = grouped(layout.columns, lambda column: column.group or column.title)
-            titles = {title for row in rows for title in row}
-            assert [
-                g for g, columns in groups.items() if not titles & {c.title for c in columns}
-            ] == []
 
 
 def test_a_missed_claim_is_named_in_table_and_answer(make):
@@ -218,7 +202,7 @@ def test_convergence_counts_iterations_and_drift(records):
 
 
 def test_iterations_that_do_not_suffice_are_said_so(make):
-    made = make.stepped("newton")
+    made = make.sample("stepped", solver="newton")
     short = replace(made, arrays=made.arrays | {"error": np.array([1.0, 0.5])})
     table = cloth.convergence(Results([short]))
     assert "Newton more than 1" in table.summary.points[0]

@@ -278,10 +278,9 @@ def test_the_scale_gives_the_number_of_targets_if_there_are_records(make, run):
 
 def test_a_paired_ratio_holds_the_factor_and_a_single_pair_leaves_it_open():
     found = metrics.paired_ratio(np.array([2.0, 8.0, np.nan]), np.array([1.0, 2.0, 1.0]))
-    assert found.mean == pytest.approx(np.sqrt(8.0))
+    assert found.value == pytest.approx(np.sqrt(8.0))
     assert found.low < 1.0 < found.high
-    assert found.pairs == 2
-    assert metrics.paired_ratio(np.array([2.0]), np.array([1.0])) == (2.0, 0.0, np.inf, 1)
+    assert metrics.paired_ratio(np.array([2.0]), np.array([1.0])) == (2.0, 0.0, np.inf)
     many = metrics.paired_ratio(np.full(50, 3.0), np.ones(50))
     assert many.low == pytest.approx(3.0)
 

@@ -178,15 +178,6 @@ def test_of_many_damaged_lines_a_few_are_listed_and_all_are_counted(file):
     assert len(sentence) < 500
 
 
-@pytest.mark.parametrize("line", [b"rubbish", b"{}", b"\x00\xff", b'{"format": 99}', b"[" * 10**5])
-def test_a_file_without_a_record_is_neither_read_nor_changed(file, line):
-    file.path.write_bytes(line + b"\n" + line)
-    for use in (file.read, lambda: file.drop(lambda record: True)):
-        with pytest.raises(ValueError, match=rf"{FILE_NAME}, line 1: not a record"):
-            use()
-    assert file.path.read_bytes() == line + b"\n" + line
-
-
 def test_an_end_that_is_no_truncated_record_is_kept(file):
     file.append([block("ccd")])
     whole = file.path.read_bytes()

@@ -102,15 +102,18 @@ def blocks(scale):
     yield Block("sums", "1 + 1", "Python", lambda: Measured(Sum(2)), facts={"title": "One"})
 """,
     "tables.py": """
-from plumbob.bench.tables.columns import number, titled
 from plumbob.bench.tables.layout import Layout
+from plumbob.bench.tables.table import Column
 
 sums = Layout(
     "What is 1 + 1?",
     "sums",
     "Sums",
     subjects=lambda results: results.all("sums"),
-    columns=(titled("of"), number("sum")),
+    columns=(
+        Column("of", words=True, read=lambda record: record.title),
+        Column("sum", read=lambda record: record.values.sum),
+    ),
     shows="a",
     measured="b",
 )

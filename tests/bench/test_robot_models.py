@@ -104,7 +104,8 @@ def test_what_an_engine_does_not_take_is_said_and_what_it_rounds_too(make):
 
 
 def test_robots_in_engines_of_peers_stand_beside_files(make):
-    table = readers(Results([make.read_by_a_peer("PyBullet"), make.compared("MuJoCo")]))
+    peer = make.sample("read_by_a_peer", solver="PyBullet")
+    table = readers(Results([peer, make.compared("MuJoCo")]))
     assert column(table, "robot") == ["arm", "the arm"]
     assert table.rows[1][1:] == (
         *("PyBullet 1.2", None, None, 3e-8, 2e-7, None, SINGLE_PRECISION["PyBullet"], None, None),

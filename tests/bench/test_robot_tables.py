@@ -109,6 +109,17 @@ def test_a_solver_with_a_time_limit_is_marked_and_not_ranked(run):
     assert column(table, "solver").index("limited") in table.unranked
 
 
+@pytest.mark.parametrize(
+    ("repeats", "mark"),
+    [((84, 90, 87), "70.0 to 75.0 % in 3 runs"), ((90, 90, 90), "75.0 % in each of 3 runs")],
+)
+def test_a_solver_with_a_time_limit_is_listed_with_the_spread_of_its_runs(run, repeats, mark):
+    record = run("limited", 90, facts={"time_limited": True})
+    record.arrays["repeats"] = np.array(repeats)
+    marks = by_solver(over_all(Results([record, run("a", 9)])), "mark")
+    assert marks["limited"] == f"time-limited, {mark}"
+
+
 def test_robots_for_tuning_and_robots_held_out_are_never_averaged(run):
     groups = {"arm": "tuning", "leg": "tuning", "hand": "held out"}
     records = [

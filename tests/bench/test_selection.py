@@ -158,12 +158,9 @@ def run(capsys, *arguments):
     return code, *capsys.readouterr()
 
 
-def test_the_list_names_every_table_and_its_columns(capsys, folder, records):
-    code, out, _ = run(capsys, "--list")
-    made = sections.tables(Results(records))
-    assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == ["table", *(t.name for t in made)]
+def test_the_list_of_a_table_names_its_columns(capsys, folder):
     code, out, _ = run(capsys, "--table", "accuracy", "--list")
+    assert code == 0
     assert out.splitlines()[0] == "1 problem"
     assert "greatest is best" in out
     assert "folded" in out

@@ -174,7 +174,7 @@ def test_the_first_screen_of_the_page_begins_with_the_solver_of_the_user(make, t
     assert any(line.startswith("Right? ") for line in lines)
     page = made.page.read_text("utf-8")
     screen = page[page.index('<section id="answers"') : page.index("</section>")]
-    assert screen.index("Mine ranks 3 of 3: ") < screen.index("The reference was not checked")
+    assert screen.index("Mine ranks 3 of 3: ") < screen.index("answers were not checked")
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
         assert f'href="#{standing.table}"' in screen
         assert standing.sentence in screen

@@ -89,7 +89,7 @@ def test_the_history_begins_at_the_start_and_ends_at_the_residual():
 def test_a_claim_is_judged_as_by_the_cross_check():
     (block,) = [b for b in blocks("check", TINY) if b.problem == "damper forces"]
     values, notes, _ = block.measure()
-    assert values.held
+    assert values.holds
     assert 0 < values.difference <= values.tolerance
     assert notes["missed"] == ""
 

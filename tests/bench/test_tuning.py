@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments.robots import tuning
-from plumbob.bench.experiments.robots.tuning import COUNT, MAXIMUM, SCREENED, Search, Trial
+from plumbob.bench.experiments.robots.tuning import (
+    COUNT,
+    MAXIMUM,
+    SCREENED,
+    SettingsSearch,
+    SettingsTrial,
+)
 from plumbob.bench.problems import robots
 from plumbob.bench.problems.robot_targets import robot_targets
 
@@ -33,11 +39,11 @@ def test_every_setting_was_tried_and_the_finalists_on_all_targets(search):
     assert len(screened) == len(search.settings)
     final = [trial.settings for trial in tuning.trials_of(search, TRIALS, COUNT)]
     assert all(settings in final for settings in tuning.finalists(search, screened))
-    assert not tuning.chosen(search, tuning.trials_of(search, TRIALS, COUNT)).trouble
+    assert not tuning.best_trial(search, tuning.trials_of(search, TRIALS, COUNT)).trouble
 
 
 def test_the_bench_uses_the_settings_that_the_search_chose(search):
-    chosen = dict(tuning.chosen(search, tuning.trials_of(search, TRIALS, COUNT)).settings)
+    chosen = dict(tuning.best_trial(search, tuning.trials_of(search, TRIALS, COUNT)).settings)
     entry = search.peer.entry(search.start)
     assert entry.restarts == chosen.pop("bench_restarts", 0)
     assert entry.settings == chosen
@@ -67,20 +73,20 @@ def test_the_tables_of_the_pages_are_those_of_the_results():
 def test_share_decides_then_time_then_the_default(hits, time, winner):
     """Of 120 targets the default solves 50; ten more or fewer cannot be chance (p = 0.002)."""
     names = [{"name": name} for name in ("default", "other")]
-    search = Search("A", "one start", names[0], names[0], tuple(names))
+    search = SettingsSearch("A", "one start", names[0], names[0], tuple(names))
     trials = [
-        Trial(
+        SettingsTrial(
             "A", "one start", name, "1", 20, us, np.packbits(np.arange(120) < hits).tobytes().hex()
         )
         for name, hits, us in zip(names, (50, hits), (1.0, time), strict=True)
     ]
-    assert tuning.chosen(search, trials).settings == {"name": winner}
+    assert tuning.best_trial(search, trials).settings == {"name": winner}
 
 
 def test_an_interrupted_search_goes_on_and_a_lost_process_solves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "SCREENED", 2)
     settings = ({"restarts": 20}, {"wrong": 1})
-    search = Search("Plumbob LM", "restarts", settings[0], settings[0], settings)
+    search = SettingsSearch("Plumbob LM", "restarts", settings[0], settings[0], settings)
     first = [next(tuning.perform(search, tmp_path / "a"))]
     rest = list(tuning.perform(search, tmp_path / "a"))
     assert [trial.share for trial in first + rest] == [1, 0, 1]
