@@ -55,7 +55,7 @@ class Results:
         self.trials = tuning.trials_of(search, trials, tuning.COUNT)
         self.default = self.full(search.default)
         self.before = self.full(search.before)
-        self.chosen = tuning.chosen(search, self.trials)
+        self.chosen = tuning.best_trial(search, self.trials)
 
     def full(self, settings):
         """The trial of these settings on all targets."""
