@@ -106,8 +106,8 @@ def test_fault_is_named_without_a_declared_method(method, every):
 
 @pytest.mark.parametrize(
     ("method", "pairs", "allowed"),
-    [("forward", slice(None, None, 12), 0.0)]
-    + [(method, slice(5, None, 197), 0.0) for method in METHODS]
+    [("forward", slice(None, None, 24), 0.0)]
+    + [(method, slice(5, None, 397), 0.0) for method in METHODS]
     + [pytest.param("forward", slice(None), 0.0, marks=pytest.mark.slow)]
     + [pytest.param(method, slice(None), 0.02, marks=pytest.mark.slow) for method in METHODS],
 )
