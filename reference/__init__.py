@@ -9,6 +9,7 @@ from .explicit import runge_kutta, symplectic_euler
 from .implicit_euler import STEP_SOLVERS, ImplicitEuler, StepResult
 from .implicit_euler.certificate import Certificate, Coverage
 from .inverse_kinematics import IK_SOLVERS, IKSolution, Target, solve_ik
+from .inverse_kinematics.certificate import IKCertificate, IKCoverage, certify_ik
 from .judging import PoseJudgement, StepJudgement, judge_pose, judge_step
 from .kinematics import forward_kinematics, local_from_global
 from .mass_spring import MassSpring, State
@@ -23,6 +24,8 @@ __all__ = [
     "Articulation",
     "Certificate",
     "Coverage",
+    "IKCertificate",
+    "IKCoverage",
     "IKSolution",
     "ImplicitEuler",
     "MassSpring",
@@ -35,6 +38,7 @@ __all__ = [
     "StepJudgement",
     "StepResult",
     "Target",
+    "certify_ik",
     "curves",
     "forward_kinematics",
     "judge_pose",

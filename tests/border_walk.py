@@ -21,7 +21,14 @@ import numpy as np
 import scipy
 from public_calls import calls, robot, system, tree
 
-from plumbob.reference import Articulation, MassSpring, Skeleton, State, StepJudgement
+from plumbob.reference import (
+    Articulation,
+    IKCertificate,
+    MassSpring,
+    Skeleton,
+    State,
+    StepJudgement,
+)
 from plumbob.reference.implicit_euler.certificate import Certificate
 from plumbob.reference.implicit_euler.objective import Iterate, Objective
 
@@ -123,7 +130,7 @@ def all_finite(result):
     """Return whether all numbers of a result are; an outcome may say that they are not."""
     if isinstance(result, Articulation):
         return all_finite(result.forward(result.neutral()))
-    if isinstance(result, Certificate | Objective | MassSpring):
+    if isinstance(result, Certificate | IKCertificate | Objective | MassSpring):
         return True
     if isinstance(result, StepJudgement):
         return all_finite(result.minimiser)

@@ -73,7 +73,8 @@ _INTERNAL = {
     "made only by us": """
         reference.implicit_euler.objective.Iterate reference.judging.step.StepJudgement
         reference.judging.pose.PoseJudgement reference.implicit_euler.StepResult
-        reference.implicit_euler.certificate.Certificate crosscheck.verdict.Claim""",
+        reference.implicit_euler.certificate.Certificate crosscheck.verdict.Claim
+        reference.inverse_kinematics.certificate.IKCertificate""",
     "of our own sources": """
         crosscheck.verdict.each_case reference.implicit_euler.objective.Iterate.within
         reference.implicit_euler.objective.Iterate.is_above crosscheck.samples.generator
@@ -341,6 +342,8 @@ def _solves():
     given = {"model": balls, "pose": local, "positions": place, **judged}
     yield entry(reference.judge_pose, given, names=names)
     yield entry(reference.judge_pose, {"model": model, "pose": q, **judged}, "robot", names=names)
+    yield entry(reference.certify_ik, {"model": balls, "pose": local, **judged}, names=names)
+    yield entry(reference.certify_ik, {"model": model, "pose": q, **judged}, "robot", names=names)
 
 
 def _systems():

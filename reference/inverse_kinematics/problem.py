@@ -164,6 +164,19 @@ def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:
     return checked
 
 
+def check_single(targets: list[CheckedTarget]) -> list[CheckedTarget]:
+    """Return the targets; a ValueError if they are a batch."""
+    for target in targets:
+        for name, values, length in (
+            ("target", target.position, 3),
+            ("rotation", target.rotation, 4),
+        ):
+            if values is not None and values.ndim != 1:
+                got = arguments.shape(values.shape)
+                raise ValueError(f"{name}: expected shape ({length},), got {got}")
+    return targets
+
+
 class IKSolver(NamedTuple):
     """A solver's two kernels; its pickle holds the name."""
 

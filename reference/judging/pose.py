@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, frozen
 from ..articulation import Articulation, joint_excess
-from ..inverse_kinematics.problem import CheckedTarget, Target, check_numbers, checked_targets
+from ..inverse_kinematics.problem import Target, check_numbers, check_single, checked_targets
 from ..kinematics import forward_kinematics
 from ..model import Model, checked_model, coordinates_name
 from ..skeleton import Pose, Skeleton
@@ -116,8 +116,7 @@ def judge_pose(
             an effector does not exist, or a pose is missing where it is needed.
     """
     model = checked_model(model, "model")
-    targets = check_numbers(checked_targets(model, target, effector))
-    _check_single(targets)
+    targets = check_single(check_numbers(checked_targets(model, target, effector)))
     tree = model if isinstance(model, Skeleton) else model.skeleton
     x = None
     if positions is not None:
@@ -163,14 +162,6 @@ def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatA
         unit[part], difference = rotation.normalise(unit[part], name)
         deviation = max(deviation, float(difference))
     return unit, deviation
-
-
-def _check_single(targets: Sequence[CheckedTarget]) -> None:
-    for goal in targets:
-        for name, values, length in (("target", goal.position, 3), ("rotation", goal.rotation, 4)):
-            if values is not None and values.ndim != 1:
-                got = arguments.shape(values.shape)
-                raise ValueError(f"{name}: expected shape ({length},), got {got}")
 
 
 def _length_errors(model: Skeleton | Articulation, tree: Skeleton, x: FloatArray) -> FloatArray:

@@ -1,0 +1,279 @@
+"""Proven bounds of the distances that a chain of limited joints can give: shells of reach.
+
+Let P be a point fixed to the end of a chain, C a point fixed to its base, and r = |P - C|. For
+joint i let D_i bound the distance of C from its axis over all configurations, and d_i that of P:
+the chain is followed from either end, from each axis to the nearest point of the next. With the
+lengths replaced by 1 for a slide,
+
+    |dr / dq_i| <= min(D_i, d_i),    |d²(r²) / dq_i dq_j| <= 2 D_min(i,j) d_max(i,j) = H_ij,
+
+because r² depends on both q_i and q_j only through twice the product of a vector of length D_i
+and one of length d_j. In a box of coordinates of half-widths w, with g the gradient of r² in its
+middle,
+
+    |r² - r²(middle)| <= |g| w + w H w / 2.
+
+Boxes are halved until a bound is within 1e-3 of the length of the chain, or a fixed number of
+boxes is used up; the bound holds in either case. Mimic joints count as independent joints.
+
+Rounding: with n joints and u = 2^-53 the forward kinematics of a chain of length S has an error of
+at most (289 n + 131) u S, an axis of (288 n + 64) u (see `certificate`); hence r² and g w are known
+to 3000 (n + 1) u S² (1 + sum of w).
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import rotation
+from ..arguments import FloatArray
+from ..articulation import HINGE, SLIDE, Articulation
+from ..jacobians import jacobians
+from ..skeleton import Skeleton
+
+UNIT = 2.0**-53
+ROUNDINGS = 3000
+# The accuracy of a shell, over the length of the chain, and the boxes for a shell and for a target.
+ACCURACY, SHELL_BOXES, TARGET_BOXES = 1e-3, 50_000, 4_000
+# Factor that covers the rounding errors of widths and lengths, which have few operations.
+WIDER = 1.0 + 1e-12
+# Axes count as parallel if the square of the sine between them is smaller.
+PARALLEL = 1e-12
+
+
+class ReachShell(NamedTuple):
+    """The shell of a point on a path, by the joints above it within their limits."""
+
+    joint: int  # whose axis the point is on, by its position on the path; beyond it the effector's
+    point: FloatArray  # in the frame of that joint [m], (3,)
+    least: float  # distance from the base point [m]
+    largest: float
+
+
+class Reach(NamedTuple):
+    """The base point of a path, and shells about it."""
+
+    path: list[int]  # joints from the root on
+    length: float  # of all offsets on the path [m]
+    base: FloatArray  # on the axis of the first joint that moves, in the world [m], (3,)
+    shells: list[ReachShell]
+
+
+class Axes(NamedTuple):
+    """The joints of a path where all coordinates are zero, in the world."""
+
+    kinds: list[str]
+    origins: FloatArray  # [m], (joint, 3)
+    directions: FloatArray  # (joint, 3)
+
+    def nearest(self, k: int, other: int) -> FloatArray:
+        """Return the point of a hinge's axis nearest to another axis, from its origin [m].
+
+        The origin itself of other joints, and where the axes are parallel.
+        """
+        if self.kinds[k] != "hinge" or k == other:
+            return np.zeros(3)
+        a, b, v = self.directions[k], self.directions[other], self.origins[other] - self.origins[k]
+        if self.kinds[other] != "hinge":
+            return a * float(a @ v)
+        cosine = float(a @ b)
+        square = 1.0 - cosine * cosine
+        return a * float(a @ v - cosine * (b @ v)) / square if square > PARALLEL else np.zeros(3)
+
+
+def least_distance(
+    model: Articulation, joint: int, position: FloatArray, Q: FloatArray | None
+) -> tuple[float, float]:
+    """Return a bound [m] and a lever [m]: distance + lever angle >= bound for every pose.
+
+    These are the distance [m] and the angle [rad] of the effector from its target in any pose
+    within the limits. Without a target rotation the lever is 0. Proof: the pose of the effector
+    fixes the base point in its frame, up to the distance and, as it is `lever` from the target, to
+    the lever times the angle. So the distances from the base point to a point on an axis that
+    joints above it allow, and those that joints below it allow, are disjoint by at most this sum.
+    """
+    reach = reach_of(model, joint, Q is not None)
+    offset = reach.base - position
+    r = float(np.linalg.norm(offset))
+    lever = 0.0 if Q is None else r * WIDER
+    scale = reach.length + np.linalg.norm(reach.base) + np.linalg.norm(position)
+    rounding = float(ROUNDINGS * UNIT * scale)
+    for shell in reach.shells:
+        if Q is None:
+            gap = max(r - shell.largest, shell.least - r)
+        else:
+            below, interval = reach.path[shell.joint + 1 :], (shell.least, shell.largest)
+            point = rotation.rotate(rotation.conjugate(Q), offset)
+            gap = separation(model, below, shell.point, point, interval)
+        if gap > rounding:
+            return gap - rounding, lever
+    return 0.0, lever
+
+
+def reach_of(model: Articulation, joint: int, oriented: bool) -> Reach:
+    """Return the base point and the shells of the path to a joint, kept by the model.
+
+    With a rotation to reach there is a shell for every hinge and ball, the last first, of the
+    point on its axis nearest to the next; else only that of the effector's origin.
+    """
+    key = "reach", joint, oriented
+    if key not in model.mechanisms:
+        path, offsets = model.skeleton.path_array(joint).tolist(), model.skeleton.offsets
+        x, R = (part[path] for part in model.forward(model.zero()))
+        axes = Axes([model.kinds[j] for j in path], x, rotation.rotate(R, model.axes[path]))
+        moving = [k for k, kind in enumerate(axes.kinds) if kind != "fixed"]
+        base = x[0]
+        if moving:
+            base = x[moving[0]] + axes.nearest(moving[0], moving[min(1, len(moving) - 1)])
+        shells = []
+        if not oriented:
+            shells = [ReachShell(len(path), np.zeros(3), *span(model, path, base, np.zeros(3)))]
+        for i in reversed(range(len(moving) if oriented else 0)):
+            k = moving[i]
+            if axes.kinds[k] in ("hinge", "ball"):
+                other = moving[i + 1] if i + 1 < len(moving) else moving[max(i - 1, 0)]
+                point = rotation.rotate(rotation.conjugate(R[k]), axes.nearest(k, other))
+                end = offsets[path[k]] + rotation.rotate(model.frames[path[k]], point)
+                shells.append(ReachShell(k, point, *span(model, path[:k], base, end)))
+        length = float(np.linalg.norm(offsets[path], axis=1).sum())
+        model.mechanisms[key] = Reach(path, length, base, shells)
+    reach: Reach = model.mechanisms[key]
+    return reach
+
+
+def span(
+    model: Articulation, joints: list[int], base: FloatArray, point: FloatArray
+) -> tuple[float, float]:
+    """Return bounds of the distance from a base point to a point at the end of a chain [m].
+
+    At a ball the chain is cut, and the parts may point in any direction: limits of balls do not
+    count. A free joint, or a slide without limits, reaches everything.
+    """
+    balls = [k for k, j in enumerate(joints) if model.kinds[j] in ("ball", "free")]
+    if balls:
+        k = balls[-1]
+        if model.kinds[joints[k]] == "free":
+            return 0.0, math.inf
+        before = span(model, joints[:k], base, model.skeleton.offsets[joints[k]])
+        after = span(model, joints[k + 1 :], np.zeros(3), point)
+        least = max(0.0, before[0] - after[1], after[0] - before[1])
+        return least, before[1] + after[1]
+    chain = _chain(model, joints, point)
+    longest = _Bounds(chain, base).longest
+    if not math.isfinite(longest):
+        return 0.0, math.inf
+    least = _separation(chain, base, (-math.inf, 0.0), SHELL_BOXES)
+    return least, longest - _separation(chain, base, (longest, math.inf), SHELL_BOXES)
+
+
+def separation(
+    model: Articulation, joints: list[int], base: FloatArray, point: FloatArray,
+    interval: tuple[float, float],
+) -> float:  # fmt: skip
+    """Return a lower bound of how far all distances from base to point are from an interval [m]."""
+    if any(model.kinds[j] in ("ball", "free") for j in joints):
+        least, largest = span(model, joints, base, point)
+        return max(0.0, least - interval[1], interval[0] - largest)
+    return _separation(_chain(model, joints, point), base, interval, TARGET_BOXES)
+
+
+def _chain(model: Articulation, joints: list[int], point: FloatArray) -> Articulation:
+    """Return hinges, slides and fixed joints of a path as a chain of its own, to a point."""
+    records = model.joints[joints]
+    leaders = records["leader"]
+    ends = np.array([model.joints["lower"][leaders], model.joints["upper"][leaders]])
+    with np.errstate(invalid="ignore"):  # 0 times infinity: a follower that does not move
+        ends = np.where(records["multiplier"] == 0.0, 0.0, records["multiplier"] * ends)
+    ends = np.sort(ends + records["shift"], axis=0)
+    whole = (records["kind"] == HINGE) & ~(ends[1] - ends[0] < 2.0 * np.pi)
+    ends[:, whole] = np.array([[-np.pi], [np.pi]]) * WIDER
+    count = len(joints) + 1
+    return Articulation(
+        Skeleton(np.arange(count) - 1, np.vstack([records["offset"], point])),
+        [*(model.kinds[j] for j in joints), "fixed"],
+        np.vstack([records["axis"], [0.0, 0.0, 1.0]]),
+        frames=np.vstack([records["frame"], [1.0, 0.0, 0.0, 0.0]]),
+        lower=np.append(ends[0], 0.0),
+        upper=np.append(ends[1], 0.0),
+    )
+
+
+class _Bounds:
+    """Bounds of the distance r from a base point to the end of a chain, in boxes."""
+
+    def __init__(self, chain: Articulation, base: FloatArray) -> None:
+        joints, self.chain, self.base = chain.joints, chain, base
+        moving = np.flatnonzero(np.isin(joints["kind"], (HINGE, SLIDE)))
+        self.lower, self.upper = joints["lower"][moving], joints["upper"][moving]
+        x, R = chain.forward(chain.zero())
+        axes, is_slide = rotation.rotate(R, chain.axes), joints["kind"] == SLIDE
+        travel = np.where(is_slide, np.maximum(-joints["lower"], joints["upper"]), 0.0)
+        scale = np.linalg.norm(joints["offset"], axis=1).sum() + np.abs(travel).sum()
+        scale += np.linalg.norm(base)
+        self.rounding = float(ROUNDINGS * UNIT * len(joints) * scale)  # [m]
+        self.scale = float(scale)
+        D, longest = self._lengths(base, x, axes, travel, moving, x[-1])
+        d, _ = self._lengths(x[-1], x, axes, travel, moving[::-1], base)
+        self.longest = longest
+        self.slopes, d = np.minimum(D, d[::-1]), d[::-1]
+        above = np.triu(np.outer(D, d))
+        self.H = 2.0 * (above + np.triu(above, 1).T)
+
+    def _lengths(
+        self, start: FloatArray, x: FloatArray, axes: FloatArray, travel: FloatArray,
+        moving: Any, end: FloatArray,
+    ) -> tuple[FloatArray, float]:  # fmt: skip
+        """Return bounds of the distance of a start from each axis, 1 for slides, and of an end."""
+        length, bounds = self.rounding, []
+        for j in moving:
+            if self.chain.kinds[j] == "slide":
+                length += float(travel[j])
+                bounds.append(1.0)
+                continue
+            anchor = x[j] + axes[j] * float((start - x[j]) @ axes[j])
+            length += float(np.linalg.norm(anchor - start)) * WIDER + self.rounding
+            bounds.append(length)
+            start = anchor
+        return np.array(bounds), length + float(np.linalg.norm(end - start)) * WIDER
+
+    def __call__(self, q: FloatArray, w: FloatArray) -> tuple[FloatArray, ...]:
+        """Return r in the middle, its bounds in the box, and each joint's share of their width."""
+        last = self.chain.joint_count - 1
+        v = self.chain.forward(q)[0][:, -1] - self.base
+        J = jacobians(self.chain, q, [last])[:, 0, :3]
+        square, w = np.sum(v * v, axis=1), w * WIDER
+        shares = 2.0 * np.abs(np.einsum("ni,nij->nj", v, J)) * w + 0.5 * w * (w @ self.H)
+        width = WIDER * shares.sum(axis=1) + self.rounding * self.scale * (1.0 + w.sum(axis=1))
+        r, change = np.sqrt(square), w @ self.slopes + self.rounding
+        least = np.maximum(np.sqrt(np.maximum(square - width, 0.0)), r - change)
+        largest = np.minimum(np.sqrt(square + width) * WIDER, r + change)
+        return r, least, np.minimum(largest, self.longest), shares
+
+
+def _separation(
+    chain: Articulation, base: FloatArray, interval: tuple[float, float], boxes: int
+) -> float:
+    """Return a lower bound of how far r is from an interval, by branch and bound."""
+    bounds = _Bounds(chain, base)
+    if not np.isfinite([bounds.lower, bounds.upper]).all():
+        return 0.0
+    middle = 0.5 * (bounds.lower + bounds.upper)[None]
+    half = 0.5 * (bounds.upper - bounds.lower)[None]
+    nearest, settled, count = math.inf, math.inf, 1
+    while True:
+        r, least, largest, shares = bounds(middle, half)
+        nearest = min(nearest, np.maximum(r - interval[1], interval[0] - r).min())
+        gaps = np.maximum(least - interval[1], interval[0] - largest)
+        close = gaps >= nearest - min(ACCURACY * bounds.longest, 0.5 * nearest)
+        settled = min(settled, gaps[close].min(initial=math.inf))
+        middle, half, shares, gaps = (a[~close] for a in (middle, half, shares, gaps))
+        count += 2 * len(gaps)
+        if nearest <= 0.0 or not shares.size or count > boxes:
+            return max(0.0, float(min(settled, gaps.min(initial=math.inf))))
+        rows, widest = np.arange(len(gaps)), shares.argmax(axis=1)
+        half = half.copy()
+        half[rows, widest] *= 0.5
+        step = np.zeros_like(half)
+        step[rows, widest] = half[rows, widest]
+        middle, half = np.vstack([middle - step, middle + step]), np.vstack([half, half])

@@ -1,0 +1,375 @@
+"""Laws of the certificate of a pose: what it says is proven, and it says why where it is silent."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from plumbob.reference import (
+    Articulation,
+    IKCoverage,
+    Mimic,
+    Skeleton,
+    Target,
+    certify_ik,
+    forward_kinematics,
+    rotation,
+    scenes,
+    solve_ik,
+)
+from plumbob.reference.inverse_kinematics import certificate, reach
+from plumbob.reference.inverse_kinematics.certificate import Equations, path_bounds, path_of
+from plumbob.reference.inverse_kinematics.problem import checked_targets
+from plumbob.reference.jacobians import integrate
+
+UPPER, LOWER = 0.5, 0.3  # links of the elbow [m]
+MIXED = ["free", "hinge", "slide", "ball", "hinge", "fixed", "slide", "hinge"]
+HINGES = ["hinge"] * 7
+
+
+def elbow(low=-math.pi, high=math.pi):
+    """A shoulder that turns and nods, and an elbow with limits; closed forms are in its plane."""
+    links = Skeleton([-1, 0, 1, 2], [[0, 0, 0.2], [0, 0, 0], [UPPER, 0, 0], [LOWER, 0, 0]])
+    kinds, axes = ["hinge", "hinge", "hinge", "fixed"], [[0, 0, 1], *[[0, 1, 0]] * 3]
+    return Articulation(
+        links, kinds, axes, lower=[-np.inf, -np.inf, low, 0], upper=[np.inf, np.inf, high, 0]
+    )
+
+
+def distance_at(angle):
+    """The law of cosines: from shoulder to hand."""
+    return math.sqrt(UPPER**2 + LOWER**2 + 2 * UPPER * LOWER * math.cos(angle))
+
+
+def seven(limit=2.0):
+    """An arm of seven hinges with a shoulder and a wrist of three axes each."""
+    axes = [[0, 0, 1], [0, 1, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1]]
+    heights = [0.2, 0.0, 0.3, 0.0, 0.3, 0.0, 0.1]
+    offsets = [[0, 0, height] for height in heights]
+    return Articulation(
+        Skeleton(np.arange(7) - 1, offsets), "hinge", axes, lower=-limit, upper=limit
+    )
+
+
+def target_at(model, q, effector=-1):
+    """The pose of an effector as a target."""
+    pose = forward_kinematics(model, q)
+    return Target(pose.positions[effector], pose.rotations[effector], effector)
+
+
+def equations(model, q, oriented=True):
+    target = target_at(model, q)
+    if not oriented:
+        target = target._replace(rotation=None)
+    return Equations(model, checked_targets(model, target, None), q)
+
+
+class Precise:
+    """Forward kinematics in 40 digits, quaternions and axes made unit."""
+
+    def __init__(self, model, q):
+        mpmath.mp.dps = 40
+        self.x, self.R, joints = [], [], model.joints
+        for j in joints:
+            position, frame = self.wide(j["offset"]), self.unit(j["frame"])
+            at, axis = j["coordinate"], self.unit(j["axis"])
+            kind = int(j["kind"])
+            if kind in (1, 2):
+                value = mpmath.mpf(float(j["multiplier"])) * float(q[at]) + float(j["shift"])
+            if kind == 2:
+                position = position + self.rotate(frame, axis * value)
+            if kind == 4:
+                position = position + self.rotate(frame, self.wide(q[at : at + 3]))
+            if kind == 1:
+                half = [mpmath.cos(value / 2), *(axis * mpmath.sin(value / 2))]
+                frame = self.multiply(frame, np.array(half))
+            if kind in (3, 4):
+                begin = at + (3 if kind == 4 else 0)
+                frame = self.multiply(frame, self.unit(q[begin : begin + 4]))
+            if j["parent"] >= 0:
+                above = self.R[j["parent"]]
+                position = self.x[j["parent"]] + self.rotate(above, position)
+                frame = self.multiply(above, frame)
+            self.x.append(position)
+            self.R.append(frame)
+
+    @staticmethod
+    def wide(values):
+        return np.array([mpmath.mpf(float(value)) for value in values])
+
+    def unit(self, values):
+        values = self.wide(values)
+        return values / mpmath.sqrt(np.sum(values * values))
+
+    @staticmethod
+    def multiply(a, b):
+        v = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
+        return np.array([a[0] * b[0] - a[1:] @ b[1:], *v])
+
+    def rotate(self, Q, v):
+        return self.multiply(self.multiply(Q, np.array([0, *v])), Q * [1, -1, -1, -1])[1:]
+
+
+class TestRounding:
+    @pytest.mark.parametrize("kinds", [HINGES, MIXED], ids=["hinges", "mixed"])
+    def test_forward_kinematics_in_40_digits_is_within_the_bound(self, articulated, kinds):
+        worst = 0.0
+        for seed in range(3):
+            model = articulated(kinds, seed)
+            q = model.checked("q", model.random(np.random.default_rng(seed)))
+            x, R = model.forward(q)
+            precise = Precise(model, q)
+            for j in range(model.joint_count):
+                bounds = path_bounds(model, path_of(model, j), q)
+                error = float(mpmath.norm(precise.x[j] - x[j]))
+                sign = -1 if precise.R[j] @ R[j] < 0 else 1
+                error_rotation = float(mpmath.norm(sign * precise.R[j] - R[j]))
+                assert error <= bounds.position
+                assert error_rotation <= bounds.rotation
+                worst = max(worst, error / bounds.position, error_rotation / bounds.rotation)
+        assert worst > 1e-3  # the bound is not too large to say anything
+
+    def test_of_an_arm_it_is_nine_orders_below_a_tolerance(self):
+        model = seven()
+        q = model.random(np.random.default_rng(0))
+        result = certify_ik(model, q, target_at(model, q))
+        assert 0 < result.rounding < 2e-13
+        assert result.rounding <= result.residual < 2 * result.rounding
+
+
+class TestLipschitz:
+    @pytest.mark.parametrize(
+        "kinds", [HINGES, MIXED, ["ball"] * 4], ids=["hinges", "mixed", "balls"]
+    )
+    @pytest.mark.parametrize("oriented", [False, True])
+    def test_second_differences_are_below_it(self, articulated, kinds, oriented):
+        """|F(p + t v) - 2 F(p) + F(p - t v)| / t² is the second derivative along v."""
+        ratios, t = [], 1e-3
+        for seed in range(6):
+            model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+            p = model.random(rng)
+            system = equations(model, p, oriented)
+            L = system.lipschitz(np.ones(model.freedom_count, dtype=bool))
+            for _ in range(10):
+                v = rng.standard_normal(model.freedom_count)
+                v /= np.linalg.norm(v)
+                points = [integrate(model, p, s * t * v) for s in (-1.0, 0.0, 1.0)]
+                before, here, after = (system.evaluate(q)[0] for q in points)
+                ratios.append(np.linalg.norm(after - 2 * here + before) / t**2 / L)
+        assert max(ratios) <= 1.0
+        assert max(ratios) > 0.05
+
+    def test_the_jacobian_is_the_derivative(self, articulated):
+        model, rng = articulated(MIXED, 3), np.random.default_rng(3)
+        p, t = model.random(rng), 1e-5
+        system = equations(model, p)
+        v = rng.standard_normal(model.freedom_count)
+        ends = [system.evaluate(integrate(model, p, s * v))[0] for s in (-t, t)]
+        J = system.evaluate(p)[1]
+        # The truncation error is of the size of t² times the third derivative.
+        np.testing.assert_allclose((ends[1] - ends[0]) / (2 * t), J @ v, atol=1e-8)
+
+
+class TestExactSolution:
+    @pytest.mark.parametrize("bend", [0.3, -1.2, 2.5])
+    @pytest.mark.parametrize("error", [0.0, 1e-9, 1e-3])
+    def test_the_distance_is_that_of_the_closed_form(self, bend, error):
+        """Three joints reach a point in four ways; the exact solution is the nearest."""
+        model, q = elbow(), np.array([0.4, -0.7, bend])
+        target = forward_kinematics(model, q).positions[-1]
+        moved = q + error * np.array([0.6, 0.0, -0.8])
+        result = certify_ik(model, moved, target)
+        assert result.covered
+        # The target itself is rounded: a joint moves by some 1e-15.
+        assert error - 1e-14 <= result.distance <= error * (1 + 1e-6) + 1e-10
+        assert result.reached == (error < 1e-4)
+
+    def test_slides_have_the_distance_itself(self):
+        gantry = Articulation(Skeleton([-1, 0, 1], np.zeros((3, 3))), "slide", np.eye(3),
+                              lower=-1.0, upper=1.0)  # fmt: skip
+        result = certify_ik(gantry, [0.1, 0.2, 0.3], [0.1, 0.2, 0.31])
+        assert result.distance == pytest.approx(0.01, rel=1e-6)
+        assert certify_ik(gantry, [0.1, 0.2, 0.3], [0.1, 0.2, 1.01]).impossible is False
+
+    def test_redundant_arms_and_chains_of_balls_are_covered(self, rng):
+        model = seven()
+        q = model.random(rng)
+        assert certify_ik(model, q + 1e-4 * rng.uniform(-1, 1, 7), target_at(model, q)).covered
+        chain, _ = scenes.ball_chain(links=5)
+        local = rotation.random(rng, chain.joint_count)
+        x = forward_kinematics(chain, local).positions[-1]
+        bent = rotation.multiply(local, rotation.exponential(1e-3 * rng.uniform(-1, 1, (6, 3))))
+        result = certify_ik(chain, bent, x)
+        assert result.covered
+        assert 0 < result.distance < 1e-2
+
+    def test_several_effectors_are_covered_together(self, rng):
+        """A spine with two arms of two links."""
+        tree = Skeleton([-1, 0, 1, 2, 1, 4], rng.uniform(0.2, 0.5, (6, 3)))
+        local = rotation.random(rng, 6)
+        x = forward_kinematics(tree, local).positions
+        targets = [Target(x[effector], effector=effector) for effector in (3, 5)]
+        assert certify_ik(tree, local, targets).covered
+        beyond = [targets[0], targets[1]._replace(position=x[5] + 5.0)]
+        assert certify_ik(tree, local, beyond).impossible
+
+    def test_mimic_joints_count_with_their_leaders(self):
+        links = Skeleton([-1, 0, 1, 2, 3], [[0, 0, 0], *[[0.3, 0, 0]] * 4])
+        axes = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0], [0, 1, 0]]
+        finger = Articulation(
+            links, ["hinge"] * 4 + ["fixed"], axes, mimics={3: Mimic(2, 0.8, 0.1)}
+        )
+        q = np.array([0.3, 0.4, 0.5])
+        result = certify_ik(finger, q + 1e-4, forward_kinematics(finger, q).positions[-1])
+        assert result.covered
+        assert result.distance == pytest.approx(1e-4 * math.sqrt(3), rel=1e-4)
+
+
+class TestLimits:
+    def test_a_joint_at_its_limit_stays_there(self):
+        model = seven(limit=1.0)
+        q = np.array([0.3, 0.5, 1.0, 0.7, -0.2, 0.6, 0.1])
+        result = certify_ik(model, q, target_at(model, q))
+        assert result.covered
+        assert result.distance < 1e-9
+
+    def test_a_solution_beyond_a_limit_is_not_claimed(self):
+        """The elbow would have to bend a little further than it can."""
+        free, limited = elbow(), elbow(0.0, 1.0)
+        target = forward_kinematics(free, [0.2, 0.3, 1.001]).positions[-1]
+        result = certify_ik(limited, [0.2, 0.3, 1.0], target, tolerance=1e-3)
+        assert result.reached
+        assert not result.covered
+
+    def test_a_pose_beyond_its_limits_has_not_reached(self):
+        target = forward_kinematics(elbow(), [0.2, 0.3, 1.01]).positions[-1]
+        assert certify_ik(elbow(), [0.2, 0.3, 1.01], target).reached
+        assert not certify_ik(elbow(0.0, 1.0), [0.2, 0.3, 1.01], target).reached
+
+
+class TestImpossible:
+    @pytest.mark.parametrize("r", [0.05, 0.15, 0.3, 0.79, 0.85, 2.0])
+    @pytest.mark.parametrize("limits", [(-math.pi, math.pi), (0.5, 2.0)])
+    def test_the_least_distance_is_that_of_the_closed_form(self, r, limits):
+        """Between the distances at the elbow's limits, or with a straight and a folded arm."""
+        model = elbow(*limits)
+        ends = [distance_at(max(limits[0], 0.0)), distance_at(limits[1])]
+        exact = max(0.0, r - ends[0], ends[1] - r)
+        position = np.array([0.0, 0.0, 0.2]) + r * np.array([0.6, 0.48, 0.64])
+        result = certify_ik(model, [0.1, 0.2, 0.9], position)
+        assert result.least_distance <= exact
+        # A shell is within 1e-3 of the arm's length.
+        assert result.least_distance >= exact - 1e-3 * (UPPER + LOWER)
+        assert result.impossible == (result.least_distance > 0.0)
+        assert result.covered == (exact == 0.0)
+        assert result.lever == 0.0
+
+    @pytest.mark.parametrize(("d", "exact"), [(2.5, 0.5), (0.1, 0.3), (1.0, 0.0)])
+    def test_chains_of_balls_have_the_exact_distance(self, rng, d, exact):
+        """max(0, d - reach, 2 longest - reach - d)."""
+        chain = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [1.2, 0, 0], [0, 0.5, 0], [0.3, 0, 0]])
+        local = rotation.random(rng, 4)
+        result = certify_ik(chain, local, [0.0, 0.6 * d, 0.8 * d])
+        assert result.least_distance == pytest.approx(exact, abs=1e-11)
+        assert result.least_distance <= exact
+
+    def test_a_pose_may_be_out_of_reach_where_its_position_is_not(self):
+        """The wrist would be 0.1 m further away than the straight arm's 0.6 m."""
+        model = seven()
+        target = Target([0.6, 0.0, 0.2], rotation.exponential([0.0, -np.pi / 2, 0.0]))
+        result = certify_ik(model, model.neutral(), target)
+        assert result.impossible
+        assert result.lever == pytest.approx(0.6)
+        assert 0.09 < result.least_distance <= 0.1
+        assert certify_ik(model, model.neutral(), [0.6, 0.0, 0.2]).least_distance == 0.0
+
+    @pytest.mark.parametrize("kinds", [HINGES, MIXED, ["slide", "hinge", "hinge", "ball", "hinge"]])
+    def test_distances_of_random_poses_are_within_all_shells(self, articulated, kinds):
+        for seed in range(4):
+            model = articulated(kinds, seed)
+            tip = model.joint_count - 1
+            poses = forward_kinematics(model, model.random(np.random.default_rng(seed), 500))
+            whole = reach.reach_of(model, tip, True)
+            for shell in (*whole.shells, *reach.reach_of(model, tip, False).shells):
+                joint = [*whole.path, tip][shell.joint]
+                arm = rotation.rotate(poses.rotations[:, joint], shell.point)
+                r = np.linalg.norm(poses.positions[:, joint] + arm - whole.base, axis=-1)
+                assert shell.least - 1e-12 <= r.min()
+                assert r.max() <= shell.largest + 1e-12
+
+    @pytest.mark.parametrize("kinds", [HINGES[:6], MIXED, ["ball", "hinge", "ball", "hinge"]])
+    def test_a_pose_that_exists_is_never_impossible(self, articulated, kinds):
+        for seed in range(5):
+            model = articulated(kinds, seed)
+            q = model.random(np.random.default_rng(seed))
+            target = target_at(model, q)
+            other = model.random(np.random.default_rng(seed + 99))
+            assert not certify_ik(model, other, target).impossible
+            bound, _ = reach.least_distance(model, model.joint_count - 1, *target[:2])
+            assert bound == 0.0
+
+    @pytest.mark.parametrize("count", [5, pytest.param(400, marks=pytest.mark.slow)])
+    def test_no_solver_refutes_it(self, count):
+        """Distance + lever times angle of the nearest pose of a hundred restarts is no less."""
+        model, rng, proven = seven(), np.random.default_rng(7), 0
+        for _ in range(count):
+            v = rng.standard_normal(3)
+            position = rng.uniform(0.4, 0.8) * v / np.linalg.norm(v) + [0, 0, 0.2]
+            target = Target(position, rotation.random(rng))
+            solution = solve_ik(model, model.neutral(), target, restarts=100)
+            result = certify_ik(model, solution.coordinates, target)
+            nearest = solution.residual + result.lever * solution.residual_rotation
+            assert result.least_distance <= nearest
+            assert result.covered <= solution.outcome.solved
+            proven += result.impossible
+        assert proven > 0.2 * count
+
+
+@pytest.mark.parametrize("scale", [1e-70, 1e-6, 1e6, 1e70])
+def test_units_of_length_do_not_matter(scale):
+    links = Skeleton(
+        [-1, 0, 1, 2], scale * np.array([[0, 0, 0.2], [0, 0, 0], [0.5, 0, 0], [0.3, 0, 0]])
+    )
+    model = Articulation(links, "hinge", [[0, 0, 1], *[[0, 1, 0]] * 3], lower=-2.0, upper=2.0)
+    q = np.array([0.1, 0.2, 0.9, 0.0])
+    x = forward_kinematics(model, q).positions[-1]
+    assert certify_ik(model, q + 1e-9, x).covered
+    result = certify_ik(model, q, 2.0 * x)
+    assert result.impossible
+    assert 0.1 * scale < result.least_distance < scale
+
+
+class TestReasons:
+    """Each reason for no proof has its case."""
+
+    def test_too_few_freedoms(self):
+        model = elbow()
+        result = certify_ik(model, [0.1, 0.2, 0.5], target_at(model, [0.1, 0.2, 0.5]))
+        assert result.coverage == IKCoverage.TOO_FEW_FREEDOMS
+        assert result.reached
+
+    def test_a_straight_arm_is_singular(self):
+        model = elbow()
+        target = forward_kinematics(model, [0.1, 0.2, 0.0]).positions[-1]
+        result = certify_ik(model, [0.1, 0.2, 0.0], target)
+        assert result.coverage == IKCoverage.SINGULAR
+
+    def test_newtons_method_ends_elsewhere(self):
+        """Nothing is proven of balls with limits, which stay where they are."""
+        balls = Articulation(Skeleton([-1, 0, 1], [[0, 0, 0], [1, 0, 0], [0.8, 0, 0]]),
+                             ["ball", "hinge", "fixed"], cones=[0.5, np.inf, np.inf])  # fmt: skip
+        result = certify_ik(balls, balls.neutral(), [1.0, 0.5, 0.2])
+        assert result.coverage == IKCoverage.TOO_FEW_FREEDOMS
+
+    def test_a_limit_within_the_distance(self, monkeypatch):
+        monkeypatch.setattr(certificate, "MARGIN", 0.0)
+        model = elbow(0.0, 1.0)
+        q = [0.2, 0.3, 1.0 - 1e-16]
+        target = forward_kinematics(model, q).positions[-1]
+        assert certify_ik(model, q, target).coverage == IKCoverage.AT_LIMIT
+
+    def test_every_reason_has_a_sentence(self):
+        sentences = {reason.sentence for reason in IKCoverage}
+        assert len(sentences) == len(IKCoverage)
+        assert sum(sentence.startswith("Open") for sentence in sentences) == 4
