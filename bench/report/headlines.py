@@ -27,6 +27,7 @@ from ..experiments.robots.readings import (
     Score,
     fields_of,
     ratio_of_times,
+    times_of_both,
     together,
 )
 from ..experiments.timing.tables import median_time, ranked_by_time
@@ -36,7 +37,7 @@ from ..peers import registry
 from ..problems.robots import CHARACTER
 from ..tables.results import Results, by_problem, counted, grouped, listed
 from ..tables.table import words
-from .standings import MISSES, Headline, best_rival, factor, full_name, percent, speed, standings
+from .standings import Headline, best_rival, factor, full_name, percent, speed, standings
 
 # The most robots or cases that a sentence names.
 MAX_NAMED = 3
@@ -174,16 +175,7 @@ def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> 
     if first := _first(order):
         sentence = _most_solved(rows, first, best_rival(first, order))
         yield _headline("Most poses solved", group, start, f"{place}, {sentence}.")
-    first = _first(times)
-    if first and (rival := best_rival(first, times)):
-        ratio = ratio_of_times(rows[rival], rows[first])
-        sentence = (
-            f"{full_name(first)} is the fastest, {MISSES}: it is {speed(ratio, rival)}, the best "
-        )
-        sentence += "other solver"
-        if ratio.low < 1.0 < ratio.high:
-            names = f"{full_name(first)} and {full_name(rival)}"
-            sentence = f"{names} are the fastest and tie within chance, {MISSES}"
+    if sentence := _fastest(rows, times, first):
         yield _headline("Fastest", group, start, f"{place}, {sentence}.")
 
 
@@ -203,6 +195,46 @@ def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:
         )
     other = f"the best other solver is {full_name(rival)} with {percent(rows[rival].share)}"
     return f"{full_name(first)} solves the most poses: {solved}; {other}{chance}"
+
+
+def _fastest(rows: dict[str, Score], times: Sequence[str], best: str) -> str:
+    """Return who is the fastest of the solvers that solve as many as the best, "" without rivals.
+
+    Times are compared on the poses that both solve: a miss costs no time here, so solvers that
+    solve fewer poses are compared with the best only if none solves as many.
+    """
+    equals = [solver for solver in times if solver in rows[best].success.first] if best else []
+    first = _first(equals)
+    if first and (rival := best_rival(first, equals)):
+        ratio = ratio_of_times(rows[rival], rows[first])
+        names = f"{full_name(first)} and {full_name(rival)}"
+        if ratio.low <= 1.0 <= ratio.high:
+            return (
+                f"of the solvers that solve the most, {names} are the fastest, a tie within chance"
+            )
+        first, rival, ratio = _in_order(first, rival, ratio)
+        return (
+            f"{full_name(first)} is the fastest of the solvers that solve the most: it is "
+            f"{speed(ratio, rival)}, the next"
+        )
+    if best not in times:
+        return ""
+    ratios = {s: ratio_of_times(rows[s], rows[best]) for s in times if best_rival(best, [s])}
+    ratios = {solver: ratio for solver, ratio in ratios.items() if ratio.value > 0.0}
+    if not ratios:
+        return ""
+    rival = min(ratios, key=lambda solver: ratios[solver].value)
+    return (
+        f"{full_name(best)} solves more poses than any other solver and is, where both solve, "
+        f"{speed(ratios[rival], rival)}, the fastest other one there"
+    )
+
+
+def _in_order(a: str, b: str, ratio: metrics.Interval) -> tuple[str, str, metrics.Interval]:
+    """Return two solvers, the faster first, with the ratio of the other's time to its."""
+    if ratio.value >= 1.0:
+        return a, b, ratio
+    return b, a, metrics.Interval(1.0 / ratio.value, 1.0 / ratio.high, 1.0 / ratio.low)
 
 
 def _headline(question: str, group: str, start: str, sentence: str) -> Headline:
@@ -342,19 +374,32 @@ def _robot_wins(group: str, start: str, fields: dict[str, list[Score]]) -> Itera
     """Yield the robots on which another solver solves more, or is faster."""
     for robot, field in fields.items():
         rows = {row.solver: row for row in field}
-        rankings = {"solves more poses": field[0].success, "is faster": field[0].time}
-        for verb, ranking in rankings.items():
-            own_solver = next(filter(registry.is_ours, ranking.order), "")
-            first = _first(ranking.first)
-            if not own_solver or not first or own_solver in ranking.first:
-                continue
-            if ranking is field[0].time:
-                size = ratio_of_times(rows[own_solver], rows[first]).value
-            else:
-                size = 100 * float(np.mean(rows[first].solved) - np.mean(rows[own_solver].solved))
-            result = f"{verb} than {full_name(own_solver)} {_FROM[start]}"
-            cases = _robots(group, len(fields))
+        cases = _robots(group, len(fields))
+        own = next(filter(registry.is_ours, field[0].success.order), "")
+        first = _first(field[0].success.first)
+        if own and first and own not in field[0].success.first:
+            size = 100 * float(np.mean(rows[first].solved) - np.mean(rows[own].solved))
+            result = f"solves more poses than {full_name(own)} {_FROM[start]}"
             yield Win("kinematics", first, result, robot, size, cases, "robots_by_robot")
+        own = next(filter(registry.is_ours, field[0].time.order), "")
+        if own and (first := _faster(rows, own)):
+            size = ratio_of_times(rows[own], rows[first]).value
+            result = f"is faster than {full_name(own)} {_FROM[start]}, where both solve,"
+            yield Win("kinematics", first, result, robot, size, cases, "robots_by_robot")
+
+
+def _faster(rows: dict[str, Score], own: str) -> str:
+    """Return the fastest solver that is faster than ours on the poses that both solve, else ""."""
+    rivals = [solver for solver in rows[own].time.order if best_rival(own, [solver])]
+    pairs = [times_of_both(rows[own], rows[rival]) for rival in rivals]
+    logs = [(np.log(ours), np.log(theirs)) for ours, theirs in pairs]
+    chances = metrics.adjusted([metrics.chance_of_pairs(*pair) for pair in logs])
+    gains = {
+        rival: metrics.mean(ours - theirs)
+        for rival, chance, (ours, theirs) in zip(rivals, chances, logs, strict=True)
+        if chance <= 1.0 - metrics.CONFIDENCE
+    }
+    return max((rival for rival in gains if gains[rival] > 0.0), key=gains.__getitem__, default="")
 
 
 def _race_wins(race: Race) -> Iterator[Win]:

@@ -8,7 +8,6 @@ import numpy as np
 from ..experiments import chain, cloth_peers
 from ..experiments.cloth_peers.readings import Point, points
 from ..experiments.robots.readings import (
-    PENALTY,
     STARTS,
     Score,
     by_robot,
@@ -26,7 +25,6 @@ from ..tables.table import words
 
 # The most cloths with a sentence of their own.
 MAX_CLOTHS = 3
-MISSES = f"a miss counted as {PENALTY:g} s"
 
 
 class Headline(NamedTuple):
@@ -92,8 +90,9 @@ def _rank(row: Score, rows: Mapping[str, Score]) -> str:
         share += f", the best solver, {full_name(order[0])}, {percent(rows[order[0]].share)}"
     if len(order) > 1:
         rivals = _fastest([solver for solver in row.time.order if solver != row.solver])
-        speeds = [speed(ratio_of_times(rows[rival], row), rival) for rival in rivals]
-        share += f"; it is {listed(speeds)}, {MISSES}" if speeds else ""
+        ratios = {rival: ratio_of_times(rows[rival], row) for rival in rivals}
+        speeds = [speed(ratio, rival) for rival, ratio in ratios.items() if ratio.value > 0.0]
+        share += f"; where both solve, it is {listed(speeds)}" if speeds else ""
     place = 1 if row.solver in first else order.index(row.solver) + 1
     tie = f", in a tie of {len(first)}" if row.solver in first and len(first) > 1 else ""
     unfinished = len(rows) - len(order)
@@ -137,7 +136,7 @@ def factor(ratio: float) -> str:
 def speed(ratio: metrics.Interval, rival: str) -> str:
     """Return how much faster a solver is than a rival, by the ratio of the rival's time to its."""
     mean, low, high = ratio
-    if low < 1.0 < high:
+    if low <= 1.0 <= high:
         return f"as fast as {full_name(rival)} within chance"
     adverb = "faster" if mean >= 1.0 else "slower"
     return f"{factor(max(mean, 1.0 / mean))} times {adverb} than {full_name(rival)}"

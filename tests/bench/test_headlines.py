@@ -88,7 +88,7 @@ def test_a_solver_cut_short_is_not_ranked(run):
     records = [run("a", 150), run("b", 20), cut]
     for question in (MOST, FASTEST):
         assert "slow" not in sentence(records, question)
-        assert sentence(records, question).startswith("On the arm from one start, a ")
+        assert sentence(records, question).startswith("On the arm from one start, a solves ")
     assert headlines.headlines(Results([records[0], cut])) == []
 
 
@@ -139,14 +139,27 @@ def test_the_fastest_leads_by_a_factor_over_the_best_other(run):
     spread = np.geomspace(1.0, 1.2, N)
     records = [run("a", N, 1e-3 * spread), run("b", N, 4e-3 * spread[::-1])]
     assert sentence(records, FASTEST) == (
-        "On the arm from one start, a is the fastest, a miss counted as 0.1 s: it is 4.0 times "
-        "faster than b, the best other solver."
+        "On the arm from one start, a is the fastest of the solvers that solve the most: it is 4.0 "
+        "times faster than b, the next."
     )
     hasty = [run("a", 190, 1e-4), run("hasty", 5, 1e-6), run("b", 190)]
-    assert ", b is the fastest" in sentence(hasty, FASTEST)
+    assert ", b is the fastest of the solvers that solve the most" in sentence(hasty, FASTEST)
     noise = np.exp(np.random.default_rng(0).normal(0.0, 1.0, (2, N)))
     near = [run(s, N, 1e-5 * times) for s, times in zip("ab", noise, strict=True)]
     assert "within chance" in sentence(near, FASTEST)
+
+
+def test_a_miss_costs_no_time_and_a_solver_that_is_faster_where_both_solve_wins(run):
+    """A penalty for misses would hide it: Plumbob solves twice as many."""
+    records = [run("Plumbob LM", N, 3e-4), run("pink", 100, 1e-4), run("mink", 100, 2e-4)]
+    assert sentence(records, FASTEST) == (
+        "On the arm from one start, Plumbob LM (ours) solves more poses than any other solver and "
+        "is, where both solve, 3.0 times slower than pink, the fastest other one there."
+    )
+    assert wins(records) == [
+        "pink is faster than Plumbob LM (ours) from one start, where both solve, on 1 of 1 robot "
+        "of yours (the arm), by a factor of 3.0."
+    ]
 
 
 def test_a_share_is_never_rounded_to_all():

@@ -185,7 +185,7 @@ def test_a_switch_shows_one_start_or_restarts_on_the_whole_page(table):
                 names[entry.kind].append(peer.label_of(entry))
         assert sorted(set(column(table, 3))) == sorted(names[value])
     click(table, "[value=time]")
-    assert "relative to the fastest" in texts(table, ".map caption")[0]
+    assert "Median time of a pose solved [µs, 1k = 1,000]" in texts(table, ".map caption")[0]
 
 
 def test_a_robot_of_the_map_leads_to_its_rows_the_best_first(browser):

@@ -302,8 +302,10 @@ def test_the_map_has_a_field_for_each_robot_that_a_solver_takes(run, cut):
     records = [run("a", MANY), run("a", MANY, robot="leg"), run("b", MANY, seconds=1e-2)]
     table, heat_map = robot_by_robot(Results(records)), FIGURES[0]
     assert column(table, "time relative to fastest") == pytest.approx([1.0, 100.0, 1.0])
-    # three shares of 100 %, and a time of 100 relative to the fastest
-    assert drawn(heat_map(Results(records))).svg.count(">100<") == 4
+    # three shares of 100 %, two times of 100 µs, and one of 10 ms
+    svg = drawn(heat_map(Results(records))).svg
+    assert svg.count(">100<") == 5
+    assert svg.count(">10k<") == 1
     assert drawn(heat_map(cut)).svg.count("*<") == 2  # both fields of the solver cut short
     assert [figure(Results([])) for figure in FIGURES] == [None] * 6
 

@@ -35,9 +35,9 @@ CAPTIONS = Captions(
     agreement=words(AGREEMENT),
     repeats=str(REPEATS),
 )
-# The quantities of a map; so many times the least time is drawn as the palest.
+# The quantities of a map; so many times the shortest time is drawn as the palest.
 SOLVED, TIME, SLOWEST = "poses solved", "time", 1000.0
-UNITS_OF_MAPS = {SOLVED: "solved [%]", TIME: "time relative to fastest"}
+UNITS_OF_MAPS = {SOLVED: "solved [%]", TIME: "median time of a pose solved [µs]"}
 # Maps of more robots than this are stacked.
 MAXIMUM_BESIDE = 5
 
@@ -101,10 +101,11 @@ def _share(score: Score, x: Floats, rates: Floats) -> Series:
 
 
 class MapCell(NamedTuple):
-    """A solver on a robot: its text, and its shade from 0 (worst) to 100."""
+    """A solver on a robot: its text, its shade from 0 (worst) to 100, a star if it is unranked."""
 
     text: str
     shade: int
+    is_starred: bool = False
 
 
 class MapRow(NamedTuple):
@@ -123,6 +124,16 @@ class RobotMap(NamedTuple):
     groups: list[tuple[str, int]]
     robots: list[str]
     rows: list[MapRow]
+
+    @property
+    def first_columns(self) -> list[int]:
+        """The index of the first robot of each group."""
+        return [sum(count for _, count in self.groups[:i]) for i in range(len(self.groups))]
+
+    @property
+    def has_stars(self) -> bool:
+        """Whether a solver is not ranked on some robot."""
+        return any(cell.is_starred for row in self.rows for cell in row.cells if cell)
 
 
 def robot_maps(results: Results, *starts: str) -> list[RobotMap]:
@@ -143,30 +154,30 @@ def _map(start: str, quantity: str, fields: dict[str, list[Score]], results: Res
     rows = []
     for solver in dict.fromkeys(solver for solver, _ in scores):
         pairs = (scores.get((solver, robot)) for robot in robots)
-        cells = [score and cell(score) for score in pairs]
+        cells = [score and cell(score, fields[score.robots]) for score in pairs]
         rows.append(MapRow(solver, solver in results.entrants, cells))
     rows.sort(key=lambda row: -sum(cell.shade for cell in row.cells if cell))
     groups = [(group, len(members)) for group, members in by_group.items()]
     return RobotMap(start, quantity, groups, robots, rows)
 
 
-def _solved_cell(score: Score) -> MapCell:
+def _solved_cell(score: Score, field: Sequence[Score]) -> MapCell:
     rate = score.share.hits / max(score.share.total, 1)
     return _cell(score, f"{math.floor(100 * rate)}", rate)
 
 
-def _time_cell(score: Score) -> MapCell:
-    ratio = score.relative_time
-    if math.isnan(ratio):
+def _time_cell(score: Score, field: Sequence[Score]) -> MapCell:
+    seconds = score.median_time
+    if math.isnan(seconds):
         return MapCell("–", 0)
-    size, unit = (ratio, "") if ratio < 999.5 else (ratio / 1e3, "k")
-    text = f"{size:.{1 if size < 10 else 0}f}{unit}"
-    return _cell(score, text, 1.0 - math.log(max(ratio, 1.0)) / math.log(SLOWEST))
+    ratio = seconds / np.nanmin([other.median_time for other in field])
+    size, unit = (1e6 * seconds, "") if seconds < 999.5e-6 else (1e3 * seconds, "k")
+    text = f"{size:.{1 if size < 9.95 else 0}f}{unit}"
+    return _cell(score, text, 1.0 - math.log(ratio) / math.log(SLOWEST))
 
 
 def _cell(score: Score, text: str, shade: float) -> MapCell:
-    """Return a cell; a star marks a solver that is not ranked."""
-    return MapCell(text + "*" * (not score.is_ranked), round(100 * min(1.0, max(0.0, shade))))
+    return MapCell(text, round(100 * min(1.0, max(0.0, shade))), not score.is_ranked)
 
 
 def heat_map(start: str, results: Results) -> Sketch | None:
@@ -194,10 +205,10 @@ def draw_maps(maps: Sequence[RobotMap]) -> "Canvas":
 
 def _draw_map(ax: "Axes", rows: Sequence[Sequence[MapCell | None]], robots: Sequence[str]) -> None:
     cells = ((i, j, *cell) for i, row in enumerate(rows) for j, cell in enumerate(row) if cell)
-    for i, j, text, shade in cells:
+    for i, j, text, shade, is_starred in cells:
         alpha = 0.06 + 0.005 * shade
         ax.barh(i, 0.96, 0.92, j - 0.48, color=COLOURS["blue"], alpha=alpha, linewidth=0)
-        ax.text(j, i, text, ha="center", va="center", fontsize=8)
+        ax.text(j, i, text + "*" * is_starred, ha="center", va="center", fontsize=8)
     ax.set(xlim=(-0.5, len(robots) - 0.5), ylim=(-0.5, len(rows) - 0.5))
     names = [plain_label(robot) for robot in robots]
     ax.set_xticks(range(len(robots)), names, rotation=25, ha="right", rotation_mode="anchor")

@@ -116,6 +116,11 @@ class Score(NamedTuple):
         return float(np.exp(np.mean(np.log(self.penalised + SHIFT))) - SHIFT)
 
     @property
+    def median_time(self) -> float:
+        """The median time of the targets that are solved [s]; NaN without any."""
+        return metrics.spread(self.seconds[self.timed_solved]).median if self.is_timed else np.nan
+
+    @property
     def disputed(self) -> int:
         """The number of answers that the two engines place differently."""
         return sum(np.size(record.arrays.get("disputed", ())) for record in self.records)
@@ -346,5 +351,13 @@ def out_of_reach(results: Results) -> list[Score]:
 
 
 def ratio_of_times(rival: Score, score: Score) -> metrics.Interval:
-    """Return by what factor a rival takes longer for the same targets, misses penalised."""
-    return metrics.paired_ratio(rival.penalised + SHIFT, score.penalised + SHIFT)
+    """Return by what factor a rival takes longer for the targets that both solve; NaN if none."""
+    return metrics.paired_ratio(*times_of_both(rival, score))
+
+
+def times_of_both(a: Score, b: Score) -> tuple[Floats, Floats]:
+    """Return the times of two solvers for the targets that both solve [s], (target,) each."""
+    if a.seconds.shape != b.seconds.shape:
+        return np.empty(0), np.empty(0)
+    both = a.timed_solved & b.timed_solved
+    return a.seconds[both], b.seconds[both]
