@@ -8,7 +8,14 @@ from .curve import curves, resample
 from .explicit import runge_kutta, symplectic_euler
 from .implicit_euler import STEP_SOLVERS, ImplicitEuler, StepResult
 from .implicit_euler.certificate import Certificate, Coverage
-from .inverse_kinematics import IK_SOLVERS, IKSolution, Target, solve_ik
+from .inverse_kinematics import (
+    IK_SOLVERS,
+    IKSolution,
+    IKSolutions,
+    Target,
+    all_solutions,
+    solve_ik,
+)
 from .inverse_kinematics.certificate import IKCertificate, IKCoverage, certify_ik
 from .judging import PoseJudgement, StepJudgement, judge_pose, judge_step
 from .kinematics import forward_kinematics, local_from_global
@@ -27,6 +34,7 @@ __all__ = [
     "IKCertificate",
     "IKCoverage",
     "IKSolution",
+    "IKSolutions",
     "ImplicitEuler",
     "MassSpring",
     "Mimic",
@@ -38,6 +46,7 @@ __all__ = [
     "StepJudgement",
     "StepResult",
     "Target",
+    "all_solutions",
     "certify_ik",
     "curves",
     "forward_kinematics",

@@ -201,6 +201,28 @@ def system():
     return model, State(x, RNG().uniform(-1.0, 1.0, (5, 3)))
 
 
+def _lists(position, rotation):
+    """All solutions of an arm that is searched on a grid, and of an arm with a closed form."""
+    axes, offsets = RNG().standard_normal((2, 7, 3))
+    arm = Articulation(Skeleton(range(-1, 6), offsets), "hinge", axes, lower=-2.0, upper=1.5)
+    wrist = Articulation(Skeleton(range(-1, 5), [*offsets[:4], [0, 0, 0], [0, 0, 0]]), "hinge",
+                         axes[:6])  # fmt: skip
+
+    def listed(position, rotation, effector, grid, restarts, seed):
+        target, grid = Target(position, rotation), {2: grid}
+        options = {"grid": grid, "restarts": restarts, "seed": seed}
+        return reference.all_solutions(arm, target, effector, **options)
+
+    def listed_by_form(position, rotation):
+        return reference.all_solutions(wrist, Target(position, rotation))
+
+    pose, all_solutions = {"position": position, "rotation": rotation}, reference.all_solutions
+    options = {"effector": 6, "grid": np.array([0.2, 0.4]), "restarts": 8, "seed": 3}
+    laws = {"free": "position rotation grid", "names": "target"}
+    yield entry(listed, pose | options, of=all_solutions, **laws)
+    yield entry(listed_by_form, pose, "closed form", all_solutions, **laws)
+
+
 def _rotations():
     q, p = rotation.random(RNG(), 6), rotation.random(np.random.default_rng(1), 6)
     v, w = RNG().uniform(-1.0, 1.0, (2, 6, 3))
@@ -329,6 +351,7 @@ def _solves():
     target = {"position": points[0], "rotation": rotations[0], "effector": "f", "weight": 2.0}
     yield entry(posed, target, "poses", solve, free="position rotation", names="target")
     yield entry(one_pose, target, "pose", solve, free="position rotation", names="target")
+    yield from _lists(points[0], rotations[0])
     motion = {"warm": True, "coherent": True, "closed": True, "record": True}
     yield entry(
         reference.track, {"skeleton": balls, "curve": points, "start": local, **settings, **motion},

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..model import Model, checked_model
 from ..outcome import Outcome
+from .branches import IKSolutions, all_solutions
 from .problem import (
     IK_SOLVERS,
     RESTARTS,
@@ -23,7 +24,16 @@ from .problem import (
 )
 from .solve import solve_checked, solve_plain
 
-__all__ = ["IK_SOLVERS", "RESTARTS", "IKSolution", "Outcome", "Target", "solve_ik"]
+__all__ = [
+    "IK_SOLVERS",
+    "RESTARTS",
+    "IKSolution",
+    "IKSolutions",
+    "Outcome",
+    "Target",
+    "all_solutions",
+    "solve_ik",
+]
 
 
 def solve_ik(

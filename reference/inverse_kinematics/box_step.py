@@ -11,6 +11,8 @@ there are. A freedom that a limit stops is active: the others are solved for aga
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from ..arguments import FloatArray
 from ..articulation import BALL, FREE, FREEDOMS, HINGE, SLIDE, clamp_joint
 from ..jacobians import accumulate, motion, move_joint, velocity_at
@@ -46,6 +48,15 @@ class TaskSystem(NamedTuple):
     step: FloatArray  # of the freedoms, lengths over the reach, (freedom,)
     # 1 where the upper limit stops a freedom, -1 where the lower does, else 0, (freedom,)
     active: FloatArray
+
+
+def new_system(equations, freedoms):
+    """Return a system, not filled, in a single block of memory."""
+    m, n = equations, freedoms
+    block = np.empty(n * m + m * m + 2 * m + 2 * n)
+    J, A, rows = block[: n * m], block[n * m : n * m + m * m], block[n * m + m * m :]
+    e, z, step, active = rows[:m], rows[m : 2 * m], rows[2 * m : 2 * m + n], rows[2 * m + n :]
+    return TaskSystem(e, J.reshape(n, m), A.reshape(m, m), z, step, active)
 
 
 def linearise_task(mechanism, target, data, system):

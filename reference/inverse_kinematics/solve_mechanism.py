@@ -29,7 +29,7 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .box_step import TaskSystem, clear
+from .box_step import TaskSystem, clear, new_system
 from .ccd import ccd_update
 from .chain import BEND, POSITION_ROUNDING
 from .fabrik import BACKWARD, fabrik_update
@@ -162,10 +162,7 @@ def solve_mechanisms(
 
 def new_workspace(mechanism):
     """Return a workspace, not filled."""
-    m, n = mechanism.equations, mechanism.freedoms
-    system = TaskSystem(
-        np.empty(m), np.empty((n, m)), np.empty((m, m)), np.empty(m), np.empty(n), np.empty(n)
-    )
+    system = new_system(mechanism.equations, mechanism.freedoms)
     return Workspace(system, np.empty(len(mechanism.joints), BACKWARD), np.empty((2, 4, 4)))
 
 

@@ -1,0 +1,190 @@
+"""All solutions of a pose: closed forms where the axes of an arm allow them, else a search.
+
+`arms.py` brings a robot down to arms of at most six joints, `closed_forms.py` solves them by the
+angles of `subproblems.py`, and `settle.py` checks what comes out by forward kinematics.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ... import arguments
+from ...arguments import FloatArray
+from ...articulation import Articulation
+from ...model import Model, checked_model, effector_of
+from ..problem import (
+    CheckedTarget,
+    Target,
+    check_numbers,
+    checked_settings,
+    checked_targets,
+)
+from ..solve import is_plain, solve_checked, target_rows
+from .arms import SEARCH, Arm, Arms, arms_of
+from .closed_forms import CANDIDATES, HINGES, LARGEST_COUNT
+from .settle import FIGURES, closed_form_kernel, settle_kernel
+
+# Random starts of a search.
+RESTARTS = 256
+# A start of the search is given up at this distance from the target, over the reach, and angle.
+SEARCH_TOLERANCE = 1e-6
+
+
+class IKSolutions(NamedTuple):
+    """All solutions of a pose that a method finds; the arrays are read-only.
+
+    Attributes:
+        coordinates: (solution, coordinate). Each angle is the one within the limits that is nearest
+            to their middle, or to zero without limits; whole revolutions more are not listed.
+            Joints that do not move the effector are at neutral.
+        residual: distances from effector to target [m], by forward kinematics, (solution,).
+        residual_rotation: angles between them [rad], (solution,).
+        method: the name of the closed form, or "restarts".
+        complete: whether the method proves that there are no other solutions within the limits, to
+            rounding; with a grid, at its values.
+        continuum: whether the target is singular, within 1e-7 of the reach and in angle: some
+            solutions are members of a continuum of which the others are not listed.
+        unseen: the probability that a further restart would find a solution that is not listed,
+            estimated as the share of those found once (Good 1953); 0 of closed forms.
+        grid: the values at which joints were locked, by their names.
+    """
+
+    coordinates: FloatArray
+    residual: FloatArray
+    residual_rotation: FloatArray
+    method: str
+    complete: bool
+    continuum: bool
+    unseen: float
+    grid: dict[str, FloatArray]
+
+
+class _ArmSolutions(NamedTuple):
+    """The solutions of an arm: see IKSolutions."""
+
+    rows: FloatArray  # the arm's coordinates, then FIGURES
+    complete: bool
+    continuum: bool
+    starts: int = 0  # of a search, those that come to a solution
+    single: int = 0  # and those that alone come to theirs
+
+
+def all_solutions(
+    robot: Model,
+    target: Target,
+    effector: int | str | None = None,
+    *,
+    grid: Mapping[int | str, ArrayLike] | None = None,
+    restarts: int = RESTARTS,
+    seed: int = 0,
+) -> IKSolutions:
+    """Return all joint coordinates within the limits that bring an effector to a pose.
+
+    Six hinges have closed forms if the last or the first three axes meet (Pieper 1968), or if the
+    second to fourth, or third to fifth, are parallel and the two at the end meet (Elias & Wen 2022,
+    by subproblems of Paden 1986 and Kahan 1983). They prove their lists complete where the axes do
+    so to rounding. Every other arm is searched by Levenberg-Marquardt from random starts.
+
+    All solutions are polished by Newton's method, reach the target within 1e-9, of the reach and in
+    radians, and differ by more than 1e-6. A robot of seven joints has a continuum of solutions: a
+    joint is locked at values of a grid, and the others are solved for.
+
+    Args:
+        robot: an Articulation or a Robot; hinges and slides move the effector.
+        target: the pose, with a rotation.
+        effector: the joint that is to reach it, as for `solve_ik`.
+        grid: joints to lock, each with its values, which are combined. By default, of seven joints
+            the most redundant whose arm has a closed form, at 16 values between its limits.
+        restarts: the number of starts of a search, at each value of the grid.
+        seed: of the starts.
+
+    Raises:
+        ValueError: if an argument is not valid, the target has no rotation or is a batch, a joint
+            is no hinge or slide, or more than six joints remain.
+    """
+    model = checked_model(robot, "robot")
+    if not isinstance(model, Articulation):
+        raise ValueError("robot: expected hinges and slides, got a Skeleton")
+    pose = _checked_pose(model, target, effector)
+    arms = arms_of(model, pose.joint, grid)
+    if len(arms.members) == 1 and arms.members[0].is_plain:
+        return _plain(arms.members[0], pose)
+    count = arguments.count("restarts", restarts, minimum=1)
+    seed = arguments.integer("seed", seed, minimum=0)
+    solved = [
+        _by_search(arm, pose, count, seed) if arm.method == SEARCH else _by_closed_form(arm, pose)
+        for arm in arms.members
+    ]
+    return _merged(arms, solved)
+
+
+def _checked_pose(model: Articulation, target: Any, effector: int | str | None) -> CheckedTarget:
+    """Return the target, its numbers not yet checked."""
+    if type(target) is Target and (effector is None or target.effector is None):
+        x, R = target.position, target.rotation
+        if is_plain(x, (3,)) and is_plain(R, (4,)):
+            joint = effector_of(model, target.effector if effector is None else effector)
+            return CheckedTarget(joint, x, R, 1.0)  # type: ignore[arg-type]
+    if not isinstance(target, Target) or target.rotation is None:
+        raise ValueError(f"target: expected a Target with a rotation, got {target!r:.80}")
+    (checked,) = checked_targets(model, target, effector)
+    arguments.check_shape("target", checked.position, 3)
+    arguments.check_shape("rotation", checked.rotation, 4)  # type: ignore[arg-type]
+    return checked
+
+
+def _plain(arm: Arm, pose: CheckedTarget) -> IKSolutions:
+    """Return the solutions of an arm with a closed form, whose joints are all the robot has."""
+    rows, complete, continuum, *_ = _by_closed_form(arm, pose)
+    return IKSolutions(
+        rows[:, :HINGES], rows[:, HINGES], rows[:, HINGES + 1], arm.method, complete,
+        continuum, 0.0, {},
+    )  # fmt: skip
+
+
+def _by_closed_form(arm: Arm, pose: CheckedTarget) -> _ArmSolutions:
+    rows = np.empty((CANDIDATES, HINGES + FIGURES))
+    count, continuum, doubts = closed_form_kernel(*arm.flat, pose.position, pose.rotation, rows)
+    rows.flags.writeable = False
+    if count < 0:
+        check_numbers([pose])
+        raise ValueError("rotation: expected a quaternion within 1e-6 of unit length")
+    return _ArmSolutions(rows[:count], arm.is_exact and not (continuum or doubts), continuum)
+
+
+def _by_search(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:
+    (pose,) = check_numbers([pose])
+    starts = arm.articulation.random(np.random.default_rng(seed), restarts)
+    tolerances = SEARCH_TOLERANCE * arm.mechanism.reach, SEARCH_TOLERANCE
+    settings = checked_settings("levenberg_marquardt", *tolerances, None, 0, 0, False)
+    ends = solve_checked(arm.articulation, starts, [pose], settings)
+    is_near = (ends.residual <= tolerances[0]) & (ends.residual_rotation <= tolerances[1])
+    candidates = np.ascontiguousarray(ends.coordinates[is_near][:, arm.mechanism.columns])
+    rows = np.empty((len(candidates), len(arm.columns) + FIGURES))
+    count, _ = settle_kernel(*arm.mechanism, candidates, target_rows([pose], ()), rows)
+    rows = rows[:count]
+    hits = rows[:, -1]
+    single = int((hits == 1.0).sum())
+    return _ArmSolutions(rows, False, count > LARGEST_COUNT, int(hits.sum()), single)
+
+
+def _merged(arms: Arms, solved: list[_ArmSolutions]) -> IKSolutions:
+    """Return the solutions of all arms."""
+    coordinates = np.repeat(
+        [arm.rest for arm in arms.members], [len(s.rows) for s in solved], axis=0
+    )
+    rows = solved[0].rows if len(solved) == 1 else np.concatenate([s.rows for s in solved])
+    coordinates[:, arms.members[0].columns] = rows[:, :-FIGURES]
+    distance, angle, _ = rows[:, -FIGURES:].T.copy()
+    for values in (coordinates, distance, angle):
+        values.flags.writeable = False
+    methods = dict.fromkeys(arm.method for arm in arms.members)
+    starts, unseen = sum(s.starts for s in solved), float(SEARCH in methods)
+    if starts:
+        unseen = sum(s.single for s in solved) / starts
+    return IKSolutions(
+        coordinates, distance, angle, ", ".join(methods), all(s.complete for s in solved),
+        any(s.continuum for s in solved), unseen, arms.grid,
+    )  # fmt: skip

@@ -1,0 +1,196 @@
+"""Subproblems of closed forms: angles that solve one or two geometric equations.
+
+An angle is a pair of its cosine and sine, so that most steps need no trigonometry. The subproblems
+are those of Paden (1986) and Kahan (1983) and, with a quartic, of Elias & Wen (2022).
+"""
+
+import math
+
+from ...quaternion import add, cross, dot, scale, subtract
+
+# Coefficients no greater than this, over those of lengths and rotations near one, are zero.
+ZERO = 1e-12
+# A cosine this far beyond one, or a quartic this near to zero at an extremum, has a double root.
+DOUBLE_ROOT = 1e-14
+# Angles within this of a double root [rad] are taken for it: it has half the digits of rounding.
+SAME_ROOT = 1e-7
+# A vector no longer across an axis than this has no angle about it.
+SINGULAR = 1e-7
+# Halvings of an interval that holds a root, at the most: those of its length down to rounding.
+HALVINGS = 60
+
+
+def rotated(axis, angle, v):
+    """Return a vector rotated about a unit axis by an angle (Rodrigues' formula)."""
+    c, s = angle
+    along = scale((1.0 - c) * dot(axis, v), axis)
+    return add(add(scale(c, v), scale(s, cross(axis, v))), along)
+
+
+def rotated_back(axis, angle, v):
+    """Return a vector rotated about a unit axis by minus an angle."""
+    return rotated(axis, (angle[0], -angle[1]), v)
+
+
+def rotated_back_about(axis, point, angle, x):
+    """Return a point rotated by minus an angle about the axis through another point."""
+    return add(point, rotated_back(axis, angle, subtract(x, point)))
+
+
+def projection(u, axis, v):
+    """Return k, a, b of u · R v = k + a cos + b sin, R the rotation about an axis."""
+    k = dot(axis, u) * dot(axis, v)
+    return k, dot(u, v) - k, dot(u, cross(axis, v))
+
+
+def angle_between(axis, v, w):
+    """Return the angle about an axis that brings v into the half-plane of w (subproblem 1).
+
+    Also return whether one of them is on the axis, so that every angle does; then it may be zero.
+    """
+    c, s = dot(v, w) - dot(axis, v) * dot(axis, w), dot(axis, cross(v, w))
+    product = math.sqrt(c * c + s * s)
+    if product <= ZERO * ZERO:
+        return (1.0, 0.0), True
+    return (c / product, s / product), product <= SINGULAR * SINGULAR
+
+
+def line_roots(k, a, b, deviation, roots):
+    """Fill the angles of k + a cos + b sin = 0 (subproblems 3 and 4).
+
+    A deviation of the coefficients may hide or part a double root: the angles are then near it.
+
+    Returns their number, and whether every angle is one; then it fills in zero.
+    """
+    r = math.sqrt(a * a + b * b)
+    if r <= ZERO:
+        return every_angle(roots) if abs(k) <= ZERO else (0, False)
+    x, a, b, largest = -k / r, a / r, b / r, 1.0 - min(1.0, deviation / r)
+    if abs(x) > 1.0 + (DOUBLE_ROOT + deviation) / r:
+        return 0, False
+    x = min(max(x, -largest), largest)
+    y = math.sqrt(max(0.0, 1.0 - x * x))
+    if y <= SAME_ROOT:
+        sign = math.copysign(1.0, x)
+        roots[0, 0], roots[0, 1] = sign * a, sign * b
+        return 1, False
+    roots[0, 0], roots[0, 1] = x * a - y * b, x * b + y * a
+    roots[1, 0], roots[1, 1] = x * a + y * b, x * b - y * a
+    return 2, False
+
+
+def every_angle(roots):
+    """Fill in the angle zero for all angles; see `line_roots`."""
+    roots[0, 0], roots[0, 1] = 1.0, 0.0
+    return 1, True
+
+
+def product(f, g):
+    """Return the product of two linear forms k + a cos + b sin, as `conic_roots` takes it.
+
+    That is p0 + p1 cos + p2 sin + p3 cos 2 + p4 sin 2.
+    """
+    cosines, sines = f[1] * g[1], f[2] * g[2]
+    return (
+        f[0] * g[0] + 0.5 * (cosines + sines),
+        f[0] * g[1] + f[1] * g[0],
+        f[0] * g[2] + f[2] * g[0],
+        0.5 * (cosines - sines),
+        0.5 * (f[1] * g[2] + f[2] * g[1]),
+    )
+
+
+def weighted_sum(s, p, t, q):
+    """Return s p + t q of two such products."""
+    return (
+        s * p[0] + t * q[0], s * p[1] + t * q[1], s * p[2] + t * q[2], s * p[3] + t * q[3],
+        s * p[4] + t * q[4],
+    )  # fmt: skip
+
+
+def conic_roots(p, deviation, roots, work):
+    """Fill the angles of p0 + p1 cos + p2 sin + p3 cos 2 + p4 sin 2 = 0, as `line_roots` does.
+
+    These are the intersections of a conic with the unit circle (Elias & Wen 2022, subproblems 5 and
+    6). In t, the tangent of half the angle, it is a quartic; t in [-1, 1] about 0 and about pi
+    covers the circle. `work`, (5, 12), holds the roots of its derivatives.
+    """
+    size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(p[3]) + abs(p[4])
+    if size <= ZERO * ZERO:
+        return every_angle(roots)
+    count = 0
+    for side in (1.0, -1.0):
+        p1, p2 = side * p[1], side * p[2]
+        quartic = (
+            p[0] + p1 + p[3], 2.0 * p2 + 4.0 * p[4], 2.0 * p[0] - 6.0 * p[3],
+            2.0 * p2 - 4.0 * p[4], p[0] - p1 + p[3],
+        )  # fmt: skip
+        n = quartic_roots(quartic, (DOUBLE_ROOT + deviation) * size, work)
+        for i in range(n):
+            t = work[0, i]
+            c, s = (1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t)
+            if abs(t) < 1.0 or side > 0.0:  # both halves have the ends
+                roots[count, 0], roots[count, 1] = side * c, side * s
+                count += 1
+    return count, False
+
+
+def quartic_roots(a, margin, work):
+    """Fill work[0] with the roots of a0 + a1 t + ... + a4 t^4 in [-1, 1]; return their number.
+
+    Between extrema, the roots of the derivative, a polynomial has a root where its sign changes. A
+    value within the margin at an extremum or an end is a double root or a root at the end.
+    """
+    # the polynomial and its derivatives
+    chain = (
+        a,
+        (a[1], 2.0 * a[2], 3.0 * a[3], 4.0 * a[4], 0.0),
+        (2.0 * a[2], 6.0 * a[3], 12.0 * a[4], 0.0, 0.0),
+        (6.0 * a[3], 24.0 * a[4], 0.0, 0.0, 0.0),
+        (24.0 * a[4], 0.0, 0.0, 0.0, 0.0),
+    )
+    work[4, 0], count = 1.0, 0
+    for order in (3, 2, 1, 0):
+        f, slope, allowance = chain[order], chain[order + 1], margin if order == 0 else 0.0
+        extrema, work[order + 1, count] = count, 1.0
+        row, left, count = work[order], -1.0, 0
+        f_left = value(f, left, allowance)
+        if f_left == 0.0:
+            row[0], count = left, 1
+        for i in range(extrema + 1):
+            right = work[order + 1, i]
+            f_right = value(f, right, allowance)
+            if f_right == 0.0:
+                row[count] = right
+                count += 1
+            elif f_left * f_right < 0.0:
+                row[count] = root_between(f, slope, left, right, f_left)
+                count += 1
+            left, f_left = right, f_right
+    return count
+
+
+def value(a, t, margin):
+    """Return a0 + a1 t + ... + a4 t^4, zero within a margin."""
+    f = (((a[4] * t + a[3]) * t + a[2]) * t + a[1]) * t + a[0]
+    return 0.0 if abs(f) <= margin else f
+
+
+def root_between(f, slope, left, right, f_left):
+    """Return the only root between two points of opposite sign: Newton's method, else halving."""
+    t = 0.5 * (left + right)
+    for _ in range(HALVINGS):
+        f_t = value(f, t, 0.0)
+        if f_t * f_left > 0.0:
+            left = t
+        else:
+            right = t
+        gradient = value(slope, t, 0.0)
+        step = f_t / gradient if gradient != 0.0 else 2.0
+        following = t - step
+        if not left < following < right:
+            following = 0.5 * (left + right)
+        if following == t or abs(following - t) <= 1e-16:
+            break
+        t = following
+    return t

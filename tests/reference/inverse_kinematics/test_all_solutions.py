@@ -1,0 +1,339 @@
+"""All solutions of a pose: laws of the list, closed forms against searches, singular poses."""
+
+import numpy as np
+import pytest
+
+from plumbob import Articulation, Mimic, Skeleton, Target, all_solutions, solve_ik
+from plumbob.reference import forward_kinematics, rotation, set_backend
+from plumbob.reference.inverse_kinematics.branches import subproblems
+from plumbob.reference.inverse_kinematics.branches.closed_forms import FORMS
+
+WRIST, PARALLEL = FORMS
+X, Y, Z = np.eye(3)
+# Axes and points on them with all joints at zero, by the makers' published dimensions [m].
+ARMS = {
+    "UR5": ([Z, Y, Y, Y, -Z, Y], [[0, 0, 0.089], [0, 0.136, 0.089], [0.425, 0.016, 0.089],
+            [0.817, 0.016, 0.089], [0.817, 0.109, 0.089], [0.817, 0.109, -0.006]], PARALLEL),
+    "Puma 560": ([Z, -Y, -Y, Z, -Y, Z], [[0, 0, 0], [0, 0.244, 0], [0.432, 0.15, 0],
+                 [0.412, 0.15, 0.432], [0.412, 0.15, 0.432], [0.412, 0.15, 0.432]], WRIST),
+    "offset shoulder": ([Z, Y, Y, X, Y, X], [[0, 0, 0.4], [0.025, 0, 0.4], [0.025, 0, 0.855],
+                        [0.445, 0, 0.89], [0.445, 0, 0.89], [0.525, 0, 0.89]], WRIST),
+    "skew": ([Z, [0.2, 0.9, 0.3], [0.5, 0.3, 0.7], X, [0.3, 0.8, 0.1], Z], [[0, 0, 0.1],
+             [0.1, 0.2, 0.3], [0.4, 0.1, 0.3], [0.7, 0.2, 0.5], [0.7, 0.2, 0.5], [0.7, 0.2, 0.5]],
+             WRIST),
+    "Jaco-like wrist": ([Z, Y, Y, X, [1, 0, 1], X], [[0, 0, 0.2], [0, 0, 0.2], [0, 0, 0.6],
+                        [0.3, 0.01, 0.6], [0.3, 0.01, 0.6], [0.3, 0.01, 0.6]], WRIST),
+}  # fmt: skip
+SEVEN = [Z, Y, Z, -Y, Z, Y, Z], [[0, 0, h] for h in (0.15, 0.36, 0.56, 0.78, 0.96, 1.18, 1.3)]
+GENERAL = [Z, [0.1, 1, 0], [0.2, 1, 0.3], [1, 0.2, 0], [0, 1, 0.2], X], [
+    [0, 0, 0.2], [0.1, 0, 0.3], [0.5, 0.05, 0.3], [0.6, 0, 0.4], [0.9, 0.1, 0.35], [1, 0, 0.4],
+]  # fmt: skip
+LIMIT = np.pi
+# Forward kinematics of an arm of a metre rounds to 1e-15; the function promises 1e-9.
+REACHED = 1e-9
+# A coordinate is a root, whose condition number is up to 1e6 in random poses, or a double root.
+SAME = 1e-6
+
+
+def arm_of(axes, points, lower=-LIMIT, upper=LIMIT, base=(1.0, 0.0, 0.0, 0.0), backwards=False):
+    """Return an arm with a tool, turned by its base; backwards from its tool to its base."""
+    axes, points = np.array(axes, dtype=float), np.array(points, dtype=float)
+    if backwards:
+        axes, points = -axes[::-1], points[::-1] - points[-1]
+    points = np.vstack([points, points[-1] + [0.05, 0.1, -0.02]])
+    offsets = np.diff(points, axis=0, prepend=np.zeros((1, 3)))
+    count = len(axes)
+    frames = rotation.identity(count + 1)
+    offsets[0], frames[0] = rotation.rotate(np.array(base), offsets[0]), base
+    frames[-1] = rotation.exponential(np.array([0.3, -0.5, 0.8]))
+    kinds = [*["hinge"] * count, "fixed"]
+    skeleton = Skeleton(range(-1, count), offsets)
+    axes = np.vstack([axes, Z])
+    return Articulation(skeleton, kinds, axes, frames=frames, lower=lower, upper=upper)
+
+
+def target_of(arm, q):
+    pose = forward_kinematics(arm, q)
+    return Target(pose.positions[-1], pose.rotations[-1])
+
+
+def differences(a, b):
+    """Return the largest difference of angles of each row of a from each row of b."""
+    turns = a[:, None] - b[None]
+    return np.abs(turns - 2.0 * np.pi * np.round(turns / (2.0 * np.pi))).max(axis=-1)
+
+
+def assert_lists(solutions, arm, target, q=None):
+    """Check the laws of a list: poses, limits, no duplicates, and that it has q."""
+    pose = forward_kinematics(arm, solutions.coordinates)
+    distance = np.linalg.norm(pose.positions[:, -1] - target.position, axis=-1)
+    angle = rotation.angle(pose.rotations[:, -1], target.rotation)
+    assert distance.max(initial=0.0) <= REACHED
+    assert angle.max(initial=0.0) <= REACHED
+    np.testing.assert_allclose(solutions.residual, distance, atol=1e-14)
+    assert arm.within_limits(solutions.coordinates).all()
+    apart = differences(solutions.coordinates, solutions.coordinates)
+    assert (apart + 9.0 * np.eye(len(apart))).min(initial=9.0) > SAME
+    if q is not None:
+        assert differences(solutions.coordinates, q[None]).min(initial=9.0) < SAME
+
+
+@pytest.fixture(params=ARMS)
+def named(request):
+    return request.param
+
+
+@pytest.mark.parametrize("backwards", [False, True], ids=["forwards", "backwards"])
+def test_a_closed_form_lists_the_pose_that_made_the_target(named, backwards, rng):
+    *geometry, method = ARMS[named]
+    arm, moved = arm_of(*geometry, backwards=backwards), []
+    for q in arm.random(rng, 30):
+        target = target_of(arm, q)
+        solutions = all_solutions(arm, target)
+        assert_lists(solutions, arm, target, q)
+        assert (solutions.method, solutions.complete, solutions.unseen) == (method, True, 0.0)
+        assert len(solutions.coordinates) <= 8
+        assert len(solutions.coordinates) % 2 == 0  # isolated solutions of 6R arms come in pairs
+        moved.append(len(solutions.coordinates))
+    assert max(moved) > 2
+
+
+@pytest.mark.parametrize(
+    ("targets", "starts"), [(2, 60), pytest.param(60, 600, marks=pytest.mark.slow)]
+)
+def test_no_search_finds_more_than_a_closed_form(named, targets, starts, rng):
+    arm = arm_of(*ARMS[named][:2])
+    for q in arm.random(rng, targets):
+        target = target_of(arm, q)
+        solutions = all_solutions(arm, target).coordinates
+        ends = solve_ik(arm, arm.random(rng, starts), target, tolerance=1e-11,
+                        tolerance_rotation=1e-11, restarts=0)  # fmt: skip
+        ends = ends.coordinates[(ends.residual < 1e-10) & (ends.residual_rotation < 1e-10)]
+        assert len(ends) > starts // 4
+        assert differences(ends, solutions).min(axis=1).max() < 1e-5
+
+
+def test_bases_and_tools_change_nothing(named, rng):
+    geometry = ARMS[named][:2]
+    base, arm = rotation.random(rng), arm_of(*geometry)
+    turned = arm_of(*geometry, base=base)
+    target = target_of(arm, arm.random(rng))
+    moved = Target(*(turn(base, x) for turn, x in zip(
+        (rotation.rotate, rotation.multiply), target[:2], strict=True)))  # fmt: skip
+    a, b = (all_solutions(*pair).coordinates for pair in ((arm, target), (turned, moved)))
+    assert len(a) == len(b) > 0
+    assert differences(a, b).min(axis=1).max() < SAME
+
+
+def test_limits_keep_those_within_them(named, rng):
+    geometry = ARMS[named][:2]
+    arm, narrow = arm_of(*geometry), arm_of(*geometry, lower=-1.5, upper=2.5)
+    kept = 0
+    for q in narrow.random(rng, 10):
+        target = target_of(arm, q)
+        everything, within = all_solutions(arm, target), all_solutions(narrow, target)
+        expected = everything.coordinates[narrow.within_limits(everything.coordinates)]
+        assert len(expected) == len(within.coordinates)
+        assert differences(expected, within.coordinates).min(axis=1).max() < SAME
+        kept += len(expected) < len(everything.coordinates)
+    assert kept > 0
+
+
+def test_angles_are_the_nearest_to_the_middle_of_the_limits(rng):
+    arm = arm_of(*ARMS["UR5"][:2], lower=1.0, upper=[9.0, 9.0, 9.0, 9.0, 9.0, np.inf, 9.0])
+    q = arm.random(rng)
+    solutions = all_solutions(arm, target_of(arm, q))
+    assert_lists(solutions, arm, target_of(arm, q), q)
+    assert np.abs(solutions.coordinates[:, :5] - 5.0).max() <= np.pi
+
+
+def test_both_backends_agree(named, rng):
+    arm = arm_of(*ARMS[named][:2])
+    target = target_of(arm, arm.random(rng))
+    compiled = all_solutions(arm, target)
+    with set_backend("python"):
+        plain = all_solutions(arm, target)
+    np.testing.assert_allclose(plain.coordinates, compiled.coordinates, atol=1e-9)
+
+
+# The third angle at which 0.025 + 0.42 cos + 0.035 sin = 0: the wrist is on the first axis.
+ABOVE = np.arctan2(0.035, 0.42) + np.arccos(-0.025 / np.hypot(0.42, 0.035))
+SINGULAR = {
+    "wrist of UR5": ("UR5", [0.3, -1.0, 0.8, 0.5, 0.0, 0.4], True),
+    "straight elbow of UR5": ("UR5", [0.3, -1.0, 0.0, 0.5, 0.9, 0.4], False),
+    "wrist of Puma": ("Puma 560", [0.3, -1.0, 0.8, 0.5, 0.0, 0.4], True),
+    "wrist of the offset arm": ("offset shoulder", [0.3, -1.0, 0.8, 0.5, 0.0, 0.4], True),
+    "wrist above the base": ("offset shoulder", [0.3, 0.0, ABOVE, 0.5, 0.7, 0.4], True),
+}
+
+
+@pytest.mark.parametrize(("name", "q", "continuum"), SINGULAR.values(), ids=SINGULAR)
+def test_singular_poses_are_said(name, q, continuum):
+    arm, q = arm_of(*ARMS[name][:2]), np.array(q)
+    target = target_of(arm, q)
+    solutions = all_solutions(arm, target)
+    assert_lists(solutions, arm, target, None if continuum else q)
+    assert len(solutions.coordinates) > 0
+    assert solutions.continuum == continuum
+    assert solutions.complete != continuum
+
+
+def test_out_of_reach_there_is_no_solution(named):
+    arm = arm_of(*ARMS[named][:2])
+    solutions = all_solutions(arm, Target([3.0, 2.0, 1.0], rotation.identity()))
+    assert solutions.coordinates.shape == (0, 6)
+    assert solutions.complete
+    assert not solutions.continuum
+
+
+def test_axes_that_nearly_meet_prove_nothing(rng):
+    axes, points, method = ARMS["Puma 560"]
+    points = np.array(points) + 1e-7 * rng.standard_normal((6, 3))
+    arm = arm_of(axes, points)
+    for q in arm.random(rng, 10):
+        target = target_of(arm, q)
+        solutions = all_solutions(arm, target)
+        assert_lists(solutions, arm, target, q)
+        assert (solutions.method, solutions.complete) == (method, False)
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_seven_joints_are_solved_on_a_grid(joint, rng):
+    arm = arm_of(*SEVEN)
+    q = arm.random(rng)
+    target, values = target_of(arm, q), np.array([q[joint], 0.4])
+    solutions = all_solutions(arm, target, grid={joint: values})
+    is_elbow = joint == 3  # which the target alone determines: a continuum goes through q
+    assert_lists(solutions, arm, target, None if is_elbow else q)
+    assert solutions.continuum == is_elbow
+    assert np.isin(solutions.coordinates[:, joint], values).all()
+    assert list(solutions.grid) == [arm.names[joint]]
+
+
+def test_the_default_grid_is_of_a_redundant_joint_and_stated(rng):
+    arm = arm_of(*SEVEN)
+    target = target_of(arm, arm.random(rng))
+    solutions = all_solutions(arm, target)
+    assert_lists(solutions, arm, target)
+    ((name, values),) = solutions.grid.items()
+    joint = arm.index(name)
+    assert joint != 3  # the elbow's angle is given by the distance of the wrist
+    assert solutions.complete
+    assert set(solutions.coordinates[:, joint]) <= set(values)
+    repeated = all_solutions(arm, target, grid={name: values})
+    np.testing.assert_array_equal(repeated.coordinates, solutions.coordinates)
+
+
+@pytest.mark.parametrize(
+    ("targets", "dense"), [(1, 512), pytest.param(20, 4096, marks=pytest.mark.slow)]
+)
+def test_a_search_states_its_coverage(targets, dense, rng):
+    arm = arm_of(*GENERAL)
+    for q in arm.random(rng, targets):
+        target = target_of(arm, q)
+        solutions = all_solutions(arm, target)
+        assert_lists(solutions, arm, target)
+        assert (solutions.method, solutions.complete) == ("restarts", False)
+        more = all_solutions(arm, target, restarts=dense, seed=1)
+        assert_lists(more, arm, target, q)
+        assert 0.0 <= more.unseen < 0.02
+        missing = differences(more.coordinates, solutions.coordinates).min(axis=1) > SAME
+        assert missing.sum() <= 1 + (solutions.unseen > 0.01)
+
+
+def test_slides_and_joints_that_follow_others_are_searched(rng):
+    skeleton = Skeleton(range(-1, 7), 0.3 * rng.standard_normal((8, 3)))
+    kinds = ["slide", "hinge", "slide", "hinge", "hinge", "hinge", "hinge", "hinge"]
+    arm = Articulation(skeleton, kinds, rng.standard_normal((8, 3)), lower=-1.0, upper=1.0,
+                       mimics={3: Mimic(1, 0.5, 0.2), 6: Mimic(5)})  # fmt: skip
+    q = arm.random(rng)
+    solutions = all_solutions(arm, target_of(arm, q))
+    assert_lists(solutions, arm, target_of(arm, q), q)
+    assert solutions.method == "restarts"
+    locked = all_solutions(arm, target_of(arm, q), grid={1: q[1]}, restarts=64)
+    assert_lists(locked, arm, target_of(arm, q), q)
+
+
+def test_other_joints_stay_at_neutral(rng):
+    axes, points, _ = ARMS["UR5"]
+    alone = arm_of(axes, points)
+    offsets = np.vstack([alone.skeleton.offsets, [0.1, 0.0, 0.0]])
+    arm = Articulation(
+        Skeleton([*alone.skeleton.parents, 2], offsets), [*alone.kinds, "ball"],
+        np.vstack([alone.axes, Z]), frames=np.vstack([alone.frames, rotation.identity()]),
+    )  # fmt: skip
+    target = target_of(alone, alone.random(rng))
+    solutions = all_solutions(arm, target, effector=6)
+    expected = all_solutions(alone, target).coordinates
+    np.testing.assert_allclose(solutions.coordinates[:, :6], expected, atol=1e-9)
+    np.testing.assert_array_equal(solutions.coordinates[:, 6:], [[1, 0, 0, 0]] * len(expected))
+
+
+POSE = Target([0.3, 0.2, 0.4], [1.0, 0.0, 0.0, 0.0])
+MISUSES = {
+    "no rotation": ({"target": Target([0.3, 0.2, 0.4])}, "target: expected a Target with a rot"),
+    "a position": ({"target": [0.3, 0.2, 0.4]}, "target: expected a Target with a rotation"),
+    "a batch": ({"target": Target(np.zeros((2, 3)), [1, 0, 0, 0])}, r"target: expected shape \(3"),
+    "NaN": ({"target": Target([np.nan, 0.2, 0.4], [1.0, 0, 0, 0])}, "target: expected finite"),
+    "no unit": ({"target": Target([0.3, 0.2, 0.4], [1.0, 0.1, 0, 0])}, "rotation: expected"),
+    "a skeleton": ({"robot": Skeleton([-1, 0], np.ones((2, 3)))}, "robot: expected hinges"),
+    "a ball": ({"robot": Articulation(Skeleton([-1, 0], np.ones((2, 3))))}, "robot: expected hin"),
+    "no robot": ({"robot": 3}, "robot: expected a Skeleton, an Articulation or a Robot"),
+    "no effector": ({"effector": 99}, "effector: expected"),
+    "a grid of numbers": ({"grid": [1.0]}, "grid: expected a Mapping"),
+    "an unknown joint": ({"grid": {"nose": 0.0}}, "grid: expected"),
+    "beyond limits": ({"grid": {0: 7.0}}, "grid: expected values from -3.14159 to 3.14159, got 7"),
+    "no values": ({"grid": {0: []}}, "grid: expected values of 'joint0', got none"),
+    "a fixed joint": ({"grid": {7: 0.0}}, "grid: expected hinges or slides"),
+    "too few locked": ({"grid": {}}, "grid: expected joints to lock, so that 6 of 7 remain, got 0"),
+    "no restarts": ({"restarts": 0}, "restarts: expected"),
+}
+
+
+@pytest.mark.parametrize(("changes", "message"), MISUSES.values(), ids=MISUSES)
+def test_misuse_is_named(changes, message):
+    arguments = {"robot": arm_of(*SEVEN), "target": POSE} | changes
+    with pytest.raises(ValueError, match=f"^{message}"):
+        all_solutions(**arguments)
+
+
+def conic(p, angle):
+    waves = np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)
+    return p[0] + np.tensordot(p[1:], np.array(waves), 1)
+
+
+def conic_angles(p):
+    roots = np.empty((24, 2))
+    count, every = subproblems.conic_roots(tuple(p), 0.0, roots, np.empty((5, 12)))
+    assert not every
+    return np.arctan2(*roots[:count, ::-1].T)
+
+
+def test_roots_of_a_conic_on_the_circle_are_all_its_changes_of_sign(rng):
+    grid = np.linspace(-np.pi, np.pi, 4000)
+    for p in rng.standard_normal((50, 5)):
+        angles = conic_angles(p)
+        assert np.abs(conic(p, angles)).max(initial=0.0) < 1e-12
+        changes = np.diff(np.sign(conic(p, grid))) != 0
+        assert len(angles) == changes.sum()
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, np.pi / 2, np.pi, -np.pi / 2, -2.0])
+def test_double_roots_of_a_conic_are_found(angle):
+    # (1 - cos(t - a)) (2 + cos(t - a)), which is zero and least at a alone
+    c, s = np.cos(angle), np.sin(angle)
+    p = [1.5, -c, -s, -0.5 * np.cos(2 * angle), -0.5 * np.sin(2 * angle)]
+    angles = conic_angles(p)
+    assert len(angles) in (1, 2)
+    assert np.abs(np.exp(1j * angles) - np.exp(1j * angle)).max() < 1e-6
+
+
+def test_roots_of_a_line_on_the_circle(rng):
+    roots = np.empty((2, 2))
+    for k, a, b in rng.standard_normal((50, 3)):
+        count, every = subproblems.line_roots(k, a, b, 0.0, roots)
+        assert (count, every) == (2 * (abs(k) < np.hypot(a, b)), False)
+        assert np.abs(k + roots[:count] @ [a, b]).max(initial=0.0) < 1e-14
+    assert subproblems.line_roots(1.0, 0.6, 0.8, 0.0, roots) == (1, False)
+    assert subproblems.line_roots(0.0, 0.0, 0.0, 0.0, roots) == (1, True)
+    assert subproblems.line_roots(0.1, 0.0, 0.0, 0.0, roots) == (0, False)
