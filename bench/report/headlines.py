@@ -108,7 +108,7 @@ def headlines(results: Results) -> list[Headline]:
 
 
 def scale(results: Results) -> str:
-    """Return the scale of the records: "Quick run: 20 targets a stratum", "" if unknown."""
+    """Return the scale of the records: "Quick run: 20 targets of each kind", "" if unknown."""
     names = dict.fromkeys(r.notes.get("scale", "") for r in results.all(FINISHED))
     name = listed(list(filter(None, names)))
     records = results.all("ik", task=REACHABLE)
@@ -116,7 +116,7 @@ def scale(results: Results) -> str:
     targets = listed([words(count) for count in sorted(counts)], "or")
     run = f"{name} run".strip().capitalize()
     if targets:
-        return f"{run}: {targets} targets a stratum"
+        return f"{run}: {targets} targets of each kind"
     mixture = "Some suites were measured quickly, others at full length"
     return _SCALES.get(name, mixture) if name else ""
 
@@ -384,7 +384,7 @@ def _robot_wins(group: str, start: str, fields: dict[str, list[Score]]) -> Itera
         own = next(filter(registry.is_ours, field[0].time.order), "")
         if own and (first := _faster(rows, own)):
             size = ratio_of_times(rows[own], rows[first]).value
-            result = f"is faster than {full_name(own)} {_FROM[start]}, where both solve,"
+            result = f"is faster, where both solve, than {full_name(own)} {_FROM[start]}"
             yield Win("kinematics", first, result, robot, size, cases, "robots_by_robot")
 
 

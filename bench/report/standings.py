@@ -108,8 +108,10 @@ def percent(share: metrics.Share) -> str:
 
 
 def full_name(solver: str) -> str:
-    """Return how a solver is written, with "(ours)" behind each of Plumbob's."""
-    return f"{label(solver)} (ours)" if registry.is_ours(solver) else label(solver)
+    """Return how a solver is written in a sentence: "pink (20 restarts)", "Plumbob LM (ours)"."""
+    name, *details = label(solver).split(", ")
+    details += ["ours"] * registry.is_ours(solver)
+    return f"{name} ({', '.join(details)})" if details else name
 
 
 def best_rival(solver: str, order: Sequence[str]) -> str:

@@ -157,7 +157,7 @@ def test_a_miss_costs_no_time_and_a_solver_that_is_faster_where_both_solve_wins(
         "is, where both solve, 3.0 times slower than pink, the fastest other one there."
     )
     assert wins(records) == [
-        "pink is faster than Plumbob LM (ours) from one start, where both solve, on 1 of 1 robot "
+        "pink is faster, where both solve, than Plumbob LM (ours) from one start on 1 of 1 robot "
         "of yours (the arm), by a factor of 3.0."
     ]
 
@@ -286,7 +286,7 @@ def test_peers_without_a_measurement_are_absent_or_were_not_asked(make, run):
 def test_the_scale_gives_the_number_of_targets_if_there_are_records(make, run):
     quick = make.record(FINISHED, "ik", "", notes={"scale": "quick"})
     scale = headlines.scale(Results([quick, run("a", 1)]))
-    assert scale == "Quick run: 100 targets a stratum"
+    assert scale == "Quick run: 100 targets of each kind"
 
 
 def test_a_paired_ratio_holds_the_factor_and_a_single_pair_leaves_it_open():

@@ -153,7 +153,7 @@ def test_the_first_screen_answers_and_shows_a_map_and_a_player(browser, size):
         "the best other solver",
         "Where others win",
         "a <b>slide</b> rule",
-        "Quick run: 60 targets a stratum",
+        "Quick run: 60 targets of each kind",
         "Not installed: EAIK, ",
     ):
         assert words in message

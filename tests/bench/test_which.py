@@ -38,7 +38,7 @@ def test_a_solver_has_a_row_with_its_best_settings_and_the_best_is_first(make):
     assert p95[0] == pytest.approx(1e6 * np.quantile(times, 0.95))
     assert table.title == "arm.urdf, 7 joints to hand: 200 targets"
     assert table.summary.sentence == (
-        "Choose Plumbob LM, 20 restarts (ours): it solves 100 % of the targets with a median of "
+        "Choose Plumbob LM (20 restarts, ours): it solves 100 % of the targets with a median of "
         "10.0 µs, the fastest of 2 that solve the most within chance."
     )
 
