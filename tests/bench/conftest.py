@@ -323,6 +323,7 @@ def records():
         *(sample("few", settings={"iterations": n}) for n in (1, 10, 100)),
         two_dampers(),
         certified(),
+        sample("proven"),
         *(swung(s, c) for c in ("undamped", "damped") for s in ("RK4", "discrete")),
         *(
             raced("Plumbob LM", kind, task)
