@@ -35,28 +35,32 @@ from ..skeleton import Skeleton
 UNIT = 2.0**-53
 ROUNDINGS = 3000
 # The accuracy of a shell, over the length of the chain, and the boxes for a shell and for a target.
-ACCURACY, SHELL_BOXES, TARGET_BOXES = 1e-3, 50_000, 4_000
+ACCURACY, SHELL_BOXES, TARGET_BOXES = 1e-3, 20_000, 2_000
 # Factor that covers the rounding errors of widths and lengths, which have few operations.
 WIDER = 1.0 + 1e-12
 # Axes count as parallel if the square of the sine between them is smaller.
-PARALLEL = 1e-12
+PARALLEL = 1e-6
 
 
 class ReachShell(NamedTuple):
     """The shell of a point on a path, by the joints above it within their limits."""
 
+    base: FloatArray  # its centre, in the world [m], (3,)
     joint: int  # whose axis the point is on, by its position on the path; beyond it the effector's
     point: FloatArray  # in the frame of that joint [m], (3,)
-    least: float  # distance from the base point [m]
+    least: float  # distance from the base [m]
     largest: float
 
 
 class Reach(NamedTuple):
-    """The base point of a path, and shells about it."""
+    """The shells of the points on a path.
+
+    The first are about a point on the axis of the first joint that moves, of which that joint
+    changes no distance; the others about points around it, which show the limits of that joint.
+    """
 
     path: list[int]  # joints from the root on
     length: float  # of all offsets on the path [m]
-    base: FloatArray  # on the axis of the first joint that moves, in the world [m], (3,)
     shells: list[ReachShell]
 
 
@@ -88,33 +92,35 @@ def least_distance(
     """Return a bound [m] and a lever [m]: distance + lever angle >= bound for every pose.
 
     These are the distance [m] and the angle [rad] of the effector from its target in any pose
-    within the limits. Without a target rotation the lever is 0. Proof: the pose of the effector
-    fixes the base point in its frame, up to the distance and, as it is `lever` from the target, to
-    the lever times the angle. So the distances from the base point to a point on an axis that
-    joints above it allow, and those that joints below it allow, are disjoint by at most this sum.
+    within the limits; the bound is 0 if none is proven, and the lever 0 without a target rotation.
+
+    Proof: the effector's pose fixes the centre of a shell in the effector's frame, up to the
+    distance and, as the centre is `lever` from the target, up to the lever times the angle. The
+    joints above a point on an axis keep it within the shell; for the effector to be at its target
+    the joints below would have to bring it there, and `separation` bounds by how much they fail.
     """
     reach = reach_of(model, joint, Q is not None)
-    offset = reach.base - position
-    r = float(np.linalg.norm(offset))
-    lever = 0.0 if Q is None else r * WIDER
-    scale = reach.length + np.linalg.norm(reach.base) + np.linalg.norm(position)
-    rounding = float(ROUNDINGS * UNIT * scale)
     for shell in reach.shells:
+        offset = shell.base - position
+        r = float(np.linalg.norm(offset))
         if Q is None:
             gap = max(r - shell.largest, shell.least - r)
         else:
             below, interval = reach.path[shell.joint + 1 :], (shell.least, shell.largest)
             point = rotation.rotate(rotation.conjugate(Q), offset)
             gap = separation(model, below, shell.point, point, interval)
-        if gap > rounding:
-            return gap - rounding, lever
-    return 0.0, lever
+        vectors = shell.base, shell.point, position
+        scale = reach.length + sum(float(np.linalg.norm(vector)) for vector in vectors)
+        gap -= ROUNDINGS * UNIT * scale
+        if gap > 0.0:
+            return gap, 0.0 if Q is None else r * WIDER
+    return 0.0, 0.0
 
 
 def reach_of(model: Articulation, joint: int, oriented: bool) -> Reach:
-    """Return the base point and the shells of the path to a joint, kept by the model.
+    """Return the shells of the points on the path to a joint, kept by the model.
 
-    With a rotation to reach there is a shell for every hinge and ball, the last first, of the
+    With a rotation to reach there are shells of every hinge and ball, the last first, of the
     point on its axis nearest to the next; else only that of the effector's origin.
     """
     key = "reach", joint, oriented
@@ -126,18 +132,22 @@ def reach_of(model: Articulation, joint: int, oriented: bool) -> Reach:
         base = x[0]
         if moving:
             base = x[moving[0]] + axes.nearest(moving[0], moving[min(1, len(moving) - 1)])
-        shells = []
-        if not oriented:
-            shells = [ReachShell(len(path), np.zeros(3), *span(model, path, base, np.zeros(3)))]
+        points = [] if oriented else [(len(path), np.zeros(3), np.zeros(3))]
         for i in reversed(range(len(moving) if oriented else 0)):
             k = moving[i]
             if axes.kinds[k] in ("hinge", "ball"):
                 other = moving[i + 1] if i + 1 < len(moving) else moving[max(i - 1, 0)]
                 point = rotation.rotate(rotation.conjugate(R[k]), axes.nearest(k, other))
                 end = offsets[path[k]] + rotation.rotate(model.frames[path[k]], point)
-                shells.append(ReachShell(k, point, *span(model, path[:k], base, end)))
+                points.append((k, point, end))
         length = float(np.linalg.norm(offsets[path], axis=1).sum())
-        model.mechanisms[key] = Reach(path, length, base, shells)
+        around = length * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+        shells = [
+            ReachShell(centre, k, point, *span(model, path[:k], centre, end))
+            for centre in base + around
+            for k, point, end in points
+        ]
+        model.mechanisms[key] = Reach(path, length, shells)
     reach: Reach = model.mechanisms[key]
     return reach
 

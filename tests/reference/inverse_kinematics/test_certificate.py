@@ -294,7 +294,7 @@ class TestImpossible:
             for shell in (*whole.shells, *reach.reach_of(model, tip, False).shells):
                 joint = [*whole.path, tip][shell.joint]
                 arm = rotation.rotate(poses.rotations[:, joint], shell.point)
-                r = np.linalg.norm(poses.positions[:, joint] + arm - whole.base, axis=-1)
+                r = np.linalg.norm(poses.positions[:, joint] + arm - shell.base, axis=-1)
                 assert shell.least - 1e-12 <= r.min()
                 assert r.max() <= shell.largest + 1e-12
 
