@@ -35,10 +35,14 @@ def textbook(task, faults=(), method="ccd", outputs=None):
             local, positions, _ = solve(method, inputs, switched)
             answer = {"local_rotations": local, "positions": positions}
         elif task == TRACK:
-            answer = dict(predict_track(method, switched, case_of(task, inputs)))
+            answer = predict_track(method, switched, case_of(task, inputs))
+            answer = {"positions": answer["all_positions"], **answer}
+            answer = {
+                name: answer[name] for name in {"positions", "local_rotations"} & answer.keys()
+            }
         else:
             answer = predict_forward(switched, case_of(task, inputs))
-        return {name: answer[name] for name in outputs or answer.keys() - {"placed"}}
+        return {name: answer[name] for name in outputs or answer}
 
     return function
 

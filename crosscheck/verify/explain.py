@@ -4,6 +4,7 @@ The variants with the fewest faults come first, so that a combination is named o
 of it suffices.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
@@ -31,6 +32,7 @@ class Variant(NamedTuple):
     # returns the outputs for a case by name, of which those also answered are compared; an
     # exception of NumPy or a ValueError means that the variant has no answer
     predict: Callable[[Case], Mapping[str, Any]]
+    is_special: bool = False  # compared only if no plain one with as few faults explains all
 
 
 class Match(NamedTuple):
@@ -50,13 +52,14 @@ def explain(
 ) -> tuple[tuple[Explanation, ...], int]:
     """Return the variants that reproduce most answers, nearest first, and the number compared.
 
-    The variants come in ascending order of the number of faults, the most telling answers first:
-    small, and wrong. `tolerance` is the relative difference that rounding explains; `describe` puts
-    the faults into words, given the keys of a class that no answer tells apart.
+    The variants come in ascending order of the number of faults, special ones of a number last, the
+    most telling answers first: small, and wrong. `tolerance` is the relative difference that
+    rounding explains; `describe` puts the faults into words, given the keys of a class that no
+    answer tells apart.
     """
     answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
     count, matches = 0, list[Match]()
-    for _, same_size in groupby(variants, key=lambda variant: len(variant.faults)):
+    for _, same_size in groupby(variants, key=lambda v: (len(v.faults), v.is_special)):
         for variant in same_size:
             count += 1
             match = _match(variant, answers, tolerance)
@@ -68,7 +71,7 @@ def explain(
     matches.sort(key=lambda match: (-match.share, len(match.variant.faults), match.distance))
     explanations = []
     for group in _classes(matches, answers, tolerance)[:EXPLANATIONS]:
-        keys = tuple(" + ".join(match.variant.faults) for match in group)
+        keys = tuple(dict.fromkeys(" + ".join(match.variant.faults) for match in group))
         explanations.append(Explanation(keys, describe(keys), group[0].share, group[0].distance))
     return tuple(explanations), count
 
@@ -131,13 +134,22 @@ def _difference(name: str, first: Any, second: Any) -> float:
     a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     if name.endswith("rotations") and a.shape == b.shape:
         b = b * np.where(np.nansum(a * b, -1, keepdims=True) < 0.0, -1.0, 1.0)
-    return largest_gap(a, b) / max(float(np.abs(np.nan_to_num(a)).max(initial=0.0)), 1e-300)
+    size = float(np.abs(a).max(initial=0.0))
+    if not math.isfinite(size):
+        size = float(np.abs(np.nan_to_num(a)).max())
+    return largest_gap(a, b) / max(size, 1e-300)
 
 
 def largest_gap(first: Any, second: Any) -> float:
     """Return the largest difference of two arrays, infinite between shapes, or NaN and number."""
     a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
+    if a.shape != b.shape:
+        return np.inf
+    with np.errstate(invalid="ignore"):
+        gap = float(np.abs(a - b).max(initial=0.0))
+    if math.isfinite(gap):
+        return gap
+    if (np.isnan(a) != np.isnan(b)).any():
         return np.inf
     return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 

@@ -52,7 +52,9 @@ def judging_greeting(
 
 def _greeting_of(numbers: np.ndarray, greeting: Greeting) -> tuple[Greeting, Sentence | None]:
     digits, reason = _digits(numbers), AS_SINGLE
-    if digits in SINGLE or (numbers.astype(np.float32) == numbers).all():
+    with np.errstate(over="ignore"):  # too large for single precision
+        is_single = (numbers.astype(np.float32) == numbers).all()
+    if digits in SINGLE or is_single:
         digits = SINGLE[1]
     elif MIN_DIGITS <= digits <= MAX_DIGITS:
         reason = sentence(

@@ -30,7 +30,7 @@ from .kinematics.robot_inverse_kinematics import solve_by_reference, solve_wrong
 from .kinematics.robot_jacobian import TASK as ROBOT_JACOBIAN
 from .kinematics.robot_motions import TASK as ROBOT_TRACK
 from .kinematics.robot_motions import followed
-from .kinematics.textbook import Switches
+from .kinematics.switches import Switches
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
 from .mass_spring.model import Integrator, StepModel, simulate
 from .mass_spring.problem import all_forces, problem_of, state_of, system_of

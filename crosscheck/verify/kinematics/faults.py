@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 from ..explain import either
 from ..judgement import Diagnosis
 from ..sentence import Sentence, sentence, with_code
-from .textbook import DROPPED, Switches
+from .algebra import FIRST_CROSS_TERM, FIRST_TERM
+from .switches import Switches
+from .textbook import DROPPED
 
 TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 # The orders in which a rotation is split into Euler angles, and put together: X, Y and Z in another
@@ -25,7 +27,8 @@ AS_THE_TEXTBOOK = sentence("It does what the textbook does.")
 class SwitchFault(NamedTuple):
     """A fault that setting a switch of the textbook's solvers reproduces."""
 
-    part: str  # the table that it is in: "forward", "ccd", "fabrik", "stop" or "follow"
+    # the table that it is in: "quaternion", "arc", "forward", "ccd", "fabrik", "stop" or "follow"
+    part: str
     key: str  # its short name
     switch: str  # the field of Switches
     number: int  # of the faulty setting
@@ -42,12 +45,16 @@ def _load() -> dict[str, tuple[SwitchFault, ...]]:
     }
     forward, stop, follow = parts["forward"], parts["stop"], parts["follow"]
     common = tuple(fault for fault in forward if not fault.is_rare)
+    shared = (*parts["quaternion"], *parts["arc"])
     faults = {
-        "forward": forward,
-        "ccd": (*parts["ccd"], *common, *stop),
-        "fabrik": (*parts["fabrik"], *common, *stop[:-1]),  # the last is CCD's own
+        "forward": (*forward, *parts["quaternion"]),
+        "ccd": (*parts["ccd"], *common, *stop, *shared),
+        "fabrik": (*parts["fabrik"], *common, *stop[:-1], *shared),  # the last stop is CCD's own
     }
-    return faults | {f"track {method}": (*follow, *faults[method]) for method in ("ccd", "fabrik")}
+    return faults | {
+        f"track {method}": (*follow, *(fault for fault in faults[method] if not fault.is_rare))
+        for method in ("ccd", "fabrik")
+    }
 
 
 def _faults(part: str, key: str, entry: Mapping[str, Any]) -> Iterator[SwitchFault]:
@@ -58,15 +65,41 @@ def _faults(part: str, key: str, entry: Mapping[str, Any]) -> Iterator[SwitchFau
             values = VALUES[switch](number) if is_range else {}
             words = with_code(entry["code"], Sentence(entry["sentence"], values))
             is_honest = entry.get("honest", False)
+            is_rare = is_range or entry.get("alone", False)
             yield SwitchFault(
-                part, key.format_map(values), switch, number, words, is_honest, is_range
+                part, key.format_map(values), switch, number, words, is_honest, is_rare
             )
+
+
+PASSES = (
+    sentence("both passes"), sentence("the backward pass"), sentence("the forward pass"),
+)  # fmt: skip
+
+
+def _term(number: int) -> tuple[str, str]:
+    """Return a term of the product of two quaternions, and the component that has it."""
+    i, j = divmod(number - FIRST_TERM, 4)
+    return f"a.{'wxyz'[i]} b.{'wxyz'[j]}", "wxyz"[i ^ j]
+
+
+def _cross_term(number: int) -> tuple[str, str]:
+    """Return a term of the product of two vectors, or none, and the component that has it."""
+    if number < FIRST_CROSS_TERM:
+        return "", "xyz"[number - 2]
+    c, is_second = divmod(number - FIRST_CROSS_TERM, 2)
+    i, j = ((c + 2) % 3, (c + 1) % 3) if is_second else ((c + 1) % 3, (c + 2) % 3)
+    return f"a.{'xyz'[i]} b.{'xyz'[j]}", "xyz"[c]
 
 
 # What the numbers of a switch stand for in keys and sentences.
 VALUES: Mapping[str, Callable[[int], Mapping[str, Any]]] = {
     "euler": lambda number: dict(zip(("order", "other"), EULER_ORDERS[number - 1], strict=True)),
     "dropped": lambda number: {"angle": DROPPED[number]},
+    "multiply": lambda number: dict(zip(("term", "number"), _term(number), strict=True)),
+    "cross": lambda number: dict(zip(("term", "number"), _cross_term(number), strict=True)),
+    "inverse": lambda number: {"number": "xyz"[number - 4]},
+    "pull": lambda number: {"passes": PASSES[number % 3]},
+    "lengths": lambda number: {"passes": PASSES[number % 3]},
 }
 FAULTS = _load()
 
@@ -91,7 +124,7 @@ def combinations(
     """
     faults = FAULTS[method]
     if base:
-        own = ((fault,) for fault in faults if fault.part != "forward")
+        own = ((fault,) for fault in faults if fault.part not in ("forward", "quaternion"))
         yield from ((*base, *extra) for extra in ((), *own))
         return
     yield ()

@@ -23,6 +23,9 @@ from .predictions import with_effector_of
 DEAD_JOINTS = 4.0
 # Larger positions are clipped to this [m]: `judge_pose` takes none beyond 1e75.
 FARTHEST = 1e74
+# Below this share of the largest coordinate positions are those of the rotations, in single
+# precision too.
+AGREEMENT = 1e-4
 # Coordinates beyond this share of the skeleton's size come from a division by nearly zero.
 HUGE = 1e3
 
@@ -58,13 +61,29 @@ class AnsweredPose:
 
     @property
     def outputs(self) -> Mapping[str, Any]:
-        """The outputs that are compared with variants."""
+        """The outputs that are compared with variants, all joints' and those of the path alone.
+
+        Points of the path that are those of the rotations say nothing of their own: they need not
+        be a solver's last points.
+        """
         outputs: dict[str, Any] = {}
         if self.answered_positions is not None:
             outputs["positions"] = self.answered_positions
+            if not self._agrees:
+                outputs["path_positions"] = self.answered_positions[self.path]
         if self.local is not None:
-            outputs |= {"local_rotations": self.local, "placed": self.positions}
+            outputs |= {
+                "local_rotations": self.local, "path_placed": self.positions[self.path]
+            }  # fmt: skip
         return outputs
+
+    @property
+    def _agrees(self) -> bool:
+        """Whether answered positions of the path are those of the rotations, nearly."""
+        if self.local is None or self.answered_positions is None:
+            return False
+        gap = np.abs(self.positions - self.answered_positions)[self.path]
+        return bool(gap.max() <= AGREEMENT * np.abs(self.positions[self.path]).max())
 
     @property
     def distance(self) -> float:
@@ -156,7 +175,9 @@ def position_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Fi
         return []
     bound = rounding.positions(greeting.epsilon, len(x), case.facts["size"], pose.drift)
     if not np.isfinite(x).all():
-        return [not_finite("numbers, of a joint", x.sum(axis=-1), bound)]
+        with np.errstate(invalid="ignore"):  # infinities of both signs
+            sums = x.sum(axis=-1)
+        return [not_finite("numbers, of a joint", sums, bound)]
     parents, offsets = case.inputs["parents"], case.inputs["offsets"]
     assert pose.judgement is not None
     assert pose.judgement.length_errors is not None

@@ -14,9 +14,11 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 from ..case import Case
 from ..explain import Variant
 from .faults import EULER_ORDERS, SwitchFault, combinations, switches
-from .textbook import SOLVERS, Ending, Switches, TextbookChain, TextbookPose, place_all
+from .switches import Switches
+from .textbook import OF_GLOBAL_LINKS, SOLVERS, Ending, TextbookChain, TextbookPose, place_all
 
 RIGHT = Switches()
+REVERSED = "product of quaternions reversed"
 
 
 def path_to(parents: IndexArray, effector: int) -> IndexArray:
@@ -82,17 +84,59 @@ def variants(
     """Yield the textbook's method with all combinations of its faults, the fewest first.
 
     Before them come those with the faults in `base`, which its forward kinematics is known to have.
+    A fault beside which a program's other choices show comes with each of them.
     """
     task, _, solver = method.rpartition(" ")
     predict: Callable[[Switches, Case], Mapping[str, Any]] = predict_forward
     if method != "forward":
         predict = partial(predict_track if task else predict_inverse, solver)
     with_base = combinations(method, base) if base else ()
-    for faults in itertools.chain(with_base, combinations(method)):
-        if len(faults) > max_faults + len(base):
+    by_count = itertools.groupby(itertools.chain(with_base, combinations(method)), key=len)
+    for count, same_size in by_count:
+        if count > max_faults + len(base):
             return
-        keys = tuple(fault.key for fault in faults)
-        yield Variant(keys, partial(predict, switches(faults)))
+        special = []
+        for faults in same_size:
+            keys, switched = tuple(fault.key for fault in faults), switches(faults)
+            for choices in programs(solver, faults, base):
+                variant = Variant(keys, partial(predict, switched._replace(**choices)))
+                if any(choices.values()):
+                    special.append(variant._replace(is_special=True))
+                else:
+                    yield variant
+        yield from special
+
+
+def programs(
+    method: str, faults: Sequence[SwitchFault], base: Sequence[SwitchFault]
+) -> list[dict[str, int]]:
+    """Return the choices of right programs that show beside some faults, as switches.
+
+    They show beside a single fault, or a single one besides those of the `base`.
+    """
+    parts, names = {fault.part for fault in faults}, {fault.switch for fault in faults}
+    numbers: dict[str, Sequence[int]] = {}
+    known = {fault.key for fault in base}
+    if not faults or sum(fault.key not in known for fault in faults) > 1:
+        return [{}]
+    if "quaternion" in parts:
+        # a reversed product shows in the program's rotations of vectors too, by q v q*
+        is_reversed = any(fault.key == REVERSED for fault in faults)
+        numbers["rotating"] = range(int(is_reversed), 3)
+        numbers["unit"] = (0, 2) if method == "forward" else range(3)
+    if "arc" in parts:
+        numbers["unit"] = range(2)
+    if method != "forward" and parts & {"quaternion", "forward"}:
+        numbers["grouping"] = range(4 if method == "ccd" else 2)
+    if method == "fabrik" and (
+        parts & {"quaternion", "forward", "arc"} or names & {"rotations", "angle", "link"}
+    ):
+        numbers["rule"] = range(6 if "forward" in parts else 4)
+    if any(f.switch == "rotations" and f.number >= OF_GLOBAL_LINKS for f in faults):
+        numbers["rule"] = (0, 3)
+    return [
+        dict(zip(numbers, values, strict=True)) for values in itertools.product(*numbers.values())
+    ]
 
 
 def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
@@ -102,7 +146,10 @@ def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
 
 
 def predict_inverse(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:
-    """Return the outputs of a solver, and `placed`: the positions that its local rotations give."""
+    """Return the outputs of a solver; of FABRIK the path's: its points, and those of its rotations.
+
+    Joints off the path depend on how a program turns a link about itself, which is its choice.
+    """
     return _outputs(method, switched, case.inputs)[0]
 
 
@@ -112,10 +159,28 @@ def _outputs(
     """Return the outputs of a solver, and its local rotations."""
     local, positions, _ = solve(method, inputs, switched)
     local = with_effector_of(local, inputs)
+    with np.errstate(all="ignore"):  # as the answers are read
+        local = local / np.linalg.norm(local, axis=-1, keepdims=True)
+    path = path_to(inputs["parents"], inputs["effector"])
+    if switched.returned:
+        positions = _older_positions(method, switched, inputs)
+    outputs = {"path_positions": positions[path], "all_positions": positions}
     if method == "ccd":
-        return {"positions": positions, "local_rotations": local}, local
+        return outputs | {"positions": positions, "local_rotations": local}, local
     placed, _ = forward({**inputs, "local_rotations": local})
-    return {"positions": positions, "placed": placed}, local
+    return outputs | {"path_placed": placed[path]}, local
+
+
+def _older_positions(method: str, switched: Switches, inputs: Mapping[str, Any]) -> FloatArray:
+    """Return the positions before the last rotation (1) or sweep (2) of a solve, or its start's."""
+    _, latest, sweeps = solve(method, inputs, switched)
+    links = len(path_to(inputs["parents"], inputs["effector"])) - 1
+    counts = (sweeps, sweeps * links - 1, sweeps - 1, 0)
+    if sweeps == 0:
+        return latest
+    switched = switched._replace(budget=3 if switched.returned == 1 else switched.budget)
+    inputs = {**inputs, "tolerance": 0.0, "max_iterations": counts[switched.returned]}
+    return solve(method, inputs, switched)[1]
 
 
 def predict_track(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:

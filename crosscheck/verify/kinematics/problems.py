@@ -19,7 +19,8 @@ from ..sentence import sentence
 from . import skeletons
 from .predictions import forward, path_to, solve
 from .skeletons import CaseFamily, PosedSkeleton
-from .textbook import SOLVERS, Switches
+from .switches import Switches
+from .textbook import SOLVERS
 
 TASK = "inverse_kinematics"
 # The rotations of single sweeps are at least so far from 0 and pi [rad].

@@ -21,10 +21,11 @@ from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
 from ..laws import LAWS, finding
 from ..sentence import Sentence, sentence
 from . import pose_laws, rounding
+from .algebra import DEGREE
 from .faults import FAULTS, SwitchFault, by_key, describe, switches
 from .predictions import predict_inverse, solve
 from .report import diagnosis_of
-from .textbook import Switches
+from .switches import Switches
 
 NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
 # The share of the sweeps that must be a textbook's to recognise its method.
@@ -150,8 +151,11 @@ def recognise_method(
         return ""
     if honest_variant(trials, "ccd", greeting) is None and damping_of(trials, greeting) is not None:
         return "ccd"
-    fits = {method: _best_fit(trials, method, greeting, base) for method in NAMES}
-    best = max(fits, key=lambda method: fits[method])
+    for count in range(1, RECOGNISED_FAULTS + 1):
+        fits = {method: _best_fit(trials, method, greeting, count, base) for method in NAMES}
+        best = max(fits, key=lambda method: fits[method])
+        if fits[best][0] == 1.0:
+            break
     return best if fits[best][0] >= MIN_SHARE else ""
 
 
@@ -163,14 +167,16 @@ def _is_other_solver(trial: PoseTrial, greeting: Greeting) -> bool:
 
 
 def _best_fit(
-    trials: Sequence[PoseTrial], method: str, greeting: Greeting, base: Sequence[SwitchFault]
+    trials: Sequence[PoseTrial],
+    method: str,
+    greeting: Greeting,
+    max_faults: int,
+    base: Sequence[SwitchFault],
 ) -> tuple[float, int]:
     """Return the share of the sweeps that a faulty textbook reproduces, and minus its faults."""
     exchanges = [trial.comparable for trial in trials]
     bound = partial(prediction_bound, greeting)
-    diagnosis = diagnosis_of(
-        method, exchanges, exchanges, bound, max_faults=RECOGNISED_FAULTS, base=base
-    )
+    diagnosis = diagnosis_of(method, exchanges, exchanges, bound, max_faults=max_faults, base=base)
     for explanation in diagnosis.explanations[:1]:
         return explanation.share, -len(explanation.faults[0].split(" + "))
     return 0.0, 0
@@ -223,7 +229,12 @@ def damping_of(trials: Sequence[PoseTrial], greeting: Greeting) -> Sentence | No
     for switched in (Switches(), switches([by_key("ccd")["root to tip"]])):
         gain, cap = _damping(trials, switched)
         scaled, capped = switched._replace(gain=gain), switched._replace(cap=cap)
-        if SMALLEST < gain < 0.999 and _explains(trials, "ccd", greeting, scaled):
+        is_degrees = abs(gain / DEGREE - 1.0) < SMALLEST  # radians taken for degrees, a mistake
+        if (
+            SMALLEST < gain < 0.999
+            and not is_degrees
+            and _explains(trials, "ccd", greeting, scaled)
+        ):
             return sentence(
                 "It is CCD with each rotation scaled by {gain:.4g}, which is slower.", gain=gain
             )

@@ -17,62 +17,27 @@ from plumbob.reference.backend.compiled import Kernel, bind
 from plumbob.reference.quaternion import (
     IDENTITY,
     add,
-    between,
     conjugate,
     load_quaternion,
     load_vector,
     logarithm,
-    multiply,
     norm,
-    renormalised,
-    rotate,
-    rotation_about,
-    scale,
     store_quaternion,
     store_vector,
     subtract,
 )
 
+from .algebra import arc, inverse, made_unit, product, pulled, rotated
+from .switches import Switches
+
 ORIGIN = (0.0, 0.0, 0.0)
-# Numbers of `applied` from this one on rotate the child on the path.
-GIVEN_TO_CHILD = 10
+# Of `applied`, the numbers that rotate the child on the path.
+GIVEN_TO_CHILD = (10, 13)
+# Of `rotations`, those from this number on rotate a link from its present or its first direction.
+OF_GLOBAL_LINKS = 13
 # CCD drops rotations smaller than these, by the number of `dropped` [rad]; among them are a degree,
 # and the angles with the cosines 0.99999, 0.9999 and 0.999.
 DROPPED = (0.0, 1e-4, 1e-3, 4.4721e-3, 1e-2, 1.41421e-2, 1.745329e-2, 4.47214e-2, 0.1)
-UNCAPPED = 10.0  # an angle that no rotation has [rad]
-
-
-class Switches(NamedTuple):
-    """The number of the fault in each rule of a solver; 0 is right."""
-
-    numbers: int = 0  # the order of a quaternion's numbers
-    euler: int = 0  # the orders in which rotations are split and put together
-    frame: int = 0  # forward kinematics: what rotates an offset
-    product: int = 0  # R of R_parent and Q
-    base: int = 0  # what an offset is added to
-    root: int = 0  # the root's pose
-    parent: int = 0  # which joint is the parent
-    applied: int = 0  # CCD: what Q becomes
-    angle: int = 0  # of d
-    order: int = 0  # of joints in a sweep
-    joints: int = 0  # which joints a sweep leaves out
-    update: int = 0  # when joints are placed anew
-    aim: int = 0  # the two directions that d joins
-    offsets: int = 0  # what becomes of a child's offset
-    dropped: int = 0  # which angle is too small to rotate by
-    passes: int = 0  # FABRIK: which passes there are
-    base_joint: int = 0  # where the root goes back to
-    lengths: int = 0  # of links
-    rotations: int = 0  # that positions stand for
-    start: int = 0  # of either: from the rest pose
-    effector: int = 0  # the last joint
-    test: int = 0  # the end of a solve: what is compared with the tolerance
-    budget: int = 0  # how many sweeps are allowed
-    frame_start: int = 0  # following a curve: where a frame starts
-    frame_target: int = 0  # which target a frame has
-    # What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad].
-    gain: float = 1.0
-    cap: float = UNCAPPED
 
 
 class TextbookChain(NamedTuple):
@@ -117,7 +82,7 @@ def root_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: int
         Q = conjugate(Q)
     rotations = (Q, Q, IDENTITY, Q)
     R = rotations[faults.root]
-    places = (offset, ORIGIN, offset, rotate(R, offset))
+    places = (offset, ORIGIN, offset, rotated(R, offset, faults))
     return places[faults.root], R
 
 
@@ -128,7 +93,9 @@ def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: in
         (R_parent, Q), (Q, R_parent), (R_parent, conjugate(Q)), (IDENTITY, Q), (R_parent, IDENTITY),
     )  # fmt: skip
     left, right = products[faults.product]
-    R = multiply(left, right)
+    R = product(left, right, faults)
+    if faults.unit == 2:
+        R = made_unit(R)
     above = chain.parents[p]
     R_above = load_quaternion(pose.rotations, above) if above >= 0 else IDENTITY
     frames = (
@@ -138,7 +105,7 @@ def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: in
     offset = load_vector(chain.offsets, j)
     if faults.frame == 7:
         offset = subtract(offset, load_vector(chain.offsets, p))
-    offset = rotate(frames[faults.frame], offset)
+    offset = rotated(frames[faults.frame], offset, faults)
     return add(base_of(chain, pose, p, faults.base), offset), R
 
 
@@ -198,8 +165,8 @@ def sweep_ccd(
         return
     for link in range(links):
         k = link if faults.order == 1 else links - 1 - link
-        left_out = (-1, 0, links - 1)
-        if k != left_out[faults.joints]:
+        left_out = (-1, 0, links - 1, -1)
+        if k != left_out[faults.joints] and (faults.joints != 3 or link == 0):
             rotate_joint(chain, k, target, faults, pose)
     if faults.update < 2:
         place(chain, faults, pose)
@@ -213,77 +180,95 @@ def rotate_joint(
     effector = load_vector(pose.positions, chain.path[-1])
     arm, direction = subtract(effector, joint), subtract(target, joint)
     parent = load_vector(pose.positions, chain.path[max(k - 1, 0)])
-    child = load_vector(pose.positions, chain.path[k + 1])
+    child, root = load_vector(pose.positions, chain.path[k + 1]), load_vector(pose.positions, 0)
     directions = (
         (arm, direction),
         (arm, target),
         (effector, direction),
-        (arm, add(direction, load_vector(pose.positions, 0))),
+        (arm, add(direction, root)),
         (arm, subtract(target, effector)),
         (subtract(effector, parent), subtract(target, parent)),
         (subtract(effector, child), subtract(target, child)),
+        (subtract(child, joint), direction),
+        (arm, subtract(target, parent)),
+        (arm, subtract(target, child)),
+        (arm, subtract(target, root)),
+        (subtract(effector, root), direction),
+        (subtract(effector, root), subtract(target, root)),
     )
     a, b = directions[faults.aim]
-    d = damped(between(a, b), faults)
+    d = arc(a, b, faults)
     if faults.dropped > 0 and norm(logarithm(d)) < DROPPED[faults.dropped]:
         return
-    turn_offset(chain, k, d, faults.offsets, pose)
+    rotate_offset(chain, k, d, faults, pose)
     if faults.update < 3:
-        apply_rotation(chain, k, d, faults.applied, pose)
+        apply_rotation(chain, k, d, faults, pose)
     if faults.update == 0:
         place(chain, faults, pose)
     elif faults.update >= 2:
-        follow_by_hand(chain, k, d, faults.update, pose)
+        follow_by_hand(chain, k, d, faults, pose)
 
 
-def turn_offset(chain: TextbookChain, k: int, d: Any, fault: int, pose: TextbookPose) -> None:
+def rotate_offset(
+    chain: TextbookChain, k: int, d: Any, faults: Switches, pose: TextbookPose
+) -> None:
     """Rotate the offset of the next joint too: in the joint's frame (1), in the world's (2)."""
-    if fault == 0:
+    if faults.offsets == 0:
         return
     R = load_quaternion(pose.rotations, chain.path[k])
-    rotations = (IDENTITY, multiply(multiply(conjugate(R), d), R), d)
-    offset = rotate(rotations[fault], load_vector(chain.offsets, chain.path[k + 1]))
+    local = product(product(inverse(R, faults), d, faults), R, faults)
+    offset = load_vector(chain.offsets, chain.path[k + 1])
+    offset = rotated(local if faults.offsets == 1 else d, offset, faults)
     store_vector(chain.offsets, chain.path[k + 1], offset)
 
 
-def follow_by_hand(chain: TextbookChain, k: int, d: Any, fault: int, pose: TextbookPose) -> None:
+def follow_by_hand(
+    chain: TextbookChain, k: int, d: Any, faults: Switches, pose: TextbookPose
+) -> None:
     """Rotate the effector about joint k, or (3) every joint after it on the path."""
     last = len(chain.path) - 1
     joint = load_vector(pose.positions, chain.path[k])
-    for m in range(last if fault == 2 else k + 1, last + 1):
+    for m in range(last if faults.update == 2 else k + 1, last + 1):
         arm = subtract(load_vector(pose.positions, chain.path[m]), joint)
-        store_vector(pose.positions, chain.path[m], add(joint, rotate(d, arm)))
+        store_vector(pose.positions, chain.path[m], add(joint, rotated(d, arm, faults)))
 
 
-def damped(d: Any, faults: Switches) -> Any:
-    """Return the rotation with another angle: negative (1), doubled (2), halved (3), damped."""
-    if faults.angle == 1:
-        return conjugate(d)
-    if faults.angle == 2:
-        return multiply(d, d)
-    factor = 0.5 * faults.gain if faults.angle == 3 else faults.gain
-    if factor == 1.0 and faults.cap >= UNCAPPED:
-        return d
-    v = logarithm(d)
-    angle = norm(v)
-    if angle == 0.0:
-        return d
-    return rotation_about(scale(1.0 / angle, v), min(factor * angle, faults.cap))
-
-
-def apply_rotation(chain: TextbookChain, k: int, d: Any, fault: int, pose: TextbookPose) -> None:
+def apply_rotation(
+    chain: TextbookChain, k: int, d: Any, faults: Switches, pose: TextbookPose
+) -> None:
     """Give joint k of the path, or its child, the world rotation d."""
     j = chain.path[k]
     p = chain.parents[j]
     R, P = load_quaternion(pose.rotations, j), IDENTITY
     if p >= 0:
         P = load_quaternion(pose.rotations, p)
-    if fault >= GIVEN_TO_CHILD:
+    if GIVEN_TO_CHILD[0] <= faults.applied <= GIVEN_TO_CHILD[1]:
         j = chain.path[k + 1]
-    Q, unit = load_quaternion(pose.local, j), IDENTITY
-    P_inverse, R_inverse = conjugate(P), conjugate(R)
+    Q = load_quaternion(pose.local, j)
+    if faults.applied == 0:
+        Q = from_world(P, d, Q, R, faults)
+    else:
+        Q = wrong_rotation(P, d, Q, R, faults)
+    store_quaternion(pose.local, j, Q if faults.unit == 1 else made_unit(Q))
+
+
+def from_world(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
+    """Return P* d P Q, where R is P Q, in one of the groupings of programs."""
+    inverse_P = inverse(P, faults)
+    if faults.grouping == 1:
+        return product(inverse_P, product(d, R, faults), faults)
+    if faults.grouping == 2:
+        return product(product(inverse_P, d, faults), R, faults)
+    if faults.grouping == 3:
+        return product(product(inverse_P, product(d, P, faults), faults), Q, faults)
+    return product(product(product(inverse_P, d, faults), P, faults), Q, faults)
+
+
+def wrong_rotation(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
+    """Return what becomes of Q in the world rotation d, by the number of `applied`."""
+    unit, P_inverse, R_inverse = IDENTITY, inverse(P, faults), inverse(R, faults)
     products = (
-        (P_inverse, d, P, Q),
+        (unit, unit, unit, Q),
         (unit, unit, d, Q),
         (unit, unit, Q, d),
         (P, d, P_inverse, Q),
@@ -297,9 +282,16 @@ def apply_rotation(chain: TextbookChain, k: int, d: Any, fault: int, pose: Textb
         (R_inverse, d, R, Q),
         (P_inverse, d, P, Q),
         (unit, unit, Q, d),
+        (unit, P, d, R),
+        (unit, d, R, P_inverse),
+        (unit, R_inverse, d, R),
+        (unit, unit, R, d),
+        (unit, P_inverse, d, P),
+        (unit, R, d, P_inverse),
+        (unit, P, d, Q),
     )
-    a, b, c, e = products[fault]
-    store_quaternion(pose.local, j, renormalised(multiply(multiply(multiply(a, b), c), e)))
+    a, b, c, e = products[faults.applied]
+    return product(product(product(a, b, faults), c, faults), e, faults)
 
 
 def keep(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
@@ -312,75 +304,195 @@ def sweep_fabrik(
     chain: TextbookChain, target: Any, i: int, faults: Switches, pose: TextbookPose
 ) -> None:
     """Pull the joints to the target, then back to the root."""
-    last, positions = len(chain.path) - 1, pose.positions
+    positions, before = pose.positions, pose.positions.copy()
     if faults.passes == 0:
-        store_vector(positions, chain.path[last], target)
-        for k in range(last - 1, -1, -1):
-            length = link_length(chain, k, faults.lengths, positions)
-            pull(positions, chain.path[k + 1], chain.path[k], length)
-    root = chain.path[0]
+        pull_to_target(chain, target, faults, positions, before)
+    pull_to_root(chain, faults, positions)
+
+
+def pull_to_target(
+    chain: TextbookChain, target: Any, faults: Switches, positions: FloatArray, before: FloatArray
+) -> None:
+    """Put the effector on the target, and pull each joint to the one after it."""
+    last, root = len(chain.path) - 1, load_vector(chain.offsets, chain.path[0])
+    ends = (target, add(target, root), subtract(target, root))
+    store_vector(positions, chain.path[last], ends[faults.end])
+    kind = in_pass(faults.pull, 1)
+    for k in range(last - (2 if faults.loop == 1 else 1), -1, -1):
+        length = link_length(chain, k, in_pass(faults.lengths, 1), positions)
+        j, fixed = chain.path[k], load_vector(positions, chain.path[k + 1])
+        moved = load_vector(positions, j)
+        if faults.stale == 1:  # the direction between both points before the pass
+            moved = add(fixed, subtract(moved, load_vector(before, chain.path[k + 1])))
+        elif faults.stale == 2 and k < last - 1:
+            fixed = load_vector(before, chain.path[k + 1])
+        store_vector(positions, j, pulled(fixed, moved, length, kind))
+
+
+def pull_to_root(chain: TextbookChain, faults: Switches, positions: FloatArray) -> None:
+    """Put the root back, and pull each joint to the one before it."""
+    last, root = len(chain.path) - 1, chain.path[0]
     places = (load_vector(chain.offsets, root), load_vector(positions, root), ORIGIN)
     store_vector(positions, root, places[faults.base_joint])
-    for k in range(last):
-        length = link_length(chain, k, faults.lengths, positions)
-        pull(positions, chain.path[k], chain.path[k + 1], length)
+    kind = in_pass(faults.pull, 2)
+    for k in range(1 if faults.loop == 3 else 0, last - (1 if faults.loop == 2 else 0)):
+        length = link_length(chain, k, in_pass(faults.lengths, 2), positions)
+        child = chain.path[k + 1]
+        moved, fixed = load_vector(positions, child), load_vector(positions, chain.path[k])
+        store_vector(positions, child, pulled(fixed, moved, length, kind))
 
 
-def link_length(chain: TextbookChain, k: int, fault: int, positions: FloatArray) -> float:
-    """Return the length of link k, from joint k of the path to the next; or (3) as it is now."""
+def in_pass(number: int, which: int) -> int:
+    """Return the kind of a fault that is in both passes, in the backward (1) or the forward (2).
+
+    Its number is three times the kind, and the pass.
+    """
+    return number // 3 if number % 3 in (0, which) else 0
+
+
+def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) -> float:
+    """Return the length of link k, from joint k of the path to the next, or a wrong one.
+
+    It is the next link's (1), the previous link's (2), that of now (3), the first link's (4), the
+    mean (5), 1 (6), or that of the offset of the link's first joint (7).
+    """
     last = len(chain.path) - 2
-    links = (k, min(k + 1, last), max(k - 1, 0), k)
-    if fault == 3:
+    links = (k, min(k + 1, last), max(k - 1, 0), k, 0, k, k, k - 1)
+    if kind == 3:
         start = load_vector(positions, chain.path[k])
         return norm(subtract(load_vector(positions, chain.path[k + 1]), start))
-    return norm(load_vector(chain.offsets, chain.path[links[fault] + 1]))
+    if kind == 5:
+        total = 0.0
+        for j in chain.path[1:]:
+            total += norm(load_vector(chain.offsets, j))
+        return total / (last + 1)
+    return 1.0 if kind == 6 else norm(load_vector(chain.offsets, chain.path[links[kind] + 1]))
 
 
-def pull(positions: FloatArray, fixed: int, moved: int, length: float) -> None:
-    """Bring a joint to a distance from another, along the line between them."""
-    start = load_vector(positions, fixed)
-    direction = subtract(load_vector(positions, moved), start)
-    distance = norm(direction)
-    if distance > 0.0:
-        store_vector(positions, moved, add(start, scale(length / distance, direction)))
+class Solved(NamedTuple):
+    """The points of FABRIK's last sweep, and the pose that it started from."""
+
+    points: FloatArray
+    positions: FloatArray
+    rotations: FloatArray
 
 
 def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
     """Rotate each joint of the path to its link's new direction; the path keeps its positions."""
-    moved, start = pose.positions.copy(), pose.rotations.copy()
+    points = pose.positions.copy()
+    place(chain, faults, pose)
+    solved = Solved(points, pose.positions.copy(), pose.rotations.copy())
     for k in range(len(chain.path) - 1 if sweeps > 0 else 0):
         place(chain, faults, pose)
-        parents_of = start if faults.rotations == 4 else pose.rotations
-        point_link(chain, k, moved, faults.rotations, parents_of, pose)
+        point_link(chain, k, solved, faults, pose)
     place(chain, faults, pose)
     for j in chain.path:
-        store_vector(pose.positions, j, load_vector(moved, j))
+        store_vector(pose.positions, j, load_vector(points, j))
 
 
 def point_link(
-    chain: TextbookChain,
-    k: int,
-    moved: FloatArray,
-    fault: int,
-    rotations: FloatArray,
-    pose: TextbookPose,
+    chain: TextbookChain, k: int, solved: Solved, faults: Switches, pose: TextbookPose
 ) -> None:
-    """Rotate joint k of the path, or its child (3), by global rotations as they are thought."""
+    """Rotate joint k of the path, or its child (3), by one of the rules of programs."""
     j, child = chain.path[k], chain.path[k + 1]
     p = chain.parents[j]
-    offset, Q = load_vector(chain.offsets, child), load_quaternion(pose.local, j)
-    R, P = load_quaternion(rotations, j), IDENTITY
+    Q, R, P = load_quaternion(pose.local, j), load_quaternion(pose.rotations, j), IDENTITY
     if p >= 0:
-        P = load_quaternion(rotations, p)
-    link = subtract(load_vector(moved, child), load_vector(moved, j))
-    arc = between(rotate(R, offset), link)
-    if fault == 1:
-        Q = between(offset, link)
-    elif fault == 2:
-        Q = multiply(arc, Q)
+        P = load_quaternion(solved.rotations if faults.rotations == 4 else pose.rotations, p)
+    rest = rest_of(chain, k, solved, faults, pose)
+    link = link_of(chain, k, solved.points, faults.link)
+    if faults.rule == 1:  # in the parent's frame
+        link = rotated(P if faults.rotations == 9 else inverse(P, faults), link, faults)
+    d = arc(rest, link, faults)
+    if faults.rule in (3, 4):
+        R = load_quaternion(solved.rotations, j)
+    elif faults.rule in (1, 2):
+        R = IDENTITY
+    if faults.rotations in (0, 3, 4, 9):
+        Q = local_of(P, d, Q, R, faults)
     else:
-        Q = multiply(multiply(multiply(conjugate(P), arc), P), Q)
-    store_quaternion(pose.local, child if fault == 3 else j, renormalised(Q))
+        Q = wrong_local(chain, k, P, d, R, faults, pose)
+    Q = Q if faults.unit == 1 else made_unit(Q)
+    store_quaternion(pose.local, child if faults.rotations == 3 else j, Q)
+
+
+def rest_of(
+    chain: TextbookChain, k: int, solved: Solved, faults: Switches, pose: TextbookPose
+) -> Any:
+    """Return the direction of link k that its new one is compared with.
+
+    By the number of `rule` it is that of the present pose, at rest in the parent's frame or in the
+    world's, that of the start; or the one between the positions of the start or of the present.
+    """
+    j, child = chain.path[k], chain.path[k + 1]
+    offset = load_vector(chain.offsets, child)
+    if faults.rule in (1, 2) or faults.rotations == 1:
+        return offset
+    if faults.rule == 0:
+        return rotated(load_quaternion(pose.rotations, j), offset, faults)
+    if faults.rule == 3:
+        return rotated(load_quaternion(solved.rotations, j), offset, faults)
+    x = solved.positions if faults.rule == 4 else pose.positions
+    return subtract(load_vector(x, child), load_vector(x, j))
+
+
+def link_of(chain: TextbookChain, k: int, points: FloatArray, fault: int) -> Any:
+    """Return the direction of link k; or the opposite (1), the next (2) or previous link's (3)."""
+    last = len(chain.path) - 2
+    links = (k, k, min(k + 1, last), max(k - 1, 0))
+    start, end = chain.path[links[fault]], chain.path[links[fault] + 1]
+    if fault == 1:
+        start, end = end, start
+    return subtract(load_vector(points, end), load_vector(points, start))
+
+
+def local_of(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
+    """Return the local rotation after the arc d, in the parent's frame or the world's."""
+    if faults.rule == 1:
+        return d
+    if faults.rule == 2:
+        return product(inverse(P, faults), d, faults)
+    if faults.rule in (0, 5):
+        return from_world(P, d, Q, R, faults)
+    inverse_P = inverse(P, faults)
+    if faults.grouping == 0:
+        return product(inverse_P, product(d, R, faults), faults)
+    return product(product(inverse_P, d, faults), R, faults)
+
+
+def wrong_local(
+    chain: TextbookChain,
+    k: int,
+    P: Any,
+    d: Any,
+    R: Any,
+    faults: Switches,
+    pose: TextbookPose,
+) -> Any:
+    """Return a wrong local rotation after the arc d, by the number of `rotations`."""
+    j, unit, P_inverse = chain.path[k], IDENTITY, inverse(P, faults)
+    Q, Q_parent = load_quaternion(pose.local, j), IDENTITY
+    if chain.parents[j] >= 0:
+        Q_parent = load_quaternion(pose.local, chain.parents[j])
+    products = (
+        (unit, unit, d),
+        (unit, unit, d),
+        (unit, d, Q),
+        (unit, unit, d),
+        (unit, unit, d),
+        (P, d, R),
+        (d, R, P_inverse),
+        (unit, Q, d),
+        (P_inverse, d, P),
+        (unit, unit, d),
+        (P_inverse, d, Q),
+        (P, d, product(P_inverse, Q, faults)),
+        (inverse(Q_parent, faults), d, R),
+        (unit, unit, d),
+        (unit, d, R),
+    )
+    a, b, c = products[faults.rotations]
+    return product(product(a, b, faults), c, faults)
 
 
 class Method(NamedTuple):

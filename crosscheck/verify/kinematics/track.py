@@ -22,11 +22,11 @@ from ..sentence import sentence
 from . import pose_laws, problems, rounding, skeletons, sweeps
 from .inverse_kinematics import METHODS
 from .pose_laws import AnsweredPose
-from .predictions import forward, path_to, predict_track
+from .predictions import forward, predict_track
 from .problems import TargetProblem
 from .report import diagnosis_of, report
 from .skeletons import CaseFamily
-from .textbook import Switches
+from .switches import Switches
 
 TASK = "track"
 # Another method that is within this share of the reach is slow, not wrong.
@@ -75,11 +75,10 @@ def _is_smooth(problem: CurveProblem) -> bool:
     start, curve = problem
     inputs = problems.request(start, TOLERANCE, problems.EASY, "") | {"curve": curve}
     case = Case("", TASK, inputs, "", HOLDS)
-    path = path_to(start.skeleton.parents, start.effector)
     for method in METHODS:
-        x = predict_track(method, Switches(), case)["positions"]
-        is_far = np.linalg.norm(x[:, start.effector] - curve, axis=-1).max() > TOLERANCE
-        if is_far or np.linalg.norm(np.diff(x[:, path], axis=0), axis=-1).max() >= 0.5:
+        x = predict_track(method, Switches(), case)["path_positions"]
+        is_far = np.linalg.norm(x[:, -1] - curve, axis=-1).max() > TOLERANCE
+        if is_far or np.linalg.norm(np.diff(x, axis=0), axis=-1).max() >= 0.5:
             return False
     return True
 
@@ -165,7 +164,8 @@ def frames_of(exchange: Exchange) -> list[Frame]:
 def _comparable(exchange: Exchange) -> Exchange:
     """Return the exchange with the outputs that variants predict."""
     frames = [frame.pose.outputs for frame in frames_of(exchange)]
-    answer = Answer({name: np.array([x[name] for x in frames]) for name in frames[0]}, 0.0)
+    names = [name for name in frames[0] if all(name in frame for frame in frames)]
+    answer = Answer({name: np.array([x[name] for x in frames]) for name in names}, 0.0)
     return Exchange(exchange.case, answer, answer)
 
 

@@ -17,7 +17,7 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.kinematics.predictions import forward
-from plumbob.crosscheck.verify.kinematics.textbook import Switches
+from plumbob.crosscheck.verify.kinematics.switches import Switches
 from plumbob.crosscheck.verify.output import json_file, junit, page, terminal
 from plumbob.crosscheck.verify.output.fault_text import cause_and_remedy, explained, failure_of
 from plumbob.crosscheck.verify.output.words import Presentation, advice, speaker
@@ -26,7 +26,19 @@ from plumbob.crosscheck.verify.verify import verify
 
 DOCUMENTATION = runpy.run_path(str(Path(__file__).parents[3] / "docs/write_faults.py"))
 REMEDY = sentence("Remedy")
-FAMILIES = ("FK", "CCD", "FABRIK", "STOP", "TRACK", "RESAMPLE", "ROBOT", "STEP", "FORCE", "ENERGY")
+FAMILIES = (
+    "FK",
+    "QUAT",
+    "CCD",
+    "FABRIK",
+    "STOP",
+    "TRACK",
+    "RESAMPLE",
+    "ROBOT",
+    "STEP",
+    "FORCE",
+    "ENERGY",
+)
 CODE = re.compile(rf"PB-({'|'.join(FAMILIES)})-(\d{{3}})")
 
 

@@ -28,7 +28,7 @@ from plumbob.crosscheck.verify.kinematics import (
 )
 from plumbob.crosscheck.verify.kinematics.polylines import Polyline
 from plumbob.crosscheck.verify.kinematics.predictions import predict_track
-from plumbob.crosscheck.verify.kinematics.textbook import Switches
+from plumbob.crosscheck.verify.kinematics.switches import Switches
 from plumbob.crosscheck.verify.laws import HOLDS, equal_answers
 from plumbob.crosscheck.verify.mass_spring import energy, forces
 from plumbob.crosscheck.verify.mass_spring.problem import all_forces, problem_of
@@ -167,7 +167,7 @@ def motion():
     """The request for a chain's small circle, and the textbook's answer by FABRIK."""
     case = track.cases(Greeting(1, ("track",)), "fabrik", 0, False)[0]
     found = predict_track("fabrik", Switches(), case)
-    return case, np.array(found["positions"])
+    return case, np.array(found["path_positions"])
 
 
 @pytest.mark.parametrize("frame", [0, 4, -1])

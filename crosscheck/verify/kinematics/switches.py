@@ -1,0 +1,53 @@
+"""The switches of the textbook's solvers: a number for each rule, 0 if it is right."""
+
+from typing import NamedTuple
+
+UNCAPPED = 10.0  # an angle that no rotation has [rad]
+
+
+class Switches(NamedTuple):
+    """The number of the fault in each rule of a solver; 0 is right."""
+
+    numbers: int = 0  # the order of a quaternion's numbers
+    euler: int = 0  # the orders in which rotations are split and put together
+    multiply: int = 0  # the product of two quaternions
+    cross: int = 0  # the product of two vectors
+    inverse: int = 0  # of a quaternion
+    rotate: int = 0  # a vector by a quaternion
+    frame: int = 0  # forward kinematics: what rotates an offset
+    product: int = 0  # R of R_parent and Q
+    base: int = 0  # what an offset is added to
+    root: int = 0  # the root's pose
+    parent: int = 0  # which joint is the parent
+    applied: int = 0  # CCD: what Q becomes
+    angle: int = 0  # of d
+    order: int = 0  # of joints in a sweep
+    joints: int = 0  # which joints a sweep leaves out
+    update: int = 0  # when joints are placed anew
+    aim: int = 0  # the two directions that d joins
+    offsets: int = 0  # what becomes of a child's offset
+    dropped: int = 0  # which angle is too small to rotate by
+    returned: int = 0  # which positions are returned
+    passes: int = 0  # FABRIK: which passes there are
+    loop: int = 0  # which links a pass leaves out
+    stale: int = 0  # which points of before the pass are used
+    base_joint: int = 0  # where the root goes back to
+    end: int = 0  # where the effector is put
+    lengths: int = 0  # of links
+    pull: int = 0  # where a point comes on a line
+    link: int = 0  # the direction that a joint is rotated to
+    rotations: int = 0  # that positions stand for
+    start: int = 0  # of either: from the rest pose
+    effector: int = 0  # the last joint
+    test: int = 0  # the end of a solve: what is compared with the tolerance
+    budget: int = 0  # how many sweeps are allowed
+    frame_start: int = 0  # following a curve: where a frame starts
+    frame_target: int = 0  # which target a frame has
+    # Choices of right programs, which only show beside a fault.
+    rotating: int = 0  # a vector is rotated by cross products, by (q v) q* (1) or by q (v q*) (2)
+    grouping: int = 0  # ((P* d) P) Q, P* (d R), (P* d) R or (P* (d P)) Q
+    unit: int = 0  # local rotations are made unit (0), none (1), or global ones too (2)
+    rule: int = 0  # FABRIK: the direction of a link from which its joint is rotated
+    # What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad].
+    gain: float = 1.0
+    cap: float = UNCAPPED
