@@ -369,7 +369,7 @@ def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) 
     return 1.0 if kind == 6 else norm(load_vector(chain.offsets, chain.path[links[kind] + 1]))
 
 
-class Solved(NamedTuple):
+class SolvedPath(NamedTuple):
     """The points of FABRIK's last sweep, and the pose that it started from."""
 
     points: FloatArray
@@ -381,7 +381,7 @@ def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPo
     """Rotate each joint of the path to its link's new direction; the path keeps its positions."""
     points = pose.positions.copy()
     place(chain, faults, pose)
-    solved = Solved(points, pose.positions.copy(), pose.rotations.copy())
+    solved = SolvedPath(points, pose.positions.copy(), pose.rotations.copy())
     for k in range(len(chain.path) - 1 if sweeps > 0 else 0):
         place(chain, faults, pose)
         point_link(chain, k, solved, faults, pose)
@@ -391,7 +391,7 @@ def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPo
 
 
 def point_link(
-    chain: TextbookChain, k: int, solved: Solved, faults: Switches, pose: TextbookPose
+    chain: TextbookChain, k: int, solved: SolvedPath, faults: Switches, pose: TextbookPose
 ) -> None:
     """Rotate joint k of the path, or its child (3), by one of the rules of programs."""
     j, child = chain.path[k], chain.path[k + 1]
@@ -417,7 +417,7 @@ def point_link(
 
 
 def rest_of(
-    chain: TextbookChain, k: int, solved: Solved, faults: Switches, pose: TextbookPose
+    chain: TextbookChain, k: int, solved: SolvedPath, faults: Switches, pose: TextbookPose
 ) -> Any:
     """Return the direction of link k that its new one is compared with.
 
