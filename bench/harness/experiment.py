@@ -60,6 +60,7 @@ EXPERIMENTS = [
         ("arm", "arm", "chains", WITHOUT_TIMES),
         ("pictures", "pictures", "chains", WITHOUT_TIMES),
         ("robots", "ik", "kinematics", WITH_TIMES),
+        ("branches", "ik", "kinematics", WITH_TIMES),
         ("published", "ik", "kinematics", WITH_TIMES),
         ("ik_proofs", "ik_proofs", "kinematics", WITH_TIMES),
         ("cloth", "cloth", "cloth", WITHOUT_TIMES),

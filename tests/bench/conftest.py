@@ -342,6 +342,7 @@ def records():
         fell("Plumbob Newton"),
         sample("missing_engine", solver="pybullet"),
         bounded("MuJoCo Euler", 0.02),
+        sample("listed"),
         sample("as_liu", solver="local_global", arrays={"seconds": [0.03]}),
         *pictured(),
         *moved(),

@@ -9,16 +9,20 @@ REVOLUTION = 2.0 * np.pi
 
 
 def first_within(robot: BenchRobot, solutions: FloatArray) -> tuple[FloatArray | None, bool]:
-    """Return the first solution, (solution, joint), within the limits, and whether there is one.
+    """Return the first solution, (solution, joint), within the limits, and whether there is one."""
+    valid = all_within(robot, solutions)
+    return (valid[0], True) if len(valid) else (None, False)
+
+
+def all_within(robot: BenchRobot, solutions: FloatArray) -> FloatArray:
+    """Return the solutions, (solution, joint), within the limits.
 
     Whole revolutions bring angles above their lower limits.
     """
     lowest, highest = robot.lower - LIMIT_TOLERANCE, robot.upper + LIMIT_TOLERANCE
     angles = solutions - REVOLUTION * np.floor((solutions - lowest) / REVOLUTION)
     is_valid = (angles <= highest).all(axis=-1)
-    if not is_valid.any():
-        return None, False
-    return np.clip(angles[is_valid.argmax()], robot.lower, robot.upper), True
+    return np.clip(angles[is_valid], robot.lower, robot.upper)
 
 
 def axes_at_zero(robot: BenchRobot) -> tuple[FloatArray, FloatArray, FloatArray]:

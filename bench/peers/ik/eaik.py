@@ -5,6 +5,7 @@ out, and so are solutions beyond the limits, after whole revolutions are tried. 
 Its time is that of `calculate_IK`: the choice among all solutions is its user's.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -24,6 +25,27 @@ def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
     Raises:
         UnableError: if it knows no decomposition of this robot.
     """
+    return _asking(robot, lambda solutions: first_within(robot, solutions))
+
+
+def prepare_all(robot: BenchRobot) -> Ask:
+    """Return the solver of all solutions, set up for a robot; see `prepare`."""
+    return _asking(robot, lambda solutions: (solutions, None))
+
+
+def _asking(robot: BenchRobot, choose: Callable[[FloatArray], Any]) -> Ask:
+    engine = _engine_of(robot)
+
+    def read(solutions: Any) -> Any:
+        return choose(solutions.Q[~np.array(solutions.is_LS, dtype=bool)])
+
+    def ask(request: PoseRequest) -> Solve:
+        return Solve(partial(engine.calculate_IK, request.matrix), read)
+
+    return ask
+
+
+def _engine_of(robot: BenchRobot) -> Any:
     robot.require_chain()
     axes, offsets, rotation = axes_at_zero(robot)
     if len(axes) > MAXIMUM_HINGES:
@@ -31,11 +53,4 @@ def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
     engine = EAIK.Robot(axes.T, offsets.T, rotation, [], True)
     if not engine.has_known_decomposition():
         raise UnableError("knows no decomposition of this arm")
-
-    def read(solutions: Any) -> tuple[FloatArray | None, bool]:
-        return first_within(robot, solutions.Q[~np.array(solutions.is_LS, dtype=bool)])
-
-    def ask(request: PoseRequest) -> Solve:
-        return Solve(partial(engine.calculate_IK, request.matrix), read)
-
-    return ask
+    return engine

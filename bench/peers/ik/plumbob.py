@@ -3,7 +3,7 @@
 from functools import partial
 from typing import Any
 
-from plumbob.reference import IKSolution, Outcome, Target, rotation, solve_ik
+from plumbob.reference import IKSolution, Outcome, Target, all_solutions, rotation, solve_ik
 from plumbob.reference.formats import mjcf, urdf
 
 from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
@@ -29,6 +29,17 @@ def prepare(
         targets = [*map(Target, x, quaternions, robot.effectors)]
 
         return Solve(partial(solve_ik, articulation, start, targets, **settings), _read)
+
+    return ask
+
+
+def prepare_all(robot: BenchRobot) -> Ask:
+    """Return the solver of all solutions, set up for a chain."""
+    articulation = urdf.parse(robot.text).articulation
+
+    def ask(request: PoseRequest) -> Solve:
+        target = Target(request.positions[0], rotation.from_matrix(request.rotations[0]))
+        return Solve(partial(all_solutions, articulation, target), lambda s: (s.coordinates, None))
 
     return ask
 

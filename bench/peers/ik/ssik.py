@@ -14,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 from ssik import cli
 
 from ...problems.robots import UnableError
@@ -37,6 +38,20 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, solutions: int = 1) -> Ask:
 
 def _read(solutions: list[Any]) -> tuple[FloatArray | None, bool]:
     return (solutions[0].q, True) if solutions else (None, False)
+
+
+def prepare_all(robot: BenchRobot) -> Ask:
+    """Return the solver of all solutions, a single angle of those that differ by revolutions."""
+    run = built_solver(robot).solve
+
+    def ask(request: PoseRequest) -> Solve:
+        return Solve(partial(run, request.matrix, enumerate_windings=False), read)
+
+    def read(solutions: list[Any]) -> tuple[FloatArray, None]:
+        rows = np.array([solution.q for solution in solutions])
+        return rows.reshape(-1, len(robot.joints)), None
+
+    return ask
 
 
 def kinematics(robot: BenchRobot) -> Forward:

@@ -5,7 +5,7 @@ which the maker's files have, and from a tool. Its time is that of `inverse_kine
 returns all solutions: the choice among them is its user's.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
@@ -37,11 +37,20 @@ class RobotModel(NamedTuple):
 
 def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
     """Return the solver, set up for a robot; it takes no tolerance."""
+    return _asking(robot, lambda solutions: first_within(robot, solutions))
+
+
+def prepare_all(robot: BenchRobot) -> Ask:
+    """Return the solver of all solutions, set up for a robot."""
+    return _asking(robot, lambda solutions: (solutions, None))
+
+
+def _asking(robot: BenchRobot, choose: Callable[[FloatArray], Any]) -> Ask:
     model = model_of(robot)
     from_root, from_tool = np.linalg.inv(model.root), np.linalg.inv(model.tool)
 
-    def read(solutions: Sequence[FloatArray]) -> tuple[FloatArray | None, bool]:
-        return first_within(robot, np.reshape(solutions, (-1, HINGES)))
+    def read(solutions: Sequence[FloatArray]) -> Any:
+        return choose(np.reshape(solutions, (-1, HINGES)))
 
     def ask(request: PoseRequest) -> Solve:
         target = from_root @ request.matrix @ from_tool

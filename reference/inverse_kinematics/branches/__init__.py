@@ -114,7 +114,9 @@ def all_solutions(
     count = arguments.count("restarts", restarts, minimum=1)
     seed = arguments.integer("seed", seed, minimum=0)
     solved = [
-        _by_search(arm, pose, count, seed) if arm.method == SEARCH else _by_closed_form(arm, pose)
+        _by_search(arm, pose, count, seed)
+        if arm.method == SEARCH
+        else _ArmSolutions(*_closed_form(arm, pose))
         for arm in arms.members
     ]
     return _merged(arms, solved)
@@ -137,21 +139,22 @@ def _checked_pose(model: Articulation, target: Any, effector: int | str | None) 
 
 def _plain(arm: Arm, pose: CheckedTarget) -> IKSolutions:
     """Return the solutions of an arm with a closed form, whose joints are all the robot has."""
-    rows, complete, continuum, *_ = _by_closed_form(arm, pose)
+    rows, complete, continuum = _closed_form(arm, pose)
     return IKSolutions(
-        rows[:, :HINGES], rows[:, HINGES], rows[:, HINGES + 1], arm.method, complete,
-        continuum, 0.0, {},
+        rows[:, :HINGES], rows[:, HINGES], rows[:, HINGES + 1], arm.method, complete, continuum,
+        0.0, {},
     )  # fmt: skip
 
 
-def _by_closed_form(arm: Arm, pose: CheckedTarget) -> _ArmSolutions:
+def _closed_form(arm: Arm, pose: CheckedTarget) -> tuple[FloatArray, bool, bool]:
+    """Return rows of solutions, whether they are complete, and whether some are in a continuum."""
     rows = np.empty((CANDIDATES, HINGES + FIGURES))
     count, continuum, doubts = closed_form_kernel(*arm.flat, pose.position, pose.rotation, rows)
     rows.flags.writeable = False
     if count < 0:
         check_numbers([pose])
         raise ValueError("rotation: expected a quaternion within 1e-6 of unit length")
-    return _ArmSolutions(rows[:count], arm.is_exact and not (continuum or doubts), continuum)
+    return rows[:count], arm.is_exact and not (continuum or doubts), continuum
 
 
 def _by_search(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:

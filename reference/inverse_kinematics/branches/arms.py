@@ -55,8 +55,9 @@ def arms_of(model: Articulation, effector: int, grid: Mapping[Any, ArrayLike] | 
             coordinate, a value is beyond its limits, or more than six joints remain.
     """
     key = "all_solutions", effector
-    if grid is None and key in model.mechanisms:
-        return model.mechanisms[key]
+    cached = model.mechanisms.get(key) if grid is None else None
+    if cached is not None:
+        return cached
     mechanism = prepare(model, (effector,), (True,)).mechanism
     for j, kind in enumerate(model.kinds):
         if kind in ("ball", "free") and j in model.skeleton.path(effector):

@@ -1,0 +1,160 @@
+"""Lists of all solutions: every solver on the same targets, and a search from random starts.
+
+The solutions of a target are those of any solver, and of the search, that MuJoCo's kinematics
+confirms, within the limits. Solutions that differ by whole revolutions count as one.
+"""
+
+import importlib
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.reference import Target, rotation, solve_ik
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.formats import urdf
+
+from ...harness.block import Block, Group, Measured, Scale
+from ...harness.isolation import in_a_fresh_process
+from ...harness.progress import announce
+from ...peers.ik.axes import REVOLUTION, all_within
+from ...peers.ik.protocol import Ask
+from ...peers.registry import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM, Peer
+from ...problems.evaluate import Targets, angle_between, evaluator_of
+from ...problems.robot_targets import STRATA, robot_targets
+from ...problems.robots import ROBOTS, UnableError, is_installed, robot, title
+from . import BRANCHES, LARGEST_COUNT, SAME, STARTS, TOLERANCE
+from .values import BranchValues
+
+SUITE = "ik"
+HINGES = 6
+# Targets of a stratum for those of a scale.
+_TARGETS = 0.05
+# Rounds in which calls are timed.
+ROUNDS = 5
+# Of the search [m] and [rad].
+_SEARCH_TOLERANCE = 1e-9
+# Time limit of all solvers of a robot [s].
+PATIENCE = 1800.0
+
+
+class BranchJob(NamedTuple):
+    """Targets of a robot, and a solver that lists their solutions."""
+
+    robot: str
+    peer: Peer
+    target_count: int  # of a stratum
+    seed: int
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every installed solver on every arm of six hinges."""
+    count = max(1, round(_TARGETS * scale.targets))
+    names = (name for name in ROBOTS if is_installed(name))
+    for name in (name for name in names if robot(name).is_chain):
+        if len(robot(name).joints) != HINGES:
+            continue
+        problem, facts = f"branches/{name}", {"task": BRANCHES, "title": title(name)}
+        for peer in (peer for peer in BRANCH_SOLVERS if peer.is_installed):
+            job = BranchJob(name, peer, count, scale.seed)
+            settings = {"version": peer.version, "starts": STARTS, "seed": scale.seed}
+            solver = PLUMBOB if peer is PLUMBOB_LM else peer.title
+            measure, group = partial(compare_alone, job), Group(problem, compare, job)
+            size = count * len(STRATA)
+            yield Block(SUITE, problem, solver, measure, settings, size, facts, group=group)
+
+
+def compare_alone(job: BranchJob) -> Measured:
+    """Compare the lists of a solver with the search."""
+    return compare([job])[0]
+
+
+def compare(jobs: Sequence[BranchJob]) -> list[Measured]:
+    """Compare the lists of solvers with each other and with the search."""
+    announce("all solutions, every solver")
+    modules, job = [job.peer.module for job in jobs], jobs[0]
+    results = in_a_fresh_process(PATIENCE, lists, job.robot, modules, job.target_count, job.seed)
+    return [
+        Measured(None, {"remark": result})
+        if isinstance(result, str)
+        else Measured(BranchValues(*result))
+        for result in map(results.__getitem__, modules)
+    ]
+
+
+def lists(name: str, modules: Sequence[str], count: int, seed: int) -> Mapping[str, Any]:
+    """Return by module the fields of BranchValues, or why the solver does not take the robot."""
+    targets = robot_targets(name, count, seed)
+    results: dict[str, Any] = {}
+    asks: dict[str, Ask] = {}
+    for module in modules:
+        try:
+            asks[module] = importlib.import_module(module).prepare_all(robot(name))
+        except UnableError as error:
+            results[module] = str(error)
+    requests = [targets.request(i) for i in range(len(targets.starts))]
+    solves = {module: [ask(request) for request in requests] for module, ask in asks.items()}
+    rows = {m: [_within(name, solve().q) for solve in solves[m]] for m in solves}
+    is_right = {m: [_is_right(name, targets, i, q) for i, q in enumerate(rows[m])] for m in rows}
+    right = {m: [q[ok] for q, ok in zip(rows[m], is_right[m], strict=True)] for m in rows}
+    everything = map(_distinct, _search(name, targets), *right.values())
+    unions, seconds = list(everything), _seconds(solves)
+    counts = np.array([*map(len, unions)])
+    is_isolated = counts <= LARGEST_COUNT
+    for m, parts in right.items():
+        absent = np.array([_is_missing(u, q).sum() for u, q in zip(unions, parts, strict=True)])
+        wrong = np.array([(~ok).sum() for ok in is_right[m]])
+        numbers = counts - absent, absent, wrong, seconds[m]
+        results[m] = (*(values[is_isolated] for values in numbers), int((~is_isolated).sum()))
+    return results
+
+
+def _within(name: str, solutions: Any) -> FloatArray:
+    return all_within(robot(name), np.reshape(solutions, (-1, HINGES)))
+
+
+def _is_right(name: str, targets: Targets, i: int, q: FloatArray) -> np.ndarray:
+    """Return which solutions, (solution, joint), reach a target."""
+    positions, rotations = evaluator_of(name).forward(q)
+    distance = np.linalg.norm(positions[:, 0] - targets.positions[i, 0], axis=-1)
+    angle = angle_between(rotations[:, 0], targets.rotations[i, 0])
+    return (distance <= TOLERANCE) & (angle <= TOLERANCE)
+
+
+def _is_missing(union: FloatArray, q: FloatArray) -> np.ndarray:
+    """Return which solutions of a union are not among others."""
+    turns = (union[:, None] - q + 0.5 * REVOLUTION) % REVOLUTION - 0.5 * REVOLUTION
+    return np.abs(turns).max(axis=-1).min(axis=1, initial=np.inf) > SAME
+
+
+def _distinct(*parts: FloatArray) -> FloatArray:
+    """Return the solutions of all parts, each once."""
+    union = parts[0][:0]
+    for row in np.concatenate(parts):
+        if _is_missing(row[None], union).all():
+            union = np.vstack([union, row])
+    return union
+
+
+def _search(name: str, targets: Targets) -> Iterator[FloatArray]:
+    """Yield the solutions of each target that Levenberg-Marquardt finds from random starts."""
+    model = urdf.parse(robot(name).text).articulation
+    starts = robot(name).draw(np.random.default_rng(0), STARTS)
+    limits: dict[str, Any] = {"restarts": 0, "tolerance": _SEARCH_TOLERANCE}
+    limits["tolerance_rotation"] = _SEARCH_TOLERANCE
+    for x, R in zip(targets.positions[:, 0], targets.rotations[:, 0], strict=True):
+        target = Target(x, rotation.from_matrix(R))
+        ends = solve_ik(model, starts, target, "levenberg_marquardt", **limits)
+        is_solved = np.maximum(ends.residual, ends.residual_rotation) <= _SEARCH_TOLERANCE
+        yield _distinct(_within(name, ends.coordinates[is_solved]))
+
+
+def _seconds(solves: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]:
+    """Return how long each call takes [s], the solvers in turns, in a random order each round."""
+    rng, modules = np.random.default_rng(0), list(solves)
+    seconds = {m: np.empty((ROUNDS, len(solves[m]))) for m in modules}
+    for i in range(ROUNDS):
+        for m in rng.permutation(modules):
+            seconds[m][i] = [solve().time.seconds for solve in solves[m]]
+    return {m: np.median(times, axis=0) for m, times in seconds.items()}

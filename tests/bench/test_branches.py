@@ -1,0 +1,67 @@
+"""Lists of all solutions: what a solver misses and makes up is counted, and shown."""
+
+import pytest
+from table_cells import column
+
+from plumbob.bench.experiments.branches.measurement import blocks, lists
+from plumbob.bench.experiments.branches.tables import branches
+from plumbob.bench.harness.block import Scale
+from plumbob.bench.problems.robots import is_installed
+from plumbob.bench.tables.results import Results
+
+OURS = "plumbob.bench.peers.ik.plumbob"
+FAULTY = """
+import numpy as np
+from plumbob.bench.peers.ik import plumbob
+from plumbob.bench.peers.ik.protocol import Solve
+
+def prepare_all(robot):
+    ask = plumbob.prepare_all(robot)
+    def read(solutions):
+        q = solutions.coordinates
+        return np.vstack([q[1:], q[:1] + 0.1]), None
+    return lambda request: Solve(ask(request).call, read)
+"""
+UNABLE = """
+from plumbob.bench.problems.robots import UnableError
+
+def prepare_all(robot):
+    raise UnableError("takes no arm")
+"""
+
+
+@pytest.mark.skipif(not is_installed("ur5"), reason="example-robot-data is not installed")
+def test_missing_and_false_solutions_are_counted(importable):
+    importable("faulty_lists", FAULTY)
+    importable("unable_lists", UNABLE)
+    results = lists("ur5", [OURS, "faulty_lists", "unable_lists"], 1, 1986)
+    solutions, missing, wrong, seconds, singular = results[OURS]
+    count = len(solutions)
+    assert count + singular == 6
+    assert (solutions > 0).all()
+    assert (seconds > 0.0).all()
+    assert missing.tolist() == wrong.tolist() == [0] * count
+    solutions, missing, wrong, _, _ = results["faulty_lists"]
+    assert missing.tolist() == wrong.tolist() == [1] * count
+    assert results["unable_lists"] == "takes no arm"
+
+
+@pytest.mark.skipif(not is_installed("ur5"), reason="example-robot-data is not installed")
+def test_every_arm_of_six_hinges_is_a_problem():
+    made = list(blocks(Scale(targets=20, seconds=0.1)))
+    assert {"branches/ur5", "branches/jaco2"} <= {block.problem for block in made}
+    assert "Plumbob" in {block.solver for block in made}
+    assert "branches/panda" not in {block.problem for block in made}
+
+
+def test_the_table_adds_up_the_targets(make):
+    record = make.sample("listed")
+    lacking = make.sample("listed", solver="EAIK", arrays=None, notes={"remark": "takes no arm"})
+    table = branches(Results([record, lacking]))
+    assert column(table, "solutions") == [11, None]
+    assert column(table, "missing") == [1, None]
+    assert column(table, "false") == [2, None]
+    assert column(table, "remark") == ["", "takes no arm"]
+    assert column(table, "targets with missing ones") == [1, None]
+    assert table.summary.sentence == "Plumbob lists 11 of 12 solutions."
+    assert table.summary.points == ("Plumbob: 1 missing, 2 false; UR5 20.0 µs",)
