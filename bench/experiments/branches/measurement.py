@@ -98,8 +98,8 @@ def lists(name: str, modules: Sequence[str], count: int, seed: int) -> Mapping[s
     rows = {m: [_within(name, solve().q) for solve in solves[m]] for m in solves}
     is_right = {m: [_is_right(name, targets, i, q) for i, q in enumerate(rows[m])] for m in rows}
     right = {m: [q[ok] for q, ok in zip(rows[m], is_right[m], strict=True)] for m in rows}
-    everything = map(_distinct, _search(name, targets), *right.values())
-    unions, seconds = list(everything), _seconds(solves)
+    unions = list(map(_distinct, _search(name, targets), *right.values()))
+    seconds = _seconds(solves)
     counts = np.array([*map(len, unions)])
     is_isolated = counts <= LARGEST_COUNT
     for m, parts in right.items():

@@ -38,10 +38,12 @@ def _summary(rows: Sequence[Row]) -> Summary:
         f"{words(sum(row['false'] for row in members))} false; {listed([*map(_time, members)])}"
         for solver, members in grouped(measured, lambda row: str(row["solver"])).items()
     )
-    ours = [row for row in measured if row["solver"] == PLUMBOB]
-    solutions, missing = (sum(row[title] for row in ours) for title in ("solutions", "missing"))
+    plumbob_rows = [row for row in measured if row["solver"] == PLUMBOB]
+    solutions, missing = (
+        sum(row[title] for row in plumbob_rows) for title in ("solutions", "missing")
+    )
     sentence = f"Plumbob lists {words(solutions)} of {words(solutions + missing)} solutions."
-    return listing(sentence * bool(ours), points)
+    return listing(sentence * bool(plumbob_rows), points)
 
 
 def _time(row: Row) -> str:
