@@ -18,7 +18,7 @@ from .inverse_kinematics import (
 )
 from .inverse_kinematics.certificate import IKCertificate, IKCoverage, certify_ik
 from .judging import PoseJudgement, StepJudgement, judge_pose, judge_step
-from .kinematics import forward_kinematics, local_from_global
+from .kinematics import PreparedKinematics, forward_kinematics, local_from_global, prepare
 from .mass_spring import MassSpring, State
 from .outcome import Outcome
 from .skeleton import Pose, Skeleton
@@ -41,6 +41,7 @@ __all__ = [
     "Outcome",
     "Pose",
     "PoseJudgement",
+    "PreparedKinematics",
     "Skeleton",
     "State",
     "StepJudgement",
@@ -53,6 +54,7 @@ __all__ = [
     "judge_pose",
     "judge_step",
     "local_from_global",
+    "prepare",
     "resample",
     "rotation",
     "runge_kutta",

@@ -84,6 +84,16 @@ def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
     return copied(name, numbers, np.float64)
 
 
+def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
+    """Return whether values are a float64 array of a shape that kernels take as it is."""
+    return (
+        type(values) is np.ndarray
+        and values.dtype == FLOAT64
+        and values.shape == shape
+        and values.flags.carray
+    )
+
+
 def number(
     name: str, value: Any, *, minimum: float = -LARGEST_COORDINATE, above: float = -np.inf
 ) -> float:

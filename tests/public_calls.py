@@ -263,6 +263,11 @@ def _skeletons():
     ):  # fmt: skip
         given = {"skeleton": some, "local_rotations": q}
         yield entry(reference.forward_kinematics, given, variant, free="local_rotations", names="q")
+    yield entry(reference.prepare, {"skeleton": model})
+    yield entry(
+        lambda local_rotations: reference.prepare(model)(local_rotations),
+        {"local_rotations": local[0]}, of=kinematics.PreparedKinematics,
+    )  # fmt: skip
     yield entry(
         reference.local_from_global, {"skeleton": model, "rotations": turned}, free="rotations"
     )

@@ -97,7 +97,7 @@ def style_of(row: Mapping[str, str]) -> Style:
 _IK, _STEP = _rows("ik", Solver), _rows("steps", StepSolver)
 LOOPS, FACTORS = (tuple(_rows(name, Solver).values()) for name in ("loops", "factors"))
 _BENCHMARKED = _rows("benchmarked", Solver)
-COMPILED, PLAIN, OUR_KINEMATICS, *_, LIMIT = _BENCHMARKED.values()
+COMPILED, PREPARED, PLAIN, OUR_KINEMATICS, *_, LIMIT = _BENCHMARKED.values()
 LIMIT_NAME = LIMIT.name
 SUPERNODAL = FACTORS[0]
 

@@ -294,15 +294,25 @@ def _races(results: Results) -> Iterator[Race]:
     for subject, task in _SUBJECTS.items():
         records = [r for r in results.all("timing", subject=subject) if r.solver not in _NOT_RIVALS]
         cases = {g[0].title: g for g in by_problem(records).values() if len(g) > 1}
-        times = {case: {_engine(r): median_time(r) for r in cases[case]} for case in cases}
+        times = {case: _times_of_engines(members) for case, members in cases.items()}
         rankings = {case: ranked_by_time(cases[case]) for case in cases}
-        ties = {case for case, order in rankings.items() if not order or len(order.first) > 1}
+        ties = {
+            case
+            for case, order in rankings.items()
+            if not order or len(set(map(_engine, order.first))) > 1
+        }
         yield Race("speed", task, "case", f"timing_{subject}", times, ties)
 
 
-def _engine(record: Record) -> str:
-    is_compiled = record.solver == registry.COMPILED.name
-    return registry.PLUMBOB if is_compiled else record.solver
+def _times_of_engines(records: Sequence[Record]) -> dict[str, float]:
+    """Return the shortest time of each engine [s]."""
+    slowest_first = sorted(records, key=median_time, reverse=True)
+    return {_engine(record.solver): median_time(record) for record in slowest_first}
+
+
+def _engine(solver: str) -> str:
+    calls = {registry.COMPILED.name, registry.PREPARED.name}
+    return registry.PLUMBOB if solver in calls else solver
 
 
 def _race_headline(race: Race) -> Headline | None:
@@ -392,11 +402,11 @@ def _faster(rows: dict[str, Score], own: str) -> str:
     """Return the fastest solver that is faster than ours on the poses that both solve, else ""."""
     rivals = [solver for solver in rows[own].time.order if best_rival(own, [solver])]
     pairs = [times_of_both(rows[own], rows[rival]) for rival in rivals]
-    logs = [(np.log(ours), np.log(theirs)) for ours, theirs in pairs]
+    logs = [(np.log(times), np.log(rival_times)) for times, rival_times in pairs]
     chances = metrics.adjusted([metrics.chance_of_pairs(*pair) for pair in logs])
     gains = {
-        rival: metrics.mean(ours - theirs)
-        for rival, chance, (ours, theirs) in zip(rivals, chances, logs, strict=True)
+        rival: metrics.mean(times - rival_times)
+        for rival, chance, (times, rival_times) in zip(rivals, chances, logs, strict=True)
         if chance <= 1.0 - metrics.CONFIDENCE
     }
     return max((rival for rival in gains if gains[rival] > 0.0), key=gains.__getitem__, default="")

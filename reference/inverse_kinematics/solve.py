@@ -18,6 +18,7 @@ from ..arguments import (
     FloatArray,
     RecordArray,
     frozen,
+    is_plain,
 )
 from ..articulation import Articulation, one_batch
 from ..backend.compiled import Kernel
@@ -86,16 +87,6 @@ def solve_plain(
         model.coordinate_count, settings,
     )  # fmt: skip
     return _single_solution(NO_HISTORY, *filled) if filled else None
-
-
-def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
-    """Return whether values are a float64 array of a shape that kernels take as it is."""
-    return (
-        type(values) is np.ndarray
-        and values.dtype == FLOAT64
-        and values.shape == shape
-        and values.flags.carray
-    )
 
 
 def solve_checked(

@@ -200,6 +200,20 @@ def test_headline_and_table_name_the_same_leader_by_the_same_medians(make, facto
         ]
 
 
+def test_of_two_calls_of_ours_the_faster_one_races(make):
+    """They tie with nobody but each other."""
+    rounds = np.linspace(1e-6, 1.1e-6, 27).reshape(9, 3)
+    calls = {"Plumbob, compiled": 1.0, "Plumbob, prepared": 1.0, "Pinocchio": 2.0}
+    records = [in_sweeps(make, call, factor * rounds) for call, factor in calls.items()]
+    assert "Plumbob (ours) is the fastest on 1 of 1 case, 2.0 times" in sentence(
+        records, KINEMATICS
+    )
+    assert wins(records) == []
+    slow = in_sweeps(make, "Plumbob, prepared", 3.0 * rounds)
+    records = [records[0], slow, in_sweeps(make, "Pinocchio", 0.5 * rounds)]
+    assert wins(records)[0].endswith("by a factor of 2.0.")
+
+
 def median_of(table):
     return next(column for column in table.columns if column.title == "median")
 

@@ -5,6 +5,7 @@ from plumbob.reference import (
     forward_kinematics,
     kinematics,
     local_from_global,
+    prepare,
     rotation,
     set_num_threads,
 )
@@ -86,3 +87,23 @@ def test_lengths_on_the_edge_of_the_tolerance_are_normalised_too(skeleton, local
     np.testing.assert_allclose(edge.positions, exact.positions, rtol=0, atol=ROUNDING)
     back = local_from_global(skeleton, exact.rotations * (1.0 + excess))
     np.testing.assert_allclose(back, local, rtol=0, atol=ROUNDING)
+
+
+def test_prepared_kinematics_fill_the_same_arrays_with_the_same_bits(skeleton, rng, backend):
+    forward = prepare(skeleton)
+    assert np.isnan(forward.pose.positions).all()
+    for local in (
+        *rotation.random(rng, 2, skeleton.joint_count),
+        [[1.0, 0, 0, 0]] * skeleton.joint_count,
+    ):
+        pose, other = forward(local), forward_kinematics(skeleton, local)
+        assert pose is forward.pose
+        assert all(map(np.array_equal, pose, other))
+        assert not any(values.flags.writeable for values in pose)
+    bad = np.array(local, float)
+    bad[-1] *= 1.01
+    for wrong, words in ((bad, "length 1.01"), (bad[:-1], "shape"), ("x", "numbers")):
+        with pytest.raises(ValueError, match=f"^local_rotations: expected .*{words}"):
+            forward(wrong)
+    with pytest.raises(ValueError, match=r"^skeleton: "):
+        prepare(local)

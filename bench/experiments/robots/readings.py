@@ -359,5 +359,5 @@ def times_of_both(a: Score, b: Score) -> tuple[Floats, Floats]:
     """Return the times of two solvers for the targets that both solve [s], (target,) each."""
     if a.seconds.shape != b.seconds.shape:
         return np.empty(0), np.empty(0)
-    both = a.timed_solved & b.timed_solved
-    return a.seconds[both], b.seconds[both]
+    solved = a.timed_solved & b.timed_solved
+    return a.seconds[solved], b.seconds[solved]

@@ -13,7 +13,8 @@ from plumbob.reference.backend.threads import in_slices
 
 from ...peers import registry
 
-COMPILED, PLAIN, LIMIT = registry.COMPILED.name, registry.PLAIN.name, registry.LIMIT.name
+COMPILED, PREPARED = registry.COMPILED.name, registry.PREPARED.name
+PLAIN, LIMIT = registry.PLAIN.name, registry.LIMIT.name
 
 
 class TimedWork(NamedTuple):

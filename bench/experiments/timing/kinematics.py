@@ -8,10 +8,10 @@ import numpy as np
 
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
-from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes
+from plumbob.reference import Skeleton, forward_kinematics, prepare, rotation, scenes
 from plumbob.reference.kinematics import THREAD_JOINTS
 
-from .case import COMPILED, PLAIN, TimedCase, TimedWork, streaming
+from .case import COMPILED, PLAIN, PREPARED, TimedCase, TimedWork, streaming
 
 # Bytes of each joint: its local rotation is read, its position and global rotation are written.
 READ, WRITE = 8 * 4, 8 * (3 + 4)
@@ -27,6 +27,7 @@ def cases() -> Iterator[TimedCase]:
         size = skeleton.joint_count * np.array([READ, WRITE])
         pose = _work(name, "one pose a call")
         yield TimedCase(pose, COMPILED, partial(compiled_poses, skeleton))
+        yield TimedCase(pose, PREPARED, partial(prepared_poses, skeleton))
         yield TimedCase(pose, PLAIN, partial(compiled_poses, skeleton), backend="python")
         for engine in SKELETON_ENGINES:
             yield TimedCase(pose, engine, partial(engine_pose, engine, skeleton))
@@ -65,6 +66,11 @@ def body() -> Skeleton:
 def compiled_poses(skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
     """Return our forward kinematics of random poses."""
     return partial(forward_kinematics, skeleton, _local_rotations(skeleton, *batch))
+
+
+def prepared_poses(skeleton: Skeleton) -> Callable[[], Any]:
+    """Return our forward kinematics of a random pose; the result stays in its own arrays."""
+    return partial(prepare(skeleton), _local_rotations(skeleton))
 
 
 def engine_pose(name: str, skeleton: Skeleton) -> Callable[[], Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import arguments
-from ...arguments import FloatArray
+from ...arguments import FloatArray, is_plain
 from ...articulation import Articulation
 from ...model import Model, checked_model, effector_of
 from ..problem import (
@@ -21,7 +21,7 @@ from ..problem import (
     checked_settings,
     checked_targets,
 )
-from ..solve import is_plain, solve_checked, target_rows
+from ..solve import solve_checked, target_rows
 from .arms import SEARCH, Arm, Arms, arms_of
 from .closed_forms import CANDIDATES, HINGES, LARGEST_COUNT
 from .settle import FIGURES, closed_form_kernel, settle_kernel
