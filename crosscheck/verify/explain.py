@@ -208,18 +208,14 @@ def _filled(template: Sentence, parts: Sequence[Sentence]) -> Sentence:
     return Sentence(template.template, fields)
 
 
-def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -> Sentence | None:
-    """Return a sentence about the first broken law along the computation, with the joint if any."""
+def first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
+    """Return a sentence about the first broken law along the computation."""
     for judgement in judgements:
         for finding in judgement.findings:
             if finding.verdict >= Verdict.WRONG:
                 return sentence(
-                    "The first violated law is '{law}', at joint {joint} of the case '{case}': "
-                    "{why}"
-                    if at_joints and finding.index is not None
-                    else "The first violated law is '{law}', in the case '{case}': {why}",
+                    "The first violated law is '{law}', in the case '{case}': {why}",
                     law=finding.law,
-                    joint=finding.index,
                     case=judgement.case.name,
                     why=finding.sentence,
                 )

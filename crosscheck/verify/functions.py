@@ -156,7 +156,8 @@ def understand(task: Task, inputs: Mapping[str, Any], returned: object) -> dict[
         summary = "; ".join(map(_describe, parts))
     if not outputs:
         names = ", ".join(f"{field.name} {_shape(field.shape)}" for field in task.outputs)
-        raise ValueError(f"{task.name}: expected some of {names}, got {summary}")
+        expected = f"some of {names}" if len(task.outputs) > 1 else names
+        raise ValueError(f"{task.name}: expected {expected}, got {summary}")
     for field in task.outputs:
         is_open = any(isinstance(length, str) and length not in counts for length in field.shape)
         if is_open and field.name in outputs and (size := len(outputs[field.name])) > MOST_POINTS:

@@ -51,7 +51,7 @@ def report(
     failures = smallest_failures(judgements, diagnosis.explained)
     broken = None
     if len(failures) == 1 and not diagnosis.explained:
-        broken = first_broken(failures, at_joints=True)
+        broken = first_broken(failures)
     hints = (*diagnosis.hints, *hints_of(judgements))
     if max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED:
         hints += (laws_that_hold(judgements),)

@@ -108,7 +108,10 @@ def _behaviour_at_strokes(exchanges: Sequence[Exchange], greeting: Greeting) -> 
             points, line = exchange.answer.values.get("points"), exchange.case.facts["line"]
             if points is None or not len(points) or not np.isfinite(points).all():
                 continue
-            if _distances(points, line, False).max() > _bound(exchange.case, greeting):
+            bound = _bound(exchange.case, greeting)
+            if _distances(points, line, True).max() > bound:
+                continue  # nothing is known from points off the line
+            if _distances(points, line, False).max() > bound:
                 return sentence("It bridges strokes: points lie between them as well.")
             return sentence("It keeps strokes apart: no points lie between them.")
     return None

@@ -559,3 +559,8 @@ RESAMPLE_LIES = {
 def test_law_of_resampling_catches_a_lie(law):
     report = judged(RESAMPLE, resampler(lambda case: RESAMPLE_LIES[law](bridged(case))))
     assert law in broken(report)
+
+
+def test_points_off_the_curve_tell_nothing_about_strokes():
+    report = judged(RESAMPLE, resampler(lambda case: np.full((case.inputs.get("count", 9), 3), 50)))
+    assert report.diagnosis.behaviour is None
