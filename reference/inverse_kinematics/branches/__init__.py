@@ -25,6 +25,7 @@ from ..solve import solve_checked, target_rows
 from .arms import SEARCH, Arm, Arms, arms_of
 from .closed_forms import CANDIDATES, HINGES, LARGEST_COUNT
 from .settle import FIGURES, closed_form_kernel, settle_kernel
+from .subproblems import CERTAIN, EVERY_ANGLE
 
 # Random starts of a search.
 RESTARTS = 256
@@ -42,8 +43,8 @@ class IKSolutions(NamedTuple):
         residual: distances from effector to target [m], by forward kinematics, (solution,).
         residual_rotation: angles between them [rad], (solution,).
         method: the name of the closed form, or "restarts".
-        complete: whether the method proves that there are no other solutions within the limits, to
-            rounding; with a grid, at its values.
+        complete: whether the method proves that there are no other solutions within the limits;
+            with a grid, at its values. Never near a singular pose, where their number is in doubt.
         continuum: whether the target is singular, within 1e-7 of the reach and in angle: some
             solutions are members of a continuum of which the others are not listed.
         unseen: the probability that a further restart would find a solution that is not listed,
@@ -149,12 +150,13 @@ def _plain(arm: Arm, pose: CheckedTarget) -> IKSolutions:
 def _closed_form(arm: Arm, pose: CheckedTarget) -> tuple[FloatArray, bool, bool]:
     """Return rows of solutions, whether they are complete, and whether some are in a continuum."""
     rows = np.empty((CANDIDATES, HINGES + FIGURES))
-    count, continuum, doubts = closed_form_kernel(*arm.flat, pose.position, pose.rotation, rows)
+    count, status, doubts = closed_form_kernel(*arm.flat, pose.position, pose.rotation, rows)
     rows.flags.writeable = False
     if count < 0:
         check_numbers([pose])
         raise ValueError("rotation: expected a quaternion within 1e-6 of unit length")
-    return rows[:count], arm.is_exact and not (continuum or doubts), continuum
+    complete = arm.is_exact and status == CERTAIN and not doubts
+    return rows[:count], complete, status == EVERY_ANGLE
 
 
 def _by_search(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:

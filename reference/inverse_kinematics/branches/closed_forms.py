@@ -150,7 +150,7 @@ def _feet(axes: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def fill_candidates(arm, reach, target, work):
-    """Fill the candidates for a target; return their number and whether one is in a continuum.
+    """Fill the candidates for a target; return their number and how sure it is.
 
     A candidate stands for its continuum: an angle that nothing determines is zero.
     """
@@ -209,20 +209,20 @@ def solve_wrist(arm, R, x, work):
         dot(goal, goal),
     )  # fmt: skip
     upper, lower = subtract(o3, o2), subtract(w, o3)
-    count, continuum = third_angles(arm, shoulder, upper, lower, work)
+    count, status = third_angles(arm, shoulder, upper, lower, work)
     total = 0
     for i in range(count):
         third = work.first[i, 0], work.first[i, 1]
         v = add(upper, rotated(a3, third, lower))
-        inner, singular = second_angles(arm, shoulder, v, work.second)
-        continuum |= singular
+        inner, certainty = second_angles(arm, shoulder, v, work.second)
+        status = max(status, certainty)
         for j in range(inner):
             second = work.second[j, 0], work.second[j, 1]
-            first, singular = angle_between(a1, add(normal, rotated(a2, second, v)), goal)
-            continuum |= singular
-            total, singular = solve_orientation(arm, R, (first, second, third), total, work)
-            continuum |= singular
-    return total, continuum
+            first, certainty = angle_between(a1, add(normal, rotated(a2, second, v)), goal)
+            status = max(status, certainty)
+            total, certainty = solve_orientation(arm, R, (first, second, third), total, work)
+            status = max(status, certainty)
+    return total, status
 
 
 def third_angles(arm, shoulder, upper, lower, work):
@@ -260,13 +260,13 @@ def second_angles(arm, shoulder, v, roots):
         k, c, s = projection(shoulder.normal, a2, v)
         return line_roots(k - f, c, s, arm.deviation, roots)
     image = add(scale(f / gap2, shoulder.normal), scale(g / sine2, shoulder.across))
-    (c, s), singular = angle_between(a2, v, image)
+    (c, s), certainty = angle_between(a2, v, image)
     roots[0, 0], roots[0, 1] = c, s
-    return 1, singular
+    return 1, certainty
 
 
 def solve_orientation(arm, R, angles, total, work):
-    """Add the candidates of three angles; return how many there are and whether one is singular.
+    """Add the candidates of three angles; return how many there are and how sure that is.
 
     R4 R5 R6 is known: its effect on the last axis, then on a vector across it.
     """
@@ -277,15 +277,15 @@ def solve_orientation(arm, R, angles, total, work):
         axis = axis_of(arm, i)
         last, other = rotated_back(axis, angles[i], last), rotated_back(axis, angles[i], other)
     k, c, s = projection(a4, a5, a6)
-    count, continuum = line_roots(k - dot(a4, last), c, s, arm.deviation, work.third)
+    count, status = line_roots(k - dot(a4, last), c, s, arm.deviation, work.third)
     for i in range(count):
         fifth = work.third[i, 0], work.third[i, 1]
-        fourth, singular = angle_between(a4, rotated(a5, fifth, a6), last)
-        continuum |= singular
+        fourth, certainty = angle_between(a4, rotated(a5, fifth, a6), last)
+        status = max(status, certainty)
         image = rotated_back(a5, fifth, rotated_back(a4, fourth, other))
         sixth, _ = angle_between(a6, across, image)
         total = store_candidate(arm, total, (*angles, fourth, fifth, sixth), work)
-    return total, continuum
+    return total, status
 
 
 def solve_parallel(arm, R, x, work):
@@ -297,27 +297,27 @@ def solve_parallel(arm, R, x, work):
     a1, a, a5 = axis_of(arm, 0), axis_of(arm, 1), axis_of(arm, 4)
     a6, o1, o6 = axis_of(arm, 5), point_on(arm, 0), point_on(arm, 5)
     k, c, s = projection(subtract(add(rotate(R, o6), x), o1), a1, a)
-    count, continuum = line_roots(k - dot(a, subtract(o6, o1)), c, s, arm.deviation, work.first)
+    count, status = line_roots(k - dot(a, subtract(o6, o1)), c, s, arm.deviation, work.first)
     total = 0
     for i in range(count):
         first = work.first[i, 0], work.first[i, 1]
         normal = rotate(conjugate(R), rotated(a1, first, a))  # a before P, E5 and E6
         k, c, s = projection(a, a5, a6)
-        inner, singular = line_roots(k - dot(normal, a6), c, s, arm.deviation, work.second)
-        continuum |= singular
+        inner, certainty = line_roots(k - dot(normal, a6), c, s, arm.deviation, work.second)
+        status = max(status, certainty)
         for j in range(inner):
             fifth = work.second[j, 0], work.second[j, 1]
-            sixth, singular = angle_between(a6, normal, rotated_back(a5, fifth, a))
-            continuum |= singular
-            total, singular = solve_plane(arm, R, x, (first, fifth, sixth), total, work)
-            continuum |= singular
-    return total, continuum
+            sixth, certainty = angle_between(a6, normal, rotated_back(a5, fifth, a))
+            status = max(status, certainty)
+            total, certainty = solve_plane(arm, R, x, (first, fifth, sixth), total, work)
+            status = max(status, certainty)
+    return total, status
 
 
 def solve_plane(arm, R, x, angles, total, work):
     """Add the candidates of the first, fifth and sixth angle, which leave a motion of the plane.
 
-    Returns how many there are and whether one is singular. In the plane across a the arm of two
+    Returns how many there are and how sure that is. In the plane across a the arm of two
     links has an elbow on either side (subproblem 3).
     """
     first, fifth, sixth = angles
@@ -336,17 +336,17 @@ def solve_plane(arm, R, x, angles, total, work):
     upper, lower = flat(a, subtract(o3, o2)), flat(a, subtract(o4, o3))
     k, c, s = projection(upper, a, lower)
     rest = 0.5 * (dot(goal, goal) - dot(upper, upper) - dot(lower, lower))
-    count, continuum = line_roots(k - rest, c, s, arm.deviation, work.third)
+    count, status = line_roots(k - rest, c, s, arm.deviation, work.third)
     for i in range(count):
         third = work.third[i, 0], work.third[i, 1]
-        second, singular = angle_between(a, add(upper, rotated(a, third, lower)), goal)
-        continuum |= singular
+        second, certainty = angle_between(a, add(upper, rotated(a, third, lower)), goal)
+        status = max(status, certainty)
         fourth = difference(whole, (second[0] * third[0] - second[1] * third[1],
                                     second[0] * third[1] + second[1] * third[0]))  # fmt: skip
         third = third[0], third[1] * sign_of(arm, a, 2)
         fourth = fourth[0], fourth[1] * sign_of(arm, a, 3)
         total = store_candidate(arm, total, (first, second, third, fourth, fifth, sixth), work)
-    return total, continuum
+    return total, status
 
 
 def store_candidate(arm, total, angles, work):

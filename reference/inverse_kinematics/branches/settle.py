@@ -19,6 +19,7 @@ from ..mechanism import TARGET, Mechanism, errors, new_data, update_forward_kine
 from ..restarts import copy_row
 from ..solve_mechanism import normalise_target
 from .closed_forms import ClosedForm, fill_candidates, new_roots
+from .subproblems import CERTAIN
 
 # A solution reaches its target within this, over the reach, and this angle [rad].
 TOLERANCE = 1e-9
@@ -43,10 +44,9 @@ def solve_closed_form(
 ):  # fmt: skip
     """Fill the solutions of a closed form; return their number, -1 of a target that is not valid.
 
-    Also return whether the target lies on a continuum of solutions, and how many candidates are in
-    doubt. Arrays come separately, as for `solve_mechanisms`: the fields of Mechanism and of
-    ClosedForm, position [m] and rotation of the target, and the rows to fill: coordinates of the
-    mechanism, then FIGURES.
+    Also return how sure the number of candidates is, and how many of them are in doubt. Arrays come
+    separately, as for `solve_mechanisms`: the fields of Mechanism and of ClosedForm, position [m]
+    and rotation of the target, and the rows to fill: coordinates of the mechanism, then FIGURES.
     """
     target = np.empty(1, TARGET)
     for k in range(3):
@@ -55,12 +55,12 @@ def solve_closed_form(
         target["rotation"][0, k] = rotation[k]
     target["weight"][0] = 1.0
     if not normalise_target(target):
-        return -1, False, 0
+        return -1, CERTAIN, 0
     mechanism = Mechanism(joints, columns, effectors, moves, adjacent, reach, freedoms, equations)
     arm, work = ClosedForm(form, backwards, geometry, deviation), new_roots()
-    count, continuum = fill_candidates(arm, reach, target, work)
+    count, status = fill_candidates(arm, reach, target, work)
     count, doubts = settle(mechanism, target, work.candidates[:count], rows)
-    return count, continuum, doubts
+    return count, status, doubts
 
 
 def settle_candidates(
@@ -81,8 +81,11 @@ def settle(mechanism, target, candidates, rows):
         copy_row(candidates[i], data.q)
         if bring_within_limits(mechanism.joints, data.q, reach) > FAR:
             continue
-        distance, angle = polish(mechanism, target, data, system)
+        polish(mechanism, target, data, system)
         gap = bring_within_limits(mechanism.joints, data.q, reach)
+        if gap > 0.0:
+            update_forward_kinematics(mechanism, data)
+        distance, angle = errors(mechanism, target, data, 0)
         is_near = distance <= DOUBTFUL * reach and angle <= DOUBTFUL and gap <= DOUBTFUL
         if not (distance <= TOLERANCE * reach and angle <= TOLERANCE and gap <= LIMIT_TOLERANCE):
             doubts += is_near
@@ -99,7 +102,7 @@ def settle(mechanism, target, candidates, rows):
 
 
 def polish(mechanism, target, data, system):
-    """Improve coordinates by Newton's method while it does; return distance [m] and angle [rad]."""
+    """Improve coordinates by Newton's method while it does; see `TaskSystem` for the errors."""
     update_forward_kinematics(mechanism, data)
     fill_errors(mechanism, target, data, system.e)
     square, rounding = inner(system.e, system.e), ROUNDING * mechanism.reach
@@ -116,7 +119,6 @@ def polish(mechanism, target, data, system):
         if not square < before:
             move(mechanism, data, system.step, -1.0)
             break
-    return errors(mechanism, target, data, 0)
 
 
 def move(mechanism, data, step, share):

