@@ -280,7 +280,7 @@ def _separation(
         middle, half, shares, gaps = (a[~close] for a in (middle, half, shares, gaps))
         count += 2 * len(gaps)
         if nearest <= 0.0 or not shares.size or count > boxes:
-            return max(0.0, float(min(settled, gaps.min(initial=math.inf))))
+            return max(0.0, float(np.append(gaps, settled).min()))  # 0 if it is NaN
         rows, widest = np.arange(len(gaps)), shares.argmax(axis=1)
         half = half.copy()
         half[rows, widest] *= 0.5
