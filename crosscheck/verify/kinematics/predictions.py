@@ -18,7 +18,7 @@ from .switches import Switches
 from .textbook import OF_GLOBAL_LINKS, SOLVERS, Ending, TextbookChain, TextbookPose, place_all
 
 RIGHT = Switches()
-REVERSED = "product of quaternions reversed"
+REVERSED, CONJUGATED = "product of quaternions reversed", "local rotation conjugated"
 
 
 def path_to(parents: IndexArray, effector: int) -> IndexArray:
@@ -58,6 +58,8 @@ def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
         local = np.roll(local, 1, axis=-1)
     elif switched.numbers == 4:  # w is computed as a square root
         local[:, 0] = np.abs(local[:, 0])
+    elif switched.numbers == 5:
+        local[:, 1:] *= -1.0
     if switched.euler:
         local = _through_euler_angles(local, *EULER_ORDERS[switched.euler - 1])
     return TextbookPose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
@@ -75,6 +77,8 @@ def _through_euler_angles(local: FloatArray, order: str, other_order: str) -> Fl
 
 def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:
     """Return quaternions in the order in which the solver writes them."""
+    if switched.numbers == 6:  # the conjugates
+        return rotations * [1.0, -1.0, -1.0, -1.0]
     return np.roll(rotations, -1, axis=-1) if switched.numbers in (2, 3) else rotations
 
 
@@ -132,11 +136,18 @@ def programs(
         parts & {"quaternion", "forward", "arc"} or names & {"rotations", "angle", "link"}
     ):
         numbers["rule"] = range(6 if "forward" in parts else 4)
+    if method == "fabrik" and "forward" in parts:
+        numbers["returned"] = range(2)
+    if method != "forward" and (names & {"rotations", "applied"} or parts & {"forward", "arc"}):
+        numbers["global_rotations"] = range(2)
     if any(f.switch == "rotations" and f.number >= OF_GLOBAL_LINKS for f in faults):
         numbers["rule"] = (0, 3)
-    return [
+    choices = [
         dict(zip(numbers, values, strict=True)) for values in itertools.product(*numbers.values())
     ]
+    if any(fault.key == CONJUGATED for fault in faults) and method != "forward":
+        choices.append({"product": 0, "numbers": 5})  # where rotations are read
+    return choices
 
 
 def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
@@ -162,7 +173,7 @@ def _outputs(
     with np.errstate(all="ignore"):  # as the answers are read
         local = local / np.linalg.norm(local, axis=-1, keepdims=True)
     path = path_to(inputs["parents"], inputs["effector"])
-    if switched.returned:
+    if switched.returned and method == "ccd":
         positions = _older_positions(method, switched, inputs)
     outputs = {"path_positions": positions[path], "all_positions": positions}
     if method == "ccd":

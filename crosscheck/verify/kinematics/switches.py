@@ -27,7 +27,7 @@ class Switches(NamedTuple):
     aim: int = 0  # the two directions that d joins
     offsets: int = 0  # what becomes of a child's offset
     dropped: int = 0  # which angle is too small to rotate by
-    returned: int = 0  # which positions are returned
+    returned: int = 0  # which positions are returned; FABRIK: its points, or (1) the placed joints
     passes: int = 0  # FABRIK: which passes there are
     loop: int = 0  # which links a pass leaves out
     stale: int = 0  # which points of before the pass are used
@@ -48,6 +48,7 @@ class Switches(NamedTuple):
     grouping: int = 0  # ((P* d) P) Q, P* (d R), (P* d) R or (P* (d P)) Q
     unit: int = 0  # local rotations are made unit (0), none (1), or global ones too (2)
     rule: int = 0  # FABRIK: the direction of a link from which its joint is rotated
+    global_rotations: int = 0  # they come from new local ones, or are kept as they are made (1)
     # What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad].
     gain: float = 1.0
     cap: float = UNCAPPED

@@ -168,7 +168,7 @@ def sweep_ccd(
         left_out = (-1, 0, links - 1, -1)
         if k != left_out[faults.joints] and (faults.joints != 3 or link == 0):
             rotate_joint(chain, k, target, faults, pose)
-    if faults.update < 2:
+    if faults.update < 2 and faults.global_rotations == 0:
         place(chain, faults, pose)
 
 
@@ -200,6 +200,9 @@ def rotate_joint(
     d = arc(a, b, faults)
     if faults.dropped > 0 and norm(logarithm(d)) < DROPPED[faults.dropped]:
         return
+    if faults.global_rotations == 1:
+        rotate_below(chain, chain.path[k], d, faults, pose)
+        return
     rotate_offset(chain, k, d, faults, pose)
     if faults.update < 3:
         apply_rotation(chain, k, d, faults, pose)
@@ -207,6 +210,22 @@ def rotate_joint(
         place(chain, faults, pose)
     elif faults.update >= 2:
         follow_by_hand(chain, k, d, faults, pose)
+
+
+def rotate_below(
+    chain: TextbookChain, j: int, d: Any, faults: Switches, pose: TextbookPose
+) -> None:
+    """Rotate joint j and all below it about its position, in global rotations and positions."""
+    x = load_vector(pose.positions, j)
+    for m in range(j, len(chain.parents)):
+        above = m
+        while above > j:
+            above = chain.parents[above]
+        if above == j:
+            arm = subtract(load_vector(pose.positions, m), x)
+            store_vector(pose.positions, m, add(x, rotated(d, arm, faults)))
+            R = load_quaternion(pose.rotations, m)
+            store_quaternion(pose.rotations, m, product(d, R, faults))
 
 
 def rotate_offset(
@@ -289,15 +308,35 @@ def wrong_rotation(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
         (unit, P_inverse, d, P),
         (unit, R, d, P_inverse),
         (unit, P, d, Q),
+        (unit, unit, inverse(product(d, R, faults), faults), P),
     )
     a, b, c, e = products[faults.applied]
     return product(product(product(a, b, faults), c, faults), e, faults)
 
 
 def keep(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
-    """Leave a pose of CCD as it is, unless only its effector was followed by hand."""
+    """Leave a pose of CCD, unless its effector was followed by hand, or all global rotations."""
     if faults.update == 2:
         place(chain, faults, pose)
+    if faults.global_rotations == 1:
+        for j in range(1, len(chain.parents)):
+            R = load_quaternion(pose.rotations, j)
+            P = load_quaternion(pose.rotations, chain.parents[j])
+            store_quaternion(pose.local, j, local_from_global(P, R, faults))
+        store_quaternion(pose.local, 0, load_quaternion(pose.rotations, 0))
+
+
+def local_from_global(P: Any, R: Any, faults: Switches) -> Any:
+    """Return P* R; or by the number of `applied` R (6), P R (14), R P* (15) or R* P (21)."""
+    if faults.applied == 6:
+        return R
+    if faults.applied == 14:
+        return product(P, R, faults)
+    if faults.applied == 15:
+        return product(R, inverse(P, faults), faults)
+    if faults.applied == 21:
+        return product(inverse(R, faults), P, faults)
+    return product(inverse(P, faults), R, faults)
 
 
 def sweep_fabrik(
@@ -383,10 +422,11 @@ def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPo
     place(chain, faults, pose)
     solved = SolvedPath(points, pose.positions.copy(), pose.rotations.copy())
     for k in range(len(chain.path) - 1 if sweeps > 0 else 0):
-        place(chain, faults, pose)
+        if faults.global_rotations == 0:
+            place(chain, faults, pose)
         point_link(chain, k, solved, faults, pose)
     place(chain, faults, pose)
-    for j in chain.path:
+    for j in chain.path if faults.returned == 0 else chain.path[:0]:
         store_vector(pose.positions, j, load_vector(points, j))
 
 
@@ -414,6 +454,17 @@ def point_link(
         Q = wrong_local(chain, k, P, d, R, faults, pose)
     Q = Q if faults.unit == 1 else made_unit(Q)
     store_quaternion(pose.local, child if faults.rotations == 3 else j, Q)
+    if faults.global_rotations == 1:
+        store_quaternion(pose.rotations, j, global_of(P, d, R, faults))
+
+
+def global_of(P: Any, d: Any, R: Any, faults: Switches) -> Any:
+    """Return the new global rotation of a joint: d R, d alone (15) or R d (16)."""
+    if faults.rule == 1:
+        return product(P, d, faults)
+    if faults.rotations == 15:
+        return d
+    return product(R, d, faults) if faults.rotations == 16 else product(d, R, faults)
 
 
 def rest_of(
@@ -490,7 +541,12 @@ def wrong_local(
         (inverse(Q_parent, faults), d, R),
         (unit, unit, d),
         (unit, d, R),
+        (unit, P_inverse, d),
+        (P_inverse, R, d),
+        (unit, inverse(product(d, R, faults), faults), P),
     )
+    if faults.rotations == 17 and chain.parents[j] < 0:
+        return product(d, R, faults)
     a, b, c = products[faults.rotations]
     return product(product(a, b, faults), c, faults)
 

@@ -86,6 +86,15 @@ def test_every_rule_places_the_path_on_the_points(rule):
         assert outputs["path_placed"] == pytest.approx(outputs["path_positions"], abs=1e-13 * size)
 
 
+@pytest.mark.parametrize("method", ["ccd", "fabrik"])
+def test_global_rotations_that_are_kept_give_the_same_pose(method):
+    for case in problems.cases(Greeting(1, (INVERSE,)), method, 1, False)[:4]:
+        local, kept = (
+            solve(method, case.inputs, Switches(rule=3, global_rotations=k))[0] for k in (0, 1)
+        )
+        assert rotation.angle(local, kept) == pytest.approx(0.0, abs=1e-12)
+
+
 @pytest.mark.parametrize("rule", [1, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 4))])
 def test_a_right_fabrik_of_any_rule_is_not_accused(rule):
     function = fabrik(Switches(rule=rule), ("local_rotations",))
