@@ -41,6 +41,7 @@ class Restriction(NamedTuple):
     greeting: Mapping[str, Any]  # the fields that declare it
     about: Sentence  # what it is judged on
     sentence: Sentence  # how its answers show that
+    asks: bool = False  # whether it is a mistake unless the greeting declares it
 
 
 # Restrictions, each with how answers show it.
@@ -48,7 +49,7 @@ Evidence = Sequence[tuple[Restriction, Sentence]]
 RESTRICTIONS = tuple(
     Restriction(
         entry["input"], entry["greeting"], Sentence(entry["about"], {}),
-        Sentence(entry.get("sentence", ""), {}),
+        Sentence(entry.get("sentence", ""), {}), entry.get("asks", False),
     )
     for entry in _TABLE["restriction"]
 )  # fmt: skip
@@ -120,14 +121,20 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
         for restriction, why in evidence
     ]
     declaration = json.dumps(_fields(evidence))[1:-1]
-    notes.append(sentence("Declare it with {declaration}.", declaration=declaration))
+    is_asked = any(restriction.asks for restriction, _ in evidence)
+    notes.append(
+        sentence("If that is meant, declare it with {declaration}; if not, it is a mistake.",
+                 declaration=declaration)
+        if is_asked
+        else sentence("Declare it with {declaration}.", declaration=declaration)
+    )  # fmt: skip
     if best.verdict <= Verdict.RIGHT_EXCEPT and report.diagnosis.explained:
         explanations = tuple(
             replace(found, sentence=sentence("Of other requests: {what}", what=found.sentence))
             for found in report.diagnosis.explanations
         )
         best = replace(best, diagnosis=replace(best.diagnosis, explanations=explanations))
-    return replace(best, assumptions=(*best.assumptions, *notes))
+    return replace(best, assumptions=(*best.assumptions, *notes), is_asked=is_asked)
 
 
 def _share(report: TaskReport) -> float:
@@ -183,9 +190,22 @@ def _unchanged(
     for plain_case, full_case in pairs[:TRIALS]:
         answer = contestant.answer(plain_case)
         reason = _reason(answer, contestant.answer(full_case), restriction)
-        if reason is None:
+        if reason is None or _is_unused(contestant, plain_case, answer, restriction):
             return None
     return reason
+
+
+def _is_unused(
+    contestant: Contestant, case: Case, answer: Answer | Failure, restriction: Restriction
+) -> bool:
+    """Return whether answers do not even depend on the first number of an input of many."""
+    name = restriction.input
+    if name not in _SHARED or not isinstance(answer, Answer):
+        return False
+    doubled = contestant.answer(
+        replace(case, inputs={**case.inputs, name: 2.0 * case.inputs[name]})
+    )
+    return isinstance(doubled, Answer) and _are_same(answer, doubled)
 
 
 def _plain(case: Case, names: set[str]) -> dict[str, Any]:

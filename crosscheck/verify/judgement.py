@@ -95,6 +95,7 @@ class Diagnosis:
     first_broken: Sentence | None = None  # the first law along the computation, if unexplained
     hints: tuple[Sentence, ...] = ()  # at mistakes that no variant has
     variant_count: int = 0  # number of variants that were compared
+    is_double: bool = False  # whether the answers have more digits than single precision leaves
 
     @property
     def explained(self) -> bool:
@@ -131,6 +132,7 @@ class TaskReport:
     diagnosis: Diagnosis
     # what it is judged by instead of the greeting: another precision, chains only, one mass
     assumptions: tuple[Sentence, ...] = ()
+    is_asked: bool = False  # whether something assumed is a mistake unless it is declared
 
     @property
     def smallest_failure(self) -> CaseJudgement | None:
@@ -139,9 +141,14 @@ class TaskReport:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of all cases, with a reservation if something is assumed."""
+        """The worst of all cases, no better than undecided if the user is asked what is meant.
+
+        With a reservation if something is assumed.
+        """
         verdicts = (judgement.verdict for judgement in self.judgements)
         worst = max(verdicts, default=Verdict.UNDECIDED)
+        if self.is_asked:
+            return max(worst, Verdict.UNDECIDED)
         return max(worst, Verdict.RIGHT_EXCEPT) if self.assumptions else worst
 
     @property

@@ -130,8 +130,9 @@ def judge_cases(
         judge = partial(inverse_kinematics.judge, base=forward_faults)
     greeting, reason = precision.judging_greeting(exchanges, declared or contestant.greeting)
     report = judge(exchanges, greeting, method)
-    unexplained = report.verdict is Verdict.WRONG and not report.diagnosis.explained
-    if unexplained and greeting.precision == "double":
+    diagnosis = report.diagnosis
+    unexplained = report.verdict is Verdict.WRONG and not diagnosis.explained
+    if unexplained and greeting.precision == "double" and not diagnosis.is_double:
         single = judge(exchanges, msgspec.structs.replace(greeting, precision="single"), method)
         is_right = single.verdict <= Verdict.RIGHT_EXCEPT and precision.is_off_by_single(report)
         if is_right or single.diagnosis.explained:

@@ -12,15 +12,17 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ..sentence import Sentence, with_code
+from ..sentence import Sentence, sentence, with_code
 from .model import Integrator, StepModel, SystemMatrix
 from .problem import SpringProblem, frames
 
 # Aspects of a step in the order of the computation.
 ASPECTS = (
     "time", "inertia", "masses", "gravity", "springs", "damping", "damper", "integrator",
-    "matrix", "substeps", "pins", "velocity", "scaling", "factorisation",
+    "matrix", "substeps", "pins", "velocity", "update", "scaling", "factorisation",
 )  # fmt: skip
+# Aspects of which the forces and the matrix of an implicit step may have different versions.
+IN_PARTS = ("masses", "springs", "damping")
 # No solver is searched for more faults at once.
 MAX_FAULTS = 3
 
@@ -37,6 +39,7 @@ class Option(NamedTuple):
     fields: Mapping[str, Any] = {}  # the fields that it replaces in a model
     parts: tuple[float, ...] = ()  # factors of the kinetic, elastic and gravitational energy
     rare: bool = False  # whether it is not tried together with faults
+    part: str = ""  # the part of a step that it changes alone: forces, matrix; else both
 
 
 def _with_masses(p: SpringProblem, masses: FloatArray) -> dict[str, Any]:
@@ -61,7 +64,7 @@ def _first_for_all(p: SpringProblem, name: str) -> dict[str, Any]:
 # What an entry of faults.toml may hold.
 FIELDS = {
     *("code", "program", "lines", "example", "key", "sentence", "tasks", "parts", "rare", "each"),
-    *("scale", "set", "model", "integrator", "matrix", "value"),
+    *("scale", "set", "model", "integrator", "matrix", "value", "part"),
 }
 # Faults that are no fixed factors or fields.
 CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
@@ -74,6 +77,11 @@ CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
         p, np.array([0.0, -gravity, 0.0])
     ),
     "gravity m² g": lambda p: {"weights": p.weighing[:, None] * p.weights},
+    "rest length 1 for all": lambda p: {"rest_lengths": np.ones(len(p.springs))},
+    "stiffness 1 for all": lambda p: {"stiffnesses": np.ones(len(p.springs))},
+    "springs with h": lambda p: {"stiffnesses": p.stiffnesses / p.h},
+    "springs without h²": lambda p: {"stiffnesses": p.stiffnesses / p.h**2},
+    "gravity with h³": lambda p: {"weights": p.weights * p.h},
     "gravity along z": lambda p: _with_gravity(p, np.array([0.0, 0.0, -np.linalg.norm(p.gravity)])),
     "gravity without h²": lambda p: {"weights": p.weights / p.h**2},
     "gravity with h": lambda p: {"weights": p.weights / p.h},
@@ -120,7 +128,7 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
         if "value" in entry:
             fields[aspect] = entry["value"].format(**values)
         elif "matrix" in entry:
-            fields["matrix"] = SystemMatrix(**entry["matrix"])
+            fields["matrix"] = _matrix(entry["matrix"] | values)
         elif "integrator" in entry:
             fields["integrator"] = Integrator(**entry["integrator"], **values)
         elif aspect == "time" and values:
@@ -133,7 +141,33 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
         message = with_code(entry["code"], message) if "code" in entry else message
         rare = entry.get("rare", False)
         rare = any(x in rare for x in values.values()) if isinstance(rare, list) else rare
-        yield Option(key, aspect, message, _change(entry, values), fields, parts, rare)
+        change, part = _change(entry, values), entry.get("part", "")
+        option = Option(key, aspect, message, change, fields, parts, rare, part)
+        yield option
+        if "matrix" in entry and "dv" not in fields and entry["matrix"].get("masses", 1.0) == 1.0:
+            yield option._replace(fields={**fields, "dv": True})
+
+
+def _matrix(fields: Mapping[str, Any]) -> SystemMatrix:
+    """Return a matrix whose lists are tuples."""
+    tuples: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
+    return SystemMatrix(**tuples)
+
+
+def _in_parts(option: Option, entry: Mapping[str, Any]) -> Iterator[Option]:
+    """Yield a fault of a step, then the same fault of the forces and of the matrix alone."""
+    yield option
+    if option.part or option.aspect not in IN_PARTS:
+        return
+    for part, words in _FAULTS["part"].items():
+        where = with_code(words["code"], Sentence(words["sentence"], {}))
+        message = sentence("{fault} {where}", fault=option.sentence, where=where)
+        alone = option._replace(key=f"{option.key}, {part} only", sentence=message, part=part)
+        has_dampers = option.aspect == "damping" or "set" in entry
+        if option.aspect != "damping" or part == "matrix":
+            yield alone
+        if has_dampers and part == "forces":  # those of dampers stand in the equation for dv only
+            yield alone._replace(fields={"dv": True})
 
 
 def _change(entry: Mapping[str, Any], values: Mapping[str, Any]) -> Change | None:
@@ -157,7 +191,8 @@ def faults_of(task: str, aspects: Sequence[str]) -> tuple[Option, ...]:
         for aspect in aspects
         for entry in _FAULTS.get(aspect, ())
         if task in entry.get("tasks", (task,))
-        for option in options_of(aspect, entry)
+        for basis in options_of(aspect, entry)
+        for option in (_in_parts(basis, entry) if task == "step" else [basis])
     )
     if idle := [
         option.key for option in options if not (option.change or option.fields or option.parts)
@@ -175,12 +210,16 @@ def apply(
     options: Sequence[Option], p: SpringProblem, model: StepModel
 ) -> tuple[SpringProblem, StepModel]:
     """Return the problem and the model as a solver with these options has them."""
+    linear = p
     for option in options:
-        if option.change is not None:
+        if option.change is not None and option.part != "matrix":
             p = p.changed(**option.change(p))
+        if option.change is not None and option.part != "forces":
+            linear = linear.changed(**option.change(linear))
         if option.fields:
             model = model._replace(**option.fields)
-    return p, model
+    is_apart = any(option.part for option in options)
+    return p.changed(linear=linear) if is_apart else p, model
 
 
 def combined(options: Sequence[Option]) -> Iterator[tuple[Option, ...]]:

@@ -107,9 +107,14 @@ def compatible(options: Mapping[str, Option]) -> bool:
     method = fields["integrator"].method
     if method in EXPLICIT and ("matrix" in fields or fields.get("time") == "before"):
         return False
-    matrix = fields.get("matrix")
     is_linearised = fields["integrator"][:3] == ("newton", "x_n", 1)
-    if matrix and not is_linearised and (matrix.on_right or matrix.inverse != "exact"):
+    inverse = fields["matrix"].inverse if "matrix" in fields else "exact"
+    if not is_linearised and (fields.get("dv") or inverse == "first order"):
+        return False
+    parts = {option.part for option in options.values()} - {""}
+    if method in EXPLICIT and (parts or "update" in fields):
+        return False
+    if fields.get("dampers_apart") and "matrix" not in fields:
         return False
     if damper in SYMPLECTIC_DAMPERS and method != "symplectic":
         return False

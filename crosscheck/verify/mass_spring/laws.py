@@ -28,6 +28,8 @@ IMPRECISE = 1e-3
 ROUNDED = 30.0
 # A small step's mean acceleration is off by about h omega, some hundredths.
 CONSISTENT = 0.1
+# The share of the largest displacement by which a pin may move without being declared.
+HELD = 0.1
 # The share of the largest displacement that a solver of nonlinear equations may leave to momentum.
 UNBALANCED = 1e-4
 
@@ -134,7 +136,9 @@ def pins(context: StepContext) -> Finding | None:
     tolerance = strict + IMPRECISE * float(np.abs(x - p.positions).max())
     if context.expected:
         expected = (context.expected["positions"] - p.positions)[..., p.pinned, :]
-        tolerance += 2.0 * float(np.abs(expected).max())
+        motion = 2.0 * float(np.abs(expected).max())
+        most = np.inf if context.pins_declared else HELD * float(np.abs(x - p.positions).max())
+        tolerance += min(motion, most)
     is_exact = context.model.pins in ("eliminated", "overwritten") and context.pins_declared
     verdict = Verdict.RIGHT_EXCEPT if worst <= tolerance and not is_exact else Verdict.WRONG
     index = int(p.pinned[offsets.max(axis=0).argmax()])
@@ -232,9 +236,8 @@ def momentum(context: StepContext) -> Finding | None:
     size = float(fall @ fall)
     part = float(np.clip(drift @ fall / size, 0.0, 1.0)) if size else 0.0
     gap = float(np.linalg.norm(drift - part * fall))
-    tolerance = 4.0 * context.allowed.positions
-    if method == "converged":
-        tolerance += UNBALANCED * float(np.abs(x - p.positions).max())
+    unbalanced = UNBALANCED if method == "converged" else SOLVED
+    tolerance = 4.0 * context.allowed.positions + unbalanced * float(np.abs(x - p.positions).max())
     return finding("momentum", gap, tolerance)
 
 

@@ -27,8 +27,7 @@ class Integrator(NamedTuple):
     method: str
     start: str = "x_n"  # of the iterations, "x_n" or "y"
     iterations: int = 1
-    # of Newton's method: exact; gauss: without geometric term; projected: that term only where it
-    # pulls; flipped: its sign turned; transverse: nothing but that term; frozen: exact at x_n
+    # of Newton's method: a key of HESSIANS; or frozen: exact at x_n
     hessian: str = "exact"
     rate: float = 1.0  # factor of the step of Newton's method or of the gradient
 
@@ -45,11 +44,21 @@ class SystemMatrix(NamedTuple):
     power: int = 2  # of h before the springs' part, with its sign
     sign: float = 1.0
     stiffness: bool = True  # whether the springs' part has its factor k
-    off_diagonal: float = 1.0  # factor of the entries off the diagonal
-    # how often its springs' part, times h v, is added to the right-hand side of one Newton step:
-    # 1 if a step for the change of velocity lacks h² K v there, 2 if that has the other sign
-    on_right: float = 0.0
-    inverse: str = "exact"  # or "first order": multiplied by 1 - h²/m K instead of solved
+    # what a spring adds to the rows of its first and of its second end, in the columns of both
+    element: tuple[float, ...] = (1.0, -1.0, -1.0, 1.0)
+    accumulated: bool = True  # whether springs add up on the diagonal; else the last one stays
+    components: bool = True  # whether x, y and z are coupled
+    damper_power: int = 0  # the power of h by which the dampers' part differs from h C
+    # of the equation for dv: the factor of h K v, and the powers of h by which that and the
+    # right-hand side differ
+    drag: float = 1.0
+    drag_power: int = 0
+    right_power: int = 0
+    # exact; "first order": multiplied by 1 - h²/m K; or a key of ITERATIONS with a number of them
+    inverse: str = "exact"
+
+
+RIGHT_MATRIX = SystemMatrix()
 
 
 class StepModel(NamedTuple):
@@ -63,10 +72,15 @@ class StepModel(NamedTuple):
     scaling: float = 1.0  # of every velocity after each substep
     # eliminated, overwritten; with a number: penalty (weight), springs (stiffness), heavy or
     # falling (mass); at_the_end: free through the substeps; free; unattached: no springs to them;
-    # first: only one is held; origin: their columns dropped, so that springs end at the origin
+    # first: only one is held; origin: their columns dropped, so that springs end at the origin;
+    # dropped: eliminated, then moved by gravity
     pins: str = "eliminated"
     velocity: str = "displacement"  # displacement, separate; or a key of VELOCITIES
-    matrix: SystemMatrix = SystemMatrix()  # of an implicit step
+    matrix: SystemMatrix = RIGHT_MATRIX  # of an implicit step
+    # whether a Newton step solves (M + h C + h² K) dv = h (f - h K v) for the change of velocity
+    # instead of the displacement, which matters beside a fault
+    dv: bool = False
+    dampers_apart: bool = False  # whether a fault of the springs' part spares the dampers' part
     # what stands for y: y; x_n: no velocity; doubled: x_n + 2 h v; squared: x_n + h² v
     inertia: str = "y"
     # divided among substeps; undivided; before: of the last request, in the matrix only; or a
@@ -76,6 +90,7 @@ class StepModel(NamedTuple):
     # stops at a pivot and solves with what it has (LLT); its SimplicialLLT does not solve, so that
     # the unknown, a displacement or a change of velocity, stays zero or what memory held
     factorisation: str = "LU"
+    update: str = "solved"  # of positions and velocities by the solution; else a key of UPDATES
 
     @property
     def pin_kind(self) -> str:
@@ -101,7 +116,7 @@ class Substep(NamedTuple):
     def free(self) -> BoolArray:
         """Which particles the step may move."""
         free = np.ones(self.p.count, dtype=bool)
-        if self.model.pins in ("eliminated", "unattached", "first", "origin"):
+        if self.model.pins in ("eliminated", "unattached", "first", "origin", "dropped"):
             free[self.p.pinned] = False
         return free
 
@@ -132,6 +147,8 @@ def predicted(p: SpringProblem, model: StepModel) -> dict[str, FloatArray]:
 
 def _with_pins(p: SpringProblem, model: StepModel) -> SpringProblem:
     """Return the problem with the pins' masses, springs or number as the model has them."""
+    if p.linear is not None:
+        p = p.changed(linear=_with_pins(p.linear, model))
     kind, pinned = model.pin_kind, p.pinned
     if kind in ("heavy", "falling"):
         masses, weights = p.masses.copy(), p.weights.copy()
@@ -189,9 +206,12 @@ def substep(start: Substep) -> tuple[FloatArray, FloatArray]:
             force = x - equation.y - equation.gradient(x) / p.masses[:, None]
             separate = separate + force / h
     v = VELOCITIES[model.velocity](start, x, separate) * model.scaling
+    if model.update != "solved":
+        x, v = UPDATES[model.update](start, x, v)
     if model.pins == "overwritten" or not start.free.all():
         x, v = x.copy(), v.copy()
-        x[p.pinned], v[p.pinned] = x_n[p.pinned], 0.0
+        fall = h * h * p.gravity if model.pins == "dropped" else 0.0
+        x[p.pinned], v[p.pinned] = x_n[p.pinned] + fall, 0.0
     return x, v
 
 
@@ -268,7 +288,9 @@ EXPLICIT: Mapping[str, Callable[[Substep], tuple[FloatArray, FloatArray]]] = {
 
 
 def _old_forces(start: Substep, x: FloatArray, separate: FloatArray) -> FloatArray:
-    rates = accelerations(start.p, start.x, start.v)
+    p = start.p
+    p = p.changed(dampings=0.0 * p.dampings) if start.model.damper == "none" else p
+    rates = accelerations(p, start.x, start.v)
     return start.v + start.h * np.where(start.free[:, None], rates, 0.0)
 
 
@@ -287,6 +309,19 @@ VELOCITIES: Mapping[str, Callable[[Substep, FloatArray, FloatArray], FloatArray]
     "from y": lambda s, x, separate: (x - s.x) / s.h - s.v,
     "zero": lambda s, x, separate: np.zeros_like(s.v),
     "backwards": lambda s, x, separate: (s.x - x) / s.h,
+    "times h": lambda s, x, separate: (x - s.x) * s.h,
+    "with gravity": lambda s, x, separate: (x - s.x) / s.h + s.h * s.p.gravity,
+    "over 1/60": lambda s, x, separate: (x - s.x) * 60.0,
+}
+
+# Positions and velocities after a substep from its start and the right ones.
+Update = Callable[[Substep, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+UPDATES: Mapping[str, Update] = {
+    "old velocity": lambda s, x, v: (s.x + s.h * s.v, v),
+    "change only": lambda s, x, v: (x - s.h * s.v, v - s.v),
+    "change of position only": lambda s, x, v: (x - s.h * s.v, v),
+    "without h": lambda s, x, v: (s.x + (x - s.x) / s.h, v),
+    "twice": lambda s, x, v: (2.0 * x - s.x, v),
 }
 
 
@@ -297,8 +332,8 @@ class StepEquation:
         """Set up y and the forces that stay through the step."""
         p, model, x, v, h = start
         self.start, self.free = start, start.free
-        shift = {"y": h * v, "x_n": 0.0 * v, "doubled": 2.0 * h * v, "squared": h * h * v}
-        self.y = x + shift[model.inertia]
+        self.linear = p.linear or p  # whose springs the matrix is put together from
+        self.y = x + SHIFTS[model.inertia](h) * v
         self.constant = p.constant
         if model.damper == "explicit":
             self.constant = self.constant + damper_forces(p, x, v)
@@ -320,7 +355,8 @@ class StepEquation:
     def uncoupled(self) -> bool:
         """Whether no spring acts and the matrix is M: a Newton step arrives."""
         p, model = self.start.p, self.start.model
-        return not (p.stiff or self.damped or len(self.pins)) and model.matrix == SystemMatrix()
+        usual = model.matrix == RIGHT_MATRIX and self.linear.masses is p.masses
+        return not (p.stiff or self.damped or len(self.pins)) and usual
 
     @cached_property
     def length_n(self) -> FloatArray:
@@ -356,57 +392,76 @@ class StepEquation:
         inertia = 0.5 * (p.masses[:, None] * (x - self.y) ** 2).sum()
         return float(inertia + h * h * (energy - (self.constant * x).sum()) + penalty)
 
-    def blocks(self, x: FloatArray, kind: str) -> FloatArray:
-        """Return each spring's 3 x 3 stiffness with its damper's, shape (spring, 3, 3)."""
-        p = self.start.p
+    def blocks(self, x: FloatArray, kind: str) -> tuple[FloatArray, FloatArray | None]:
+        """Return the springs' 3 x 3 stiffnesses and their dampers', shape (spring, 3, 3)."""
+        p = self.linear
         length, u = frames(p, x)
         uu = u[:, :, None] * u[:, None, :]
         k = p.stiffnesses if self.start.model.matrix.stiffness else np.ones(len(u))
         k = np.where(p.tension_only & (length <= p.rest_lengths), 0.0, k)
         safe = np.maximum(length, 1e-150)
-        across = TRANSVERSE[kind](1.0 - p.rest_lengths / safe)
-        along = 0.0 if kind == "transverse" else 1.0
-        total = _isotropic(k * across) + (k * (along - across))[:, None, None] * uu
-        if not self.damped:
-            return total
+        along, across = HESSIANS[kind](p.rest_lengths / safe, safe)
+        springs = _isotropic(k * across) + (k * (along - across))[:, None, None] * uu
+        return springs, self._damper_blocks(x, kind, uu, u, safe) if self.damped else None
+
+    def _damper_blocks(
+        self, x: FloatArray, kind: str, uu: FloatArray, u: FloatArray, length: FloatArray
+    ) -> FloatArray:
+        p = self.linear
         c = (p.dampings / self.start.h)[:, None, None]
         if self.by_length:
-            across = TRANSVERSE[kind](1.0 - self.length_n / safe)
-            return total + c * (_isotropic(across) + (1.0 - across)[:, None, None] * uu)
+            _, across = HESSIANS[kind](self.length_n / length, np.ones_like(length))
+            return c * (_isotropic(across) + (1.0 - across)[:, None, None] * uu)
         if p.damping != "along":
-            return total + c * np.eye(3)
+            return c * np.tile(np.eye(3), (len(u), 1, 1))
         if kind != "exact":
-            return total + c * uu
+            return c * uu
         # The derivative of (w·u) u by w, the relative displacement, and by u.
         w, normal = p.incidence @ (x - self.start.x), np.eye(3) - uu
         w_normal = np.einsum("sab,sb->sa", normal, w)
         turning = (w * u).sum(1)[:, None, None] * normal + u[:, :, None] * w_normal[:, None, :]
-        return total + c * (uu + turning / safe[:, None, None])
+        return c * (uu + turning / length[:, None, None])
 
     def matrix(self, x: FloatArray, kind: str) -> FloatArray:
         """Return the matrix of a Newton step, (3 particle, 3 particle), as the model has it."""
-        A = self.put_together(_assemble(self.start.p, self.blocks(x, kind)), 3)
-        rows = np.repeat(self.pins, 3) * 3 + np.tile(np.arange(3), len(self.pins))
-        A[rows, rows] += self.hold
-        return A
+        return self.put_together(*self.blocks(x, kind))
 
-    def put_together(self, springs: FloatArray, size: int) -> FloatArray:
-        """Return M + h² times the springs' part, or a faulty solver's version of it."""
-        p, model = self.start.p, self.start.model
+    def put_together(self, springs: FloatArray, dampers: FloatArray | None = None) -> FloatArray:
+        """Return M + h² times the blocks of springs and dampers, or a faulty solver's version."""
+        p, model = self.linear, self.start.model
         rule = model.matrix
         h = p.h_before / model.substeps if model.time == "before" else self.start.h
-        if rule.off_diagonal != 1.0:
-            cells = np.kron(np.eye(p.count), np.ones((size, size)))
-            springs = np.where(cells, springs, rule.off_diagonal * springs)
-        masses = rule.masses * np.repeat(p.masses, size)
-        return rule.sign * h**rule.power * springs + np.diag(masses)
+        if not rule.components:
+            springs = springs * np.eye(springs.shape[1])
+        if dampers is not None and not (model.dampers_apart or rule.damper_power):
+            springs, dampers = springs + dampers, None
+        A = rule.sign * h**rule.power * _assemble(p, springs, rule)
+        if dampers is not None:
+            A += h ** (2 + rule.damper_power) * _assemble(p, dampers)
+        size = springs.shape[1]
+        A.flat[:: len(A) + 1] += rule.masses * np.repeat(p.masses, size)
+        if self.hold:
+            rows = (self.pins[:, None] * size + np.arange(size)).ravel()
+            A[rows, rows] += self.hold
+        return A
 
-    def solve(self, A: FloatArray, right: FloatArray) -> FloatArray:
-        """Return A^-1 right over the free particles, zero elsewhere, shape (particle, 3)."""
+    def solve(
+        self, A: FloatArray, right: FloatArray, guess: FloatArray | None = None
+    ) -> FloatArray:
+        """Return A^-1 right over the free particles, zero elsewhere, shape (particle, 3).
+
+        Iterative solvers begin at a guess, by default zero.
+        """
         free = np.repeat(self.free, len(A) // len(right))
         solution = np.zeros_like(right).reshape(len(A), -1)
         part = A if free.all() else A[np.ix_(free, free)]
-        kind = self.start.model.factorisation
+        kind, inverse = self.start.model.factorisation, self.start.model.matrix.inverse
+        if inverse != "exact":
+            method, count = inverse.rsplit(" ", 1)
+            start = solution if guess is None else guess.reshape(len(A), -1)
+            b = right.reshape(len(A), -1)[free]
+            solution[free] = ITERATIONS[method](part, b, start[free], int(count))
+            return solution.reshape(right.shape)
         if kind != "LU" and not is_positive_definite(part):
             if kind == "change of velocity":
                 return np.where(self.free[:, None], self.start.h * self.start.v, 0.0)
@@ -419,18 +474,25 @@ class StepEquation:
 
     def newton_step(self, x: FloatArray, base: FloatArray, kind: str) -> FloatArray:
         """Return the displacement of an iteration with the Hessian of a base."""
-        A, right = self.matrix(base, kind), -self.gradient(x)
-        p, rule = self.start.p, self.start.model.matrix
-        M = np.repeat(p.masses, 3)
-        springs = A - np.diag(M)
-        if rule.on_right:
-            more = springs @ (self.start.h * self.start.v).ravel()
-            right = right + rule.on_right * more.reshape(right.shape)
+        springs, dampers = self.blocks(base, kind)
+        A, right = self.put_together(springs, dampers), -self.gradient(x)
+        p, rule, h = self.start.p, self.start.model.matrix, self.start.h
+        drift = np.zeros_like(right)
+        if self.start.model.dv:
+            drift = h * self.start.v
+            drag = rule.drag * h ** (2 + rule.drag_power) * _assemble(p, springs) @ drift.ravel()
+            right = right - p.masses[:, None] * drift - drag.reshape(right.shape)
+            right = right + h**2 * damper_forces(p, x, self.start.v) if self.damped else right
+        right = right * h**rule.right_power if rule.right_power else right
         if rule.inverse == "first order":
-            step = np.where(self.free[:, None], right / p.masses[:, None], 0.0)
-            change = (springs @ step.ravel() / M).reshape(step.shape)
-            return np.where(self.free[:, None], step - change, 0.0)
-        return self.solve(A, right)
+            right = np.where(self.free[:, None], right, 0.0)
+            M = np.repeat(p.masses, 3)
+            step = right.ravel() / M
+            step -= (A @ step - M * step) / M
+            step = step.reshape(right.shape)
+        else:
+            step = self.solve(A, right)
+        return np.where(self.free[:, None], drift + step, 0.0)
 
 
 def is_positive_definite(A: FloatArray) -> bool:
@@ -464,24 +526,92 @@ def stopped_cholesky(A: FloatArray) -> FloatArray:
     return L
 
 
-# What a kind of Hessian makes of 1 - r/l, the share of the stiffness that acts across a spring.
-TRANSVERSE: Mapping[str, Callable[[FloatArray], FloatArray]] = {
-    "gauss": lambda share: 0.0 * share,
-    "projected": lambda share: np.maximum(share, 0.0),
-    "flipped": lambda share: -share,
-} | dict.fromkeys(("exact", "frozen", "transverse"), lambda share: share)
+# The shares of a spring's stiffness along and across it, given r/l and l: 1 and 1 - r/l are exact.
+HESSIANS: Mapping[
+    str, Callable[[FloatArray, FloatArray], tuple[FloatArray | float, FloatArray]]
+] = {
+    "exact": lambda ratio, length: (1.0, 1.0 - ratio),
+    "frozen": lambda ratio, length: (1.0, 1.0 - ratio),
+    "gauss": lambda ratio, length: (1.0, 0.0 * ratio),
+    "projected": lambda ratio, length: (1.0, np.maximum(1.0 - ratio, 0.0)),
+    "flipped": lambda ratio, length: (1.0, ratio - 1.0),
+    "transverse": lambda ratio, length: (0.0, 1.0 - ratio),
+    "inverted": lambda ratio, length: (1.0, 1.0 - 1.0 / np.maximum(ratio, 1e-150)),
+    "added": lambda ratio, length: (1.0, 1.0 + ratio),
+    "isotropic": lambda ratio, length: (1.0, 1.0 + 0.0 * ratio),
+    "unscaled": lambda ratio, length: (length**2 * ratio + 1.0 - ratio, 1.0 - ratio),
+}
+
+# What h makes of the old velocity before it is added to x_n.
+SHIFTS: Mapping[str, Callable[[float], float]] = {
+    "y": lambda h: h,
+    "x_n": lambda h: 0.0,
+    "doubled": lambda h: 2.0 * h,
+    "squared": lambda h: h * h,
+    "undivided": lambda h: 1.0,
+    "backwards": lambda h: -h,
+}
+
+
+def _jacobi(A: FloatArray, b: FloatArray, x: FloatArray, count: int) -> FloatArray:
+    for _ in range(count):
+        x = x + (b - A @ x) / np.diag(A)[:, None]
+    return x
+
+
+def _gauss_seidel(A: FloatArray, b: FloatArray, x: FloatArray, count: int) -> FloatArray:
+    lower = np.tril(A)
+    for _ in range(count):
+        x = x + np.linalg.solve(lower, b - A @ x)
+    return x
+
+
+def _conjugate_gradient(A: FloatArray, b: FloatArray, x: FloatArray, count: int) -> FloatArray:
+    residual = b - A @ x
+    direction, square = residual, (residual**2).sum(0)
+    for _ in range(count):
+        image = A @ direction
+        rate = square / np.maximum((direction * image).sum(0), 1e-300)
+        x, residual = x + rate * direction, residual - rate * image
+        square_before, square = square, (residual**2).sum(0)
+        direction = residual + square / np.maximum(square_before, 1e-300) * direction
+    return x
+
+
+# Iterative solutions of A x = b, each column on its own, from a guess.
+ITERATIONS: Mapping[str, Callable[[FloatArray, FloatArray, FloatArray, int], FloatArray]] = {
+    "Jacobi": _jacobi,
+    "Gauss-Seidel": _gauss_seidel,
+    "conjugate gradient": _conjugate_gradient,
+}
 
 
 def _isotropic(scale: FloatArray) -> FloatArray:
     return scale[:, None, None] * np.eye(3)
 
 
-def _assemble(p: SpringProblem, blocks: FloatArray) -> FloatArray:
-    """Return the sum over springs of (A_i A_i') x block, (3 particle, 3 particle)."""
-    n = p.count
-    right = (p.incidence[:, :, None, None] * blocks[:, None]).reshape(len(blocks), -1)
-    sums = (p.pulled.T @ right).reshape(n, n, 3, 3)
-    return np.ascontiguousarray(sums.transpose(0, 2, 1, 3)).reshape(3 * n, 3 * n)
+def _assemble(
+    p: SpringProblem, blocks: FloatArray, rule: SystemMatrix = RIGHT_MATRIX
+) -> FloatArray:
+    """Return the sum over springs of (A_i A_i') x block, (size particle, size particle)."""
+    n, size = p.count, blocks.shape[1]
+    first, second = np.maximum(p.incidence, 0.0), np.maximum(-p.incidence, 0.0)
+    of_first, of_second, from_first, from_second = rule.element
+    usual = rule.element == RIGHT_MATRIX.element
+    columns = [p.incidence] if usual else [of_first * first + of_second * second]
+    rows = [p.pulled.T] if usual else [np.where(p.incidence > 0.0, p.pulled, 0.0).T]
+    if not usual:
+        columns.append(from_first * first + from_second * second)
+        rows.append(-np.where(p.incidence < 0.0, p.pulled, 0.0).T)
+    total = np.zeros((n, n * size * size))
+    for row, column in zip(rows, columns, strict=True):
+        right = (column[:, :, None, None] * blocks[:, None]).reshape(len(blocks), -1)
+        total += row @ right
+    sums = total.reshape(n, n, size, size)
+    if not rule.accumulated:
+        for (i, j), block in zip(p.springs, blocks, strict=True):
+            sums[i, i] = sums[j, j] = block
+    return np.ascontiguousarray(sums.transpose(0, 2, 1, 3)).reshape(size * n, size * n)
 
 
 def _implicit(equation: StepEquation) -> FloatArray:
@@ -508,9 +638,9 @@ def _local_global(equation: StepEquation, x: FloatArray, integrator: Integrator)
     start = equation.start
     p, h = start.p, start.h
     k, c = p.stiffnesses, (p.dampings / h if equation.damped else 0.0 * p.dampings)
-    weights = (k if start.model.matrix.stiffness else np.ones_like(k)) + c
-    A = equation.put_together(p.pulled.T @ (weights[:, None] * p.incidence), 1)
-    A[equation.pins, equation.pins] += equation.hold
+    weights = equation.linear.stiffnesses if start.model.matrix.stiffness else np.ones_like(k)
+    c_matrix = (c if equation.linear is p else equation.linear.dampings / h)[:, None, None]
+    A = equation.put_together(weights[:, None, None], c_matrix if equation.damped else None)
     pinned_x = np.where(equation.free[:, None] | (start.model.pins == "origin"), 0.0, x)
     for _ in range(integrator.iterations):
         length, u = frames(p, x)
@@ -519,7 +649,7 @@ def _local_global(equation: StepEquation, x: FloatArray, integrator: Integrator)
         pull = (k * rest + c * equation.length_n)[:, None] * u
         right = p.masses[:, None] * equation.y + h * h * (equation.constant + p.pulled.T @ pull)
         right[equation.pins] += equation.hold * p.positions[equation.pins]
-        x = np.where(equation.free[:, None], equation.solve(A, right - A @ pinned_x), x)
+        x = np.where(equation.free[:, None], equation.solve(A, right - A @ pinned_x, x), x)
     return x
 
 

@@ -48,6 +48,7 @@ class SpringProblem:
     # particle's own ("drag"), or its own along the spring ("own")
     damping: str = "along"
     normalised: bool = True  # whether a spring's direction is of length one
+    linear: "SpringProblem | None" = None  # whose springs the matrix of a step has, if others
 
     @property
     def count(self) -> int:

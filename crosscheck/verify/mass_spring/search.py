@@ -19,7 +19,7 @@ from ..judgement import LEAST_SHARE
 from .faults import ASPECTS, MAX_FAULTS, STEP_FAULTS, Option, apply
 from .honest import compatible, domains
 from .laws import SOLVED, Rounding, relative_gap, rounding
-from .model import Integrator, StepModel, first_equation, predicted
+from .model import RIGHT_MATRIX, Integrator, StepModel, first_equation, predicted
 from .problem import SpringProblem
 
 # The number of iterations and substeps that predictions with single faults take at one stage, and
@@ -32,17 +32,17 @@ HYPOTHESES, NEAREST = 32, 40
 UNEXPLAINED = 0.25
 # Integrators with more iterations are not combined with faults.
 MAX_ITERATIONS = 10
-# Matrices that are singular without pins, where they predict nothing.
-SINGULAR = ("matrix L", "matrix L without h²")
-# Matrices that matter where no spring acts.
-OF_MASSES = (*SINGULAR, "matrix 2M+h²L")
+# A relative difference below this is not from single precision.
+DOUBLE = 1e-11
 # Positions beyond this [m] come from dividing by zero; those of the probes are some metres.
 LARGEST = 1e4
 # Aspects that matter in any step; the others where there are dampers or pins.
 ALWAYS = (
     "time", "inertia", "masses", "gravity", "integrator", "matrix", "substeps", "velocity",
-    "scaling", "springs",
+    "update", "scaling", "springs",
 )  # fmt: skip
+# A step that arrives at once where no spring acts.
+ONE_STEP = Integrator("newton", "x_n", 1, "gauss")
 FAULTY = frozenset(map(id, STEP_FAULTS))
 FACTORISATIONS = [fault for fault in STEP_FAULTS if fault.aspect == "factorisation"]
 
@@ -78,6 +78,11 @@ class ModelMatch(NamedTuple):
         """The keys of the faults."""
         return tuple(fault.key for fault in self.faults)
 
+    @property
+    def complexity(self) -> tuple[int, int]:
+        """The number of faults, and of those that concern a part of the step alone."""
+        return len(self.faults), sum(bool(fault.part) for fault in self.faults)
+
 
 class Probe(NamedTuple):
     """A problem, and the answer to it."""
@@ -112,10 +117,12 @@ class ModelSearch:
         self.probes, self.step, self.epsilon = probes, step, epsilon
         self.stages = [stage for probe in probes for stage in probe.stages()]
         self.domains = domains(step)
+        # where masses are wrong, local/global iterations differ from Newton's even in flight
+        self.flight = Integrator("local_global") if step.method == "local_global" else ONE_STEP
         # the integrators that each one of the domain "flight" stands for
         self.classes: dict[Integrator, list[tuple[Option, int]]] = {}
         for option, cost in self.domains["integrator"]:
-            flight = in_flight(option.fields["integrator"])
+            flight = in_flight(option.fields["integrator"], self.flight)
             self.classes.setdefault(flight, []).append((option, cost))
         self.domains["flight"] = [
             (pairs[0][0]._replace(fields={"integrator": flight}), min(cost for _, cost in pairs))
@@ -146,8 +153,8 @@ class ModelSearch:
         matches = [self._match(self._needed(h)) for h in hypotheses if self._explains_enough(h)]
         if self._skipped:
             matches = [match for match in matches if match.faults]
-        fewest = min((len(match.faults) for match in matches), default=0)
-        first = {match.keys: match for match in reversed(matches) if len(match.faults) == fewest}
+        fewest = min((match.complexity for match in matches), default=None)
+        first = {match.keys: match for match in reversed(matches) if match.complexity == fewest}
         return list(reversed(first.values()))
 
     def _explaining(self, hypotheses: Sequence[Choices], index: int) -> list[Choices]:
@@ -170,6 +177,11 @@ class ModelSearch:
         reproducing = self._reproducing(ranked, index)
         unpredicted = [choices for choices in ranked if self._gap(choices, index) is None]
         return reproducing[:HYPOTHESES] + unpredicted[:HYPOTHESES]
+
+    def is_double(self) -> bool:
+        """Return whether answers in flight have more digits than single precision leaves."""
+        gaps = [gap for key, gap in self._gaps.items() if key[0] == 0 and gap is not None]
+        return min(gaps, default=1.0) < DOUBLE
 
     def _reproducing(self, hypotheses: Sequence[Choices], index: int) -> list[Choices]:
         """Return the explaining hypotheses that do not merely predict nothing."""
@@ -203,20 +215,27 @@ class ModelSearch:
             domains.append([option for option, cost in domain if cost <= most])
         for options in product(*domains):
             branch = chosen | dict(zip(aspects, options, strict=True))
-            if compatible(branch) and not (self._cost(branch) and self._is_rare(branch)):
+            is_untried = self._cost(branch) and self._is_rare(branch)
+            if compatible(branch) and not is_untried and not self._holds_nothing(branch):
                 yield branch
+
+    def _holds_nothing(self, choices: Choices) -> bool:
+        """Return whether springs to pins, undeclared, do not act in the only explicit step."""
+        model = StepModel()._replace(**fields_of(choices))
+        is_single = model.integrator.explicit and model.substeps == 1
+        return self.step.pins is None and is_single and model.pin_kind in ("penalty", "springs")
 
     def _singles(self, branches: Sequence[Choices], index: int) -> Iterator[SingleFault]:
         """Yield what each single fault makes of each hypothesis that fails at a stage."""
-        limit = self._work + WORK
-        for branch in sorted(branches, key=_effort):
+        limit, branches = self._work + WORK, sorted(branches, key=_effort)
+        trials = [(b, aspect, o) for b in branches for aspect, o in self._faults(b, index)]
+        for branch, aspect, option in sorted(trials, key=lambda trial: _takes_long(trial[2])):
             before = self._gap(branch, index) or 0.0
-            for aspect, option in self._faults(branch, index):
-                choices = branch | {aspect: option}
-                if self._work < limit and compatible(choices):
-                    gap = self._gap(choices, index) or 0.0
-                    if gap != before:
-                        yield SingleFault(branch, aspect, option, gap, before)
+            choices = branch | {aspect: option}
+            if self._work < limit and compatible(choices):
+                gap = self._gap(choices, index) or 0.0
+                if gap != before:
+                    yield SingleFault(branch, aspect, option, gap, before)
 
     def _faults(self, branch: Choices, index: int) -> Iterator[tuple[str, Option]]:
         """Yield the faults that may be added to a hypothesis, each with its aspect."""
@@ -227,7 +246,7 @@ class ModelSearch:
             if aspect == "integrator" and "flight" in branch:
                 aspect, domain = "flight", self.domains["flight"]
             elif aspect == "integrator":
-                domain = self.classes[in_flight(branch[aspect].fields["integrator"])]
+                domain = self.classes[in_flight(branch[aspect].fields["integrator"], self.flight)]
             if not self.costs[id(branch[aspect])]:
                 yield from ((aspect, option) for option, cost in domain if cost)
 
@@ -391,9 +410,14 @@ def _is_singular(values: Mapping[str, Any]) -> bool:
     return "positions" not in values or not np.abs(values["positions"]).max() < LARGEST
 
 
+def fields_of(choices: Choices) -> dict[str, Any]:
+    """Return the fields of a model that choices replace."""
+    return {k: value for option in choices.values() for k, value in option.fields.items()}
+
+
 def _effort(choices: Choices) -> float:
     """Return how many iterations, or a few substeps of explicit methods, a prediction takes."""
-    fields = {k: value for option in choices.values() for k, value in option.fields.items()}
+    fields = fields_of(choices)
     integrator, substeps = fields["integrator"], fields["substeps"]
     return float(1.0 + substeps * (0.3 if integrator.explicit else integrator.iterations))
 
@@ -416,20 +440,29 @@ def _relevant_in_flight(choices: Choices) -> Choices:
     return {
         aspect: option
         for aspect, option in choices.items()
-        if (aspect != "matrix" or option.key in OF_MASSES)
+        if (aspect != "matrix" or _acts_in_flight(option))
         and (aspect != "time" or option.fields.get("time") != "before")
     }
 
 
-def in_flight(integrator: Integrator) -> Integrator:
-    """Return an integrator that moves free particles alike: without springs g is quadratic."""
+def _acts_in_flight(option: Option) -> bool:
+    """Return whether a matrix matters where no spring acts."""
+    matrix = option.fields.get("matrix", RIGHT_MATRIX)
+    return bool(matrix.masses != 1.0 or matrix.right_power)
+
+
+def in_flight(integrator: Integrator, usual: Integrator = ONE_STEP) -> Integrator:
+    """Return an integrator that moves free particles alike: without springs g is quadratic.
+
+    One that solves for the minimum stands for all others that do: the usual one.
+    """
     if integrator.method == "in_place":
         return integrator._replace(method="symplectic")
     if integrator.explicit or integrator.method == "descent":
         return integrator
     if integrator.method == "newton" and integrator.rate != 1.0:
         return integrator._replace(hessian="gauss")
-    return Integrator("newton", "x_n", 1, "gauss")
+    return usual
 
 
 def probes_of(

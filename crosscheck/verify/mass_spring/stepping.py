@@ -61,7 +61,8 @@ class Stepping(NamedTuple):
             for exchange in exchanges
         ]
         diagnosis = _diagnose(judgements, search, matches, probes)
-        if diagnosis.explained and (not recognised or "factorisation" in faults):
+        is_wrong = diagnosis.explained and (not recognised or "factorisation" in faults)
+        if is_wrong or any(found.share == 1.0 for found in diagnosis.explanations):
             judgements = list(map(_with_wrong_step, judgements))
         return TaskReport(self.task, "", judgements, diagnosis)
 
@@ -227,6 +228,7 @@ def _diagnose(
     is_undecided = (
         max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED
     )
+    diagnosis = replace(diagnosis, is_double=search.is_double())
     if search.probes and behaviour is None and (step.method is None or is_undecided):
         hints += (_nearest(search), laws_that_hold(judgements))
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)

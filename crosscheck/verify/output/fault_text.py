@@ -107,4 +107,5 @@ def failure_of(fault: CodedFault) -> CaseJudgement | None:
         ):
             return failure
         first = first or failure
-    return first
+    # A single case may be undecided where all cases together show the fault.
+    return first or judge_cases(contestant, task, method, cases).smallest_failure

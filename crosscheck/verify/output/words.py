@@ -146,6 +146,8 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
         template = sentence("Next: write {task}, then run this again.")
         return Sentence(template.template, {"task": title(bad[0])})
     first = bad[0]
+    if first.is_asked:
+        return sentence("Next: declare what is meant in the greeting, or correct it.")
     if first.verdict is Verdict.UNDECIDED:
         return (
             sentence("Next: compare your step with the nearest known one; if it is meant to be "

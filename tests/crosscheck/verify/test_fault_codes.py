@@ -102,13 +102,6 @@ def test_the_code_stands_on_screen_on_the_page_in_json_and_in_junit(switches, co
 # ---- the short programs of each code
 
 
-# Faults without lines, which no `explain` can show; to be empty.
-OPEN_FAMILIES = ("STEP",)
-WITHOUT_LINES = {
-    code
-    for code, fault in coded_faults().items()
-    if fault.family in OPEN_FAMILIES and not fault.lines
-}
 # So many programs are judged for one that is quick to test; the others are slow tests.
 QUICK = 40
 
@@ -120,15 +113,13 @@ def reports(program, task):
 
 def samples():
     for number, fault in enumerate(coded_faults().values()):
-        if fault.code not in WITHOUT_LINES:
-            is_quick = number % QUICK == 0 and fault.family != "ROBOT"
-            marks = () if is_quick else pytest.mark.slow
-            yield pytest.param(fault, id=fault.code, marks=marks)
+        is_quick = number % QUICK == 0 and fault.family != "ROBOT"
+        marks = () if is_quick else pytest.mark.slow
+        yield pytest.param(fault, id=fault.code, marks=marks)
 
 
 def test_every_fault_has_lines():
-    faults = coded_faults().items()
-    assert {code for code, fault in faults if not fault.lines} == WITHOUT_LINES
+    assert all(fault.lines for fault in coded_faults().values())
 
 
 @pytest.mark.parametrize("fault", list(samples()))
@@ -142,8 +133,12 @@ def test_a_wrong_program_is_named_by_its_code(fault):
 
 
 RIGHT_PROGRAMS = sorted({fault.program for fault in coded_faults().values()})
-SLOW = ("robot", "robot_track", "newton step", "local-global step")
-RESERVED = ("step", "substeps", "local-global step", "robot", "robot_track")
+STEPS = (
+    "step", "substeps", "local-global step", "Newton iterations", "change of velocity",
+    "damped change of velocity", "particle by particle",
+)  # fmt: skip
+SLOW = ("robot", "robot_track", "newton step", *STEPS[2:])
+RESERVED = ("robot", "robot_track", *STEPS)
 
 
 @pytest.mark.parametrize(

@@ -45,10 +45,11 @@ from plumbob.reference.explicit import runge_kutta, symplectic_euler
 from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
 
 EVERYTHING = System(external_forces=True, tension_only=True)
-BY_KEY = {fault.key: fault for fault in reversed(STEP_FAULTS)}
+BY_KEY = {fault.key: fault for fault in reversed(STEP_FAULTS) if not fault.part}
 # Faults that a linearised step cannot have, or has under another name.
 NOT_LINEARISED = ("h not divided", "pins free until the end", "velocity over the whole h",
-                  "pins at the origin", "moved in place", "Cholesky unchecked")  # fmt: skip
+                  "pins at the origin", "moved in place", "Cholesky unchecked",
+                  *(f"damping matrix with h^{n} too much" for n in (1, -1)))  # fmt: skip
 
 
 def report(function, task="mass_spring_step", step=None, **greeting):
@@ -445,8 +446,8 @@ ENERGY_FAULTS = {fault.key: fault for fault in energy.ENERGY_FAULTS if fault.key
 @pytest.mark.parametrize("key", mark(ENERGY_FAULTS, [*ENERGY_FAULTS][::4]))
 def test_every_fault_of_energies_is_caught_and_named(key):
     judged = report(energies([ENERGY_FAULTS[key]]), "energy")
-    is_restricted = key.endswith("for all")  # one value for all is what a greeting may declare
-    assert judged.verdict is (Verdict.RIGHT_EXCEPT if is_restricted else Verdict.WRONG)
+    is_asked = key.endswith("for all")  # one value for all is what a greeting may declare
+    assert judged.verdict is (Verdict.UNDECIDED if is_asked else Verdict.WRONG)
     assert {key} in named(judged)
 
 
