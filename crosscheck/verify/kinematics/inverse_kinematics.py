@@ -77,7 +77,10 @@ def judge(
             trial.add([_equal_worlds(trial, original, comparison, greeting)])
     # what repeats its start is explained by chance by several faults at once
     diagnosis = _diagnosis(trials, comparison, greeting, 1 if idle else MAX_FAULTS, base)
-    diagnosis = replace(diagnosis, hints=tuple(filter(None, [idle])))
+    points = None
+    if not diagnosis.explained:
+        points = sweeps.right_points(comparison, sweep_trials, greeting)
+    diagnosis = replace(diagnosis, hints=tuple(filter(None, [idle, points])))
     if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
             trial.correct(_aggravate)

@@ -295,6 +295,24 @@ def explained(
     )
 
 
+def right_points(
+    comparison: SweepComparison, trials: Sequence[PoseTrial], greeting: Greeting
+) -> Sentence | None:
+    """Return that wrong sweeps of FABRIK have the right points, None if not so or not known."""
+    if comparison.method != "fabrik" or not comparison.wrong:
+        return None
+    for trial in trials:
+        if trial.pose.answered_positions is None:
+            return None
+        _, x, _ = solve("fabrik", trial.case.inputs)
+        gap = np.abs(trial.pose.answered_positions - x)[trial.pose.path].max()
+        if not gap <= _error(trial, "fabrik", greeting)[1]:
+            return None
+    return sentence(
+        "Its points are those of FABRIK: the mistake is in the rotations that it makes of them."
+    )
+
+
 def is_grave(method: str, diagnosis: Diagnosis) -> bool:
     """Return whether a fault that is never on purpose reproduces every sweep."""
     faults = by_key(method)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from kinematics_solvers import FORWARD, INVERSE, judged, named
 
+from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
-from plumbob.crosscheck.verify.kinematics import algebra, problems
+from plumbob.crosscheck.verify.kinematics import algebra, problems, sweeps
 from plumbob.crosscheck.verify.kinematics.faults import FAULTS, by_key, switches
 from plumbob.crosscheck.verify.kinematics.predictions import predict_forward, predict_inverse, solve
 from plumbob.crosscheck.verify.kinematics.switches import Switches
@@ -149,3 +150,17 @@ def test_a_fault_of_quaternions_is_named_in_every_grouping(method, fault):
 def test_every_shared_fault_is_a_fault_of_all_methods():
     keys = {fault.key for fault in SHARED}
     assert all(keys <= by_key(method).keys() for method in ("ccd", "fabrik"))
+
+
+@pytest.mark.parametrize(("end", "is_told"), [(0, True), (1, False)])
+def test_right_points_beside_unknown_rotations_are_told(end, is_told):
+    """The rotations have a mistake that no catalogue knows; the points are right, or are not."""
+
+    greeting, trials = Greeting(1, (INVERSE,)), []
+    for case in problems.cases(greeting, "fabrik", 1, False)[:3]:
+        local, positions, _ = solve("fabrik", case.inputs, Switches(end=end))
+        local = rotation.multiply(local, rotation.exponential([0.3, 0.2, 0.1]))
+        answer = Answer({"local_rotations": local, "positions": positions}, 0.0)
+        trials.append(sweeps.PoseTrial(Exchange(case, answer, answer)))
+    comparison = sweeps.SweepComparison("fabrik", wrong=[trials[0].case.name])
+    assert (sweeps.right_points(comparison, trials, greeting) is not None) == is_told
