@@ -4,8 +4,10 @@
 BRANCHES = "branches"
 # Random starts of the search at a target.
 STARTS = 128
-# A solution is right within this [m] and [rad], which solvers without a last polish reach, and is
-# the same as another within this [rad]: near singular poses a tolerance moves angles by its root.
-TOLERANCE, SAME = 1e-6, 1e-3
+# A solution must be listed if it reaches the target within EXACT [m] and [rad], and is false beyond
+# TOLERANCE: solvers without a last polish stay between the two near singular poses.
+EXACT, TOLERANCE = 1e-9, 1e-6
+# Solutions are the same within this [rad]: near singular poses an error moves angles by its root.
+SAME = 1e-3
 # More solutions of six joints are members of a continuum (Primrose 1986).
 LARGEST_COUNT = 16

@@ -24,7 +24,7 @@ from ...peers.registry import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM, Peer
 from ...problems.evaluate import Targets, angle_between, evaluator_of
 from ...problems.robot_targets import STRATA, robot_targets
 from ...problems.robots import ROBOTS, UnableError, is_installed, robot, title
-from . import BRANCHES, LARGEST_COUNT, SAME, STARTS, TOLERANCE
+from . import BRANCHES, EXACT, LARGEST_COUNT, SAME, STARTS, TOLERANCE
 from .values import BranchValues
 
 SUITE = "ik"
@@ -33,8 +33,6 @@ HINGES = 6
 _TARGETS = 0.05
 # Rounds in which calls are timed.
 ROUNDS = 5
-# Of the search [m] and [rad].
-_SEARCH_TOLERANCE = 1e-9
 # Time limit of all solvers of a robot [s].
 PATIENCE = 1800.0
 
@@ -96,15 +94,16 @@ def lists(name: str, modules: Sequence[str], count: int, seed: int) -> Mapping[s
     requests = [targets.request(i) for i in range(len(targets.starts))]
     solves = {module: [ask(request) for request in requests] for module, ask in asks.items()}
     rows = {m: [_within(name, solve().q) for solve in solves[m]] for m in solves}
-    is_right = {m: [_is_right(name, targets, i, q) for i, q in enumerate(rows[m])] for m in rows}
-    right = {m: [q[ok] for q, ok in zip(rows[m], is_right[m], strict=True)] for m in rows}
-    unions = list(map(_distinct, _search(name, targets), *right.values()))
+    errors = {m: [_errors(name, targets, i, q) for i, q in enumerate(rows[m])] for m in rows}
+    exact = ([q[e <= EXACT] for q, e in zip(rows[m], errors[m], strict=True)] for m in rows)
+    unions = list(map(_distinct, _search(name, targets), *exact))
     seconds = _seconds(solves)
     counts = np.array([*map(len, unions)])
     is_isolated = counts <= LARGEST_COUNT
-    for m, parts in right.items():
-        absent = np.array([_is_missing(u, q).sum() for u, q in zip(unions, parts, strict=True)])
-        wrong = np.array([(~ok).sum() for ok in is_right[m]])
+    for m in rows:
+        right = [q[e <= TOLERANCE] for q, e in zip(rows[m], errors[m], strict=True)]
+        absent = np.array([_is_missing(u, q).sum() for u, q in zip(unions, right, strict=True)])
+        wrong = np.array([(e > TOLERANCE).sum() for e in errors[m]])
         numbers = counts - absent, absent, wrong, seconds[m]
         results[m] = (*(values[is_isolated] for values in numbers), int((~is_isolated).sum()))
     return results
@@ -114,12 +113,11 @@ def _within(name: str, solutions: Any) -> FloatArray:
     return all_within(robot(name), np.reshape(solutions, (-1, HINGES)))
 
 
-def _is_right(name: str, targets: Targets, i: int, q: FloatArray) -> np.ndarray:
-    """Return which solutions, (solution, joint), reach a target."""
+def _errors(name: str, targets: Targets, i: int, q: FloatArray) -> FloatArray:
+    """Return by how much solutions, (solution, joint), miss a target [m] or [rad], (solution,)."""
     positions, rotations = evaluator_of(name).forward(q)
     distance = np.linalg.norm(positions[:, 0] - targets.positions[i, 0], axis=-1)
-    angle = angle_between(rotations[:, 0], targets.rotations[i, 0])
-    return (distance <= TOLERANCE) & (angle <= TOLERANCE)
+    return np.maximum(distance, angle_between(rotations[:, 0], targets.rotations[i, 0]))
 
 
 def _is_missing(union: FloatArray, q: FloatArray) -> np.ndarray:
@@ -141,12 +139,12 @@ def _search(name: str, targets: Targets) -> Iterator[FloatArray]:
     """Yield the solutions of each target that Levenberg-Marquardt finds from random starts."""
     model = urdf.parse(robot(name).text).articulation
     starts = robot(name).draw(np.random.default_rng(0), STARTS)
-    limits: dict[str, Any] = {"restarts": 0, "tolerance": _SEARCH_TOLERANCE}
-    limits["tolerance_rotation"] = _SEARCH_TOLERANCE
+    limits: dict[str, Any] = {"restarts": 0, "tolerance": EXACT}
+    limits["tolerance_rotation"] = EXACT
     for x, R in zip(targets.positions[:, 0], targets.rotations[:, 0], strict=True):
         target = Target(x, rotation.from_matrix(R))
         ends = solve_ik(model, starts, target, "levenberg_marquardt", **limits)
-        is_solved = np.maximum(ends.residual, ends.residual_rotation) <= _SEARCH_TOLERANCE
+        is_solved = np.maximum(ends.residual, ends.residual_rotation) <= EXACT
         yield _distinct(_within(name, ends.coordinates[is_solved]))
 
 

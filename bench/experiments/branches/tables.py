@@ -11,7 +11,7 @@ from ...tables.columns import words_in
 from ...tables.layout import Layout, Row
 from ...tables.results import Results, grouped, listed
 from ...tables.table import Summary, listing, words
-from . import BRANCHES, LARGEST_COUNT, SAME, STARTS, TOLERANCE
+from . import BRANCHES, EXACT, LARGEST_COUNT, SAME, STARTS, TOLERANCE
 
 
 def _rows(results: Results) -> list[Row]:
@@ -53,6 +53,7 @@ def _time(row: Row) -> str:
 _CAPTIONS = Captions(
     __file__,
     starts=words(STARTS),
+    exact=words(EXACT),
     tolerance=words(TOLERANCE),
     same=words(SAME),
     largest=words(LARGEST_COUNT),

@@ -45,8 +45,8 @@ class IKSolutions(NamedTuple):
         method: the name of the closed form, or "restarts".
         complete: whether the method proves that there are no other solutions within the limits;
             with a grid, at its values. Never near a singular pose, where their number is in doubt.
-        continuum: whether the target is singular, within 1e-7 of the reach and in angle: some
-            solutions are members of a continuum of which the others are not listed.
+        continuum: whether the target is singular, within 1e-7 of the reach and in angle: solutions
+            form a continuum, of which the list has single members, or none.
         unseen: the probability that a further restart would find a solution that is not listed,
             estimated as the share of those found once (Good 1953); 0 of closed forms.
         grid: the values at which joints were locked, by their names.
