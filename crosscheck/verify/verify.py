@@ -71,7 +71,8 @@ def verify(
     """Try a solver at its tasks, by default all that it offers, and return the report.
 
     The cases are random by the seed; there are more if `thorough`. `notify` is called before each
-    with the task, the number of cases done, and of all. Raise ValueError if a task is not offered.
+    with the task, the number of cases done, and of all, and likewise before each stage of a search
+    of faults. Raise ValueError if a task is not offered.
     """
     greeting, remarks = _with_methods(contestant, tasks, seed)
     reports, forward_faults = list[TaskReport](), tuple[SwitchFault, ...]()
@@ -128,6 +129,8 @@ def judge_cases(
     judge = DISCIPLINES[task].judge
     if forward_faults and task == inverse_kinematics.TASK:
         judge = partial(inverse_kinematics.judge, base=forward_faults)
+    if isinstance(discipline := DISCIPLINES[task], Stepping):
+        judge = partial(discipline.judge, notify=partial(notify, task))
     greeting, reason = precision.judging_greeting(exchanges, declared or contestant.greeting)
     report = judge(exchanges, greeting, method)
     diagnosis = report.diagnosis

@@ -433,6 +433,8 @@ class StepEquation:
         h = p.h_before / model.substeps if model.time == "before" else self.start.h
         if not rule.components:
             springs = springs * np.eye(springs.shape[1])
+            if dampers is not None and not model.dampers_apart:
+                dampers = dampers * np.eye(springs.shape[1])
         if dampers is not None and not (model.dampers_apart or rule.damper_power):
             springs, dampers = springs + dampers, None
         A = rule.sign * h**rule.power * _assemble(p, springs, rule)

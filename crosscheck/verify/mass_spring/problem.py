@@ -135,6 +135,8 @@ def frames(p: SpringProblem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the length of each spring and its direction from the second end to the first."""
     d = x[p.springs[:, 0]] - x[p.springs[:, 1]]
     length = np.sqrt((d * d).sum(axis=1))
+    if length.min(initial=1.0) > COINCIDENT:
+        return length, d / length[:, None]
     u = np.where(
         length[:, None] > COINCIDENT, d / np.maximum(length, COINCIDENT)[:, None], (1.0, 0.0, 0.0)
     )

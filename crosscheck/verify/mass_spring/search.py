@@ -7,7 +7,7 @@ moves it. So every fault answers for evidence of its own, and few of the million
 are tried. All is tried in a fixed order, within a fixed amount of work, on every machine.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -23,8 +23,8 @@ from .model import RIGHT_MATRIX, Integrator, StepModel, first_equation, predicte
 from .problem import SpringProblem
 
 # The number of iterations and substeps that predictions with single faults take at one stage, and
-# those with pairs: some seconds each.
-WORK = 40_000
+# those with pairs: a few seconds each.
+WORK, WORK_OF_PAIRS = 40_000, 10_000
 # The number of hypotheses that are kept from one probe to the next, and of those to which a second
 # fault is added: the nearest.
 HYPOTHESES, NEAREST = 32, 40
@@ -139,10 +139,16 @@ class ModelSearch:
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
         self._gaps: dict[tuple[Any, ...], float | None] = {}
 
-    def run(self) -> list[ModelMatch]:
-        """Return the matches of the probes with the fewest faults, none if there are none."""
+    def run(
+        self, notify: Callable[[int, int], None] = lambda count, total: None
+    ) -> list[ModelMatch]:
+        """Return the matches of the probes with the fewest faults, none if there are none.
+
+        `notify` is called before each stage with the number of stages done, and of all.
+        """
         hypotheses = [Choices()]
         for index in range(len(self.stages)):
+            notify(index, len(self.stages))
             is_hopeless = index - 1 in self._skipped and self._is_complete(index)
             explaining = [] if is_hopeless else self._explaining(hypotheses, index)
             if not explaining:
@@ -166,7 +172,7 @@ class ModelSearch:
             failing = [branch for branch in branches if not self._explains(branch, index)]
             singles = list(self._singles(failing, index))
             explaining += [one.choices for one in singles if self._fits(one.choices, index)]
-            if not self._reproducing(explaining, index):
+            if not self._skipped and not self._reproducing(explaining, index):
                 explaining += [
                     pair for pair in self._pairs(singles, index) if self._fits(pair, index)
                 ]
@@ -227,7 +233,8 @@ class ModelSearch:
 
     def _singles(self, branches: Sequence[Choices], index: int) -> Iterator[SingleFault]:
         """Yield what each single fault makes of each hypothesis that fails at a stage."""
-        limit, branches = self._work + WORK, sorted(branches, key=_effort)
+        limit = self._work + (WORK_OF_PAIRS if self._skipped else WORK)
+        branches = sorted(branches, key=_effort)
         trials = [(b, aspect, o) for b in branches for aspect, o in self._faults(b, index)]
         for branch, aspect, option in sorted(trials, key=lambda trial: _takes_long(trial[2])):
             before = self._gap(branch, index) or 0.0
@@ -255,7 +262,7 @@ class ModelSearch:
 
         Those of which the first brings it nearest come first.
         """
-        limit = self._work + WORK
+        limit = self._work + WORK_OF_PAIRS
         singles = [one for one in singles if not _takes_long(one.option)]
         nearer = sorted((one for one in singles if one.gap < one.before), key=lambda one: one.gap)
         for first in nearer[:NEAREST]:

@@ -45,12 +45,21 @@ class Stepping(NamedTuple):
         """Return cases that suit the solver, the smallest first."""
         return task_cases(self.task, greeting, seed, thorough)
 
-    def judge(self, exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-        """Hold answers against the step that is declared, or inferred, and name the faults."""
+    def judge(
+        self,
+        exchanges: Sequence[Exchange],
+        greeting: Greeting,
+        method: str,
+        notify: Callable[[int, int], None] = lambda count, total: None,
+    ) -> TaskReport:
+        """Hold answers against the step that is declared, or inferred, and name the faults.
+
+        `notify` is called with the progress of the search of faults.
+        """
         problems = problems_of(exchanges, greeting)
         search = ModelSearch(probes_of(exchanges, problems), greeting.step, greeting.epsilon)
         probes = probes_of(exchanges, problems, every=True)
-        matches = with_factorisation(search.run(), probes, greeting.epsilon)
+        matches = with_factorisation(search.run(notify), probes, greeting.epsilon)
         options = honest_options(matches, greeting.step)
         faults = {fault.aspect for fault in matches[0].faults} if matches else {"unknown"}
         recognised = greeting.step.method is not None or faults <= {"factorisation"}
