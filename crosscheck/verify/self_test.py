@@ -24,9 +24,8 @@ from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
 from .judgement import Verdict
 from .kinematics.faults import FAULTS, switches
 from .kinematics.predictions import predict_forward, predict_track, solve
-from .kinematics.robot_inverse_kinematics import FAULTS as ROBOT_FAULTS
 from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
-from .kinematics.robot_inverse_kinematics import solve_by_reference, solve_wrongly
+from .kinematics.robot_inverse_kinematics import solve_by_reference
 from .kinematics.robot_jacobian import TASK as ROBOT_JACOBIAN
 from .kinematics.robot_motions import TASK as ROBOT_TRACK
 from .kinematics.robot_motions import followed
@@ -125,19 +124,17 @@ def _kinematic_faults() -> Iterator[Subject]:
 
 
 def _robots() -> Iterator[Subject]:
-    faults = {key: partial(solve_wrongly, fault) for key, fault in ROBOT_FAULTS.items()}
-    yield from _subjects("robots", ROBOTS, faults)
-    for task in (ROBOT_TRACK, ROBOT_JACOBIAN):
+    for task in (ROBOTS, ROBOT_TRACK, ROBOT_JACOBIAN):
         programs = [fault for fault in coded_faults().values() if fault.task == task]
         wrong = {fault.name: _function(task, fault.wrong_program) for fault in programs}
         yield from _subjects("robots", task, wrong)
         right = {f"program, {task}": _function(task, programs[0].right_program)}
         yield from _subjects(HONEST, task, right)
     yield from _subjects(HONEST, ROBOT_TRACK, {"reference, tracking": _followed})
-    yield from _subjects(HONEST, ROBOTS, {
-        "damped least squares, robots": partial(solve_wrongly, None),
-        "reference, robots": solve_by_reference,
-    })  # fmt: skip
+    solvers = ("levenberg_marquardt", "damped_least_squares")
+    robots = {f"reference, {solver}, robots": partial(solve_by_reference, solver)
+              for solver in solvers}  # fmt: skip
+    yield from _subjects(HONEST, ROBOTS, robots)
 
 
 def _function(task: str, program: str) -> Callable[..., Any]:

@@ -40,8 +40,11 @@ class SwitchFault(NamedTuple):
 def _load() -> dict[str, tuple[SwitchFault, ...]]:
     """Return the faults that each method may have, the most frequent first."""
     parts = {
-        part: tuple(itertools.chain.from_iterable(_faults(part, *item) for item in entries.items()))
-        for part, entries in TABLE.items()
+        part: tuple(
+            itertools.chain.from_iterable(_faults(part, *item) for item in TABLE[part].items())
+        )
+        for part in TABLE
+        if not part.startswith("robot")
     }
     forward, stop, follow = parts["forward"], parts["stop"], parts["follow"]
     common = tuple(fault for fault in forward if not fault.is_rare)

@@ -1,34 +1,38 @@
-"""Faults of robots that follow targets: the frames that they explain."""
+"""Faults of robots that reach and follow targets: the frames that they explain."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.reference import Target, rotation, solve_ik
+from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray
 
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
 from ..sentence import Sentence, with_code
 from .faults import TABLE
-from .robot_inverse_kinematics import FAULTS as MISREADINGS
-from .robot_inverse_kinematics import LENIENT, Misreading
-from .robot_models import mechanism, tool_pose
-from .trajectories import Trajectory, twists_between
+from .robot_faults import FAULTS as POSE_FAULTS
+from .robot_faults import JACOBIAN_FAULTS, POSITION_ONLY, RIGHT, RobotFault
+from .robot_textbook import rotation_error, sine_error
+from .trajectories import AT_LIMIT, LENIENT, Trajectory
 
 # Steps agree if they differ by less than this share, with one of these squared dampings [m^2].
-SAME_STEP, DAMPINGS = 0.05, (1e-9, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 3e-2, 0.1, 1.0)
+SAME_STEP, DAMPINGS = 0.05, np.geomspace(1e-9, 1.0, 37)[:, None]
+# The right step is preferred if its gap is below the former, or the smallest times the latter.
+EQUAL_STEP, NEARER = 1e-3, 1.5
 # Singular values below this share of the largest are small.
 SINGULAR = 0.05
-# Fewer joints off their limits fit any step.
-MIN_FREE = 5
+# Fewer joints off their limits fit any step, and fewer joints reach no pose in general.
+MIN_FREE, POSE_FREEDOMS = 5, 6
+# An error is least where its gradient is this small, relative to error and Jacobian.
+STATIONARY = 0.01
 # Frames that a fault has to explain before it is named, and the least share of those it concerns.
 MIN_FRAMES, MIN_SHARE = 3, 0.5
-# Joints that hold the same limit so closely are at it [rad].
-AT_LIMIT = 1e-6
 # A rotation by about 2 pi: by how much it may differ [rad].
 WHOLE_TURN = 0.7
+# Errors that fall to less than this share have been reduced.
+REDUCED = 0.9
 
 
 class Evidence(NamedTuple):
@@ -45,29 +49,32 @@ Signature = Callable[[Trajectory, set[str]], Evidence]
 def diagnosis_of(
     judgements: Sequence[CaseJudgement], motions: Mapping[str, Trajectory]
 ) -> Diagnosis:
-    """Return the faults that explain most of the frames that they concern, if a law is broken."""
-    wrong = [
-        (motions[judgement.case.name], _broken(judgement))
-        for judgement in judgements
-        if judgement.verdict >= Verdict.WRONG and judgement.case.name in motions
-    ]
-    if not wrong:
+    """Return the fault that explains most of the frames that it concerns, if a law is broken.
+
+    The signatures of a later tier are vaguer: they count where no fault of a tier before does.
+    """
+    if max((judgement.verdict for judgement in judgements), default=0) < Verdict.WRONG:
         return Diagnosis()
-    misread = {key: partial(_misread, fault) for key, fault in MISREADINGS.items()}
-    poses: Mapping[str, Signature] = {**EXACT, **misread}
-    for signatures, by_family in ((poses, False), (STEPS, True), (VAGUE, False)):
+    wrong = [
+        (motion, _broken(judgement))
+        for judgement in judgements
+        if (motion := motions.get(judgement.case.name))
+        and (judgement.verdict >= Verdict.WRONG or motion.inputs["max_iterations"] == 1)
+    ]
+    count = sum(len(signatures) for signatures, _ in TIERS)
+    for signatures, by_family in TIERS:
         shares = {key: _share(rule, wrong, by_family) for key, rule in signatures.items()}
         key = max(shares, key=shares.__getitem__)
         if shares[key] >= MIN_SHARE:
             explanation = Explanation((key,), sentence_of(key), shares[key], 0.0)
-            return Diagnosis((explanation,), variant_count=COUNT)
-    return Diagnosis(variant_count=COUNT)
+            return Diagnosis((explanation,), variant_count=count)
+    return Diagnosis(variant_count=count)
 
 
 def sentence_of(key: str) -> Sentence:
     """Return the mistake, and its correction."""
-    if key in MISREADINGS:
-        return MISREADINGS[key].sentence
+    if fault := (POSE_FAULTS | JACOBIAN_FAULTS).get(key):
+        return fault.sentence
     entry = TABLE["robot_track"][key]
     return with_code(entry["code"], Sentence(entry["sentence"], {}))
 
@@ -92,20 +99,90 @@ def _share(
     return max(shares)
 
 
-# ---- signatures of faults
+# ---- poses: the target is reached, as the solver sees it
 
 
-def _misread(fault: Misreading, motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames whose coordinates, read otherwise, bring the tool to its target."""
-    position, quaternion = motion.targets()
-    request = {**motion.inputs, "target_position": position, "target_rotation": quaternion}
-    inputs = fault.read(request)
-    tool = tool_pose(inputs, fault.coordinates(inputs, motion.q))
-    target = inputs["target_rotation"] if inputs["target_rotation"] is not None else tool.rotations
-    target = tool._replace(positions=position, rotations=target)
-    is_missed = motion.errors(motion.twists(motion.q)) > LENIENT
-    is_missed &= motion.case.facts["reachable"] & (motion.inputs["max_iterations"] > 1)
-    return Evidence(is_missed, motion.errors(twists_between(tool, target)) <= LENIENT)
+def _reached(fault: RobotFault, motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames in which a fault's kinematics reach the target.
+
+    Of robots with few joints, which reach no target in other kinematics, only frames that do count.
+    """
+    explained = motion.errors(_errors(fault, motion, motion.q, sine_error)) <= LENIENT
+    concerned = motion.is_missed & (motion.inputs["max_iterations"] > 1)
+    return Evidence(concerned & (explained | (motion.q.shape[1] >= POSE_FREEDOMS)), explained)
+
+
+def _errors(
+    fault: RobotFault,
+    motion: Trajectory,
+    q: FloatArray,
+    angular: Callable[[FloatArray, FloatArray], FloatArray] = rotation_error,
+) -> FloatArray:
+    """Return the displacements and rotations to the target as a solver sees them, (frame, 6)."""
+    frames, targets = fault.frames(motion.inputs, q), fault.targets(motion.inputs, motion.targets())
+    turned = np.zeros_like(targets.positions)
+    if targets.rotations is not None:
+        goals = rotation.to_matrix(targets.rotations)
+        turned = angular(frames.rotation, goals)
+        is_near = np.einsum("fij,fij->f", frames.rotation, goals) > 1.0
+        turned = np.where(is_near[:, None] | (angular is not sine_error), turned, np.pi)
+    return np.concatenate([targets.positions - frames.position, turned], axis=-1)
+
+
+def _is_at_minimum(motion: Trajectory) -> BoolArray:
+    """Return whether no joint off its limits would reduce the error, (frame)."""
+    e, J = motion.twists(motion.q), next(RIGHT.jacobians(motion.inputs, motion.q))
+    J = J * ~motion.at_limits[:, None, :]
+    gradient = np.linalg.norm(np.einsum("fij,fi->fj", J, e), axis=-1)
+    scale = np.linalg.norm(J, axis=(1, 2)) * np.linalg.norm(e, axis=-1)
+    return np.asarray(gradient <= STATIONARY * scale)
+
+
+def _limits_ignored(motion: Trajectory, laws: set[str]) -> Evidence:
+    is_beyond = motion.excess.max(axis=-1) > AT_LIMIT
+    return Evidence(is_beyond & ("limits kept" in laws), ~motion.is_off_target)
+
+
+def _from_zero(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames with angles between 0 and 2 pi that are within limits a turn before."""
+    q, is_beyond = motion.q, motion.excess > AT_LIMIT
+    is_turned = (q >= 0.0) & (q < 2.0 * np.pi) & (q - 2.0 * np.pi >= motion.inputs["lower"])
+    is_negative = (q < 0.0) & ~motion.inputs["slides"]
+    explained = (is_turned | ~is_beyond).all(axis=-1) & ~is_negative.any(axis=-1)
+    return Evidence(np.asarray(is_beyond.any(axis=-1)), np.asarray(explained))
+
+
+def _clamped(motion: Trajectory, laws: set[str]) -> Evidence:
+    return Evidence(motion.is_missed & motion.at_limits.any(axis=-1), motion.is_clamped)
+
+
+def _claimed(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the targets beyond reach that are said to be reached."""
+    is_beyond = ~motion.case.facts["reachable"] & ("claims" in laws)
+    return Evidence(is_beyond, np.full(len(is_beyond), motion.is_claimed))
+
+
+def _stopped(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames that end while the error still falls."""
+    before, after = (np.linalg.norm(motion.twists(q), axis=-1) for q in (motion.previous, motion.q))
+    is_moving = (after < REDUCED * before) & ~_is_at_minimum(motion)
+    concerned = motion.is_missed & (motion.inputs["max_iterations"] > 1)
+    return Evidence(concerned & (motion.is_pose), is_moving)
+
+
+def _late(motion: Trajectory, shift: int) -> Evidence:
+    is_moving = motion.errors(motion.displacements) > LENIENT
+    is_there = motion.errors(motion.twists(motion.q, shift)) <= LENIENT
+    return Evidence(is_moving & motion.is_off_target, is_there)
+
+
+def _by_law(law: str, motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return all frames of a motion that breaks a law."""
+    is_wrong = np.full(len(motion.q), law in laws)
+    return Evidence(is_wrong, is_wrong)
+
+
+# ---- steps
 
 
 def _step_gap(motion: Trajectory, J: FloatArray, q: FloatArray, twists: FloatArray) -> FloatArray:
@@ -113,55 +190,83 @@ def _step_gap(motion: Trajectory, J: FloatArray, q: FloatArray, twists: FloatArr
 
     Relative to the step; joints that end at a limit are left out.
     """
-    changes, gap = motion.q - q, np.full(len(q), np.inf)
-    is_free = ~at_limits(motion)
-    for damping in DAMPINGS:
-        inverse = np.linalg.inv(J @ np.swapaxes(J, 1, 2) + damping * np.eye(6))
-        steps = np.einsum("fij,fik,fk->fj", J, inverse, twists) * is_free
-        factors = (steps * changes).sum(-1) / np.maximum((steps * steps).sum(-1), 1e-300)
-        gaps = np.linalg.norm((changes - factors[:, None] * steps) * is_free, axis=-1)
-        gap = np.minimum(gap, np.where(factors > 0.0, gaps, np.inf))
+    is_free, changes = ~motion.at_limits, motion.q - q
+    values, U = np.linalg.eigh(J @ np.swapaxes(J, 1, 2))
+    parts = np.einsum("fij,fi->fj", U, twists)[:, None] / (
+        np.maximum(values, 0.0)[:, None] + DAMPINGS
+    )
+    steps = np.einsum("fij,fik,fdk->fdj", J, U, parts) * is_free[:, None]
+    scale = np.maximum((steps * steps).sum(axis=-1), 1e-300)
+    factors = np.einsum("fdj,fj->fd", steps, changes) / scale
+    gaps = np.linalg.norm(
+        (changes[:, None] - factors[..., None] * steps) * is_free[:, None], axis=-1
+    )
+    gap = np.where(factors > 0.0, gaps, np.inf).min(axis=-1)
     gap[is_free.sum(axis=-1) < MIN_FREE] = np.inf
-    return gap / np.maximum(np.linalg.norm(changes * is_free, axis=-1), 1e-300)
+    return np.asarray(gap / np.maximum(np.linalg.norm(changes * is_free, axis=-1), 1e-300))
 
 
-@lru_cache(maxsize=20)
 def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
     """Return the gaps to a right step and to those of faults, by key."""
     J, q, e = motion.jacobians, motion.previous, motion.twists(motion.previous)
-    R = rotation.to_matrix(tool_pose(motion.inputs, q).rotations)
-    start = np.tile(q[0], (len(q), 1))
+    R = RIGHT.frames(motion.inputs, q).rotation
     twists = {
         "": e,
         "Jacobian in the tool's frame": _both(R, e),
         "error in the tool's frame": _both(np.swapaxes(R, 1, 2), e),
         "rotation error reversed": e * np.repeat([1.0, -1.0], 3),
         "linear and angular swapped": np.roll(e, 3, axis=-1),
-        "no feedback": motion.displacements,
+        "step reversed": -e,
     }
+    if len(q) > 1:
+        twists["no feedback"] = motion.displacements
     gaps = {key: _step_gap(motion, J, q, twist) for key, twist in twists.items()}
-    first = np.repeat(J[:1], len(q), axis=0)
-    return gaps | {"frames start anew": _step_gap(motion, first, start, motion.twists(start))}
+    if motion.inputs["max_iterations"] == 1:
+        for key, fault in STEP_FAULTS.items():
+            gaps[key] = np.minimum.reduce(list(_fault_gaps(fault, motion)))
+    if len(q) > 1:
+        first, start = np.repeat(J[:1], len(q), axis=0), np.tile(q[0], (len(q), 1))
+        gaps["frames start anew"] = _step_gap(motion, first, start, motion.twists(start))
+    return gaps
+
+
+def _fault_gaps(fault: RobotFault, motion: Trajectory) -> Iterator[FloatArray]:
+    """Yield the gaps to steps with a fault's Jacobians, and rotation vectors or sines."""
+    q = motion.previous
+    errors = [_errors(fault, motion, q)]
+    if len(q) == 1:  # the errors of frames are small
+        errors.append(_errors(fault, motion, q, lambda R, target: sine_error(R, target)))
+    for J in fault.jacobians(motion.inputs, q):
+        yield from (_step_gap(motion, J, q, error) for error in errors)
+
+
+@lru_cache(maxsize=200)
+def _nearest_steps(motion: Trajectory) -> tuple[BoolArray, list[str]]:
+    """Return the frames that move from off their targets, and the key of each frame's step."""
+    is_off = motion.errors(motion.twists(motion.previous)) > LENIENT
+    is_moving = np.abs(motion.changes).max(axis=-1) > AT_LIMIT
+    gaps = _step_gaps(motion)
+    keys, table = list(gaps), np.array(list(gaps.values()))
+    is_right = (gaps[""] <= SAME_STEP) & (
+        gaps[""] <= np.maximum(EQUAL_STEP, NEARER * table.min(axis=0))
+    )
+    table[0] = np.where(is_right, 0.0, table[0])
+    names = [keys[i] if table[i, f] <= SAME_STEP else "unknown"
+             for f, i in enumerate(table.argmin(axis=0))]  # fmt: skip
+    return is_off & is_moving & motion.case.facts["reachable"], names
 
 
 def _is_step(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames that move, and those whose step is nearest to that of a fault."""
-    gaps = _step_gaps(motion)
-    nearest = np.minimum.reduce(list(gaps.values()))
-    return Evidence(_is_telling(motion), (gaps[key] == nearest) & (nearest <= SAME_STEP))
+    is_telling, keys = _nearest_steps(motion)
+    return Evidence(is_telling, np.array([name == key for name in keys]))
 
 
-def _is_telling(motion: Trajectory) -> BoolArray:
-    """Return whether frames begin off their targets and move."""
-    is_off = motion.errors(motion.twists(motion.previous)) > LENIENT
-    is_off &= motion.case.facts["reachable"]
-    return is_off & (np.abs(motion.changes).max(axis=-1) > AT_LIMIT)
-
-
-def at_limits(motion: Trajectory) -> BoolArray:
-    """Return whether joints are at their limits or beyond, (frame, joint)."""
-    inputs, q = motion.inputs, motion.q
-    return (q >= inputs["upper"] - AT_LIMIT) | (q <= inputs["lower"] + AT_LIMIT)
+def _single_step(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames that make a single right step though more are allowed."""
+    is_single = motion.is_missed & (motion.inputs["max_iterations"] > 1)
+    is_single &= motion.is_pose
+    return Evidence(is_single, _is_step("", motion, laws).explained)
 
 
 def _both(R: FloatArray, twists: FloatArray) -> FloatArray:
@@ -171,12 +276,12 @@ def _both(R: FloatArray, twists: FloatArray) -> FloatArray:
 
 def _transposed(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames whose step is J' e, with any weight of the rotation."""
-    error, is_free = motion.twists(motion.previous), ~at_limits(motion)
+    error, is_free = motion.twists(motion.previous), ~motion.at_limits
     parts = np.einsum("fpij,fpi->fjp", motion.jacobians.reshape(len(error), 2, 3, -1),
                       error.reshape(-1, 2, 3))  # fmt: skip
     spans = map(_spans, parts * is_free[..., None], motion.changes * is_free)
-    is_right = _is_step("", motion, laws).explained
-    return Evidence(_is_telling(motion), np.array(list(spans)) & ~is_right)
+    is_right = _is_step("", motion, laws).explained | (motion.q.shape[1] < MIN_FREE)
+    return Evidence(_nearest_steps(motion)[0], np.array(list(spans)) & ~is_right)
 
 
 def _spans(columns: FloatArray, vector: FloatArray) -> bool:
@@ -186,30 +291,18 @@ def _spans(columns: FloatArray, vector: FloatArray) -> bool:
     return bool(gap <= 0.02 * np.linalg.norm(vector) and (weights > 0.0).any())
 
 
-def _limits_ignored(motion: Trajectory, laws: set[str]) -> Evidence:
-    is_beyond = motion.excess.max(axis=-1) > AT_LIMIT
-    is_on_target = motion.errors(motion.twists(motion.q)) <= LENIENT
-    return Evidence(is_beyond & ("limits kept" in laws), is_on_target)
+def _overshoot(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames in which the joints go back on their last movement: g > 1."""
+    error = motion.twists(motion.previous)
+    step = np.einsum("fij,fj->fi", motion.jacobians, motion.changes)
+    before = np.concatenate([motion.changes[:1], motion.changes[:-1]])
+    goes_back = (before * motion.changes).sum(-1) < 0.0
+    concerned = motion.errors(error) > LENIENT
+    beyond = (step * error).sum(-1) > (error * error).sum(-1)
+    return Evidence(concerned & (len(laws & {"rest", "target followed"}) > 0), goes_back & beyond)
 
 
-def _clamped(motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames that reach their targets if the joints at limits leave these."""
-    inputs, q = motion.inputs, motion.q
-    at_limit = at_limits(motion)
-    is_missed = motion.errors(motion.twists(q)) > LENIENT
-    concerned = is_missed & motion.case.facts["reachable"]
-    explained = np.zeros(len(q), dtype=bool)
-    for i in np.flatnonzero(concerned & at_limit.any(axis=-1)):
-        bounds = (np.where(at_limit[i], side, q[i]) for side in (-np.inf, np.inf))
-        free = {**inputs, **dict(zip(("lower", "upper"), bounds, strict=True))}
-        position, quaternion = (part[i] for part in motion.targets())
-        target = Target(position, quaternion, -1)
-        solution = solve_ik(mechanism(free), q[i], target, "levenberg_marquardt", restarts=0,
-                            tolerance=inputs["tolerance"],
-                            tolerance_rotation=inputs["tolerance_rotation"])  # fmt: skip
-        frame = motion.errors(motion.twists(np.tile(solution.coordinates, (len(q), 1))))[i]
-        explained[i] = frame <= LENIENT
-    return Evidence(concerned, explained)
+# ---- jumps
 
 
 def _wrapped(motion: Trajectory, laws: set[str]) -> Evidence:
@@ -231,70 +324,56 @@ def _is_singular(motion: Trajectory) -> BoolArray:
 
 def _undamped(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the jumps from near a singularity, or towards a target beyond reach."""
-    return _jumping(motion, _is_singular(motion) | ~motion.case.facts["reachable"], least=1)
+    explained = _is_singular(motion) | ~motion.case.facts["reachable"]
+    return _jumping(motion, explained, least=1)
 
 
 def _branch(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the jumps between configurations that are both on their targets."""
-    is_on_target = motion.errors(motion.twists(motion.q)) <= LENIENT
+    is_on_target = ~motion.is_off_target
     before = np.concatenate([is_on_target[:1], is_on_target[:-1]])
     whole = np.abs(np.abs(motion.changes) - 2.0 * np.pi).min(axis=-1) < WHOLE_TURN
     return _jumping(motion, is_on_target & before & ~whole & ~_is_singular(motion))
 
 
-def _overshoot(motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames in which the joints go back on their last movement: g > 1."""
-    error = motion.twists(motion.previous)
-    step = np.einsum("fij,fj->fi", motion.jacobians, motion.changes)
-    before = np.concatenate([motion.changes[:1], motion.changes[:-1]])
-    goes_back = (before * motion.changes).sum(-1) < 0.0
-    concerned = motion.errors(error) > LENIENT
-    beyond = (step * error).sum(-1) > (error * error).sum(-1)
-    return Evidence(concerned & (len(laws & {"rest", "target followed"}) > 0), goes_back & beyond)
-
-
-def _late(motion: Trajectory, shift: int) -> Evidence:
-    is_moving = motion.errors(motion.displacements) > LENIENT
-    is_missed = motion.errors(motion.twists(motion.q)) > LENIENT
-    is_there = motion.errors(motion.twists(motion.q, shift)) <= LENIENT
-    return Evidence(is_moving & is_missed, is_there)
-
-
-def _long_way(motion: Trajectory, laws: set[str]) -> Evidence:
-    is_wrong = np.full(len(motion.q), "both signs of a quaternion" in laws)
-    return Evidence(is_wrong, is_wrong)
-
-
-def _time_step(motion: Trajectory, laws: set[str]) -> Evidence:
-    is_wrong = np.full(len(motion.q), "velocities and coordinates" in laws)
-    return Evidence(is_wrong, is_wrong)
-
-
-STEP_KEYS = (
-    "Jacobian in the tool's frame", "error in the tool's frame", "rotation error reversed",
-    "linear and angular swapped", "no feedback", "frames start anew",
-)  # fmt: skip
-# Steps of single frames, as some families of cases show them.
-STEPS: Mapping[str, Signature] = {
-    **{key: partial(_is_step, key) for key in STEP_KEYS},
-    "transposed Jacobian": _transposed,
-    "gain too high": _overshoot,
-}
-# Frames of all cases; what explains whole poses comes before what explains jumps and misses.
-EXACT: Mapping[str, Signature] = {
+# What explains whole poses comes before what explains steps, jumps and misses.
+POSES: Mapping[str, Signature] = {
+    "angles from zero": _from_zero,
     "limits ignored": _limits_ignored,
     "one frame late": lambda motion, laws: _late(motion, -1),
     "one frame early": lambda motion, laws: _late(motion, 1),
-    "long way round": _long_way,
-    "wrong time step": _time_step,
+    "long way round": partial(_by_law, "both signs of a quaternion"),
+    "wrong time step": partial(_by_law, "velocities and coordinates"),
     "clamped after the solve": _clamped,
+    **{k: partial(_reached, fault) for k, fault in POSE_FAULTS.items() if k != POSITION_ONLY},
+}
+STEP_FAULTS = {
+    key: fault
+    for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()
+    if not (fault.relative or fault.reversed or key in ("columns negated", POSITION_ONLY))
+}
+STEP_KEYS = (
+    "Jacobian in the tool's frame", "error in the tool's frame", "rotation error reversed",
+    "linear and angular swapped", "no feedback", "frames start anew", "step reversed", *STEP_FAULTS,
+)  # fmt: skip
+STEPS: Mapping[str, Signature] = {
+    **{key: partial(_is_step, key) for key in STEP_KEYS},
+    "transposed Jacobian": _transposed,
+    "single step": _single_step,
+    "gain too high": _overshoot,
 }
 VAGUE: Mapping[str, Signature] = {
     "angles wrapped": _wrapped,
     "undamped": _undamped,
     "another branch": _branch,
+    "success always claimed": _claimed,
+    "stopped early": _stopped,
 }
-
-
-FAULTS = (*EXACT, *STEPS, *VAGUE)
-COUNT = len(FAULTS) + len(MISREADINGS)
+# Signatures, and whether the family of cases that shows a fault best decides.
+TIERS: Sequence[tuple[Mapping[str, Signature], bool]] = (
+    (POSES, False),
+    (STEPS, True),
+    ({POSITION_ONLY: partial(_reached, POSE_FAULTS[POSITION_ONLY])}, False),
+    (VAGUE, False),
+)
+FAULTS = tuple(key for signatures, _ in TIERS for key in signatures)

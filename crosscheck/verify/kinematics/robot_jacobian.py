@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import forward_kinematics, rotation
+from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import jacobian
 
@@ -15,16 +15,19 @@ from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import LEAST_SHARE, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import judge_case, not_finite, of_joints
-from ..sentence import Sentence, sentence, with_code
+from ..sentence import sentence
 from . import robot_models, rounding
-from .faults import TABLE
 from .report import report
+from .robot_faults import FAULTS as POSE_FAULTS
+from .robot_faults import JACOBIAN_FAULTS, TARGET_FAULTS, RobotFault
 from .robot_models import mechanism, tool_pose
+from .robot_textbook import Inputs
 from .skeletons import suits
 
-Inputs = Mapping[str, Any]
 TASK = "robot_jacobian"
 _SEED = 1972
+# A fault is compared with all answers only if it explains one of the first.
+TRIAL = 2
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -33,7 +36,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return [
         _case(f"{name}, pose {number + 1}", robot, rng)
         for name, robot in robot_models.robots(rng).items()
-        if suits(robot["parents"], greeting)
+        if suits(robot["parents"], greeting, robot["effector"])
         for number in range(5 if thorough else 2)
     ]
 
@@ -46,59 +49,49 @@ def _case(name: str, robot: Mapping[str, Any], rng: np.random.Generator) -> Case
     return Case(name, TASK, inputs, "any configuration", about, facts={"size": max(reach, 1.0)})
 
 
-def _world(inputs: Inputs) -> FloatArray:
+def _world(J: FloatArray, x: FloatArray, R: FloatArray) -> FloatArray:
     """Return the Jacobian of the tool's origin along the axes of the world, (6, joint)."""
-    return jacobian(mechanism(inputs), inputs["q"], -1)
+    return J
 
 
-def _body(inputs: Inputs) -> FloatArray:
+def _body(J: FloatArray, x: FloatArray, R: FloatArray) -> FloatArray:
     """Return both parts along the axes of the tool."""
-    R = rotation.to_matrix(tool_pose(inputs, inputs["q"]).rotations)
-    return np.kron(np.eye(2), R.T) @ _world(inputs)
+    return np.asarray(np.kron(np.eye(2), R.T) @ J)
 
 
-def _spatial(inputs: Inputs) -> FloatArray:
+def _spatial(J: FloatArray, x: FloatArray, R: FloatArray) -> FloatArray:
     """Return the velocity of the point of the tool's body that is at the world's origin."""
-    J, x = _world(inputs), tool_pose(inputs, inputs["q"]).positions
     return np.concatenate([J[:3] - np.cross(J[3:].T, x).T, J[3:]])
 
 
-def _arranged(convert: Callable[[Inputs], FloatArray], shift: int, inputs: Inputs) -> FloatArray:
+# Returns a Jacobian in another frame and order, given the tool's position and rotation.
+Convention = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+def _arranged(convert: Convention, shift: int, *arguments: FloatArray) -> FloatArray:
     """Return a Jacobian with its rows rolled: 3 puts the angular part first."""
-    return np.roll(convert(inputs), shift, axis=0)
+    return np.roll(convert(*arguments), shift, axis=0)
 
 
 # Frames and orders that textbooks use, by name.
-CONVENTIONS: Mapping[str, Callable[[Inputs], FloatArray]] = {
+CONVENTIONS: Mapping[str, Convention] = {
     f"{frame}, {order} part first": partial(_arranged, convert, shift)
     for order, shift in (("linear", 0), ("angular", 3))
     for frame, convert in (("world", _world), ("tool", _body), ("spatial", _spatial))
 }
-
-
-def _with_arms(inputs: Inputs, arms: FloatArray) -> FloatArray:
-    """Return the Jacobian with other arms from the joints to the tool, (joint, 3)."""
-    J = _world(inputs)
-    linear = np.where(inputs["slides"], J[:3], np.cross(J[3:].T, arms).T)
-    return np.concatenate([linear, J[3:]])
-
-
-def _slides_as_hinges(inputs: Inputs) -> FloatArray:
-    J, x = _world(inputs), forward_kinematics(mechanism(inputs), inputs["q"]).positions
-    columns = np.concatenate([np.cross(J[:3].T, x[-1] - x[1:-1]).T, J[:3]])
-    return np.where(inputs["slides"], columns, J)
-
-
-# What a program with a fault answers.
-FAULTS: Mapping[str, Callable[[Inputs], FloatArray]] = {
-    "lever arms missing": lambda inputs: _with_arms(inputs, np.zeros((len(inputs["q"]), 3))),
-    "lever arms from the origin": lambda inputs: _with_arms(
-        inputs, np.tile(tool_pose(inputs, inputs["q"]).positions, (len(inputs["q"]), 1))
-    ),
-    "slides as hinges": _slides_as_hinges,
-    "columns negated": lambda inputs: -_world(inputs),
-    "frames mixed": lambda inputs: np.concatenate([_world(inputs)[:3], _body(inputs)[3:]]),
+# What programs with a fault answer.
+FAULTS: Mapping[str, RobotFault] = {
+    key: fault
+    for key, fault in (JACOBIAN_FAULTS | POSE_FAULTS).items()
+    if not fault.relative and key not in TARGET_FAULTS
 }
+
+
+def right_jacobian(inputs: Inputs, convention: Convention) -> FloatArray:
+    """Return the reference's Jacobian in a convention."""
+    tool = tool_pose(inputs, inputs["q"])
+    J = jacobian(mechanism(inputs), inputs["q"], -1)
+    return convention(J, tool.positions, rotation.to_matrix(tool.rotations))
 
 
 def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
@@ -108,17 +101,26 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         for exchange in exchanges
         if isinstance(exchange.answer, Answer) and "jacobian" in exchange.answer.values
     ]
-    convention = max(CONVENTIONS, key=lambda name: _share(CONVENTIONS[name], answered, greeting))
+    matches = {
+        name: [
+            _matches(exchange, greeting, right_jacobian(exchange.case.inputs, convention))
+            for exchange in answered
+        ]
+        for name, convention in CONVENTIONS.items()
+    }
+    name = max(matches, key=lambda name: sum(matches[name]))
     judgements = []
     for exchange in exchanges:
-        J = CONVENTIONS[convention](exchange.case.inputs)
+        J = right_jacobian(exchange.case.inputs, CONVENTIONS[name])
         laws = partial(_findings, exchange.case, J, greeting)
         allowed = rounding.repeats(greeting.epsilon, exchange.case.facts["size"])
         judgements.append(judge_case(exchange, laws, allowed, None, {"jacobian": J}))
     wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
-    diagnosis = _diagnosis(answered, greeting) if wrong else Diagnosis()
+    missed = [exchange for exchange, is_right in zip(answered, matches[name], strict=True)
+              if not is_right]  # fmt: skip
+    diagnosis = _diagnosis(missed, greeting) if wrong else Diagnosis()
     if not wrong and answered:
-        words = sentence("The Jacobian's convention: {convention}.", convention=convention)
+        words = sentence("The Jacobian's convention: {convention}.", convention=name)
         diagnosis = Diagnosis(behaviour=words)
     return report(TASK, method, judgements, diagnosis)
 
@@ -128,16 +130,26 @@ def _bound(case: Case, greeting: Greeting) -> float:
     return rounding.positions(greeting.epsilon, len(case.inputs["q"]), case.facts["size"])
 
 
-def _share(
-    predict: Callable[[Inputs], FloatArray], exchanges: Sequence[Exchange], greeting: Greeting
-) -> float:
-    """Return the share of the Jacobians that a prediction explains."""
-    matches = []
-    for exchange in exchanges:
-        assert isinstance(exchange.answer, Answer)
-        gap = np.abs(exchange.answer.values["jacobian"] - predict(exchange.case.inputs)).max()
-        matches.append(bool(gap <= _bound(exchange.case, greeting)))
-    return float(np.mean(matches)) if matches else 0.0
+def _matches(exchange: Exchange, greeting: Greeting, J: FloatArray) -> bool:
+    """Return whether an answer is a Jacobian."""
+    assert isinstance(exchange.answer, Answer)
+    gap = np.abs(exchange.answer.values["jacobian"] - J).max()
+    return bool(gap <= _bound(exchange.case, greeting))
+
+
+def _share(fault: RobotFault, exchanges: Sequence[Exchange], greeting: Greeting) -> float:
+    """Return the share of the answers that a fault explains in one of the conventions."""
+    counts = np.zeros(len(CONVENTIONS))
+    for i, exchange in enumerate(exchanges):
+        if i == TRIAL and not counts.any():
+            return 0.0
+        inputs = exchange.case.inputs
+        frames = fault.frames(inputs, inputs["q"])
+        jacobians = list(fault.jacobians(inputs, inputs["q"]))
+        for k, convention in enumerate(CONVENTIONS.values()):
+            predictions = (convention(J, frames.position, frames.rotation) for J in jacobians)
+            counts[k] += any(_matches(exchange, greeting, J) for J in predictions)
+    return float(counts.max()) / len(exchanges)
 
 
 def _findings(
@@ -152,11 +164,13 @@ def _findings(
 
 
 def _diagnosis(exchanges: Sequence[Exchange], greeting: Greeting) -> Diagnosis:
-    """Return the fault that explains most Jacobians."""
-    shares = {key: _share(predict, exchanges, greeting) for key, predict in FAULTS.items()}
-    key = max(shares, key=shares.__getitem__)
-    if shares[key] < LEAST_SHARE:
+    """Return the fault that explains most Jacobians, those of robots with many joints first."""
+    exchanges = sorted(exchanges, key=lambda exchange: -len(exchange.case.inputs["q"]))
+    if not exchanges:
+        return Diagnosis()
+    shares = {key: _share(fault, exchanges, greeting) for key, fault in FAULTS.items()}
+    key = max(shares, key=shares.__getitem__, default="")
+    if not key or shares[key] < LEAST_SHARE:
         return Diagnosis(variant_count=len(FAULTS))
-    entry = TABLE["robot_jacobian"][key]
-    words = with_code(entry["code"], Sentence(entry["sentence"], {}))
-    return Diagnosis((Explanation((key,), words, shares[key], 0.0),), variant_count=len(FAULTS))
+    explanation = Explanation((key,), FAULTS[key].sentence, shares[key], 0.0)
+    return Diagnosis((explanation,), variant_count=len(FAULTS))

@@ -3,6 +3,7 @@
 import math
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,16 @@ import numpy as np
 
 from plumbob.reference import (
     Articulation,
+    Outcome,
     Skeleton,
     Target,
     forward_kinematics,
     judge_pose,
     rotation,
+    solve_ik,
 )
 from plumbob.reference.arguments import FloatArray
+from plumbob.reference.jacobians import jacobian
 from plumbob.reference.judging import PoseJudgement
 from plumbob.reference.skeleton import Pose
 
@@ -30,11 +34,20 @@ ITERATIONS = 200
 TOLERANCES = {"double": 1e-5, "single": 1e-3}
 # From a start so near to an answer [rad, m] no other minimum than the target's is nearer.
 NEAR = 0.1
-# Starts at the answer, near it, anywhere; targets that nothing reaches.
+# Starts at the answer, near it, anywhere; targets that nothing reaches; a joint that comes to its
+# limit while the others can reach the target; a single iteration.
 AT, CLOSE, ANYWHERE, BEYOND = "start at the target", "near start", "any start", "beyond reach"
+AT_A_LIMIT, STEP = "at a limit", "a single iteration"
+# How far single iterations and motions to a limit begin from an answer [rad, m]: of slides a tenth.
+DISTANCE = 0.3
+# Robots of so many joints have a freedom to spare; draws of a motion to a limit.
+REDUNDANT, DRAWS = 7, 50
+# The largest share of a joint in a movement that the others can make up for in few iterations.
+SHARE = 0.5
 # Larger coordinates are clipped to this: the reference takes none beyond 1e75.
 FARTHEST = 1e74
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+DAMPED = "damped_least_squares"
 _SEED = 1955
 _TEXT = Path(__file__).with_name("robots.toml").read_text(encoding="utf-8")
 
@@ -131,7 +144,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return [
         case
         for name, robot in robots(rng).items()
-        if suits(robot["parents"], greeting)
+        if suits(robot["parents"], greeting, robot["effector"])
         for number in range(3 if thorough else 1)
         for case in _cases_of(f"{name}, pose {number + 1}", robot, rng, greeting)
     ]
@@ -149,21 +162,74 @@ def _cases_of(
     tool = tool_pose(robot, answer)
     unreachable = tool._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * size)
     tolerance = TOLERANCES[greeting.precision]
-    starts = ((AT, answer, tool), (CLOSE, close, tool), (ANYWHERE, anywhere, tool),
-              (BEYOND, anywhere, unreachable))  # fmt: skip
-    for family, start, target in starts:
+    starts = ((AT, robot, answer, tool), (CLOSE, robot, close, tool),
+              (ANYWHERE, robot, anywhere, tool), (BEYOND, robot, anywhere, unreachable),
+              *_distant_starts(robot, rng))  # fmt: skip
+    for number, (family, arm, start, target) in enumerate(starts):
         inputs = {
-            **robot,
+            **arm,
             "start": start,
             "target_position": target.positions,
             "target_rotation": target.rotations,
             "tolerance": tolerance * max(size, 1.0),
             "tolerance_rotation": tolerance,
-            "max_iterations": ITERATIONS,
-            "urdf": urdf(robot),
+            "max_iterations": 1 if family == STEP else ITERATIONS,
+            "urdf": urdf(arm),
         }
         about = sentence("A robot of {joints} joints.", joints=len(start))
-        yield Case(f"{name}, {family}", TASK, inputs, family, about, facts={"size": size})
+        facts = {"size": size, "reachable": np.array([family != BEYOND])}
+        again = number > 0 and starts[number - 1][0] == family
+        yield Case(f"{name}, {family}{' again' * again}", TASK, inputs, family, about, facts=facts)
+
+
+def _distant_starts(
+    robot: dict[str, Any], rng: np.random.Generator
+) -> Iterator[tuple[str, dict[str, Any], FloatArray, Pose]]:
+    """Yield a family, a robot, a start and a target of a single iteration, and of a limit."""
+    lower, upper, count = robot["lower"], robot["upper"], len(robot["axes"])
+    distances = np.where(robot["slides"], 0.1 * DISTANCE, DISTANCE)
+    for _ in range(2 if count >= REDUNDANT - 1 else 0):
+        answer = lower + (upper - lower) * rng.uniform(0.3, 0.7, count)
+        start = answer + distances * rng.uniform(-1.0, 1.0, count)
+        yield STEP, robot, start, tool_pose(robot, answer)
+    if count >= REDUNDANT:
+        draws = (_draw_limited(robot, distances, rng) for _ in range(DRAWS))
+        yield from islice((draw for draw in draws if draw is not None), 2)
+
+
+def _draw_limited(
+    robot: dict[str, Any], distances: FloatArray, rng: np.random.Generator
+) -> tuple[str, dict[str, Any], FloatArray, Pose] | None:
+    """Return a start, and limits that one joint would leave on its way to a target.
+
+    The other joints can do without it: by Klein and Huang (1983), a step of least length of all
+    joints has a share of the joint that is the diagonal entry of J^+ J.
+    """
+    lower, upper = robot["lower"], robot["upper"]
+    start = lower + (upper - lower) * rng.uniform(0.3, 0.7, len(lower))
+    target = tool_pose(robot, start + distances * rng.uniform(-1.0, 1.0, len(lower)))
+    changes = solved(robot, start, target)[0] - start
+    J = jacobian(mechanism(robot), start, -1)
+    is_spare = (np.diag(np.linalg.pinv(J) @ J) < SHARE) & ~robot["slides"]
+    joint = int(np.argmax(np.abs(changes) * is_spare))
+    side = "upper" if changes[joint] > 0.0 else "lower"
+    limits = robot[side].copy()
+    limits[joint] = start[joint] + 0.3 * changes[joint]
+    limited = {**robot, side: limits}
+    results = [solved(limited, start, target, s) for s in ("levenberg_marquardt", DAMPED)]
+    is_solvable = is_spare[joint] and all(is_reached for _, is_reached in results)
+    return (AT_A_LIMIT, limited, start, target) if is_solvable else None
+
+
+def solved(
+    robot: Mapping[str, Any], start: FloatArray, tool: Pose, solver: str = "levenberg_marquardt"
+) -> tuple[FloatArray, bool]:
+    """Return the coordinates of a solver of the reference, and whether they reach the target."""
+    solution = solve_ik(
+        mechanism(robot), start, Target(*tool, -1), solver, restarts=0,
+        tolerance=1e-9, tolerance_rotation=1e-9, max_iterations=ITERATIONS,
+    )  # fmt: skip
+    return solution.coordinates, bool(solution.outcome == Outcome.CONVERGED)
 
 
 def robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
@@ -186,19 +252,22 @@ def _random_frames(rng: np.random.Generator) -> dict[str, Any]:
 
 def _robot(
     axes: Any, origins: Any, slides: Any = None, *, parents: Any = None, orientations: Any = None,
-    tool: Any = (0.0, 0.0, 0.1), tool_rotation: Any = (1.0, 0.0, 0.0, 0.0),
+    effector: int | None = None, tool: Any = (0.0, 0.0, 0.1),
+    tool_rotation: Any = (1.0, 0.0, 0.0, 0.0),
 ) -> dict[str, Any]:  # fmt: skip
     count = len(axes)
     slides = np.zeros(count, dtype=bool) if slides is None else np.array(slides)
     return {
         "parents": np.array(np.arange(count) - 1 if parents is None else parents),
         "origins": np.array(origins, dtype=float),
-        "orientations": rotation.identity(count) if orientations is None else orientations,
+        "orientations": np.array(
+            rotation.identity(count) if orientations is None else orientations
+        ),
         "axes": np.array(axes, dtype=float),
         "slides": slides,
         "lower": np.where(slides, -0.2, -2.2),
         "upper": np.where(slides, 0.3, 2.4),
-        "effector": count - 1,
+        "effector": count - 1 if effector is None else effector,
         "tool_position": np.array(tool, dtype=float),
         "tool_rotation": np.array(tool_rotation, dtype=float),
     }

@@ -14,9 +14,8 @@ from ..laws import finding, judge_case, not_finite
 from ..sentence import sentence
 from . import motion_faults, robot_motions, rounding
 from .report import report
-from .robot_inverse_kinematics import LENIENT
 from .robot_models import FARTHEST
-from .trajectories import Trajectory
+from .trajectories import LENIENT, Trajectory
 
 TASK = robot_motions.TASK
 cases = robot_motions.cases

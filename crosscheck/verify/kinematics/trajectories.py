@@ -1,4 +1,4 @@
-"""The frames of a robot's motion: errors, displacements of targets, jumps."""
+"""The frames of a robot's motion, or its one answer: errors, displacements of targets, jumps."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plumbob.reference import Target, rotation, solve_ik
-from plumbob.reference.arguments import FloatArray
+from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.reference.jacobians import jacobian
 from plumbob.reference.skeleton import Pose
 
@@ -20,6 +20,15 @@ from .robot_motions import ITERATIONS
 # frame, and this much farther [rad]: solvers that weight joints, or move in the null space, may.
 # Beyond reach the arm is singular, and an honest arm may turn about itself.
 JUMP_FACTOR, JUMP_MARGIN, MARGIN_BEYOND_REACH = 5.0, 1.0, 5.0
+# Answers of a faulty solver may stop so many times as far off as its tolerance: it has its own.
+LENIENT = 10.0
+# Joints that hold the same limit so closely are at it [rad].
+AT_LIMIT = 1e-6
+# Newton iterations of joints that leave their limits; joints that are enough for any target.
+RELEASES, ENOUGH_JOINTS = 10, 6
+# Joints that a solver has clamped leave their limits so far [rad, m]: what is left of slow
+# iterations is less.
+RELEASED = 0.03
 
 
 def twists_between(start: Pose, end: Pose) -> FloatArray:
@@ -35,6 +44,12 @@ class Trajectory:
 
     case: Case
     q: FloatArray  # (frame, joint)
+    is_claimed: bool = False  # whether the solver reports success
+
+    @property
+    def is_pose(self) -> bool:
+        """Whether it is the answer to a single target."""
+        return "target_position" in self.inputs
 
     @property
     def inputs(self) -> Mapping[str, Any]:
@@ -58,8 +73,11 @@ class Trajectory:
 
     def targets(self, shift: int = 0) -> Pose:
         """Return the targets of all frames, or of those so much later; the ends are repeated."""
+        names = ["target_position", "target_rotation"]
+        if self.is_pose:
+            return Pose(*(self.inputs[name][None] for name in names))
         rows = np.clip(np.arange(len(self.q)) + shift, 0, len(self.q) - 1)
-        return Pose(self.inputs["target_positions"][rows], self.inputs["target_rotations"][rows])
+        return Pose(*(self.inputs[f"{name}s"][rows] for name in names))
 
     def twists(self, q: FloatArray, shift: int = 0) -> FloatArray:
         """Return the twists from the tool at q, (frame, joint), to the targets, (frame, 6)."""
@@ -70,6 +88,35 @@ class Trajectory:
         position, angle = np.linalg.norm(twists.reshape(-1, 2, 3), axis=-1).T
         return np.maximum(position / self.inputs["tolerance"],
                           angle / self.inputs["tolerance_rotation"])  # fmt: skip
+
+    @cached_property
+    def is_off_target(self) -> BoolArray:
+        """Whether the tool is off its target, (frame)."""
+        return self.errors(self.twists(self.q)) > LENIENT
+
+    @property
+    def is_missed(self) -> BoolArray:
+        """Whether the tool is off a target that it can reach, (frame)."""
+        return np.asarray(self.is_off_target & self.case.facts["reachable"])
+
+    @cached_property
+    def at_limits(self) -> BoolArray:
+        """Whether joints are at their limits or beyond, (frame, joint)."""
+        lower, upper = self.inputs["lower"], self.inputs["upper"]
+        return np.asarray((self.q >= upper - AT_LIMIT) | (self.q <= lower + AT_LIMIT))
+
+    @cached_property
+    def is_clamped(self) -> BoolArray:
+        """Whether the tool is brought to a missed target by the joints at limits alone, (frame)."""
+        q, is_held = self.q.copy(), self.at_limits
+        is_held = is_held & self.is_missed[:, None]
+        is_held &= (is_held.sum(axis=-1) < min(ENOUGH_JOINTS, q.shape[1]))[:, None]
+        robot = mechanism(self.inputs)
+        for _ in range(RELEASES if is_held.any() else 0):
+            J = jacobian(robot, q, -1) * is_held[:, None, :]
+            q += np.einsum("fji,fi->fj", np.linalg.pinv(J), self.twists(q))
+        is_beyond = np.abs(q - self.q).max(axis=-1) > RELEASED
+        return np.asarray(is_beyond & (self.errors(self.twists(q)) <= LENIENT))
 
     @cached_property
     def displacements(self) -> FloatArray:
@@ -93,6 +140,8 @@ class Trajectory:
     def jumps(self) -> FloatArray:
         """How far the joints move, in multiples of the least that is a jump, (frame)."""
         is_reachable = self.case.facts["reachable"]
+        if self.is_pose:
+            return np.zeros(len(self.q))
         limits = JUMP_FACTOR * np.where(is_reachable, self.least_changes, 0.0)
         limits += np.where(is_reachable, JUMP_MARGIN, MARGIN_BEYOND_REACH)
         return np.linalg.norm(self.changes, axis=-1) / limits

@@ -12,7 +12,7 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.kinematics import robot_motions
-from plumbob.crosscheck.verify.kinematics.robot_inverse_kinematics import FAULTS as MISREADINGS
+from plumbob.crosscheck.verify.kinematics.robot_faults import FAULTS as POSE_FAULTS
 from plumbob.crosscheck.verify.kinematics.robot_models import mechanism, tool_at
 from plumbob.crosscheck.verify.kinematics.robot_motions import TASK, followed
 from plumbob.crosscheck.verify.kinematics.robot_track import judge
@@ -106,9 +106,9 @@ def test_the_program_without_a_fault_is_right():
 
 @pytest.mark.parametrize("key", ["degrees", "rotation sense", "relative", "tool ignored"])
 def test_requests_that_are_misread_are_named(key):
-    fault, inputs = MISREADINGS[key], CASES["curve"].inputs
+    fault, inputs = POSE_FAULTS[key], CASES["curve"].inputs
     q = followed(fault.read(inputs), inputs["start"], tool_of(CASES["curve"]))
-    answer = Answer({"q": np.array([fault.answer(inputs, row) for row in q])}, 0.0)
+    answer = Answer({"q": (q - inputs["start"] if fault.relative else q) / fault.scale}, 0.0)
     report = judge([Exchange(CASES["curve"], answer, answer)], GREETING, "")
     assert [one.faults for one in report.diagnosis.explanations] == [(key,)]
 

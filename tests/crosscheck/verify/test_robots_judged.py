@@ -11,16 +11,20 @@ from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.kinematics import robot_models
+from plumbob.crosscheck.verify.kinematics.motion_faults import STEP_FAULTS
+from plumbob.crosscheck.verify.kinematics.robot_faults import FAULTS, RIGHT
 from plumbob.crosscheck.verify.kinematics.robot_inverse_kinematics import (
-    FAULTS,
     TASK,
     judge,
-    solve_wrongly,
+    solve_by_reference,
 )
-from plumbob.crosscheck.verify.kinematics.robot_models import CLOSE, tool_pose
+from plumbob.crosscheck.verify.kinematics.robot_models import AT_A_LIMIT, CLOSE, STEP, tool_pose
+from plumbob.crosscheck.verify.kinematics.robot_textbook import rotation_error
+from plumbob.crosscheck.verify.kinematics.trajectories import twists_between
 from plumbob.crosscheck.verify.verify import judge_cases
-from plumbob.reference import forward_kinematics, rotation
+from plumbob.reference import forward_kinematics, jacobians, rotation
 from plumbob.reference.formats import urdf
+from plumbob.reference.skeleton import Pose
 
 GREETING = Greeting(PROTOCOL, (TASK,), name="robots")
 CASES = robot_models.cases(GREETING, "", 0, False)
@@ -28,23 +32,28 @@ FEW = [
     case for case in CASES
     if case.name.startswith(("two", "seven")) and case.family != robot_models.ANYWHERE
 ]  # fmt: skip
+SOLVERS = ("levenberg_marquardt", "damped_least_squares")
 
 
 def misled(case, key):
     """The case with a target that a solver with this fault believes to have reached."""
     inputs, fault = dict(case.inputs), FAULTS[key]
     q = 0.7 * inputs["upper"] + 0.2 - 0.1 * np.arange(len(inputs["upper"]))
-    pose = tool_pose(fault.read(inputs), fault.coordinates(inputs, q))
-    target = np.roll(pose.rotations, -1) if key == "scalar last" else pose.rotations
-    if key == "position only":
+    frames = fault.frames({**inputs, "target_rotation": np.eye(4)[0]}, q)
+    target = rotation.from_matrix(frames.rotation)
+    if key in ("scalar last", "every scalar last"):
+        target = np.roll(target, -1)
+    elif key == "inverse rotations":
+        target = rotation.conjugate(target)
+    elif key == "position only":
         target = rotation.multiply(target, rotation.random(np.random.default_rng(3)))
-    inputs |= {"target_position": pose.positions, "target_rotation": target}
+    inputs |= {"target_position": frames.position, "target_rotation": target}
     answer = Answer({"q": q}, 0.0)
     return Exchange(replace(case, inputs=inputs), answer, answer)
 
 
-def judged(function):
-    return judge_cases(FunctionContestant({TASK: function}, GREETING), TASK, "", FEW)
+def judged(function, cases=FEW):
+    return judge_cases(FunctionContestant({TASK: function}, GREETING), TASK, "", cases)
 
 
 def broken(report):
@@ -52,15 +61,27 @@ def broken(report):
 
 
 def test_a_right_solver_is_right_or_stuck_somewhere():
-    report = judged(lambda **inputs: solve_wrongly(None, **inputs))
+    report = judged(lambda **inputs: solve_by_reference(SOLVERS[1], **inputs))
     assert report.verdict <= Verdict.RIGHT_EXCEPT
     assert broken(report) == set()
-    assert len(report.judgements) == len(FEW) == 15
+    assert len(report.judgements) == len(FEW) > 20
 
 
-@pytest.mark.parametrize("key", FAULTS)
+# Whose matrices are no rotations, single iterations show; who takes chains only is judged on them;
+# one robot has a slide in a rotated frame, which Jacobians show.
+ELSEWHERE = ("parents ignored", "effector ignored", "slides not rotated", "slides not rotated 2")
+KEYS = [
+    key for key, one in FAULTS.items()
+    if not (one.switches.hinge or one.switches.sign or key in ELSEWHERE)
+]  # fmt: skip
+QUICK = 6
+SAMPLES = [pytest.param(k, marks=pytest.mark.slow if i % QUICK else ()) for i, k in enumerate(KEYS)]
+NEAR = [case for case in CASES if case.family in (robot_models.AT, CLOSE)]
+
+
+@pytest.mark.parametrize("key", SAMPLES)
 def test_a_fault_breaks_a_law_and_is_named(key):
-    report = judge([misled(case, key) for case in FEW if case.family == CLOSE], GREETING, "")
+    report = judge([misled(case, key) for case in NEAR], GREETING, "")
     assert broken(report) & {"target reached", "rotation reached"}
     assert [one.faults for one in report.diagnosis.explanations] == [(key,)]
 
@@ -78,27 +99,20 @@ def test_angle_beyond_its_limits_by_whole_turns_is_said_to_be(turns, is_wrapped)
     assert ("whole turns" in str(limits.sentence)) is is_wrapped
 
 
-@pytest.mark.parametrize("key", FAULTS)
-def test_an_answer_means_what_it_was_given_for(key):
-    inputs = CASES[8].inputs
-    assert inputs["slides"].any()
-    q = inputs["start"] + 0.1
-    answer = FAULTS[key].answer(inputs, q)
-    np.testing.assert_allclose(FAULTS[key].coordinates(inputs, answer), q, atol=1e-14)
-
-
 def test_limits_that_are_left_aside_are_seen():
-    assert "limits kept" in broken(judged(lambda upper, **_: {"q": upper + 0.01}))
+    assert "limits kept" in broken(judged(lambda upper, **_: {"q": upper + 0.01}, FEW[:4]))
 
 
 def test_a_claim_that_is_not_so_is_seen_beyond_reach():
-    claiming = judged(lambda **inputs: {**solve_wrongly(None, **inputs), "converged": True})
+    claiming = judged(
+        lambda **inputs: {**solve_by_reference(SOLVERS[1], **inputs), "converged": True}
+    )
     assert broken(claiming) == {"claims"}
 
 
 @pytest.mark.parametrize("number", [np.nan, 1e300])
 def test_what_is_no_coordinate_is_wrong(number):
-    report = judged(lambda start, **_: {"q": np.full_like(start, number)})
+    report = judged(lambda start, **_: {"q": np.full_like(start, number)}, FEW[:4])
     assert report.verdict is (Verdict.BROKEN if np.isnan(number) else Verdict.WRONG)
 
 
@@ -118,3 +132,80 @@ def test_kinematics_are_those_of_the_same_text_by_the_reference_and_by_mujoco(ca
     np.testing.assert_allclose(theirs.positions[0], pose.positions, atol=1e-12)
     matrix = rotation.to_matrix(pose.rotations)
     np.testing.assert_allclose(theirs.matrices[0], matrix, atol=1e-12)
+
+
+@pytest.mark.parametrize("case", CASES[::5], ids=lambda case: case.name)
+def test_kinematics_of_the_textbook_without_faults_are_those_of_the_reference(case):
+    """Central differences of 1e-6 are wrong by 1e-10, and rounding adds 1e-10."""
+    inputs = case.inputs
+    q = np.random.default_rng(4).uniform(inputs["lower"], inputs["upper"])
+    frames, pose = RIGHT.frames(inputs, q), tool_pose(inputs, q)
+    np.testing.assert_allclose(frames.position, pose.positions, atol=1e-12)
+    np.testing.assert_allclose(frames.rotation, rotation.to_matrix(pose.rotations), atol=1e-12)
+    (J,) = RIGHT.jacobians(inputs, q)
+    expected = jacobians.jacobian(robot_models.mechanism(inputs), q, -1)
+    np.testing.assert_allclose(J, expected, atol=1e-12)
+    moved = RIGHT.frames(inputs, q + 1e-6).rotation
+    turned = rotation_error(frames.rotation, moved)
+    np.testing.assert_allclose(turned, 1e-6 * expected[3:].sum(axis=1), atol=1e-9)
+
+
+def exchange_of(case, q, **claims):
+    answer = Answer({"q": q, **claims}, 0.0)
+    return Exchange(case, answer, answer)
+
+
+def named(exchanges):
+    report = judge(exchanges, GREETING, "")
+    return report.verdict, [one.faults[0] for one in report.diagnosis.explanations]
+
+
+@pytest.mark.parametrize("key", ["axes not rotated", "lever arms reversed", "plus the cosine"])
+def test_wrong_kinematics_are_named_by_single_iterations(key):
+    exchanges = [exchange_of(FEW[0], FEW[0].inputs["start"] + 0.5)]
+    for case in [case for case in CASES if case.family == STEP][:3]:
+        inputs, q, fault = case.inputs, case.inputs["start"], STEP_FAULTS[key]
+        frames, J = fault.frames(inputs, q), next(fault.jacobians(inputs, q))
+        error = rotation_error(frames.rotation, rotation.to_matrix(inputs["target_rotation"]))
+        e = np.concatenate([inputs["target_position"] - frames.position, error])
+        step = J.T @ np.linalg.solve(J @ J.T + 0.01 * np.eye(6), e)
+        exchanges.append(exchange_of(case, q + 0.1 * step / np.abs(step).max()))
+    assert named(exchanges) == (Verdict.WRONG, [key])
+
+
+def test_limits_that_are_kept_only_after_the_solve_are_named():
+    limited = [case for case in CASES if case.family == AT_A_LIMIT]
+    exchanges = []
+    for case in limited[:4]:
+        free = {name: np.full(7, x) for name, x in (("lower", -9.0), ("upper", 9.0))}
+        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
+        q, _ = robot_models.solved({**case.inputs, **free}, case.inputs["start"], tool)
+        clamped = np.clip(q, case.inputs["lower"], case.inputs["upper"])
+        exchanges.append(exchange_of(case, clamped))
+        right, is_reached = robot_models.solved(case.inputs, case.inputs["start"], tool)
+        assert is_reached
+        assert broken(judge([exchange_of(case, right)], GREETING, "")) == set()
+    assert named(exchanges) == (Verdict.WRONG, ["clamped after the solve"])
+
+
+def test_angles_from_zero_to_two_pi_are_named():
+    near = [case for case in FEW if case.family == robot_models.AT]
+    exchanges = [exchange_of(case, case.inputs["start"] % (2.0 * np.pi)) for case in near]
+    assert named(exchanges) == (Verdict.WRONG, ["angles from zero"])
+
+
+def test_success_that_is_always_claimed_is_named():
+    beyond = [case for case in FEW if case.family == robot_models.BEYOND]
+    exchanges = [exchange_of(case, case.inputs["start"], converged=True) for case in beyond]
+    assert named(exchanges) == (Verdict.WRONG, ["success always claimed"])
+
+
+def test_a_single_step_where_a_solve_is_asked_is_named():
+    exchanges = []
+    for case in [case for case in CASES if case.family == CLOSE]:
+        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
+        e = twists_between(tool_pose(case.inputs, case.inputs["start"]), tool)
+        (J,) = RIGHT.jacobians(case.inputs, case.inputs["start"])
+        step = J.T @ np.linalg.solve(J @ J.T + 1e-3 * np.eye(6), e)
+        exchanges.append(exchange_of(case, case.inputs["start"] + step))
+    assert named(exchanges) == (Verdict.WRONG, ["single step"])

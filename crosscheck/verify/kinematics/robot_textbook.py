@@ -1,0 +1,133 @@
+"""A robot's kinematics in rotation matrices as textbooks write them, right or with faults.
+
+Coordinates q have the shape (..., joint); leading axes are configurations.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.reference import rotation
+from plumbob.reference.arguments import FloatArray
+
+Inputs = Mapping[str, Any]
+# The entries of a rotation matrix whose sine may have the wrong sign, by the number of `sign`.
+SIGNS = ((0, 0), (0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
+DIFFERENCE = 1e-6  # of coordinates, for numerical derivatives [rad, m]
+
+
+class RobotSwitches(NamedTuple):
+    """The number of the fault in each rule; 0 is right."""
+
+    hinge: int = 0  # the rotation matrix of a hinge
+    sign: int = 0  # the entry of that matrix with a wrong sign
+    product: int = 0  # of the parent's rotation, that of the joint's frame and the joint's own
+    origin: int = 0  # what rotates a joint's origin
+    slide: int = 0  # what rotates the direction of a slide
+    tool: int = 0  # what rotates the tool's position
+    axis: int = 0  # Jacobian: what rotates an axis
+    column: int = 0  # Jacobian: what the columns are
+
+
+class RobotFrames(NamedTuple):
+    """Where the joints and the tool are in each configuration."""
+
+    origins: FloatArray  # of the joints [m], (..., joint, 3)
+    axes: FloatArray  # of the joints, (..., joint, 3)
+    position: FloatArray  # of the tool [m], (..., 3)
+    rotation: FloatArray  # of the tool, (..., 3, 3)
+
+
+def hinge_matrix(axis: FloatArray, angle: FloatArray, faults: RobotSwitches) -> FloatArray:
+    """Return the rotations about an axis, a 1 + b [axis] + c axis axis^T, (..., 3, 3).
+
+    By Rodrigues' formula a is the cosine, b the sine and c one minus the cosine.
+    """
+    s, c = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
+    forms = (
+        (c, s, 1.0 - c), (c, s, 1.0 + c), (-c, s, 1.0 + c), (c, s, 0.0), (1.0, s, 0.0), (c, s, c),
+        (1.0 - c, s, c), (s, c, 1.0 - s), (s, c, 1.0 - c), (c, s, 1.0),
+    )  # fmt: skip
+    a, b, outer = forms[faults.hinge]
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    K[SIGNS[faults.sign]] *= -1.0
+    return np.asarray(a * np.eye(3) + b * K + outer * axis[:, None] * axis)
+
+
+def frames_at(inputs: Inputs, q: FloatArray, faults: RobotSwitches) -> RobotFrames:
+    """Return the frames of a robot at coordinates q."""
+    unit = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
+    quaternions = np.concatenate([inputs["orientations"], [inputs["tool_rotation"]]])
+    *frames, tool_frame = rotation.to_matrix(quaternions)
+    places, axes = list[tuple[FloatArray, FloatArray]](), list[FloatArray]()
+    for j, p in enumerate(inputs["parents"]):
+        x, P = places[p] if p >= 0 else (np.zeros_like(unit[..., 0]), unit)
+        axis, origin, slides = (inputs[name][j] for name in ("axes", "origins", "slides"))
+        F, coordinate = frames[j], q[..., j]
+        M = unit if slides else hinge_matrix(axis, coordinate, faults)
+        R = (P @ F @ M, M @ P @ F, F @ M, P @ M @ F, P @ M @ F)[faults.product]
+        x = x + (P, unit, R, P @ M)[3 if faults.product == 4 else faults.origin] @ origin
+        directions = (P @ F, unit, P, R)
+        if slides:
+            x = x + coordinate[..., None] * (directions[faults.slide] @ axis)
+        places.append((x, R))
+        axes.append(directions[faults.axis] @ axis)
+    x, R = places[inputs["effector"]]
+    position = x + (R, unit)[faults.tool] @ inputs["tool_position"]
+    origins = np.stack([place[0] for place in places], axis=-2)
+    return RobotFrames(origins, np.stack(axes, axis=-2), position, R @ tool_frame)
+
+
+def jacobians_at(inputs: Inputs, q: FloatArray, faults: RobotSwitches) -> Iterator[FloatArray]:
+    """Yield the Jacobians, (..., 6, joint), that programs with these faults may compute.
+
+    Their axes are those before the joint moves, or those after; or they are differences.
+    """
+    yield geometric_jacobian(inputs, q, faults)
+    if faults.product:
+        yield geometric_jacobian(inputs, q, faults._replace(axis=3))
+    if faults[:6] != RobotSwitches()[:6]:
+        steps = DIFFERENCE * np.eye(q.shape[-1])
+        first, last = (frames_at(inputs, q[..., None, :] + x, faults) for x in (-steps, steps))
+        moves = np.concatenate(
+            [last.position - first.position, rotation_error(first.rotation, last.rotation)], -1
+        )
+        yield np.swapaxes(moves, -1, -2) / (2.0 * DIFFERENCE)
+
+
+def geometric_jacobian(inputs: Inputs, q: FloatArray, faults: RobotSwitches) -> FloatArray:
+    """Return the axes and their moments about the tool, (..., 6, joint)."""
+    frames = frames_at(inputs, q, faults)
+    tool = frames.position[..., None, :]
+    arms = (tool - frames.origins, 0.0 * frames.origins, tool + 0.0 * frames.origins,
+            frames.origins - tool)[{1: 1, 2: 2, 6: 3}.get(faults.column, 0)]  # fmt: skip
+    slides = inputs["slides"][:, None] & (faults.column != 3)
+    linear = np.where(slides, frames.axes, np.cross(frames.axes, arms))
+    angular = np.where(slides, 0.0, frames.axes)
+    if faults.column == 5:
+        angular = angular @ frames.rotation
+    J = np.swapaxes(np.concatenate([linear, angular], axis=-1), -1, -2)
+    return np.asarray(J * _ancestors(inputs) * (-1.0 if faults.column == 4 else 1.0))
+
+
+def _ancestors(inputs: Inputs) -> FloatArray:
+    """Return 1 for the joints that move the tool, 0 for the others, (joint,)."""
+    moves, j = np.zeros(len(inputs["parents"])), inputs["effector"]
+    while j >= 0:
+        moves[j], j = 1.0, inputs["parents"][j]
+    return moves
+
+
+def rotation_error(R: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the rotation vectors from matrices, also such that are no rotations, to others."""
+    sines = sine_error(R, target)
+    sine = np.linalg.norm(sines, axis=-1, keepdims=True)
+    trace = np.einsum("...ij,...ij->...", R, target)[..., None]
+    return np.arctan2(sine, 0.5 * (trace - 1.0)) / np.maximum(sine, 1e-300) * sines
+
+
+def sine_error(R: FloatArray, target: FloatArray) -> FloatArray:
+    """Return half the sum of the cross products of columns, which is the axis times the sine."""
+    return np.asarray(0.5 * np.cross(R, target, axis=-2).sum(axis=-1))
