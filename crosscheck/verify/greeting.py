@@ -37,7 +37,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         method: explicit or symplectic Euler, one linearised implicit step, local/global or Newton
             iterations, or implicit Euler converged.
-        start: where iterations begin: x_n, or y = x_n + h v_n.
+        start: where iterations begin: x_n, y = x_n + h v_n, or s_n = y + h² M⁻¹ f_ext.
         iterations: how many of them a step has.
         substeps: how many equal steps make up h.
         damper: none; explicit; length_rate: (c/h) (l - l_n) along the spring; end_velocity:
@@ -49,7 +49,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     method: Method | None = None
-    start: Literal["x_n", "y"] | None = None
+    start: Literal["x_n", "y", "s_n"] | None = None
     iterations: Iterations | None = None
     substeps: Substeps | None = None
     damper: Literal["none", "explicit", "length_rate", "end_velocity", "global_factor"] | None = (

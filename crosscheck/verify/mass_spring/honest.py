@@ -66,7 +66,8 @@ def declared(option: Option, step: Step) -> bool:
 
 def _declared_integrator(integrator: Integrator, step: Step) -> bool:
     iterative = integrator.method in ("newton", "local_global")
-    if iterative and step.start not in (None, integrator.start):
+    starts = {None: (integrator.start,), "y": ("y", "s_n")}  # many call s_n y
+    if iterative and integrator.start not in starts.get(step.start, (step.start,)):
         return False
     if step.method == "linearised":
         return integrator.method == "newton" and integrator.iterations == 1

@@ -25,7 +25,7 @@ class Integrator(NamedTuple):
     # explicit, symplectic, taylor (x + h v + h²/2 a), runge_kutta, in_place; newton, local_global,
     # descent (along the gradient), converged
     method: str
-    start: str = "x_n"  # of the iterations, "x_n" or "y"
+    start: str = "x_n"  # of the iterations, "x_n", "y" or "s_n"
     iterations: int = 1
     # of Newton's method: a key of HESSIANS; or frozen: exact at x_n
     hessian: str = "exact"
@@ -352,6 +352,13 @@ class StepEquation:
         )
 
     @property
+    def starts(self) -> dict[str, FloatArray]:
+        """Where iterations may begin; s_n = y + h² M⁻¹ f_ext (Bouaziz et al. 2014, Algorithm 1)."""
+        start = self.start
+        s_n = self.y + start.h**2 * self.constant / start.p.masses[:, None]
+        return {"x_n": start.x, "y": self.y, "s_n": s_n}
+
+    @property
     def uncoupled(self) -> bool:
         """Whether no spring acts and the matrix is M: a Newton step arrives."""
         p, model = self.start.p, self.start.model
@@ -620,9 +627,9 @@ def _implicit(equation: StepEquation) -> FloatArray:
     """Return the positions at the end of an implicit step."""
     start, free = equation.start, equation.free[:, None]
     integrator = start.model.integrator
-    x = np.where(free, equation.y if integrator.start == "y" else start.x, start.x)
+    x = np.where(free, equation.starts[integrator.start], start.x)
     if equation.uncoupled and integrator.method != "descent":
-        minimum = equation.y + start.h**2 * equation.constant / start.p.masses[:, None]
+        minimum = equation.starts["s_n"]
         remainder = (1.0 - integrator.rate) ** integrator.iterations
         return np.where(free, minimum + remainder * (x - minimum), x)
     return _METHODS[integrator.method](equation, x, integrator)

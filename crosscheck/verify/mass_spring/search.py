@@ -140,11 +140,15 @@ class ModelSearch:
         self._gaps: dict[tuple[Any, ...], float | None] = {}
 
     def run(
-        self, notify: Callable[[int, int], None] = lambda count, total: None
+        self,
+        notify: Callable[[int, int], None] = lambda count, total: None,
+        cases: Sequence[Probe] = (),
     ) -> list[ModelMatch]:
         """Return the matches of the probes with the fewest faults, none if there are none.
 
-        `notify` is called before each stage with the number of stages done, and of all.
+        `notify` is called before each stage with the number of stages done, and of all. Small
+        probes do not tell where many iterations begin: of several honest steps the one that
+        explains all `cases` is taken.
         """
         hypotheses = [Choices()]
         for index in range(len(self.stages)):
@@ -159,6 +163,7 @@ class ModelSearch:
         matches = [self._match(self._needed(h)) for h in hypotheses if self._explains_enough(h)]
         if self._skipped:
             matches = [match for match in matches if match.faults]
+        matches.sort(key=lambda match: bool(match.faults) or not self._explains_all(match, cases))
         fewest = min((match.complexity for match in matches), default=None)
         first = {match.keys: match for match in reversed(matches) if match.complexity == fewest}
         return list(reversed(first.values()))
@@ -183,6 +188,11 @@ class ModelSearch:
         reproducing = self._reproducing(ranked, index)
         unpredicted = [choices for choices in ranked if self._gap(choices, index) is None]
         return reproducing[:HYPOTHESES] + unpredicted[:HYPOTHESES]
+
+    def _explains_all(self, match: ModelMatch, cases: Sequence[Probe]) -> bool:
+        """Return whether a match explains every case."""
+        gaps = (gaps_of(match.options, [case], self.epsilon)[0] for case in cases)
+        return all(gap <= SOLVED for gap in gaps)
 
     def is_double(self) -> bool:
         """Return whether answers in flight have more digits than single precision leaves."""
@@ -407,7 +417,7 @@ def _ascends(match: ModelMatch, case: Probe) -> bool:
     if (model.integrator.iterations, model.substeps) != (1, 1) or "positions" not in case.answers:
         return False
     equation = first_equation(p, model)
-    start = equation.y if model.integrator.start == "y" else equation.start.x
+    start = equation.starts[model.integrator.start]
     step = case.answers["positions"] - start
     return not float((equation.free_gradient(start) * step).sum()) < 0.0
 

@@ -59,7 +59,7 @@ class Stepping(NamedTuple):
         problems = problems_of(exchanges, greeting)
         search = ModelSearch(probes_of(exchanges, problems), greeting.step, greeting.epsilon)
         probes = probes_of(exchanges, problems, every=True)
-        matches = with_factorisation(search.run(notify), probes, greeting.epsilon)
+        matches = with_factorisation(search.run(notify, probes), probes, greeting.epsilon)
         options = honest_options(matches, greeting.step)
         faults = {fault.aspect for fault in matches[0].faults} if matches else {"unknown"}
         recognised = greeting.step.method is not None or faults <= {"factorisation"}

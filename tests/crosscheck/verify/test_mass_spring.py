@@ -167,10 +167,14 @@ HONEST = {
     "from x_n": (
         StepModel(Integrator("local_global", "x_n", 10), damper="none"),
         Step("local_global", "x_n", 10)),
+    "from s_n": (StepModel(Integrator("local_global", "s_n", 20), damper="none"), Step()),
+    "from s_n, which it calls y": (
+        StepModel(Integrator("local_global", "s_n", 20), damper="none"),
+        Step("local_global", "y", 20)),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", mark(HONEST, ("global factor",)))
+@pytest.mark.parametrize("name", mark(HONEST, ("global factor", "from s_n, which it calls y")))
 def test_an_honest_step_is_not_accused(name):
     model, declared = HONEST[name]
     assert_not_accused(report(Stepper(model), step=declared))
