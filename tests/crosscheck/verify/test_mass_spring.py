@@ -266,7 +266,7 @@ def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told(monkeypat
     judged = report(extended_position_based)
     assert judged.verdict is Verdict.UNDECIDED
     nearest, holds = map(str, judged.diagnosis.hints)
-    assert re.search(r"nearest known step is \d+ local/global iterations from y", nearest)
+    assert re.search(r"nearest known step is \d+ local/global iterations from s_n", nearest)
     median, worst = (float(x) for x in re.search(r"by (\S+) in .* by (\S+) in", nearest).groups())
     assert 0.0 < median <= worst < 0.1
     laws_that_hold = set(holds.removesuffix(".").partition(": ")[2].split(", "))
