@@ -28,6 +28,8 @@ IMPRECISE = 1e-3
 ROUNDED = 30.0
 # A small step's mean acceleration is off by about h omega, some hundredths.
 CONSISTENT = 0.1
+# Positions beyond this [m] are none that the reference judges.
+LARGEST = 1e75
 # The share of the largest displacement by which a pin may move without being declared.
 HELD = 0.1
 # The share of the largest displacement that a solver of nonlinear equations may leave to momentum.
@@ -112,6 +114,8 @@ class StepContext:
         if damper != "length_rate":
             p = p.changed(dampings=np.zeros_like(p.dampings))
         x = self.answers["positions"]
+        if np.abs(x).max(initial=0.0) > LARGEST:
+            return None
         return judge_step(system_of(p), state_of(p), p.h, x, external_forces=external)
 
     @property

@@ -580,7 +580,8 @@ def _conjugate_gradient(A: FloatArray, b: FloatArray, x: FloatArray, count: int)
     direction, square = residual, (residual**2).sum(0)
     for _ in range(count):
         image = A @ direction
-        rate = square / np.maximum((direction * image).sum(0), 1e-300)
+        curvature = (direction * image).sum(0)  # negative where the matrix is indefinite
+        rate = np.where(curvature != 0.0, square / np.where(curvature, curvature, 1.0), 0.0)
         x, residual = x + rate * direction, residual - rate * image
         square_before, square = square, (residual**2).sum(0)
         direction = residual + square / np.maximum(square_before, 1e-300) * direction
