@@ -113,7 +113,7 @@ def reports(program, task):
 
 def samples():
     for number, fault in enumerate(coded_faults().values()):
-        is_quick = number % QUICK == 0 and fault.family != "ROBOT"
+        is_quick = number % QUICK == 0 and fault.family not in ("ROBOT", "STEP")
         marks = () if is_quick else pytest.mark.slow
         yield pytest.param(fault, id=fault.code, marks=marks)
 

@@ -332,7 +332,7 @@ def test_law_of_forward_kinematics_catches_a_lie(name):
         assert diagnosis.first_broken is not None
     if name == "unknown fault":
         assert not diagnosis.explanations
-        assert "joint 1" in str(diagnosis.first_broken)
+        assert "Joint 1 is" in str(diagnosis.first_broken)
         assert diagnosis.variant_count > 150
 
 
