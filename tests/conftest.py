@@ -39,3 +39,36 @@ def extended_precision():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+# Tests of ten seconds and more on two cores, left to the slow sweep; others show the same in less.
+LONG = (
+    "test_dask.py::test_two_workers_give_the_same_tables",
+    "test_rerun.py::test_a_solver_of_another_project_is_measured",
+    "test_entrants.py::test_problems_of_a_python_file_stand",
+    "test_entrants.py::test_a_dry_run_measures_nothing",
+    "test_labels.py::test_no_labels_overlap_on_the_page[1440]",
+    "test_branches.py::test_missing_and_false_solutions_are_counted",
+    "test_figures.py::test_no_legend_covers_the_data[20]",
+    "test_cloth_peers.py::test_the_truth_is_of_order_four",
+    "test_inference.py::test_an_undeclared_restriction_is_inferred_and_its_field_is_named[one",
+    "test_inference.py::test_an_undeclared_restriction_is_inferred_and_its_field_is_named[no p",
+    "test_inference.py::test_inference_hides_no_fault[mass_spring_step",
+    "test_precision.py::test_answers_of_inputs_in_single_precision_are_judged_so",
+    "test_naming.py::test_right_program_is_not_accused[javascript]",
+    "test_kinematics.py::test_pair_is_named[ccd",
+    "test_kinematics.py::test_fault_is_named_without_a_declared_method",
+    "test_robot_track.py::test_a_fault_is_named_by_its_code[error",
+    "test_robot_track.py::test_a_fault_is_named_by_its_code[linear",
+    "test_robot_track.py::test_a_fault_is_named_by_its_code[rotation",
+    "test_robot_track.py::test_a_fault_is_named_by_its_code[another",
+    "test_robot_track.py::test_a_fault_is_named_by_its_code[trans",
+)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark long tests as slow."""
+    for item in items:
+        if any(name in item.nodeid for name in LONG):
+            item.add_marker(pytest.mark.slow)
