@@ -431,7 +431,7 @@ def _steps():
     yield entry(g.hessian, {"positions": x, "geometric": True})
     yield entry(g.quadratic_form, {"positions": x, "d": g.rest_vectors(x)})
     yield entry(certificate.certify, {"objective": g, "positions": x})
-    yield entry(proof.shares_minimiser, {"other": proof, "apart": 0.1})
+    yield entry(proof.shares_minimiser, {"other": proof, "distance": 0.1})
 
 
 def _scenes():

@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import command_names
 import numpy as np
 import pytest
 
@@ -321,23 +322,7 @@ def test_files_that_differ_exit_1(capsys, robots):
     assert "Of 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
 
 
-EVERY_COMMAND = (
-    "",
-    "verify",
-    "explain",
-    "check",
-    "bench",
-    "which",
-    "report",
-    "show",
-    "compare",
-    "history",
-)
-EVERY_COMMAND += ("records",)
-EVERY_COMMAND += ("records list", "records merge", "records drop")
-
-
-@pytest.mark.parametrize("command", EVERY_COMMAND)
+@pytest.mark.parametrize("command", command_names.COMMANDS)
 def test_help_has_examples_in_columns_and_does_nothing(capsys, main_job, empty_folder, command):
     """It names no type of Python, and no line of it is an unfinished phrase."""
     code, out, _ = plumbob(capsys, *command.split(), "--help")

@@ -75,7 +75,7 @@ def coded_faults() -> dict[str, CodedFault]:
 
 def _faults_of(part: Any) -> Iterator[CodedFault]:
     """Yield the faults in a table of a file: entries by their keys, or a list of entries."""
-    for key, entry in part.items() if isinstance(part, dict) else ((None, one) for one in part):
+    for key, entry in part.items() if isinstance(part, dict) else ((None, entry) for entry in part):
         values = {name: numbers[0] for name, numbers in entry.get("each", {}).items()}
         values |= entry.get("example", {})
         family, name = entry["code"].split("-")[1], key or entry.get("key", entry.get("value", ""))

@@ -117,8 +117,8 @@ def smallest_failures(judgements: Sequence[CaseJudgement], explained: bool) -> l
     first = smallest_failure(judgements, explained)
     if first is None:
         return []
-    others = [judgement for judgement in judgements if judgement.verdict != first.verdict]
-    other = smallest_failure(others, explained)
+    remaining = [judgement for judgement in judgements if judgement.verdict != first.verdict]
+    other = smallest_failure(remaining, explained)
     return [first] if other is None else [first, other]
 
 

@@ -114,26 +114,26 @@ class Certificate:
         """Whether there is a bound."""
         return self.coverage == Coverage.COVERED
 
-    def shares_minimiser(self, other: "Certificate", apart: float) -> bool | None:
+    def shares_minimiser(self, other: "Certificate", distance: float) -> bool | None:
         """Return whether two results of the same step have the same minimiser nearby.
 
-        `apart` is the distance between the two results [m]. None means that neither is proven, as
-        when one of the certificates has no bound.
+        `distance` is that between the two results [m]. None means that neither is proven, as when
+        one of the certificates has no bound.
         """
         instance("other", other, Certificate)
-        return self.shares_minimiser_within(other, number("apart", apart, minimum=0.0))
+        return self.shares_minimiser_within(other, number("distance", distance, minimum=0.0))
 
-    def shares_minimiser_within(self, other: "Certificate", apart: float) -> bool | None:
+    def shares_minimiser_within(self, other: "Certificate", distance: float) -> bool | None:
         """Do what `shares_minimiser` does, of a distance that is not checked."""
         if not (self.covered and other.covered):
             return None
-        reach = apart * SLACK
+        reach = distance * SLACK
         if (
             reach + other.distance <= self.unique_within
             or reach + self.distance <= other.unique_within
         ):
             return True
-        return False if apart > (self.distance + other.distance) * SLACK else None
+        return False if distance > (self.distance + other.distance) * SLACK else None
 
 
 @np.errstate(all="ignore")  # bounds that overflow prove nothing, nor does NaN

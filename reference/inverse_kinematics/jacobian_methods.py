@@ -111,13 +111,13 @@ def levenberg_marquardt_update(state, target):
     linearise_task(mechanism, target, data, system)
     positions = 3 * len(mechanism.effectors) == mechanism.equations
     share = DAMPING_OF_POSITIONS if positions else DAMPING_OF_POSES
-    phase, made = int(data.phase[0]), data.phase[1]
+    phase, iteration = int(data.phase[0]), data.phase[1]
     if phase > 0:
         share, turns = PHASES[phase - 1]
-        if made < turns:
+        if iteration < turns:
             turn_the_long_way(mechanism, target, system)
     damping = share * inner(system.e, system.e) + BIAS * mechanism.reach * mechanism.reach
-    if phase > 0 and made < LEANING:
+    if phase > 0 and iteration < LEANING:
         lean(mechanism, data, system)
     data.phase[1] += 1.0
     damped_step(mechanism, data, system, far_damping(mechanism, target, data, system, damping))

@@ -48,7 +48,7 @@ class ReachShell(NamedTuple):
     base: FloatArray  # its centre, in the world [m], (3,)
     joint: int  # whose axis the point is on, by its position on the path; beyond it the effector's
     point: FloatArray  # in the frame of that joint [m], (3,)
-    least: float  # distance from the base [m]
+    smallest: float  # distance from the base [m]
     largest: float
 
 
@@ -104,9 +104,9 @@ def least_distance(
         offset = shell.base - position
         r = float(np.linalg.norm(offset))
         if Q is None:
-            gap = max(r - shell.largest, shell.least - r)
+            gap = max(r - shell.largest, shell.smallest - r)
         else:
-            below, interval = reach.path[shell.joint + 1 :], (shell.least, shell.largest)
+            below, interval = reach.path[shell.joint + 1 :], (shell.smallest, shell.largest)
             point = rotation.rotate(rotation.conjugate(Q), offset)
             gap = separation(model, below, shell.point, point, interval)
         vectors = shell.base, shell.point, position
@@ -167,14 +167,14 @@ def span(
             return 0.0, math.inf
         before = span(model, joints[:k], base, model.skeleton.offsets[joints[k]])
         after = span(model, joints[k + 1 :], np.zeros(3), point)
-        least = max(0.0, before[0] - after[1], after[0] - before[1])
-        return least, before[1] + after[1]
+        smallest = max(0.0, before[0] - after[1], after[0] - before[1])
+        return smallest, before[1] + after[1]
     chain = _chain(model, joints, point)
     longest = _Bounds(chain, base).longest
     if not math.isfinite(longest):
         return 0.0, math.inf
-    least = _separation(chain, base, (-math.inf, 0.0), SHELL_BOXES)
-    return least, longest - _separation(chain, base, (longest, math.inf), SHELL_BOXES)
+    smallest = _separation(chain, base, (-math.inf, 0.0), SHELL_BOXES)
+    return smallest, longest - _separation(chain, base, (longest, math.inf), SHELL_BOXES)
 
 
 def separation(
@@ -183,8 +183,8 @@ def separation(
 ) -> float:  # fmt: skip
     """Return a lower bound of how far all distances from base to point are from an interval [m]."""
     if any(model.kinds[j] in ("ball", "free") for j in joints):
-        least, largest = span(model, joints, base, point)
-        return max(0.0, least - interval[1], interval[0] - largest)
+        smallest, largest = span(model, joints, base, point)
+        return max(0.0, smallest - interval[1], interval[0] - largest)
     return _separation(_chain(model, joints, point), base, interval, TARGET_BOXES)
 
 
@@ -256,9 +256,9 @@ class _Bounds:
         shares = 2.0 * np.abs(np.einsum("ni,nij->nj", v, J)) * w + 0.5 * w * (w @ self.H)
         width = WIDER * shares.sum(axis=1) + self.rounding * self.scale * (1.0 + w.sum(axis=1))
         r, change = np.sqrt(square), w @ self.slopes + self.rounding
-        least = np.maximum(np.sqrt(np.maximum(square - width, 0.0)), r - change)
+        smallest = np.maximum(np.sqrt(np.maximum(square - width, 0.0)), r - change)
         largest = np.minimum(np.sqrt(square + width) * WIDER, r + change)
-        return r, least, np.minimum(largest, self.longest), shares
+        return r, smallest, np.minimum(largest, self.longest), shares
 
 
 def _separation(
@@ -270,17 +270,17 @@ def _separation(
         return 0.0
     middle = 0.5 * (bounds.lower + bounds.upper)[None]
     half = 0.5 * (bounds.upper - bounds.lower)[None]
-    nearest, settled, count = math.inf, math.inf, 1
+    nearest, closed_gap, count = math.inf, math.inf, 1
     while True:
-        r, least, largest, shares = bounds(middle, half)
+        r, smallest, largest, shares = bounds(middle, half)
         nearest = min(nearest, np.maximum(r - interval[1], interval[0] - r).min())
-        gaps = np.maximum(least - interval[1], interval[0] - largest)
+        gaps = np.maximum(smallest - interval[1], interval[0] - largest)
         close = gaps >= nearest - min(ACCURACY * bounds.longest, 0.5 * nearest)
-        settled = min(settled, gaps[close].min(initial=math.inf))
+        closed_gap = min(closed_gap, gaps[close].min(initial=math.inf))
         middle, half, shares, gaps = (a[~close] for a in (middle, half, shares, gaps))
         count += 2 * len(gaps)
         if nearest <= 0.0 or not shares.size or count > boxes:
-            return max(0.0, float(np.append(gaps, settled).min()))  # 0 if it is NaN
+            return max(0.0, float(np.append(gaps, closed_gap).min()))  # 0 if it is NaN
         rows, widest = np.arange(len(gaps)), shares.argmax(axis=1)
         half = half.copy()
         half[rows, widest] *= 0.5

@@ -254,8 +254,8 @@ def redraw_limbs(state, target, criteria, n):
         for e in range(len(mechanism.effectors)):
             if moves_effector(mechanism, j, e):
                 distance, angle = errors(mechanism, target, state.data, e)
-                missed = distance > criteria.distance or angle > criteria.angle
-                misses, holds = misses or missed, holds or not missed
+                misses_here = distance > criteria.distance or angle > criteria.angle
+                misses, holds = misses or misses_here, holds or not misses_here
         if misses and not (holds and n % 2 == 0):
             at = joints["coordinate"][j]
             for k in range(at, at + WIDTHS[joints["kind"][j]]):

@@ -25,14 +25,14 @@ class BlockSum:
         spring = np.repeat(np.arange(s), np.diff(columns.indptr))
         self._ends = np.full((s, 2), -1, dtype=np.int32)
         self._ends[spring, np.arange(columns.nnz) - columns.indptr[spring]] = columns.indices
-        self._scalar = _pattern(_joined(self._ends, n))
+        self._scalar = _pattern(_adjacency(self._ends, n))
         self._starts, self._rows = self._scalar.indptr, self._scalar.indices
         self._places = _block_places(self._ends, self._starts, self._rows)
 
     @functools.cached_property
     def _wide(self) -> tuple[Any, IndexArray]:
-        ones = np.broadcast_to(np.int8(1), (len(self._rows), 3, 3))
-        wide = _pattern(scipy.sparse.bsr_array((ones, self._rows, self._starts)).tocsr())
+        blocks = np.broadcast_to(np.int8(1), (len(self._rows), 3, 3))
+        wide = _pattern(scipy.sparse.bsr_array((blocks, self._rows, self._starts)).tocsr())
         columns = np.repeat(np.arange(wide.shape[1], dtype=np.int32), np.diff(wide.indptr))
         return wide, np.flatnonzero(wide.indices == columns)
 
@@ -52,13 +52,13 @@ class BlockSum:
         return _filled(self._scalar, data)
 
 
-def _joined(ends: IndexArray, count: int) -> Any:
+def _adjacency(ends: IndexArray, count: int) -> Any:
     """Return all pairs that a spring joins and the diagonal as entries, sparse CSC."""
     i, j = ends[(ends >= 0).all(axis=1)].T
     diagonal = np.arange(count, dtype=np.int32)
     rows, columns = np.concatenate([i, j, diagonal]), np.concatenate([j, i, diagonal])
-    ones = np.ones(len(rows), np.int8)
-    pairs = scipy.sparse.coo_array((ones, (rows, columns)), (count, count)).tocsc()
+    blocks = np.ones(len(rows), np.int8)
+    pairs = scipy.sparse.coo_array((blocks, (rows, columns)), (count, count)).tocsc()
     pairs.sort_indices()
     return pairs
 

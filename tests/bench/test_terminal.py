@@ -5,6 +5,7 @@ import io
 import itertools
 import re
 
+import command_names
 import pytest
 from rich.cells import cell_len
 from rich.console import Console
@@ -223,22 +224,7 @@ def test_a_missed_claim_is_said_first(tmp_path):
     assert "bench check" in outcome.outcome(written, 80)[0]
 
 
-COMMANDS = [
-    "",
-    "verify",
-    "check",
-    "bench",
-    "which",
-    "report",
-    "show",
-    "compare",
-    "history",
-    "records",
-]
-COMMANDS += ["records list", "records merge", "records drop"]
-
-
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", command_names.COMMANDS)
 def test_help_is_no_wider_than_the_terminal(capsys, monkeypatch, command):
     full = None
     for width in (200, *range(40, 121, 10)):

@@ -161,11 +161,13 @@ def describe(method: str, keys: Sequence[str]) -> Sentence:
     faults = by_key(method)
     sentences = {key: fault.sentence for key, fault in faults.items()} | {"": AS_THE_TEXTBOOK}
     names = [key.split(" + ") for key in keys]
-    what = either([[sentences[name] for name in group] for group in names])
+    mistakes = either([[sentences[name] for name in group] for group in names])
     parts = {faults[name].part for group in names for name in group if name}
     if method == "forward" or parts != {"forward"}:
-        return what
-    return sentence("Its own steps are right, but not its forward kinematics: {what}", what=what)
+        return mistakes
+    return sentence(
+        "Its own steps are right, but not its forward kinematics: {what}", what=mistakes
+    )
 
 
 def explaining(diagnosis: Diagnosis) -> tuple[SwitchFault, ...]:

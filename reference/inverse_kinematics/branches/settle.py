@@ -31,7 +31,7 @@ DOUBTFUL = 1e-6
 # Errors below this, over the reach, are rounding of the forward kinematics.
 ROUNDING = 64 * 2.220446049250313e-16
 # A candidate this far beyond its limits, over the reach or [rad], does not come back.
-FAR = 0.1
+BEYOND_RETURN = 0.1
 # Steps of Newton's method; closed forms need none or one, except for near double roots.
 NEWTON_STEPS = 12
 # Columns behind the coordinates: distance [m], angle [rad], and how many candidates came there.
@@ -79,7 +79,7 @@ def settle(mechanism, target, candidates, rows):
     count, doubts, reach, width = 0, 0, mechanism.reach, len(data.q)
     for i in range(len(candidates)):
         copy_row(candidates[i], data.q)
-        if bring_within_limits(mechanism.joints, data.q, reach) > FAR:
+        if bring_within_limits(mechanism.joints, data.q, reach) > BEYOND_RETURN:
             continue
         polish(mechanism, target, data, system)
         gap = bring_within_limits(mechanism.joints, data.q, reach)

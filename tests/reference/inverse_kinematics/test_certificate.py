@@ -313,7 +313,7 @@ class TestImpossible:
                 joint = [*whole.path, tip][shell.joint]
                 arm = rotation.rotate(poses.rotations[:, joint], shell.point)
                 r = np.linalg.norm(poses.positions[:, joint] + arm - shell.base, axis=-1)
-                assert shell.least - 1e-12 <= r.min()
+                assert shell.smallest - 1e-12 <= r.min()
                 assert r.max() <= shell.largest + 1e-12
 
     @pytest.mark.parametrize("kinds", [HINGES[:6], MIXED, ["ball", "hinge", "ball", "hinge"]])
