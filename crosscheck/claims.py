@@ -6,7 +6,7 @@ from functools import partial
 from plumbob.reference import arguments
 from plumbob.reference.inverse_kinematics import IK_SOLVERS
 
-from . import kinematics
+from . import kinematics, tasks
 from .engines import ROBOT_ENGINES, SKELETON_ENGINES
 from .mass_spring.claims import MASS_SPRING_CLAIMS
 from .robots import comparisons
@@ -59,6 +59,33 @@ def robot_claims(family: str, engine: str) -> list[Claim]:
     ]
 
 
+def task_claims(engine: str) -> list[Claim]:
+    """Return the claims about the tasks of inverse kinematics against an engine."""
+    frames = "tasks.FrameTask between links of random trees: place, rotation and their derivatives"
+    masses = "tasks.CentreOfMass with the masses that formats.mjcf.parse reads"
+    poses = f"{engine}'s link poses and Jacobians, transformed to the frame of the link"
+    centre = f"{engine}'s centre of mass"
+    rows = (
+        ("task frames", frames, poses, tasks.relative_frames, JACOBIAN),
+        ("task centre of mass", masses, centre, tasks.centre_of_mass, POSITION),
+    )
+    return [
+        Claim(f"{name}, {engine}", quantity, counterpart, each_case(partial(f, engine)), t, 20)
+        for name, quantity, counterpart, f, t in rows
+    ]
+
+
+TASK_CLAIMS = [
+    *(claim for engine in ROBOT_ENGINES for claim in task_claims(engine)),
+    Claim(
+        "task equalities, MuJoCo",
+        "residuals of connect, weld and joint that formats.mjcf.parse reads",
+        "MuJoCo's efc_pos of the equality constraints",
+        each_case(tasks.equalities),
+        POSITION,
+        20,
+    ),
+]
 ROBOT_CLAIMS = [
     claim
     for family in PACKAGES
@@ -70,6 +97,7 @@ CLAIMS: dict[str, Claim] = {
     claim.name: claim
     for claim in [
         *(claim for engine in SKELETON_ENGINES for claim in skeleton_claims(engine)),
+        *TASK_CLAIMS,
         *MASS_SPRING_CLAIMS,
         *ROBOT_CLAIMS,
     ]

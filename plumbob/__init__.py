@@ -39,6 +39,7 @@ __all__ = [
     "StepJudgement",
     "StepResult",
     "Target",
+    "TaskSolution",
     "__version__",
     "all_solutions",
     "certify_ik",
@@ -58,7 +59,9 @@ __all__ = [
     "set_backend",
     "set_num_threads",
     "solve_ik",
+    "solve_tasks",
     "symplectic_euler",
+    "tasks",
     "track",
     "wind_forces",
 ]

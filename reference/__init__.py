@@ -15,8 +15,10 @@ from .inverse_kinematics import (
     Target,
     all_solutions,
     solve_ik,
+    tasks,
 )
 from .inverse_kinematics.certificate import IKCertificate, IKCoverage, certify_ik
+from .inverse_kinematics.solve_tasks import TaskSolution, solve_tasks
 from .judging import PoseJudgement, StepJudgement, judge_pose, judge_step
 from .kinematics import PreparedKinematics, forward_kinematics, local_from_global, prepare
 from .mass_spring import MassSpring, State
@@ -47,6 +49,7 @@ __all__ = [
     "StepJudgement",
     "StepResult",
     "Target",
+    "TaskSolution",
     "all_solutions",
     "certify_ik",
     "curves",
@@ -62,7 +65,9 @@ __all__ = [
     "set_backend",
     "set_num_threads",
     "solve_ik",
+    "solve_tasks",
     "symplectic_euler",
+    "tasks",
     "track",
     "wind_forces",
 ]

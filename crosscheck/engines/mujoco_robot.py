@@ -81,6 +81,10 @@ class MujocoRobot(RobotEngine):
         bodies = [self.links[link] for link in links]
         return LinkPoses(self.data.xpos[bodies], self.data.xmat[bodies].reshape(-1, 3, 3))
 
+    def centre_of_mass(self) -> FloatArray:
+        """Return the current centre of mass of all bodies [m], (3,)."""
+        return self.data.subtree_com[0].copy()
+
     def _jacobians(self, links: list[str]) -> FloatArray:
         J = np.empty((len(links), 6, self.model.nv))
         for part, link in zip(J, links, strict=True):

@@ -76,6 +76,7 @@ class PinocchioRobot(RobotEngine):
             for name, value in values.items()
             if len(value) == 7 and name in self.joints
         }
+        self._q = q
         pinocchio.computeJointJacobians(self.model, self.data, q)
         pinocchio.updateFramePlacements(self.model, self.data)
 
@@ -85,6 +86,10 @@ class PinocchioRobot(RobotEngine):
         return LinkPoses(
             np.array([M.translation for M in frames]), np.array([M.rotation for M in frames])
         )
+
+    def centre_of_mass(self) -> FloatArray:
+        """Return the current centre of mass of all that moves [m], (3,)."""
+        return np.array(pinocchio.centerOfMass(self.model, self.data, self._q))
 
     def _jacobians(self, links: list[str]) -> FloatArray:
         """Return the Jacobians of links with respect to all joints, (link, 6, column).

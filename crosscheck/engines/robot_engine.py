@@ -61,6 +61,10 @@ class RobotEngine(ABC):
         """Return the current poses of some links."""
 
     @abstractmethod
+    def centre_of_mass(self) -> FloatArray:
+        """Return the current centre of mass [m], (3,)."""
+
+    @abstractmethod
     def _jacobians(self, links: list[str]) -> FloatArray:
         """Return the Jacobians of links with respect to all joints, (link, 6, column)."""
 

@@ -10,14 +10,16 @@ its type and its index in the body.
 `home` is the configuration in the file, with each joint at its `ref`. A free joint moves in the
 world's frame. MuJoCo limits the total angle of a ball; here its tilt and its twist about z are each
 limited by that angle, which allows all that MuJoCo does, and more. Frames, nested defaults and
-includes from one folder are supported. Elements that do not affect forward kinematics, such as
-sites, keyframes and equality constraints, are ignored. Elements that generate bodies (replicate,
+includes from one folder are supported. Active equalities `connect` and `weld` between bodies, and
+`joint`, become tasks (`Robot.equalities`); those between sites, tendons and flexes, and elements
+that do not affect forward kinematics, such as sites and keyframes, are ignored. A body's mass is
+that of its `inertial`, NaN if it is left to its geoms. Elements that generate bodies (replicate,
 attach, composite, flexcomp) are refused, except for a replicate without bodies, which is ignored
 with a warning.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,9 +27,12 @@ import numpy as np
 
 from .. import rotation
 from ..arguments import distinct_texts, frozen
+from ..backend.compiled import set_backend
+from ..inverse_kinematics.tasks import Coupling, FrameTask, IKTask
 from ..quaternion import (
     IDENTITY,
     add,
+    conjugate,
     cross,
     dot,
     exponential,
@@ -39,7 +44,18 @@ from ..quaternion import (
     subtract,
 )
 from . import xml
-from .robot import INFINITY, ORIGIN, Quaternion, Robot, RobotLink, Vector, assemble, upright
+from .robot import (
+    INFINITY,
+    ORIGIN,
+    Quaternion,
+    Robot,
+    RobotLink,
+    Vector,
+    assemble,
+    centre_of,
+    mass_of,
+    upright,
+)
 from .source import warn
 from .xml import Element
 
@@ -48,6 +64,7 @@ GENERATORS = ("replicate", "attach", "composite", "flexcomp")
 MOVING = ("body", "joint", "freejoint", *GENERATORS[1:])
 Z = (0.0, 0.0, 1.0)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+POLYNOMIAL = (0.0, 1.0, 0.0, 0.0, 0.0)  # of a coupling, where the file gives no coefficients
 OF_JOINTS = ("type", "pos", "axis", "range", "limited", "ref")
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
@@ -154,6 +171,7 @@ class _CompilerSettings(NamedTuple):
     sequence: str  # the axes of Euler angles; capitals denote fixed axes
     autolimits: bool  # whether a range implies a limit
     alignfree: bool  # whether the frames of free bodies are aligned with their inertia
+    from_geoms: bool  # whether masses are those of the geoms, whatever a body says
     classes: dict[str, dict[str, str]]  # the joint attributes of each default class
 
     def transform(self, element: Element) -> _Transform:
@@ -219,6 +237,7 @@ def _settings(root: Element) -> _CompilerSettings:
         sequence,
         _one_of(merged, "autolimits", ("true", "false"), "true") == "true",
         _one_of(merged, "alignfree", ("true", "false"), "false") == "true",
+        merged.attributes.get("inertiafromgeom") == "true",
         _classes(root),
     )
 
@@ -298,7 +317,69 @@ def _robot(root: Element, origin: str) -> Robot:
     home = np.array(built.home)
     for joint, coordinates in tree.homes.items():
         home[built.articulation.coordinates_of(joint)] = coordinates
-    return built._replace(home=frozen(home))
+    built = built._replace(home=frozen(home))
+    return built._replace(equalities=tuple(_equalities(root, built)))
+
+
+def _equalities(root: Element, robot: Robot) -> Iterator[IKTask]:
+    """Yield the active equalities between bodies, and between joints."""
+    elements = [e for part in root.children_named("equality") for e in part.children]
+    elements = [e for e in elements if e.attributes.get("active") != "false"]
+    if not elements:
+        return
+    with set_backend("python"):  # a single pose is not worth a compilation
+        positions, rotations = robot.articulation.forward(robot.home)
+    poses = [_Transform(tuple(x), tuple(R)) for x, R in zip(positions, rotations, strict=True)]
+    for element in elements:
+        if element.tag == "joint":
+            yield _coupling(element, robot)
+        elif element.tag in ("connect", "weld") and "body1" in element.attributes:
+            first, second = (
+                _index(element, name, {n: i for i, n in enumerate(robot.articulation.names)})
+                for name in ("body1", "body2")
+            )
+            yield _closure(element, first, second, poses)
+
+
+def _index(element: Element, attribute: str, indices: Mapping[str, int]) -> int:
+    """Return the index of what an attribute names, 0, the world, if it is missing."""
+    name = element.word(attribute, "world")
+    if name not in indices:
+        raise element.error(f"expected a name in the file for {attribute}, got {name!r:.80}")
+    return indices[name]
+
+
+def _closure(element: Element, first: int, second: int, poses: list[_Transform]) -> FrameTask:
+    """Return a connection of two points, or of two frames.
+
+    The anchor of a connection is in the first body, that of a weld in the second; the other point
+    and the relative rotation are as at home, or for a weld as its relpose says.
+    """
+    anchor = element.numbers("anchor", ORIGIN)
+    inverse = _Transform(R=conjugate(poses[first].R))
+    relative = inverse.compose(poses[second]._replace(x=subtract(poses[second].x, poses[first].x)))
+    if element.tag == "connect":
+        back = _Transform(R=conjugate(relative.R))
+        point = back.apply(subtract(anchor, relative.x))
+        return FrameTask(second, anchor, relative_to=first, point=point)
+    x, y, z, *quaternion = element.numbers("relpose", (*ORIGIN, 0.0, 0.0, 0.0, 0.0))
+    if any(quaternion):
+        return FrameTask(
+            second, (x, y, z), normalised(tuple(quaternion)), relative_to=first, point=anchor
+        )
+    return FrameTask(second, relative.apply(anchor), relative.R, relative_to=first, point=anchor)
+
+
+def _coupling(element: Element, robot: Robot) -> Coupling:
+    """Return a joint that follows a polynomial of another, or stays."""
+    count = len(element.attributes.get("polycoef", "").split())
+    coefficients = (*element.numbers("polycoef", POLYNOMIAL[:count]), *POLYNOMIAL[count:])
+    joint, leader = _index(element, "joint1", robot.joints), None
+    zero, leader_zero = float(robot.home[robot.articulation.coordinates_of(joint)][0]), 0.0
+    if "joint2" in element.attributes:
+        leader = _index(element, "joint2", robot.joints)
+        leader_zero = float(robot.home[robot.articulation.coordinates_of(leader)][0])
+    return Coupling(joint, leader, coefficients, zero, leader_zero)
 
 
 class _Tree:
@@ -339,6 +420,10 @@ class _Tree:
         for number, (joint, tag) in enumerate(zip(joints, tags, strict=True), len(self.links)):
             self.record(tag.element, joint, f"{name}/{joint.label}", number, pose)
         self.links += _chain(name, parent, len(self.links), pose, joints)
+        inertial = None if self.settings.from_geoms else body.single("inertial")
+        if inertial or _has_geom(body):
+            mass, centre = mass_of(inertial, "mass"), centre_of(inertial, "pos")
+            self.links[-1] = self.links[-1]._replace(mass=mass, centre=centre)
         return bodies
 
     def parts(self, body: _Part) -> tuple[list[_Part], list[_Part]]:
@@ -415,6 +500,14 @@ class _Tree:
             self.homes[number] = (joint.ref,)
 
 
+def _has_geom(body: Element) -> bool:
+    """Return whether a body has geoms, also inside frames."""
+    return any(
+        child.tag == "geom" or (child.tag == "frame" and _has_geom(child))
+        for child in body.children
+    )
+
+
 def _chain(
     name: str, parent: int, number: int, pose: _Transform, joints: list[_Joint]
 ) -> list[RobotLink]:
@@ -427,7 +520,7 @@ def _chain(
         return [RobotLink(name, 0, kind="free")]
     links: list[RobotLink] = []
     anchor = ORIGIN
-    for label, kind, next_anchor, axis, *limits, ref in joints:
+    for label, kind, next_anchor, axis, lower, upper, cone, ref in joints:
         if kind != "slide":
             pose = _Transform(pose.apply(subtract(next_anchor, anchor)), pose.R)
             anchor = next_anchor
@@ -435,7 +528,8 @@ def _chain(
         x, R = pose.compose(
             _Transform(R=exponential(shift)) if kind == "hinge" else _Transform(shift)
         )
-        links.append(RobotLink(f"{name}/{label}", parent, x, R, kind, axis, *limits))
+        path = f"{name}/{label}"
+        links.append(RobotLink(path, parent, x, R, kind, axis, lower, upper, cone))
         parent, pose = number + len(links) - 1, _Transform()
     if links and anchor == ORIGIN:
         return [*links[:-1], links[-1]._replace(name=name)]

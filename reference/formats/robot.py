@@ -1,12 +1,17 @@
 """The robot that a reader returns: an articulation, its joints by name and its home position."""
 
+import contextlib
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
+
 from ..arguments import FloatArray, frozen
 from ..articulation import Articulation, Mimic
+from ..inverse_kinematics.tasks import IKTask
 from ..quaternion import IDENTITY, between
 from ..skeleton import Skeleton
+from .xml import Element
 
 MAX_JOINTS = 10_000
 
@@ -25,6 +30,9 @@ class Robot(NamedTuple):
     # `articulation.coordinates_of(joints[name])`
     joints: dict[str, int]
     home: FloatArray  # the coordinates of the configuration in the file, (coordinate,)
+    masses: FloatArray  # of the links [kg], NaN where the file leaves them to shapes, (joint,)
+    centres: FloatArray  # the links' centres of mass in the joints' frames [m], (joint, 3)
+    equalities: tuple[IKTask, ...] = ()  # loop closures and couplings, as tasks
 
 
 class RobotLink(NamedTuple):
@@ -43,6 +51,8 @@ class RobotLink(NamedTuple):
     lower: float = -INFINITY
     upper: float = INFINITY
     cone: float = INFINITY
+    mass: float = 0.0
+    centre: Vector = ORIGIN
 
 
 def upright(axis: Vector) -> Quaternion:
@@ -65,7 +75,8 @@ def assemble(
     """
     if len(links) > MAX_JOINTS:
         raise ValueError(f"{origin}: expected at most {MAX_JOINTS:,} joints, got {len(links):,}")
-    names, parents, offsets, frames, kinds, axes, lower, upper, cones = zip(*links, strict=True)
+    columns = zip(*links, strict=True)
+    names, parents, offsets, frames, kinds, axes, lower, upper, cones, masses, centres = columns
     try:
         articulation = Articulation(
             Skeleton(parents, offsets, names),
@@ -79,4 +90,22 @@ def assemble(
         )
     except ValueError as error:
         raise ValueError(f"{origin}: {error}") from None
-    return Robot(articulation, joints, frozen(articulation.zero()))
+    home, weights = frozen(articulation.zero()), frozen(np.array(masses))
+    return Robot(articulation, joints, home, weights, frozen(np.array(centres)))
+
+
+def mass_of(element: Element | None, name: str) -> float:
+    """Return the mass that an attribute gives [kg], NaN if it gives none."""
+    mass = (float("nan"),)
+    if element is not None:
+        with contextlib.suppress(ValueError):
+            mass = element.numbers(name, mass)
+    return mass[0]
+
+
+def centre_of(element: Element | None, name: str) -> Vector:
+    """Return the centre of mass that an attribute gives [m], zero if it gives none."""
+    if element is not None:
+        with contextlib.suppress(ValueError):
+            return element.numbers(name, ORIGIN)
+    return ORIGIN

@@ -3,8 +3,8 @@
 Every link becomes the joint of the articulation that moves it, with the link's name.
 The root link is fixed to the world; a file with a moving base has a floating joint. Links precede
 their descendants, and siblings keep the order of the file. A planar joint becomes two slides, named
-after the joint with " x" and " y" added, and a hinge. Masses, shapes, transmissions and safety
-controllers are ignored.
+after the joint with " x" and " y" added, and a hinge. Links without an inertial have no mass.
+Shapes, transmissions and safety controllers are ignored.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from ..arguments import LARGEST_COORDINATE, distinct_texts
 from ..articulation import Mimic
 from ..quaternion import exponential, multiply, rotate
 from . import xml
-from .robot import INFINITY, ORIGIN, Robot, RobotLink, assemble, upright
+from .robot import INFINITY, ORIGIN, Robot, RobotLink, assemble, centre_of, mass_of, upright
 from .source import warn
 from .xml import Element
 
@@ -90,7 +90,20 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
     for joint in joints.values():
         if joint.child not in link_index:
             raise joint.element.error(f"expected a path to the root {base!r}, got a ring of links")
+    for link in root.children_named("link"):
+        j = link_index[link.word("name")]
+        links[j] = _with_mass(links[j], link)
     return assemble(origin, links, joint_index, _mimics(joints, joint_index) if follows else {})
+
+
+def _with_mass(link: RobotLink, element: Element) -> RobotLink:
+    """Return the link with its mass and the centre of that."""
+    inertials = element.children_named("inertial")
+    if not inertials:
+        return link
+    tags = inertials[-1].children_named("mass"), inertials[-1].children_named("origin")
+    mass, origin = (tag[-1] if tag else None for tag in tags)
+    return link._replace(mass=mass_of(mass, "value"), centre=centre_of(origin, "xyz"))
 
 
 def _joint(element: Element) -> _Joint:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..model import Model, checked_model
 from ..outcome import Outcome
 from .branches import IKSolutions, all_solutions
+from .nearest import nearest_solution
 from .problem import (
     IK_SOLVERS,
     RESTARTS,
@@ -49,6 +50,7 @@ def solve_ik(
     restarts: int | None = None,
     seed: int = 0,
     record: bool = False,
+    prefer: str | None = None,
 ) -> IKSolution:
     """Return the pose that brings effectors to targets, from a start pose.
 
@@ -94,6 +96,10 @@ def solve_ik(
             effectors, else 0.
         seed: of the random poses.
         record: keep the residuals of all iterations in `history`.
+        prefer: "nearest" for the solution with the least sum of squared displacements from the
+            start, "nearest_linf" for the least largest displacement of a freedom [rad or m], among
+            those of `all_solutions`, of the start and of all restarts; for a single start and
+            target of an Articulation.
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion is further than
@@ -107,6 +113,10 @@ def solve_ik(
         solver, tolerance, tolerance_rotation, max_iterations,
         0 if restarts is None else restarts, seed, record,
     )  # fmt: skip
+    if prefer is not None:
+        model = checked_model(skeleton)
+        targets = checked_targets(model, target, effector)
+        return nearest_solution(model, local_rotations, targets, settings, prefer)
     plain = solve_plain(skeleton, local_rotations, target, effector, settings)
     if plain is not None:
         return plain

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck import kinematics
-from plumbob.crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, skeleton_claims
+from plumbob.crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, TASK_CLAIMS, skeleton_claims
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.mass_spring import equilibria, forces, integrators, steps
 from plumbob.crosscheck.mass_spring.integrators import SIMULATORS
 from plumbob.crosscheck.verdict import check_claim
-from plumbob.reference import rotation
+from plumbob.reference import rotation, tasks
 from plumbob.reference.mass_spring import MassSpring
 from plumbob.reference.skeleton import Skeleton
 
@@ -53,6 +53,9 @@ FAULTS = {
     "h halved": lambda s, state, h, *rest: (s, state, h / 2.0, *rest),
     "loads left out": lambda s, state, h, loads, *rest: (s, state, h, 0.0 * loads, *rest),
     "order of the step": lambda s, h: (s, h / 2.0),
+    "coordinates negated": lambda model, q: (model, -q),
+    "masses equal": lambda masses, *rest: (np.ones(len(masses)), *rest),
+    "centres left out": lambda masses, centres, *rest: (masses, 0.0 * centres, *rest),
     "": lambda *arguments: arguments,
 }
 SYSTEM = ("gravity left out", "rest lengths left out", "dampers twice", "masses of one")
@@ -65,6 +68,9 @@ PLANTED = {
     "joint rotations": (kinematics, "forward_kinematics", ("w last", "rotations inverted")),
     "local rotations": (kinematics, "local_from_global", ("w last", "rotations inverted")),
     "IK answers": (kinematics, "solve_ik", ("longer links",)),
+    "task frames": (tasks, "configuration", ("coordinates negated",)),
+    "task centre of mass": (tasks, "CentreOfMass", ("masses equal", "centres left out")),
+    "task equalities": (tasks, "configuration", ("coordinates negated",)),
     "spring forces": (forces, "spring_forces", ("springs twice", "rest lengths left out",
                       "one spring forgotten", "slack springs push")),
     "damper forces": (forces, "damper_forces", ("dampers twice", "pins free")),
@@ -151,7 +157,11 @@ def test_without_a_fault_the_stand_in_holds(monkeypatch, quantity):
 
 
 def test_every_claim_has_a_fault():
-    claims = [*MASS_SPRING_CLAIMS, *(c for e in SKELETON_ENGINES for c in skeleton_claims(e))]
+    claims = [
+        *MASS_SPRING_CLAIMS,
+        *TASK_CLAIMS,
+        *(c for e in SKELETON_ENGINES for c in skeleton_claims(e)),
+    ]
     assert {claim.name for claim in claims} == {c.name for q in PLANTED for c in claims_of(q)}
 
 

@@ -1,0 +1,243 @@
+"""Levenberg-Marquardt on tasks: exact ones are met, the others approached as far as those allow.
+
+An augmented Lagrangian (Rockafellar 1973) holds the exact tasks: their residuals r are
+shifted by multipliers u, and where the minimum of the sum of squares of r + u and of the other
+residuals does not meet them, u grows by r. The damping follows the gain (Nielsen 1999).
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import arguments
+from ..arguments import FloatArray, frozen
+from ..articulation import Articulation
+from ..backend.compiled import Kernel
+from ..model import Model, checked_model, effector_of
+from ..outcome import Outcome
+from .box_step import TaskSystem, damped_step, new_system, take_step
+from .mechanism import (
+    EFFECTOR,
+    ConfigurationData,
+    Mechanism,
+    new_data,
+)
+from .problem import RESTARTS, Target
+from .tasks import FrameTask, IKTask, configuration
+
+MAX_ITERATIONS = 200
+# The first damping, over the largest diagonal entry of J J', and the largest.
+FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
+# An attempt settles where a step promises to lower the cost by less than this share.
+SETTLED = 1e-8
+# A step counts if the cost falls by this share of what was promised.
+ACCEPTED = 1e-3
+# After an update of the multipliers that leaves more than PROGRESS of the error exact tasks count
+# PENALTY times as much, at most PENALTIES times.
+PROGRESS, PENALTY, PENALTIES = 0.25, 10.0, 6
+
+
+class TaskSolution(NamedTuple):
+    """The configuration that `solve_tasks` finds.
+
+    Attributes:
+        coordinates: within the limits, (coordinate,).
+        errors: the largest entry of each task's residual [m or rad], (task,).
+        cost: the sum of weight |residual|² of the tasks that are not exact.
+        iterations: of all attempts.
+        outcome: CONVERGED if every exact task is met, else STALLED or ITERATION_LIMIT.
+    """
+
+    coordinates: FloatArray
+    errors: FloatArray
+    cost: float
+    iterations: int
+    outcome: Outcome
+
+
+class _Evaluation(NamedTuple):
+    """A configuration with weighted residuals of all tasks."""
+
+    q: FloatArray
+    r: FloatArray  # (row,)
+    J: FloatArray  # (row, freedom)
+    errors: FloatArray  # the largest entry of each task's residual, (task,)
+
+
+def solve_tasks(
+    model: Model,
+    q: ArrayLike,
+    tasks: Sequence[IKTask | Target],
+    *,
+    tolerance: float = 1e-4,
+    max_iterations: int = MAX_ITERATIONS,
+    restarts: int = RESTARTS,
+    seed: int = 0,
+) -> TaskSolution:
+    """Return coordinates within the limits that meet the exact tasks, near the others' minimum.
+
+    Args:
+        model: an Articulation, or a Robot read from a file.
+        q: the start, brought within the limits, (coordinate,).
+        tasks: of `plumbob.tasks`, own ones with the members of `IKTask`, and Targets.
+        tolerance: the largest entry of a residual that counts as met [m or rad].
+        max_iterations: of each attempt.
+        restarts: how many further attempts to make from random configurations, until one meets the
+            exact tasks.
+        seed: of these.
+
+    Raises:
+        ValueError: if an argument is not valid, or a task names a joint that does not exist.
+    """
+    articulation = checked_model(model, "model")
+    if not isinstance(articulation, Articulation):
+        raise ValueError("model: expected an Articulation or a Robot, got a Skeleton")
+    start = arguments.floats("q", q, articulation.coordinate_count)
+    start = articulation.clamp(articulation.checked("q", start))
+    problem = TaskProblem(articulation, start, tasks)
+    tolerance = arguments.number("tolerance", tolerance, minimum=0.0)
+    limit = arguments.count("max_iterations", max_iterations, minimum=0)
+    restarts = arguments.count("restarts", restarts, minimum=0)
+    rng = np.random.default_rng(arguments.integer("seed", seed, minimum=0))
+    best, total = None, 0
+    for row in _starts(articulation, start, restarts, rng):
+        solution = _attempt(problem, row, tolerance, limit)
+        total += solution.iterations
+        if best is None or problem.misses(solution) < problem.misses(best):
+            best = solution
+        if solution.outcome == Outcome.CONVERGED:
+            best = solution
+            break
+    assert best is not None, "the start is the first attempt"
+    return best._replace(iterations=total)
+
+
+def _starts(
+    model: Articulation, q: FloatArray, restarts: int, rng: np.random.Generator
+) -> Iterator[FloatArray]:
+    yield q
+    for _ in range(restarts):
+        yield model.random(rng)
+
+
+class TaskProblem:
+    """The tasks of a model, and the arrays of its kernels."""
+
+    def __init__(
+        self, model: Articulation, q: FloatArray, tasks: Sequence[IKTask | Target]
+    ) -> None:
+        if isinstance(tasks, Target) or not isinstance(tasks, Sequence) or not tasks:
+            raise ValueError(f"tasks: expected a list of at least one task, got {tasks!r:.80}")
+        self.model, self.tasks = model, [_as_task(model, task) for task in tasks]
+        n, freedoms = model.joint_count, model.freedom_count
+        self.mechanism = Mechanism(
+            model.joints, np.arange(model.coordinate_count), np.zeros(0, EFFECTOR),
+            np.zeros((n, 0), dtype=bool), np.zeros((n, n), dtype=bool), 1.0, freedoms, 0,
+        )  # fmt: skip
+        self.data: ConfigurationData = new_data(self.mechanism)
+        sizes = [len(task.evaluate(configuration(model, q))[0]) for task in self.tasks]
+        self.system: TaskSystem = new_system(sum(sizes), freedoms)
+        self.exact = np.repeat([task.exact for task in self.tasks], sizes)
+        self.root = np.sqrt(np.repeat([task.weight for task in self.tasks], sizes))
+        self.is_exact = np.array([task.exact for task in self.tasks])
+
+    def at(self, q: FloatArray) -> _Evaluation:
+        """Return the weighted residuals at q."""
+        current = configuration(self.model, q)
+        residuals, derivatives = zip(*(t.evaluate(current) for t in self.tasks), strict=True)
+        errors = np.array([np.abs(residual).max(initial=0.0) for residual in residuals])
+        r, J = np.concatenate(residuals), np.concatenate(derivatives)
+        return _Evaluation(q, self.root * r, self.root[:, None] * J, errors)
+
+    def step(
+        self, state: _Evaluation, e: FloatArray, scale: FloatArray, damping: float
+    ) -> tuple[FloatArray, float]:
+        """Return coordinates after a damped step within the limits, and the promised decrease."""
+        system, data = self.system, self.data
+        system.e[:], system.J[:], data.q[:] = e, (scale[:, None] * state.J).T, state.q
+        _step(self.mechanism, data, system, damping)
+        left = e - scale * (state.J @ system.step)
+        _move(self.mechanism, data, system)
+        return data.q.copy(), float(e @ e - left @ left)
+
+    def is_met(self, state: _Evaluation, tolerance: float) -> bool:
+        """Return whether every exact task is met."""
+        return bool((state.errors[self.is_exact] <= tolerance).all())
+
+    def misses(self, solution: TaskSolution) -> float:
+        """Return the largest error of an exact task."""
+        return float(solution.errors[self.is_exact].max(initial=0.0))
+
+
+def _attempt(problem: TaskProblem, q: FloatArray, tolerance: float, limit: int) -> TaskSolution:
+    """Return the solution from a start: the exact tasks first, then the others along with them.
+
+    The others are given up where they would end away from the exact tasks.
+    """
+    exact = problem.exact.astype(float)
+    state, count, stalled = _descend(problem, q, exact, tolerance, limit)
+    if problem.is_met(state, tolerance) and not problem.exact.all():
+        ones = np.ones(len(exact))
+        end, more, stalled = _descend(problem, state.q, ones, tolerance, limit)
+        count += more
+        if problem.is_met(end, tolerance):
+            state = end
+    outcome = Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT
+    if problem.is_met(state, tolerance):
+        outcome = Outcome.CONVERGED
+    cost = float(np.sum(state.r[~problem.exact] ** 2))
+    return TaskSolution(frozen(state.q), frozen(state.errors), cost, count, outcome)
+
+
+def _descend(
+    problem: TaskProblem, q: FloatArray, scale: FloatArray, tolerance: float, limit: int
+) -> tuple[_Evaluation, int, bool]:
+    """Minimise the scaled residuals from q; with tasks that are not exact, hold the exact ones.
+
+    Returns:
+        The end; the iterations; and whether it has settled.
+    """
+    state, scale, shift = problem.at(q), scale.copy(), np.zeros(len(scale))
+    exact, missed, penalties = problem.exact, np.inf, 0
+    is_single = not scale[~exact].any()
+    damping, growth = FIRST_DAMPING * float(np.sum(state.J**2, axis=1).max(initial=0.0)), 2.0
+    for count in range(limit):
+        if is_single and problem.is_met(state, tolerance):
+            return state, count, True
+        e = -scale * (state.r + shift)
+        moved, promised = problem.step(state, e, scale, damping)
+        square, new = float(e @ e), problem.at(moved)
+        gain = square - float(np.sum((scale * (new.r + shift)) ** 2))
+        ratio = gain / promised if promised > 0.0 else 0.0
+        if ratio > ACCEPTED:
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
+            growth, state = 2.0, new
+        else:
+            damping, growth = damping * growth, 2.0 * growth
+        if promised > SETTLED * square and damping < LARGEST_DAMPING:
+            continue
+        if is_single or problem.is_met(state, tolerance) or penalties == PENALTIES:
+            return state, count + 1, True
+        before, missed = missed, float(np.linalg.norm(state.r[exact]))
+        shift[exact] += state.r[exact]
+        if missed > PROGRESS * before:
+            scale[exact] *= PENALTY**0.5
+            shift /= PENALTY
+            penalties += 1
+    return state, limit, False
+
+
+def _as_task(model: Articulation, task: IKTask | Target) -> IKTask:
+    """Return a task; of a Target the placement of its effector."""
+    if isinstance(task, Target):
+        frame = effector_of(model, task.effector)
+        return FrameTask(frame, task.position, task.rotation, weight=task.weight)
+    if not callable(getattr(task, "evaluate", None)):
+        raise ValueError(f"tasks: expected tasks and Targets, got {task!r:.80}")
+    return task
+
+
+_step = Kernel(damped_step, label="solve_tasks, step")
+_move = Kernel(take_step, label="solve_tasks, move")

@@ -1,0 +1,270 @@
+"""Tasks: their derivatives, what is exact, and what is approached as far as that allows."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from plumbob import (
+    Articulation,
+    Outcome,
+    Skeleton,
+    Target,
+    all_solutions,
+    rotation,
+    solve_ik,
+    solve_tasks,
+    tasks,
+)
+from plumbob.reference.formats import mjcf
+from plumbob.reference.inverse_kinematics.solve_tasks import TaskProblem
+from plumbob.reference.jacobians import integrate
+
+STEP = 1e-6
+# Central differences with that step are off by 1e-12 times third derivatives, and by rounding over
+# the step, 1e-10.
+DIFFERENCES = 1e-8
+
+KINDS = ["free", "hinge", "ball", "slide", "hinge", "hinge", "hinge"]
+
+
+def tree():
+    """Return joints of all kinds in two branches."""
+    rng = np.random.default_rng(1)
+    parents = [-1, 0, 1, 2, 3, 1, 5]
+    skeleton = Skeleton(parents, rng.normal(size=(7, 3)) * 0.4, list("abcdefg"))
+    return Articulation(skeleton, KINDS, rng.normal(size=(7, 3)), mimics={"g": ("f", -0.7, 0.2)})
+
+
+def arm(limit=3.0):
+    """Return seven hinges in a row."""
+    axes = np.eye(3)[[2, 1, 2, 1, 2, 1, 2, 0]]
+    offsets = [[0.0, 0.0, 0.3]] * 8
+    kinds = ["hinge"] * 7 + ["fixed"]
+    return Articulation(Skeleton(range(-1, 7), offsets), kinds, axes, lower=-limit, upper=limit)
+
+
+def quaternion(seed):
+    return rotation.random(np.random.default_rng(seed))
+
+
+X, Q = (0.3, -0.2, 0.5), quaternion(5)
+TASKS = {
+    "position": tasks.FrameTask("e", X, point=X),
+    "pose": tasks.FrameTask("e", X, Q, point=(0.1, 0.2, 0.3)),
+    "axes": tasks.FrameTask("e", X, Q, axes=(1.0, 0.0, 2.0, 0.5, 1.0, 0.0)),
+    "rotation": tasks.FrameTask("g", rotation=Q),
+    "relative": tasks.FrameTask("e", X, Q, relative_to="g", point=X),
+    "look at": tasks.LookAt("e", (2.0, 1.0, -1.0), (1.0, 2.0, 0.5), X),
+    "look at a frame": tasks.LookAt("e", X, target_frame="g"),
+    "centre of mass": tasks.CentreOfMass(np.arange(7.0), np.ones((7, 3)), X, axes=(1.0, 2.0, 0.0)),
+    "posture": tasks.Posture(tree().random(np.random.default_rng(3)), axes=0.5),
+    "coupling": tasks.Coupling("d", "g", (0.1, 2.0, -0.5, 0.3), 0.2, 0.1),
+    "held joint": tasks.Coupling("b", coefficients=(0.4,)),
+}
+
+
+def at(model, q, task):
+    """Return residual and derivative of a task, its weight 1."""
+    problem = TaskProblem(model, q, [task])
+    state = problem.at(q)
+    return state.r / problem.root, state.J / problem.root[:, None]
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_a_residual_changes_by_its_derivative(name):
+    model, task = tree(), TASKS[name]
+    q = model.random(np.random.default_rng(2))
+    _, J = at(model, q, task)
+    differences = np.empty_like(J)
+    for k, v in enumerate(np.eye(model.freedom_count) * STEP):
+        ends = [at(model, integrate(model, q, sign * v), task)[0] for sign in (1.0, -1.0)]
+        differences[:, k] = (ends[0] - ends[1]) / (2.0 * STEP)
+    assert np.abs(J).max() > 0.1
+    np.testing.assert_allclose(J, differences, atol=DIFFERENCES)
+
+
+def pose_of(model, seed, joint=7):
+    x, R = model.forward(model.random(np.random.default_rng(seed)))
+    return x[joint], R[joint]
+
+
+def test_a_posture_is_approached_in_the_null_space_of_a_pose():
+    model = arm()
+    x, R = pose_of(model, 4)
+    target, rest = Target(x, R, 7), model.neutral()
+    start = model.random(np.random.default_rng(6))
+    exact = solve_tasks(model, start, [target])
+    near = solve_tasks(model, start, [target, tasks.Posture(rest)])
+    assert exact.outcome == near.outcome == Outcome.CONVERGED
+    assert max(exact.errors[0], near.errors[0]) <= 1e-4
+    assert np.linalg.norm(near.coordinates) < 0.97 * np.linalg.norm(exact.coordinates)
+    # at the minimum the displacement is orthogonal to what moves the hand not at all
+    _, J = at(model, near.coordinates, tasks.FrameTask(7, x, R))
+    motion = np.linalg.svd(J)[2][-1]
+    assert abs(motion @ near.coordinates) < 1e-2 * np.linalg.norm(near.coordinates)
+
+
+def test_a_free_axis_leaves_the_rotation_about_it():
+    model = arm()
+    x, R = pose_of(model, 8)
+    task = tasks.FrameTask(7, x, R, axes=(1, 1, 1, 1, 1, 0))
+    rest = tasks.Posture(model.neutral(), weight=0.1)
+    solution = solve_tasks(model, model.neutral(), [task, rest])
+    x_end, R_end = (part[7] for part in model.forward(solution.coordinates))
+    axis, axis_end = (rotation.rotate(Q, (0.0, 0.0, 1.0)) for Q in (R, R_end))
+    np.testing.assert_allclose(x_end, x, atol=2e-4)
+    np.testing.assert_allclose(axis_end, axis, atol=2e-4)
+    assert rotation.angle(R, R_end) > 0.1
+
+
+def test_an_axis_points_at_a_point_and_the_centre_of_mass_is_in_its_place():
+    model, point = arm(), np.array([0.5, 1.5, 0.2])
+    masses, centres = np.ones(8), np.full((8, 3), 0.05)
+    q = model.random(np.random.default_rng(9))
+    x, R = model.forward(q)
+    centre = (x + rotation.rotate(R, centres)).mean(axis=0)
+    look, balance = tasks.LookAt(7, point), tasks.CentreOfMass(masses, centres, centre)
+    solution = solve_tasks(model, model.neutral(), [look, balance])
+    assert solution.outcome == Outcome.CONVERGED
+    x, R = model.forward(solution.coordinates)
+    offset = point - x[7]
+    axis = rotation.rotate(R[7], (0.0, 0.0, 1.0))
+    np.testing.assert_allclose(axis, offset / np.linalg.norm(offset), atol=2e-4)
+    np.testing.assert_allclose((x + rotation.rotate(R, centres)).mean(0), centre, atol=2e-4)
+
+
+def test_limits_are_kept_and_what_cannot_be_met_is_said():
+    model = arm(limit=0.4)
+    solution = solve_tasks(model, model.neutral(), [Target((0.0, 0.0, 5.0))], restarts=0)
+    assert solution.outcome == Outcome.STALLED
+    assert model.within_limits(solution.coordinates)
+    assert solution.errors[0] == pytest.approx(5.0 - 2.4, abs=1e-3)
+
+
+def test_tasks_that_are_not_exact_share_the_error_by_their_weights():
+    slide = Articulation(Skeleton([-1], [[0.0, 0.0, 0.0]]), "slide", (1.0, 0.0, 0.0))
+    places = [
+        tasks.FrameTask(0, (x, 0.0, 0.0), weight=weight, exact=False)
+        for x, weight in ((1.0, 3.0), (-1.0, 1.0))
+    ]
+    solution = solve_tasks(slide, [0.0], places)
+    assert solution.coordinates[0] == pytest.approx(0.5, abs=1e-3)
+    assert solution.cost == pytest.approx(3.0, abs=1e-3)
+
+
+LOOP = """
+<mujoco><worldbody>
+  <body name="crank"><joint name="a" axis="0 1 0"/><inertial pos=".1 0 0" mass="2"
+    diaginertia="1 1 1"/><body name="rod" pos=".3 0 0"><joint name="b" axis="0 1 0"/>
+    <inertial pos=".4 0 .1" mass="1" diaginertia="1 1 1"/></body></body>
+  <body name="rocker" pos="1 0 0"><joint name="c" axis="0 1 0" ref="10"/><geom size=".1"/></body>
+  <body name="gear" pos="0 2 0"><joint name="d" axis="0 1 0"/>
+    <inertial pos="0 0 0" mass="3" diaginertia="1 1 1"/><body name="plate"/></body>
+  <body name="twin" pos="0 3 0"><freejoint name="e"/><geom size=".1"/></body></worldbody>
+<equality>
+  <connect body1="rod" body2="rocker" anchor=".8 0 .2"/>
+  <weld body1="gear" body2="twin" anchor=".1 .2 .3"/>
+  <weld body1="gear" body2="twin" anchor=".1 .2 .3" relpose="1 2 3 .5 .5 .5 .5"/>
+  <weld body1="rod" active="false"/>
+  <joint joint1="d" joint2="c" polycoef="0.1 2 -3"/><joint joint1="a"/>
+</equality></mujoco>"""
+
+
+def test_equalities_of_a_file_have_the_residuals_of_mujoco():
+    robot, model = mjcf.parse(LOOP), mujoco.MjModel.from_xml_string(LOOP)
+    data = mujoco.MjData(model)
+    data.qpos[:] = q = robot.articulation.random(np.random.default_rng(0))
+    mujoco.mj_forward(model, data)
+    residuals = [at(robot.articulation, q, task)[0] for task in robot.equalities]
+    assert [len(residual) for residual in residuals] == [3, 6, 6, 1, 1]
+    assert data.ne == 17
+    first, rows = 0, data.efc_pos[: data.ne]
+    for residual in residuals:
+        expected = rows[first : first + len(residual)]
+        first += len(residual)
+        lengths = [np.linalg.norm(part) for part in (expected[:3], np.sin(residual[3:] / 2.0))]
+        assert np.linalg.norm(residual[:3]) == pytest.approx(lengths[0], abs=1e-12)
+        if len(residual) == 6:  # MuJoCo takes the vector of the quaternion
+            angle = np.linalg.norm(residual[3:])
+            assert np.sin(angle / 2.0) == pytest.approx(np.linalg.norm(expected[3:]), abs=1e-12)
+
+
+def test_loop_closures_are_solved():
+    robot = mjcf.parse(LOOP.replace('relpose="1 2 3 .5 .5 .5 .5"', 'active="false"'))
+    q = robot.articulation.random(np.random.default_rng(3))
+    solution = solve_tasks(robot, q, [*robot.equalities, tasks.Posture(robot.home)])
+    assert solution.outcome == Outcome.CONVERGED
+    assert solution.errors[:-1].max() <= 1e-4
+
+
+def test_masses_of_a_file_are_those_of_its_inertials():
+    robot = mjcf.parse(LOOP)
+    masses = dict(zip(robot.articulation.names, robot.masses, strict=True))
+    assert (masses["crank"], masses["rod"], masses["plate"]) == (2.0, 1.0, 0.0)
+    assert np.isnan(masses["rocker"])
+    with pytest.raises(ValueError, match="masses"):
+        tasks.CentreOfMass(robot.masses, robot.centres, (0.0, 0.0, 0.0))
+
+
+def six_hinges():
+    """Return an arm with a spherical wrist, whose hinges make two revolutions."""
+    offsets = [
+        [0, 0, 0.3],
+        [0.1, 0, 0],
+        [0, 0, 0.5],
+        [0, 0, 0.4],
+        [0, 0, 0],
+        [0, 0, 0],
+        [0, 0, 0.1],
+    ]
+    axes = np.eye(3)[[2, 1, 1, 2, 1, 2, 0]]
+    kinds = ["hinge"] * 6 + ["fixed"]
+    return Articulation(Skeleton(range(-1, 6), offsets), kinds, axes, lower=-7.0, upper=7.0)
+
+
+@pytest.mark.parametrize(("prefer", "order"), [("nearest", 2.0), ("nearest_linf", np.inf)])
+def test_the_nearest_solution_is_no_further_than_any_other(prefer, order):
+    model, rng = six_hinges(), np.random.default_rng(2)
+    for _ in range(4):
+        x, R = (part[6] for part in model.forward(model.random(rng)))
+        start, target = model.random(rng), Target(x, R)
+        nearest = solve_ik(model, start, target, prefer=prefer)
+        assert nearest.outcome == Outcome.CONVERGED
+        assert model.within_limits(nearest.coordinates)
+        others = all_solutions(model, target).coordinates
+        rounds = np.pi * 2.0 * np.round((start - others) / (2.0 * np.pi))
+        others = others + rounds
+        norms = np.linalg.norm(others - start, order, axis=1)[model.within_limits(others)]
+        distance = np.linalg.norm(nearest.coordinates - start, order)
+        assert len(norms) > 1
+        assert distance <= norms.min() + 1e-6
+
+
+def test_nothing_is_nearest_where_no_solution_is():
+    model = six_hinges()
+    far = solve_ik(model, model.neutral(), (9.0, 0.0, 0.0), prefer="nearest")
+    assert far.outcome == solve_ik(model, model.neutral(), (9.0, 0.0, 0.0)).outcome
+    with pytest.raises(ValueError, match="prefer: expected one of nearest, nearest_linf"):
+        solve_ik(model, model.neutral(), X, prefer="near")
+    with pytest.raises(ValueError, match="prefer: expected an Articulation"):
+        solve_ik(Skeleton([-1, 0], [X, X]), rotation.identity(2), X, prefer="nearest")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: tasks.FrameTask(0), "position: expected a position or a rotation, got neither"),
+        (lambda: tasks.FrameTask(0, X, axes=(1.0, 2.0)), "axes: expected shape"),
+        (lambda: tasks.FrameTask(0, X, weight=0.0), "weight: expected"),
+        (lambda: tasks.LookAt(0, X, (0.0, 0.0, 0.0)), "axis: expected a direction"),
+        (lambda: tasks.CentreOfMass([0.0], [X], X), "masses: expected a positive sum"),
+        (lambda: solve_tasks(arm(), np.zeros(7), []), "tasks: expected a list"),
+        (lambda: solve_tasks(arm(), np.zeros(7), [X]), "tasks: expected tasks and Targets"),
+        (lambda: solve_tasks(arm(), np.zeros(7), [tasks.LookAt("z", X)]), "frame: expected"),
+        (lambda: solve_tasks(arm(), np.zeros(7), [tasks.Coupling(7)]), "joint: expected a hinge"),
+        (lambda: solve_tasks(Skeleton([-1], [X]), [X], []), "model: expected an Articulation"),
+    ],
+)
+def test_wrong_tasks_are_named(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
