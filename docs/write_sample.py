@@ -37,7 +37,8 @@ def write_sample(folder: Path) -> None:
             shutil.copy(figure, CHART)
     text = headlines(report, folder)
     (SAMPLE / HEADLINES).write_text(text, encoding="utf-8")
-    README.write_text(with_headlines(README.read_text(encoding="utf-8"), text), encoding="utf-8")
+    readme = with_headlines(README.read_text(encoding="utf-8"), without_tuning(text))
+    README.write_text(readme, encoding="utf-8")
 
 
 def headlines(report: BenchReport, folder: Path) -> str:
@@ -48,14 +49,21 @@ def headlines(report: BenchReport, folder: Path) -> str:
             f"| Is the reference right? | {verdict.holding} of {verdict.total} claims hold; "
             f"the largest difference uses {words(100 * verdict.used)} % of its tolerance. |"
         )
-    rows += [
-        f"| {line.question} | {line.sentence} |"
-        for line in (*report.answers.headlines, *report.answers.wins)
-    ]
+    question = ""
+    for line in (*report.answers.headlines, *report.answers.wins):
+        rows.append(f"| {line.question if line.question != question else ''} | {line.sentence} |")
+        question = line.question
     timing = [record for record in RecordFile(folder).read().records if record.suite == "timing"]
     absent = f"Absent: {listed(report.answers.absent)}. " if report.answers.absent else ""
     source = f"{report.answers.scale}; {provenance(timing)}.".lstrip("; ")
     return "\n".join([*rows, "", absent + source, ""])
+
+
+def without_tuning(text: str) -> str:
+    """Return the headlines without those of the robots that settings were tuned on."""
+    return "".join(
+        line for line in text.splitlines(keepends=True) if not re.search(r"\btuning\b", line)
+    )
 
 
 def with_headlines(text: str, lines: str) -> str:
