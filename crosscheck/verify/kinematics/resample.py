@@ -20,6 +20,7 @@ from . import rounding
 from .faults import AS_THE_TEXTBOOK, TABLE
 from .polylines import Polyline
 from .report import report
+from .resample_faults import FAULTS, even_points
 from .skeletons import generator
 
 TASK = "resample"
@@ -57,7 +58,8 @@ def _cases_of(curve: Curve, number: int) -> Iterator[Case]:
     facts = {"line": line, "size": float(np.abs(curve.points).max())}
     family = f"{curve.name} {number}"
     shared = {"curve": curve.points, "strokes": np.array(curve.strokes), "closed": curve.closed}
-    for rule in ({"count": count}, {"spacing": line.length / (2.5 * count)}):
+    pieces = 2.5 * count + 0.2  # of which rounding down, up and to the nearest differ
+    for rule in ({"count": count}, {"spacing": line.length / pieces}):
         name = f"{family}, by {next(iter(rule))}"
         yield Case(name, TASK, {**shared, **rule}, family, curve.about, facts=facts)
 
@@ -88,7 +90,7 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         judge_case(
             exchange, partial(_findings, exchange.case, greeting),
             rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
-            partial(_even, exchange.case),
+            partial(even_points, exchange.case),
         )
         for exchange in exchanges
     ]  # fmt: skip
@@ -180,7 +182,8 @@ def _gaps(points: FloatArray, arc: FloatArray, case: Case, bound: float) -> Find
         return _gaps_by_spacing(measures, case, bound)
     error = min(_spread(gaps) for gaps in measures)
     verdict = Verdict.RIGHT_EXCEPT if len(case.inputs["strokes"]) > 1 else None
-    tolerance = UNEVEN + 4.0 * bound / max(float(measures[2].mean()), bound)
+    mean = float(measures[2].sum()) / max(1, len(measures[2]))
+    tolerance = UNEVEN + 4.0 * bound / max(mean, bound)
     return finding("spacing", error, tolerance, verdict=verdict)
 
 
@@ -212,48 +215,6 @@ def _closing(points: FloatArray, arc: FloatArray, line: Polyline, bound: float) 
     return finding("closing side", gap, widest + 2.0 * bound, gap=shown, widest=limit)
 
 
-def _expected_count(case: Case) -> int:
-    """Return the number of points that a case requests."""
-    spacing, closed = case.inputs.get("spacing"), case.inputs["closed"]
-    return int(case.inputs.get("count") or case.facts["line"].count(spacing, closed))
-
-
-def _even(case: Case, extra: int = 0) -> FloatArray:
-    """Return evenly spaced points, by default the right number of them."""
-    line: Polyline = case.facts["line"]
-    return line.even_points(_expected_count(case) + extra, case.inputs["closed"])
-
-
-def _by_index(case: Case) -> FloatArray:
-    """Space points by the number of samples instead of the length along the curve."""
-    points, closed = case.facts["line"].points, bool(case.inputs["closed"])
-    place = np.linspace(0.0, len(points) - 1.0, _expected_count(case), endpoint=not closed)
-    return np.stack([np.interp(place, np.arange(len(points)), x) for x in points.T], axis=-1)
-
-
-def _samples_before(case: Case) -> FloatArray:
-    """Take the samples at or before the even lengths, without interpolating between them."""
-    line, closed = case.facts["line"], bool(case.inputs["closed"])
-    arc = np.linspace(0.0, line.length, _expected_count(case), endpoint=not closed)
-    last = np.searchsorted(line.arc, arc, side="right") - 1
-    points: FloatArray = line.points[np.minimum(last, len(line.points) - 1)]
-    return points
-
-
-# The points that a program with each fault answers.
-FAULTS: dict[str, Callable[[Case], FloatArray]] = {
-    "by index": _by_index,
-    "end left out": lambda case: case.facts["line"].even_points(_expected_count(case), True),
-    "one point less": partial(_even, extra=-1),
-    "one point more": partial(_even, extra=1),
-    "left open": lambda case: Polyline(
-        case.inputs["curve"], case.facts["line"].strokes, False
-    ).even_points(_expected_count(case), False),
-    "reversed": lambda case: _even(case)[::-1],
-    "samples only": _samples_before,
-}
-
-
 def _diagnosis(
     wrong_first: Sequence[Exchange], greeting: Greeting, behaviour: Sentence | None
 ) -> Diagnosis:
@@ -270,7 +231,8 @@ def _diagnosis(
     def tolerance(case: Case) -> float:
         return max(1e-9, 64.0 * greeting.epsilon * len(case.inputs["curve"]))
 
-    variants = [variant(key, points) for key, points in ({"": _even} | FAULTS).items()]
+    models = {"": (even_points,), **FAULTS}
+    variants = [variant(key, points) for key, choices in models.items() for points in choices]
     explanations, count = explain(variants, wrong_first, tolerance, lambda keys: sentences[keys[0]])
     faulty = tuple(explanation for explanation in explanations if explanation.faults != ("",))
     return Diagnosis(faulty, behaviour, variant_count=count)
