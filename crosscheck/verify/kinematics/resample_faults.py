@@ -30,7 +30,7 @@ def points_by(
     case: Case,
     *,
     extra: int = 0,
-    norm: Callable[..., FloatArray] = np.linalg.norm,
+    norm: Callable[..., Any] = np.linalg.norm,
     pieces: Callable[[float], float] = np.ceil,
     interpolate: Callable[..., FloatArray] | None = None,
     places: Callable[..., FloatArray] | None = None,
@@ -91,7 +91,7 @@ def _nearest_samples(s: FloatArray, arc: FloatArray, points: FloatArray) -> Floa
 
 def _by_index(s: FloatArray, arc: FloatArray, points: FloatArray) -> FloatArray:
     """Space points by the number of samples instead of the length along the curve."""
-    return _linear(s / arc[-1] * (len(points) - 1), np.arange(len(points)), points)
+    return _linear(s / arc[-1] * (len(points) - 1), np.arange(float(len(points))), points)
 
 
 def _rounded_index(
@@ -178,7 +178,8 @@ FAULTS: Mapping[str, tuple[PointsOf, ...]] = {
     "shifted by half a gap": (_places(lambda s, length, case: s + 0.5 * s[1:2].sum()),),
     "index rounded": tuple(
         partial(points_by, interpolate=partial(_rounded_index, rule=rule, is_open=is_open))
-        for rule, is_open in product((np.round, np.floor), (True, False))
+        for is_open in (True, False)
+        for rule in (np.round, np.floor)
     ),
     "nearest sample": (partial(points_by, interpolate=_nearest_samples),),
     "lengths squared": (partial(points_by, norm=lambda d, axis: (d * d).sum(axis)),),
@@ -195,7 +196,9 @@ FAULTS: Mapping[str, tuple[PointsOf, ...]] = {
         partial(_segment_by_segment, is_exact=is_exact, has_end=has_end, extra=extra)
         for is_exact, has_end, extra in product((False, True), (True, False), (0, 1))
     ),
-    "steps by chords": tuple(partial(_steps_by_chords, is_exact=is_exact) for is_exact in (0, 1)),
+    "steps by chords": tuple(
+        partial(_steps_by_chords, is_exact=is_exact) for is_exact in (False, True)
+    ),
     "coordinate dropped": tuple(
         function
         for kept in ([1.0, 1.0, 0.0], [1.0, 0.0, 1.0])
