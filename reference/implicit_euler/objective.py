@@ -164,10 +164,9 @@ class Objective:
             self.external = constant_forces(system, external_forces)
         self.effective, self._constant = _effective(system, self.x_n, h)
         arrays = self.effective.arrays
-        self._arguments = (
-            self.y, self.external, h, self._constant, arrays.masses, arrays.springs,
-            arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only, arrays.pinned,
-        )  # fmt: skip
+        particles = self.y, self.external, arrays.masses
+        elastic = arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only
+        self._arguments = h, self._constant, particles, arrays.springs, elastic, arrays.pinned
         self._floor_coefficients = _rounding_coefficients(
             self.y, self.external, h, arrays.masses, self.effective.spring_sums, system.free
         )
@@ -198,8 +197,8 @@ class Objective:
 
     def _rounding(self, positions: FloatArray) -> tuple[float, float]:
         """Return bounds on the rounding errors of the gradient's norm and of g."""
-        y, external, h, _, *springs = self._arguments
-        return _rounding_bounds(positions, y, external, h, *springs)
+        h, _, *terms = self._arguments
+        return _rounding_bounds(positions, h, *terms)
 
     def residual(self, iterate: Iterate) -> float:
         """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y."""
@@ -307,13 +306,13 @@ def _evaluate_in_parallel(
     x: FloatArray, step: tuple[Any, ...], regions: Regions
 ) -> tuple[FloatArray, float, float, float]:
     """Return the same as `evaluate_objective`, with the regions shared among threads."""
-    y, external, h, constant, masses, _, *elastic, pinned = step
+    h, constant, particles, _, elastic, pinned = step
     gradient, sums = np.empty(x.shape), np.empty((len(regions.particles) - 1, 2))
-    terms = x, y, external, h, masses, *elastic, regions
+    terms = x, h, particles, elastic, regions
     in_slices(
         _regions, len(sums), lambda part: (*terms, part.start, part.stop, gradient, sums), minimum=1
     )
-    return gradient, *_join(x, h, constant, *elastic, pinned, regions, gradient, sums)
+    return gradient, *_join(x, h, constant, elastic, pinned, regions, gradient, sums)
 
 
 _evaluate = Kernel(evaluate_objective, label="the objective of implicit Euler")

@@ -1,6 +1,7 @@
 """Kernels that sum the terms of g: value, gradient, effective dampers and rounding errors.
 
-All arguments are in SI units; `objective` defines g.
+All arguments are in SI units; `objective` defines g. Groups of arrays are plain tuples: `particles`
+of y, external forces and masses, `elastic` of rest lengths, stiffnesses and tension_only.
 """
 
 import math
@@ -36,12 +37,11 @@ def blend_dampers(x_n, h, stiffnesses, system):
     return rest_lengths, constant
 
 
-def evaluate_objective(
-    x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
-):
+def evaluate_objective(x, h, constant, particles, springs, elastic, pinned):
     """Return grad g, g, |grad g| and the largest distance of a particle from the origin."""
     gradient, hh = np.empty(x.shape), h * h
-    value, largest = add_particles(x, y, external, hh, masses, 0, len(x), gradient)
+    rest_lengths, stiffnesses, tension_only = elastic
+    value, largest = add_particles(x, particles, hh, 0, len(x), gradient)
     value += hh * constant
     for s in range(len(springs)):
         i, j, k = at(springs[s, 0]), at(springs[s, 1]), hh * stiffnesses[s]
@@ -49,29 +49,24 @@ def evaluate_objective(
     return gradient, value, zero_pins(pinned, gradient), math.sqrt(largest)
 
 
-def evaluate_regions(
-    x, y, external, h, masses, rest_lengths, stiffnesses, tension_only, regions, first, last,
-    gradient, sums,
-):  # fmt: skip
+def evaluate_regions(x, h, particles, elastic, regions, first, last, gradient, sums):
     """Add to the gradient the terms of the particles and springs inside regions first to last - 1.
 
     Store each region's part of g and largest squared distance from the origin in `sums`, (region,
     2).
     """
-    hh, elastic = h * h, (rest_lengths, stiffnesses, tension_only)
+    hh = h * h
     for r in range(first, last):
         begin, end = regions.particles[r], regions.particles[r + 1]
-        value, largest = add_particles(x, y, external, hh, masses, begin, end, gradient)
+        value, largest = add_particles(x, particles, hh, begin, end, gradient)
         begin, end = regions.starts[r], regions.starts[r + 1]
         sums[r, 0] = value + add_ordered_springs(x, hh, elastic, regions, begin, end, gradient)
         sums[r, 1] = largest
 
 
-def join_regions(
-    x, h, constant, rest_lengths, stiffnesses, tension_only, pinned, regions, gradient, sums
-):
+def join_regions(x, h, constant, elastic, pinned, regions, gradient, sums):
     """Add the springs between regions; return g, |grad g| and the largest |x_i|."""
-    hh, elastic = h * h, (rest_lengths, stiffnesses, tension_only)
+    hh = h * h
     value, largest = hh * constant, 0.0
     for r in range(len(sums)):
         value += sums[r, 0]
@@ -93,12 +88,12 @@ def add_ordered_springs(x, hh, elastic, regions, begin, end, gradient):
     return value
 
 
-def add_particles(x, y, external, hh, masses, first, last, gradient):
+def add_particles(x, particles, hh, first, last, gradient):
     """Set the gradient of particles first to last - 1 to its terms other than springs.
 
     Return their part of g, and their largest squared distance from the origin.
     """
-    value, largest = 0.0, 0.0
+    value, largest, (y, external, masses) = 0.0, 0.0, particles
     for i in range(first, last):
         x_i, f = load_vector(x, i), scale(hh, load_vector(external, i))
         displacement = subtract(x_i, load_vector(y, i))
@@ -129,10 +124,9 @@ def zero_pins(pinned, gradient):
     return math.sqrt(squares)
 
 
-def rounding_bounds(
-    x, y, external, h, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
-):
+def rounding_bounds(x, h, particles, springs, elastic, pinned):
     """Return upper bounds of the rounding errors of |grad g| and of g."""
+    (y, external, masses), (rest_lengths, stiffnesses, tension_only) = particles, elastic
     size, reach, value_size, squares = np.empty(len(x)), np.empty(len(x)), 0.0, 0.0
     for i in range(len(x)):
         x_i, y_i, pull = (

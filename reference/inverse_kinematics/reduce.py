@@ -31,7 +31,7 @@ class Prepared(NamedTuple):
     restarts: FloatArray  # the mechanism's coordinates in random poses, (restart, coordinate)
     # the effectors in these poses, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
-    flat: tuple[Any, ...]  # joints of the articulation, fields of the mechanism, the two above
+    model: tuple[Any, ...]  # joints of the articulation, fields of the mechanism, the two above
 
 
 def prepare(
@@ -53,8 +53,8 @@ def prepare(
             x, R = articulation.forward(poses)
             effector_frames = np.concatenate([x, R], axis=-1)[:, list(effectors)]
         drawn = np.ascontiguousarray(poses[:, mechanism.columns]), effector_frames.copy()
-        flat = (articulation.joints, *mechanism, *drawn)
-        articulation.mechanisms[key] = Prepared(mechanism, *drawn, flat)
+        model = articulation.joints, tuple(mechanism), *drawn
+        articulation.mechanisms[key] = Prepared(mechanism, *drawn, model)
     return articulation.mechanisms[key]
 
 

@@ -83,7 +83,7 @@ def solve_plain(
     row = targets.view(FLOAT64)[0]  # of its fields one after the other
     row[:3], row[3:7], row[7] = position, IDENTITY if rotation is None else rotation, 1.0
     filled = run(
-        settings.solver.mechanism, prepared.flat, start[None], targets, model.joint_count,
+        settings.solver.mechanism, (prepared.model,), start[None], targets, model.joint_count,
         model.coordinate_count, settings,
     )  # fmt: skip
     return _single_solution(NO_HISTORY, *filled) if filled else None
@@ -150,10 +150,10 @@ def _run_checked(
     effectors = tuple([target.joint for target in targets])
     oriented = tuple([target.rotation is not None for target in targets])
     restarts, seed = settings.limits.restarts, settings.seed
-    arrays = prepare(articulation, effectors, oriented, restarts, seed).flat
+    arrays = prepare(articulation, effectors, oriented, restarts, seed).model
     width = articulation.coordinate_count
     starts = starts.reshape(len(starts), width)
-    filled = run(settings.solver.mechanism, arrays, starts, rows, count, width, settings)
+    filled = run(settings.solver.mechanism, (arrays,), starts, rows, count, width, settings)
     if not filled:
         return None
     result = Result(*filled)

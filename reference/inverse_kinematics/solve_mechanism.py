@@ -106,22 +106,19 @@ class MechanismState(NamedTuple):
 
 
 def solve_mechanisms(
-    joints, own_joints, columns, effectors, moves, adjacent, reach, freedoms, equations,
-    restarts, restart_frames, numbers, starts, targets, local,
-    positions, figures, history, coordinates,
-):  # fmt: skip
+    model, numbers, starts, targets, local, positions, figures, history, coordinates
+):
     """Solve target after target; return whether all starts and targets were valid.
 
-    Arrays come separately, since tuples of them take longer from Python: the joints of the
-    articulation, the fields of Mechanism, the restarts of MechanismState and their effectors, the
-    numbers of Limits, coordinates of the articulation to start from, (start, coordinate), used by
-    the targets in turn, targets, records TARGET, (target, effector), to be made unit here, and the
-    fields of Result.
+    The model is a plain tuple, since named ones take longer from Python: the joints of the
+    articulation, the fields of Mechanism, the restarts of MechanismState and their effectors. The
+    others are the numbers of Limits, coordinates of the articulation to start from, (start,
+    coordinate), used by the targets in turn, targets, records TARGET, (target, effector), to be
+    made unit here, and the fields of Result.
     """
+    joints, mechanism_fields, restarts, restart_frames = model
     limits = limits_of(numbers)
-    mechanism = Mechanism(
-        own_joints, columns, effectors, moves, adjacent, reach, freedoms, equations
-    )
+    mechanism = Mechanism(*mechanism_fields)
     data = new_data(mechanism)
     state = MechanismState(
         mechanism, data, data.state, new_workspace(mechanism), restarts, restart_frames,
@@ -138,8 +135,8 @@ def solve_mechanisms(
             return False
         gather(mechanism, q, data.q)
         clear(data.far_step)
-        for j in range(len(own_joints)):
-            clamp_joint(own_joints, j, data.q)
+        for j in range(len(mechanism.joints)):
+            clamp_joint(mechanism.joints, j, data.q)
         update_forward_kinematics(mechanism, data)
         bound = least_residual(mechanism, target)
         criteria, past = mechanism_criteria(mechanism, bound, limits), history[i % len(history)]

@@ -168,7 +168,7 @@ def _by_search(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmS
     is_near = (ends.residual <= tolerances[0]) & (ends.residual_rotation <= tolerances[1])
     candidates = np.ascontiguousarray(ends.coordinates[is_near][:, arm.mechanism.columns])
     rows = np.empty((len(candidates), len(arm.columns) + FIGURES))
-    count, _ = settle_kernel(*arm.mechanism, candidates, target_rows([pose], ()), rows)
+    count, _ = settle_kernel(tuple(arm.mechanism), candidates, target_rows([pose], ()), rows)
     rows = rows[:count]
     hits = rows[:, -1]
     single = int((hits == 1.0).sum())

@@ -34,7 +34,7 @@ class Arm(NamedTuple):
     mechanism: Mechanism  # the joints that move the effector
     method: str  # the name of its closed form, or SEARCH
     is_exact: bool  # whether its axes are those of the form to rounding
-    flat: tuple[Any, ...]  # the mechanism and the form, for the kernel
+    flat: tuple[Any, ...]  # the fields of mechanism and form, for the kernel
     columns: IndexArray  # of the mechanism's coordinates among the robot's
     rest: FloatArray  # coordinates of the robot: locked values, else neutral
     is_plain: bool  # whether it has a closed form, and the robot no other coordinates
@@ -143,7 +143,7 @@ def arm_of(model: Articulation, effector: int, values: Mapping[int, float]) -> A
         return Arm(articulation, mechanism, SEARCH, False, (), columns, rest, False)
     is_plain = np.array_equal(columns, np.arange(len(rest)))
     method, is_exact = FORMS[form.form], form.deviation <= EXACT
-    flat = (*mechanism, *form)
+    flat = tuple(mechanism), tuple(form)
     return Arm(articulation, mechanism, method, is_exact, flat, columns, rest, is_plain)
 
 

@@ -38,15 +38,12 @@ NEWTON_STEPS = 12
 FIGURES = 3
 
 
-def solve_closed_form(
-    joints, columns, effectors, moves, adjacent, reach, freedoms, equations,
-    form, backwards, geometry, deviation, position, rotation, rows,
-):  # fmt: skip
+def solve_closed_form(mechanism_fields, form_fields, position, rotation, rows):
     """Fill the solutions of a closed form; return their number, -1 of a target that is not valid.
 
-    Also return how sure the number of candidates is, and how many of them are in doubt. Arrays come
-    separately, as for `solve_mechanisms`: the fields of Mechanism and of ClosedForm, position [m]
-    and rotation of the target, and the rows to fill: coordinates of the mechanism, then FIGURES.
+    Also return how sure the number of candidates is, and how many of them are in doubt. The fields
+    of Mechanism and of ClosedForm come in plain tuples, as for `solve_mechanisms`. Position [m] and
+    rotation are the target's; a row to fill has coordinates of the mechanism, then FIGURES.
     """
     target = np.empty(1, TARGET)
     for k in range(3):
@@ -56,20 +53,15 @@ def solve_closed_form(
     target["weight"][0] = 1.0
     if not normalise_target(target):
         return -1, CERTAIN, 0
-    mechanism = Mechanism(joints, columns, effectors, moves, adjacent, reach, freedoms, equations)
-    arm, work = ClosedForm(form, backwards, geometry, deviation), new_roots()
-    count, status = fill_candidates(arm, reach, target, work)
+    mechanism, work = Mechanism(*mechanism_fields), new_roots()
+    count, status = fill_candidates(ClosedForm(*form_fields), mechanism.reach, target, work)
     count, doubts = settle(mechanism, target, work.candidates[:count], rows)
     return count, status, doubts
 
 
-def settle_candidates(
-    joints, columns, effectors, moves, adjacent, reach, freedoms, equations,
-    candidates, targets, rows,
-):  # fmt: skip
+def settle_candidates(mechanism_fields, candidates, targets, rows):
     """Fill the solutions among candidates; return their number and that of doubtful candidates."""
-    mechanism = Mechanism(joints, columns, effectors, moves, adjacent, reach, freedoms, equations)
-    return settle(mechanism, targets[0], candidates, rows)
+    return settle(Mechanism(*mechanism_fields), targets[0], candidates, rows)
 
 
 def settle(mechanism, target, candidates, rows):
