@@ -18,6 +18,7 @@ from .inverse_kinematics import (
     tasks,
 )
 from .inverse_kinematics.certificate import IKCertificate, IKCoverage, certify_ik
+from .inverse_kinematics.prepared import PreparedIK, prepare_ik
 from .inverse_kinematics.solve_tasks import TaskSolution, solve_tasks
 from .judging import PoseJudgement, StepJudgement, judge_pose, judge_step
 from .kinematics import PreparedKinematics, forward_kinematics, local_from_global, prepare
@@ -43,6 +44,7 @@ __all__ = [
     "Outcome",
     "Pose",
     "PoseJudgement",
+    "PreparedIK",
     "PreparedKinematics",
     "Skeleton",
     "State",
@@ -58,6 +60,7 @@ __all__ = [
     "judge_step",
     "local_from_global",
     "prepare",
+    "prepare_ik",
     "resample",
     "rotation",
     "runge_kutta",

@@ -6,13 +6,13 @@ from typing import Any
 
 from plumbob.crosscheck.engines import SKELETON_ENGINES, SkeletonEngine
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
-from plumbob.reference import IK_SOLVERS, solve_ik
+from plumbob.reference import IK_SOLVERS, prepare_ik, solve_ik
 
 from ...peers import registry
 from ...peers.ik.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
 from ...problems.chains import chain_targets
 from ..chain.measurement import MAX_ITERATIONS, TOLERANCE
-from .case import COMPILED, PLAIN, TimedCase, TimedWork
+from .case import COMPILED, PLAIN, PREPARED, TimedCase, TimedWork
 
 STRATA = ("near", "far")
 # Plain Python takes milliseconds a solve; the first targets of the same set are enough.
@@ -27,12 +27,14 @@ KINEMATICS: dict[str, Callable[[Any], SkeletonEngine]] = {
 
 
 def cases() -> Iterator[TimedCase]:
-    """Yield our solvers compiled, plain and in batches, and a Python loop on three kinematics."""
+    """Yield our solvers in all forms, and a Python loop on three kinematics."""
     for stratum in STRATA:
         for solver in IK_SOLVERS:
             work = _work(stratum, solver)
             single = partial(single_solves, stratum, solver)
             yield TimedCase(work, COMPILED, partial(single, TARGETS), TARGETS)
+            prepared = partial(prepared_solves, stratum, solver)
+            yield TimedCase(work, PREPARED, prepared, TARGETS)
             yield TimedCase(
                 work, PLAIN, partial(single, FEW_TARGETS), FEW_TARGETS, backend="python"
             )
@@ -57,6 +59,19 @@ def single_solves(stratum: str, solver: str, count: int) -> Callable[[], Any]:
     def run() -> None:
         for start, target in pairs:
             solve_ik(problem.skeleton, start, target, solver, **LIMITS)
+
+    return run
+
+
+def prepared_solves(stratum: str, solver: str) -> Callable[[], Any]:
+    """Return a call that solves all targets, each into the same arrays."""
+    problem = chain_targets(stratum, TARGETS)
+    pairs = list(zip(problem.starts, problem.targets, strict=True))
+    solve = prepare_ik(problem.skeleton, solver, **LIMITS)
+
+    def run() -> None:
+        for start, target in pairs:
+            solve(start, target)
 
     return run
 

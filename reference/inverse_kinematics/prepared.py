@@ -1,0 +1,134 @@
+"""Inverse kinematics of single targets, into the same arrays every time."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import FLOAT64, boolean, floats, frozen, is_plain
+from ..articulation import Articulation
+from ..model import Model, checked_model, coordinates_name, effector_of
+from ..outcome import Outcome
+from ..quaternion import IDENTITY
+from ..skeleton import Skeleton
+from .mechanism import TARGET
+from .problem import Settings, Target, checked_settings, checked_targets, default_solver
+from .reduce import prepare
+from .restarts import FIGURES, OUTCOME
+from .solve import OUTCOMES, UNRECORDED, solve_checked
+
+
+class PreparedIK:
+    """Inverse kinematics of a model, a single target a call, into the same arrays every time.
+
+    Attributes:
+        coordinates: of the last solution, read-only views of what the next call fills: the local
+            rotations of a Skeleton, (joint, 4), or coordinates of an Articulation, (coordinate,).
+        positions: of all joints in that pose [m], likewise, (joint, 3).
+        figures: of IKSolution the residual, residual_rotation, iterations, outcome, merit and
+            excess, likewise, (6,).
+    """
+
+    __slots__ = (
+        "_arrays", "_call", "_problem", "_shape", "_start", "_target", "_target_shape",
+        "coordinates", "figures", "positions",
+    )  # fmt: skip
+
+    def __init__(
+        self, model: Skeleton | Articulation, joint: int, oriented: bool, settings: Settings
+    ):
+        """Allocate the arrays; `prepare_ik` checks the arguments."""
+        n, local = model.joint_count, np.full((1, model.joint_count, 4), np.nan)
+        positions, figures = np.full((1, n, 3), np.nan), np.full((1, len(FIGURES)), np.nan)
+        arrays: tuple[Any, ...]
+        self._shape: tuple[int, ...]
+        if isinstance(model, Skeleton):
+            self._shape, q, kernel = (n, 4), local, settings.solver.chain
+            arrays = (*model.arrays, model.path_array(joint))
+            targets: Any = np.empty((1, 3))
+            self._target = targets[0]
+            results: tuple[Any, ...] = local, positions, figures, UNRECORDED
+        else:
+            self._shape, kernel = (model.coordinate_count,), settings.solver.mechanism
+            drawn = settings.limits.restarts, settings.seed
+            arrays = (prepare(model, (joint,), (oriented,), *drawn).model,)
+            targets, q = np.zeros((1, 1), TARGET), np.full((1, model.coordinate_count), np.nan)
+            targets["rotation"], targets["weight"] = IDENTITY, 1.0
+            self._target = targets.view(FLOAT64)[0, : 7 if oriented else 3]
+            results = local, positions, figures, UNRECORDED, q
+        starts, self._arrays = np.empty((1, *self._shape)), (q, positions, figures)
+        self._start, self._target_shape = starts[0], self._target.shape
+        self._problem = model, joint, settings
+        call = kernel.in_force
+        self._call = partial(call, *arrays, settings.numbers, starts, targets, *results)
+        self.coordinates, self.positions = frozen(q[0]), frozen(positions[0])
+        self.figures = frozen(figures[0])
+
+    def __call__(self, start: ArrayLike, target: ArrayLike) -> Outcome:
+        """Solve for a target from a start; return the outcome.
+
+        Args:
+            start: local rotations, (joint, 4), or coordinates, (coordinate,).
+            target: the effector's position [m], (3,), and where it is oriented its rotation after
+                that, (7,).
+
+        Raises:
+            ValueError: as `solve_ik` does. The solution is then not defined.
+        """
+        if is_plain(start, self._shape) and is_plain(target, self._target_shape):
+            self._start[...], self._target[...] = start, target
+            if self._call():
+                return OUTCOMES[self.figures.item(OUTCOME)]
+        self._solve_checked(start, target)
+        return OUTCOMES[self.figures[OUTCOME]]
+
+    def _solve_checked(self, start: ArrayLike, target: ArrayLike) -> None:
+        """Solve by the route of `solve_ik`, which names what is wrong."""
+        model, joint, settings = self._problem
+        q = floats(coordinates_name(model), start, *self._shape)
+        values = floats("target", target, *self._target_shape)
+        pose = Target(values[:3], values[3:] if len(values) > 3 else None, joint)
+        solution = solve_checked(model, q, checked_targets(model, pose, None), settings)
+        figures = (
+            solution.residual, solution.residual_rotation, solution.iterations, solution.outcome,
+            solution.merit, solution.excess,
+        )  # fmt: skip
+        results = solution.coordinates, solution.positions, figures
+        for array, row in zip(self._arrays, results, strict=True):
+            array[0] = row
+
+
+def prepare_ik(
+    model: Model,
+    solver: str | None = None,
+    effector: int | str | None = None,
+    *,
+    oriented: bool = False,
+    tolerance: float = 1e-4,
+    tolerance_rotation: float = 1e-4,
+    max_iterations: int | None = None,
+    restarts: int | None = None,
+    seed: int = 0,
+) -> PreparedIK:
+    """Return `solve_ik` for many single targets: `prepare_ik(model)(start, target)`.
+
+    Arguments are those of `solve_ik`; `oriented` is whether targets have rotations. The kernel is
+    of the backend that is in force now.
+
+    Raises:
+        ValueError: if an argument is not valid, or targets on a Skeleton are oriented or restarted.
+    """
+    checked, is_oriented = checked_model(model, "model"), boolean("oriented", oriented)
+    if solver is None:
+        likely = Target((0.0, 0.0, 0.0), IDENTITY if is_oriented else None)
+        solver, default_restarts = default_solver(checked, likely)
+        restarts = default_restarts if restarts is None else restarts
+    settings = checked_settings(
+        solver, tolerance, tolerance_rotation, max_iterations, restarts or 0, seed, False
+    )
+    if isinstance(checked, Skeleton) and (is_oriented or settings.limits.restarts):
+        raise ValueError(
+            "model: expected an Articulation for rotations or restarts, got a Skeleton"
+        )
+    return PreparedIK(checked, effector_of(checked, effector), is_oriented, settings)

@@ -1,0 +1,47 @@
+"""Prepared solves: the bits of `solve_ik`, into the same arrays every time."""
+
+import numpy as np
+import pytest
+
+from plumbob import Articulation, Skeleton, Target, prepare_ik, rotation, solve_ik
+
+OFFSETS = [[0.0, 0.0, 0.4]] * 7
+SKELETON = Skeleton(range(-1, 6), OFFSETS)
+ARM = Articulation(SKELETON, "hinge", np.eye(3)[[2, 1, 0, 1, 2, 1, 0]], lower=-2.5, upper=2.5)
+FIGURES = ("residual", "residual_rotation", "iterations", "outcome", "merit", "excess")
+
+
+@pytest.mark.parametrize("target_type", [np.array, list])
+@pytest.mark.parametrize("oriented", [False, True])
+@pytest.mark.parametrize("model", [SKELETON, ARM], ids=["skeleton", "arm"])
+def test_prepared_solves_are_those_of_solve_ik(model, oriented, target_type):
+    if model is SKELETON and oriented:
+        with pytest.raises(ValueError, match="model: expected an Articulation"):
+            prepare_ik(model, oriented=oriented)
+        return
+    rng, solve = np.random.default_rng(0), prepare_ik(model, oriented=oriented, tolerance=1e-6)
+    assert np.isnan(solve.coordinates).all()
+    for _ in range(3):
+        start = rotation.random(rng, 7) if model is SKELETON else model.random(rng)
+        x, R = rng.normal(size=3) * 0.6, rotation.random(rng)
+        outcome = solve(start, target_type([*x, *R] if oriented else x))
+        expected = solve_ik(model, start, Target(x, R if oriented else None, 6), tolerance=1e-6)
+        np.testing.assert_array_equal(solve.coordinates, expected.coordinates)
+        np.testing.assert_array_equal(solve.positions, expected.positions)
+        assert solve.figures.tolist() == [getattr(expected, name) for name in FIGURES]
+        assert outcome is expected.outcome
+    assert not solve.coordinates.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("start", "target", "message"),
+    [
+        (np.zeros(6), np.zeros(3), "q: expected shape"),
+        (np.zeros(7), np.zeros(2), "target: expected shape"),
+        (np.full(7, np.nan), np.zeros(3), "q: expected"),
+        (np.zeros(7), np.full(3, np.inf), "target: expected"),
+    ],
+)
+def test_wrong_arguments_of_prepared_solves_are_named(start, target, message):
+    with pytest.raises(ValueError, match=message):
+        prepare_ik(ARM)(start, target)
