@@ -208,11 +208,11 @@ def _filled(template: Sentence, parts: Sequence[Sentence]) -> Sentence:
     return Sentence(template.template, fields)
 
 
-def first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
-    """Return a sentence about the first broken law along the computation."""
+def first_broken(judgements: Sequence[CaseJudgement], law: str = "") -> Sentence | None:
+    """Return a sentence about the first broken law, or the given one, along the computation."""
     for judgement in judgements:
         for finding in judgement.findings:
-            if finding.verdict >= Verdict.WRONG:
+            if finding.verdict >= Verdict.WRONG and law in ("", finding.law):
                 return sentence(
                     "The first violated law is '{law}', in the case '{case}': {why}",
                     law=finding.law,

@@ -4,13 +4,14 @@ Zero of the gravitational energy is where the solver has it: the states of a cas
 several places, and only differences to the first of them count.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import groupby
+from itertools import groupby, islice, product
 from typing import Any
 
 import numpy as np
 
+from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
@@ -18,21 +19,32 @@ from ..contestant import Answer, Exchange
 from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
-from ..laws import digits, finding, judge_case
+from ..laws import digits, finding, hints_of, judge_case
 from ..sentence import sentence
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, combined
 from .model import StepModel
-from .problem import SpringProblem, all_forces, elastic_energy, problem_of, state_of, system_of
+from .problem import (
+    SpringProblem,
+    all_forces,
+    elastic_energy,
+    frames,
+    problem_of,
+    state_of,
+    system_of,
+)
 
 TASK = "energy"
 Energies = Mapping[str, Any]
 PARTS = ("total", "kinetic", "potential", "elastic", "gravitational")
 SUMS = {"total": ("kinetic", "potential"), "potential": ("elastic", "gravitational")}
+ADDENDS = ("kinetic", "elastic", "gravitational")
 # Those of which each has a formula of its own.
 FORMULAS = ("kinetic", "elastic")
 ROUNDINGS = 16.0
 MAX_EXPLANATIONS = 3
+# Of solvers that answer sums alone, so many faults at once are assumed.
+MAX_TOGETHER = 2
 # Gauss points that integrate the force along a displacement of a tenth of a spring to rounding.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
@@ -51,7 +63,11 @@ def _displaced(case: Case, seed: int) -> Case:
     return replace(
         case,
         name=case.name + ", displaced",
-        inputs=dict(case.inputs) | {"positions": x + 0.02 * rng.standard_normal(x.shape)},
+        inputs=dict(case.inputs)
+        | {
+            "positions": x + 0.02 * rng.standard_normal(x.shape),
+            "velocities": 1.25 * case.inputs["velocities"],
+        },
         about=sentence("The previous case with displaced particles."),
         facts=dict(case.facts) | {"from": case.name},
     )
@@ -63,20 +79,84 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     return TaskReport(TASK, "", judgements, _diagnose(judgements, greeting.epsilon))
 
 
+def _elastic(formula: Callable[..., FloatArray]) -> Callable[[SpringProblem], float]:
+    """Return k/2 times the sum of a formula of l and r as an energy of a problem [J]."""
+
+    def energy(p: SpringProblem) -> float:
+        return float(
+            (0.5 * p.stiffnesses * formula(frames(p, p.positions)[0], p.rest_lengths)).sum()
+        )
+
+    return energy
+
+
+def _above(p: SpringProblem, origin: FloatArray) -> float:
+    """Return the gravitational energy above a point [J]."""
+    return -float((p.constant * (p.positions - origin)).sum())
+
+
+def _lowest(p: SpringProblem) -> FloatArray:
+    return p.positions[int(np.argmax(p.positions @ p.gravity))]
+
+
+# Wrong formulas of energies by the keys of the faults.
+WRONG_FORMULAS: Mapping[str, Callable[[SpringProblem], float]] = {
+    "kinetic of speeds": lambda p: float(0.5 * p.masses @ np.linalg.norm(p.velocities, axis=1)),
+    "kinetic of the mean velocity": lambda p: float(
+        0.5 * p.masses.sum() * (p.velocities.mean(0) ** 2).sum()
+    ),
+    "kinetic of two sums": lambda p: float(0.5 * p.masses.sum() * (p.velocities**2).sum()),
+    "kinetic of summed components": lambda p: float(0.5 * p.masses @ p.velocities.sum(1) ** 2),
+    "kinetic with the first mass": lambda p: float(0.5 * p.masses[0] * (p.velocities**2).sum()),
+    "kinetic with m²": lambda p: float(0.5 * p.masses**2 @ (p.velocities**2).sum(1)),
+    "elastic of squares": _elastic(lambda length, rest: np.abs(length * length - rest * rest)),
+    "elastic of strains": _elastic(lambda length, rest: ((length - rest) / rest) ** 2),
+    "elastic over rest length": _elastic(lambda length, rest: (length - rest) ** 2 / rest),
+    "elastic without rest length": _elastic(lambda length, rest: length * length),
+    "elastic not squared": _elastic(lambda length, rest: np.abs(length - rest)),
+    "elastic of stretched springs": _elastic(
+        lambda length, rest: np.maximum(length - rest, 0.0) ** 2
+    ),
+    "elastic without k": lambda p: elastic_energy(
+        p.changed(stiffnesses=np.ones_like(p.stiffnesses))
+    ),
+    "elastic of two sums": lambda p: elastic_energy(
+        p.changed(stiffnesses=np.full_like(p.stiffnesses, p.stiffnesses.sum()))
+    ),
+    "gravitational without mass": lambda p: -float((p.positions @ p.gravity).sum()),
+    "gravitational with the first mass": lambda p: (
+        -float(p.masses[0] * (p.positions @ p.gravity).sum())
+    ),
+    "gravitational along y": lambda p: float(9.81 * p.masses @ p.positions[:, 1]),
+    "gravitational along z": lambda p: float(9.81 * p.masses @ p.positions[:, 2]),
+    "gravitational above the first": lambda p: _above(p, p.positions[0]),
+    "gravitational above the lowest": lambda p: _above(p, _lowest(p)),
+    "gravitational above the mean": lambda p: _above(p, p.positions.mean(0)),
+    "gravitational without sign": lambda p: abs(_above(p, np.zeros(3))),
+}
+
+
 def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
     """Return all energies by the formulas, as a solver with these faults has them [J]."""
     p, _ = apply(faults, p, StepModel())
-    parts = np.array([
-        0.5 * (p.masses[:, None] * p.velocities**2).sum(),
-        elastic_energy(p),
-        -(p.constant * p.positions).sum(),
-    ])  # fmt: skip
+    kinetic = 0.5 * (p.masses[:, None] * p.velocities**2).sum()
+    parts = np.array([kinetic, elastic_energy(p), -(p.constant * p.positions).sum()])
     for fault in faults:
         parts *= fault.parts or 1.0
-    kinetic, elastic, gravitational = parts.tolist()
-    potential = elastic + gravitational
-    energies = (kinetic + potential, kinetic, potential, elastic, gravitational)
-    return dict(zip(PARTS, energies, strict=True))
+        if len(fault.energy) == 1:
+            parts[ADDENDS.index(fault.energy[0])] = WRONG_FORMULAS[fault.key](p)
+    energies = dict(zip(ADDENDS, parts.tolist(), strict=True))
+    return {name: _sum(name, faults, energies) for name in SUMS} | energies
+
+
+def _sum(whole: str, faults: Sequence[Option], energies: Energies) -> float:
+    """Return the total or the potential energy of these parts, as faults of sums have it [J]."""
+    factors = {part: 1.0 for part in ADDENDS if whole == "total" or part != "kinetic"}
+    for fault in faults:
+        if len(fault.energy) == 3 and fault.energy[0] == whole:
+            named = SUMS["potential"] if fault.energy[1] == "potential" else fault.energy[1:2]
+            factors |= dict.fromkeys(named, fault.energy[2])
+    return sum(factor * energies[part] for part, factor in factors.items())
 
 
 def tolerance(p: SpringProblem, epsilon: float) -> float:
@@ -123,11 +203,14 @@ def _judge_case(
 
 def _sums(energies: Energies) -> dict[str, float]:
     """Return how far energies are from the sums of their parts, where all of them are known."""
-    return {
+    sums = {
         whole: abs(energies[whole] - sum(energies[name] for name in parts))
         for whole, parts in SUMS.items()
         if {whole, *parts} <= energies.keys()
     }
+    if "total" not in sums and {"total", *ADDENDS} <= energies.keys():
+        sums["total"] = abs(energies["total"] - _sum("total", (), energies))
+    return sums
 
 
 def _work(
@@ -142,19 +225,24 @@ def _work(
 
 
 def works(p: SpringProblem, q: SpringProblem) -> dict[str, float]:
-    """Return the work of forces along the line between two states, by energy [J]."""
-    d, p = q.positions - p.positions, p.changed(velocities=np.zeros_like(p.velocities))
+    """Return by energy the work of forces along the line between two states [J].
+
+    The total changes by the kinetic energy gained, less the work.
+    """
+    before, d = p, q.positions - p.positions
+    p = p.changed(velocities=np.zeros_like(p.velocities))
     elastic = 0.0
     for t, weight in zip(POINTS, WEIGHTS, strict=True):
         forces = all_forces(p.changed(positions=p.positions + 0.5 * (1.0 + t) * d)) - p.constant
         elastic += 0.5 * weight * float((forces * d).sum())
     gravitational = float((p.constant * d).sum())
     potential = elastic + gravitational
+    gained = predict((), q)["kinetic"] - predict((), before)["kinetic"]
     return {
         "elastic": elastic,
         "gravitational": gravitational,
         "potential": potential,
-        "total": potential,
+        "total": potential - gained,
     }
 
 
@@ -166,19 +254,79 @@ def _diagnose(judgements: Sequence[CaseJudgement], epsilon: float) -> Diagnosis:
     ]
     if not answers or all(judgement.verdict < Verdict.WRONG for judgement in judgements):
         return Diagnosis()
-    count = 0
-    for _, same_size in groupby(combined(ENERGY_FAULTS), key=len):
-        matches = []
-        for faults in same_size:
-            count += 1
-            if all(_matches(predict(faults, p), p, values, epsilon) for p, values in answers):
-                matches.append(faults)
-        if matches:
-            keys = [" + ".join(fault.key for fault in faults) for faults in matches]
-            message = either([[fault.sentence for fault in faults] for faults in matches])
-            explanation = Explanation(tuple(keys[:MAX_EXPLANATIONS]), message, 1.0, 0.0)
-            return Diagnosis((explanation,), variant_count=count)
-    return Diagnosis(first_broken=first_broken(judgements), variant_count=count)
+    hints, first = hints_of(judgements), first_broken(judgements)
+    if not any(any(values[name] for name in values.keys() & PARTS) for _, values in answers):
+        return Diagnosis(first_broken=sentence("Every energy is 0 in all cases."), hints=hints)
+    if set(ADDENDS) <= answers[0][1].keys():
+        mistakes, share = _by_energy(judgements, answers, epsilon)
+    else:
+        mistakes, share = _together(answers, epsilon), 1.0
+    if not mistakes:
+        return Diagnosis(first_broken=first, hints=hints)
+    keys = [" + ".join(fault.key for fault in faults) for faults in mistakes]
+    message = either([[fault.sentence for fault in faults] for faults in mistakes])
+    explanation = Explanation(tuple(keys[:MAX_EXPLANATIONS]), message, share, 0.0)
+    return Diagnosis((explanation,), None, None if share == 1.0 else first, hints)
+
+
+Answers = Sequence[tuple[SpringProblem, Energies]]
+
+
+def _by_energy(
+    judgements: Sequence[CaseJudgement], answers: Answers, epsilon: float
+) -> tuple[list[tuple[Option, ...]], float]:
+    """Return the faults that explain each wrong energy by itself, and the share of those."""
+    named = answers[0][1].keys()
+    wrong = {
+        str(found.sentence.values.get("name"))
+        for judgement in judgements
+        for found in judgement.findings
+        if found.verdict >= Verdict.WRONG
+    }
+    groups = [
+        [fault for fault in ENERGY_FAULTS if _explains(fault, name, answers, epsilon)]
+        for name in PARTS
+        if name in named and (_is_no_sum(name, answers, epsilon) if name in SUMS else name in wrong)
+    ]
+    explained = [group for group in groups if group]
+    share = len(explained) / max(len(groups), 1)
+    return list(islice(product(*explained), MAX_EXPLANATIONS)) if explained else [], share
+
+
+def _is_no_sum(whole: str, answers: Answers, epsilon: float) -> bool:
+    """Return whether an energy is not the sum of the answered parts in any case."""
+    return any(
+        abs(values[whole] - _sum(whole, (), values)) > 8.0 * tolerance(p, epsilon)
+        for p, values in answers
+    )
+
+
+def _explains(fault: Option, name: str, answers: Answers, epsilon: float) -> bool:
+    """Return whether a fault gives all answers of an energy, a sum from the answered parts."""
+    is_of_sum = len(fault.energy) == 3
+    if (name in SUMS) != is_of_sum or (is_of_sum and fault.energy[0] != name):
+        return False
+    return all(
+        abs(
+            values[name]
+            - (_sum(name, (fault,), values) if is_of_sum else predict((fault,), p)[name])
+        )
+        <= 8.0 * tolerance(p, epsilon)
+        for p, values in answers
+    )
+
+
+def _together(answers: Answers, epsilon: float) -> list[tuple[Option, ...]]:
+    """Return the fewest faults that explain all answers, at most two."""
+    for count, same_size in groupby(combined(ENERGY_FAULTS), key=len):
+        matches = [
+            faults
+            for faults in same_size
+            if all(_matches(predict(faults, p), p, values, epsilon) for p, values in answers)
+        ]
+        if matches or count == MAX_TOGETHER:
+            return matches
+    return []
 
 
 def _matches(expected: Energies, p: SpringProblem, answers: Energies, epsilon: float) -> bool:

@@ -38,6 +38,9 @@ class Option(NamedTuple):
     change: Change | None = None  # returns the fields that it replaces in a problem
     fields: Mapping[str, Any] = {}  # the fields that it replaces in a model
     parts: tuple[float, ...] = ()  # factors of the kinetic, elastic and gravitational energy
+    # which energy has another formula, or a sum, one of its parts, and the factor of that
+    energy: tuple[Any, ...] = ()
+    output: bool = False  # whether it changes all forces at the end
     rare: bool = False  # whether it is not tried together with faults
     part: str = ""  # the part of a step that it changes alone: forces, matrix; else both
 
@@ -61,10 +64,24 @@ def _first_for_all(p: SpringProblem, name: str) -> dict[str, Any]:
     return {name: np.resize(getattr(p, name)[:1], len(p.springs))}
 
 
+def _lengths(p: SpringProblem) -> FloatArray:
+    return np.maximum(frames(p, p.positions)[0], 1e-150)
+
+
+def _as_if_long(p: SpringProblem, length: float) -> dict[str, Any]:
+    """Return the numbers with which springs pull as if all were that long."""
+    share, stretch = _lengths(p) / length, _lengths(p) - p.rest_lengths
+    stretch = np.where(stretch != 0.0, stretch, 1e-12)
+    return {
+        "stiffnesses": p.stiffnesses * share * (length - p.rest_lengths) / stretch,
+        "dampings": p.dampings * share**2,
+    }
+
+
 # What an entry of faults.toml may hold.
 FIELDS = {
     *("code", "program", "lines", "example", "key", "sentence", "tasks", "parts", "rare", "each"),
-    *("scale", "set", "model", "integrator", "matrix", "value", "part"),
+    *("scale", "set", "model", "integrator", "matrix", "value", "part", "energy", "output"),
 }
 # Faults that are no fixed factors or fields.
 CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
@@ -111,6 +128,27 @@ CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
     ),
     "pins as a mask": lambda p: {"pinned": np.flatnonzero(p.pinned[: p.count])},
     "kinetic without mass": lambda p: {"masses": np.ones(p.count)},
+    "mean rest length for all": lambda p: {
+        "rest_lengths": np.full(len(p.springs), p.rest_lengths.mean())
+    },
+    "mean stiffness for all": lambda p: {
+        "stiffnesses": np.full(len(p.springs), p.stiffnesses.mean())
+    },
+    "rest length of the next spring": lambda p: {"rest_lengths": np.roll(p.rest_lengths, -1)},
+    "stretch without sign": lambda p: {
+        "stiffnesses": p.stiffnesses * np.sign(_lengths(p) - p.rest_lengths)
+    },
+    "stretch squared": lambda p: {
+        "stiffnesses": p.stiffnesses * np.abs(_lengths(p) - p.rest_lengths)
+    },
+    "length with {length:g} added": lambda p, length: {
+        "stiffnesses": p.stiffnesses * _lengths(p) / (_lengths(p) + length),
+        "dampings": p.dampings * (_lengths(p) / (_lengths(p) + length)) ** 2,
+    },
+    "length of all springs together": lambda p: _as_if_long(p, float(np.linalg.norm(_lengths(p)))),
+    "damping over length": lambda p: {"dampings": p.dampings / _lengths(p)},
+    "damping times length": lambda p: {"dampings": p.dampings * _lengths(p)},
+    "damping times length squared": lambda p: {"dampings": p.dampings * _lengths(p) ** 2},
 }
 
 
@@ -142,7 +180,9 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
         rare = entry.get("rare", False)
         rare = any(x in rare for x in values.values()) if isinstance(rare, list) else rare
         change, part = _change(entry, values), entry.get("part", "")
-        option = Option(key, aspect, message, change, fields, parts, rare, part)
+        energy = tuple(values.get(name, name) for name in entry.get("energy", ()))
+        output = entry.get("output", False)
+        option = Option(key, aspect, message, change, fields, parts, energy, output, rare, part)
         yield option
         if "matrix" in entry and "dv" not in fields and entry["matrix"].get("masses", 1.0) == 1.0:
             yield option._replace(fields={**fields, "dv": True})
@@ -195,14 +235,16 @@ def faults_of(task: str, aspects: Sequence[str]) -> tuple[Option, ...]:
         for option in (_in_parts(basis, entry) if task == "step" else [basis])
     )
     if idle := [
-        option.key for option in options if not (option.change or option.fields or option.parts)
+        option.key
+        for option in options
+        if not any((option.change, option.fields, option.parts, option.energy, option.output))
     ]:
         raise ValueError(f"faults.toml: expected a change of each fault, got none of {idle}")
     return options
 
 
-FORCE_FAULTS = faults_of("forces", ("gravity", "springs", "damping"))
-ENERGY_FAULTS = faults_of("energy", ("kinetic", "elastic", "springs", "gravity"))
+FORCE_FAULTS = faults_of("forces", ("gravity", "springs", "damping", "forces"))
+ENERGY_FAULTS = faults_of("energy", ("kinetic", "elastic", "springs", "gravitational", "sum"))
 STEP_FAULTS = faults_of("step", ASPECTS)
 
 
@@ -223,8 +265,9 @@ def apply(
 
 
 def combined(options: Sequence[Option]) -> Iterator[tuple[Option, ...]]:
-    """Yield each option, then each pair and each triple, of different aspects."""
+    """Yield each option, then each pair and each triple without rare ones, of other aspects."""
+    usual = [option for option in options if not option.rare]
     for count in range(1, MAX_FAULTS + 1):
-        for faults in combinations(options, count):
+        for faults in combinations(options if count < MAX_FAULTS else usual, count):
             if len({fault.aspect for fault in faults}) == count:
                 yield faults

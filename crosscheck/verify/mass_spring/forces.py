@@ -1,6 +1,6 @@
 """The task mass_spring_forces: its cases and its judgement."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from ..contestant import Answer, Exchange
 from ..explain import Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
-from ..laws import digits, finding, judge_case
+from ..laws import digits, finding, hints_of, judge_case
 from ..sentence import Sentence, sentence
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
@@ -114,14 +114,80 @@ def _balance(p: SpringProblem, output: FloatArray, allowed: float) -> Finding:
     return finding("momentum balance", gap, allowed * np.sqrt(p.count) * 2.0)
 
 
-def _predict(faults: tuple[Option, ...], case: Case) -> Mapping[str, Any]:
-    return {"forces": all_forces(apply(faults, problem_of(case.inputs), StepModel())[0])}
+def _pulls(p: SpringProblem) -> FloatArray:
+    """Return the force of each spring and its damper on its first end [N], (spring, 3)."""
+    single = p.changed(
+        masses=np.ones(2 * len(p.springs)),
+        springs=np.arange(2 * len(p.springs)).reshape(-1, 2),
+        positions=p.positions[p.springs.ravel()],
+        velocities=p.velocities[p.springs.ravel()],
+    )
+    x, v = single.positions, single.velocities
+    return (spring_forces(single, x) + damper_forces(single, x, v))[::2]
 
 
-def variants() -> Iterator[Variant]:
+def _shortened(vectors: FloatArray, limit: float) -> FloatArray:
+    """Return vectors that are no longer than a limit."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors * np.minimum(1.0, limit / np.maximum(lengths, 1e-300))
+
+
+# What faults make of all forces in the end, by their keys, and with a number that answers show.
+OUTPUTS: Mapping[str, Callable[[SpringProblem, float], FloatArray]] = {
+    "accelerations": lambda p, _: all_forces(p) / p.masses[:, None],
+    "forces reversed": lambda p, _: -all_forces(p),
+    "components of forces clipped": lambda p, limit: np.clip(all_forces(p), -limit, limit),
+    "components of springs' forces clipped": lambda p, limit: (
+        p.constant + p.incidence.T @ np.clip(_pulls(p), -limit, limit)
+    ),
+    "springs' forces clipped": lambda p, limit: (
+        p.constant + p.incidence.T @ _shortened(_pulls(p), limit)
+    ),
+    "drag": lambda p, factor: all_forces(p) - factor * p.velocities,
+}
+
+
+def _numbers(
+    exchanges: Sequence[Exchange], problems: Mapping[str, SpringProblem]
+) -> dict[str, float]:
+    """Return the limits and factors that faults of outputs have, if a solver has these faults."""
+    answers = [
+        (problems[exchange.case.name], exchange.answer.values["forces"])
+        for exchange in exchanges
+        if isinstance(exchange.answer, Answer)
+    ]
+    errors = [(all_forces(p) - f, p.velocities) for p, f in answers]
+    squares = [float((v * v).sum()) for _, v in errors]
+    rates = [float((e * v).sum()) / s for (e, v), s in zip(errors, squares, strict=True) if s]
+    return {
+        "components of forces clipped": max((np.abs(f).max() for _, f in answers), default=0.0),
+        "drag": float(np.median(rates)) if rates else 0.0,
+    }
+
+
+def _predict(
+    faults: tuple[Option, ...],
+    problems: Mapping[str, SpringProblem],
+    numbers: Mapping[str, float],
+    case: Case,
+) -> Mapping[str, Any]:
+    p = apply(faults, problems[case.name], StepModel())[0]
+    key = next((fault.key for fault in faults if fault.output), "")
+    name, _, number = key.partition(" at ")
+    return {
+        "forces": OUTPUTS[name](p, float(number or numbers.get(name, 0.0)))
+        if key
+        else all_forces(p)
+    }
+
+
+def variants(exchanges: Sequence[Exchange]) -> Iterator[Variant]:
     """Yield the right formula's faults, up to three of different aspects."""
+    problems = {exchange.case.name: problem_of(exchange.case.inputs) for exchange in exchanges}
+    numbers = _numbers(exchanges, problems)
     for faults in combined(FORCE_FAULTS):
-        yield Variant(tuple(fault.key for fault in faults), partial(_predict, faults))
+        keys = tuple(fault.key for fault in faults)
+        yield Variant(keys, partial(_predict, faults, problems, numbers))
 
 
 def describe(keys: Sequence[str]) -> Sentence:
@@ -135,6 +201,8 @@ def _diagnose(
     wrong = [judgement.verdict >= Verdict.WRONG for judgement in judgements]
     if not any(wrong):
         return Diagnosis()
+    if unequal := first_broken(judgements, "equal answers"):
+        return Diagnosis((), None, unequal, hints_of(judgements))
 
     def relative_tolerance(case: Case) -> float:
         p = problem_of(case.inputs)
@@ -143,6 +211,6 @@ def _diagnose(
     # Wrong answers come first, for they tell variants apart.
     order = sorted(range(len(wrong)), key=lambda i: not wrong[i])
     telling = [exchanges[i] for i in order]
-    explanations, count = explain(variants(), telling, relative_tolerance, describe)
+    explanations, count = explain(variants(telling), telling, relative_tolerance, describe)
     first = None if explanations else first_broken(judgements)
-    return Diagnosis(explanations, None, first, (), count)
+    return Diagnosis(explanations, None, first, hints_of(judgements), count)

@@ -5,7 +5,7 @@ Its forces are written from the formulas, apart from `reference`: a spring pulls
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -44,8 +44,8 @@ class SpringProblem:
     # whether forces of springs at one particle add up; else the last one stays, of those whose
     # first end it is and of those whose second
     accumulated: bool = True
-    # the velocity that dampers see: "along" the spring, "all" of the relative velocity, the
-    # particle's own ("drag"), or its own along the spring ("own")
+    # the velocity that dampers see: a key of RATES, the particle's own ("drag"), or its own along
+    # the spring ("own"); "one end": along the spring, but the first end alone feels the damper
     damping: str = "along"
     normalised: bool = True  # whether a spring's direction is of length one
     linear: "SpringProblem | None" = None  # whose springs the matrix of a step has, if others
@@ -156,6 +156,24 @@ def spring_forces(p: SpringProblem, x: FloatArray) -> FloatArray:
     return -p.pulled.T @ (pull[:, None] * u)
 
 
+def along(v: FloatArray, u: FloatArray) -> FloatArray:
+    """Return the part of velocities v along directions u, shape (spring, 3)."""
+    return (v * u).sum(axis=1, keepdims=True) * u
+
+
+# The rate that a damper multiplies by c, from the velocities of both ends and the direction.
+RATES: Mapping[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] = {
+    "along": lambda v_i, v_j, u: along(v_i - v_j, u),
+    "one end": lambda v_i, v_j, u: along(v_i - v_j, u),
+    "all": lambda v_i, v_j, u: v_i - v_j,
+    "sum": lambda v_i, v_j, u: along(v_i + v_j, u),
+    "first": lambda v_i, v_j, u: along(v_i, u),
+    "second": lambda v_i, v_j, u: along(-v_j, u),
+    "speed": lambda v_i, v_j, u: np.linalg.norm(v_i - v_j, axis=1, keepdims=True) * u,
+    "components": lambda v_i, v_j, u: (v_i - v_j) * np.abs(u),
+}
+
+
 def damper_forces(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return the dampers' forces at velocities v on the particles [N], shape (particle, 3)."""
     if not p.damped:
@@ -165,14 +183,10 @@ def damper_forces(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     c, (_, u) = p.dampings[:, None], frames(p, x)
     first, second = v[p.springs[:, 0]], v[p.springs[:, 1]]
     if p.damping == "own":
-        return -sum(
-            np.maximum(sign * p.pulled, 0.0).T @ (c * (end * u).sum(1, keepdims=True) * u)
-            for sign, end in ((1.0, first), (-1.0, second))
-        )
-    rate = first - second
-    if p.damping == "along":
-        rate = (rate * u).sum(axis=1, keepdims=True) * u
-    return -p.pulled.T @ (c * rate)
+        own = np.maximum(p.pulled, 0.0).T @ (c * along(first, u))
+        return -own - np.maximum(-p.pulled, 0.0).T @ (c * along(second, u))
+    pulled = np.maximum(p.pulled, 0.0) if p.damping == "one end" else p.pulled
+    return -pulled.T @ (c * RATES[p.damping](first, second, u))
 
 
 def all_forces(p: SpringProblem) -> FloatArray:
