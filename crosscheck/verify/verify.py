@@ -1,6 +1,6 @@
 """Ask a solver every case of its tasks, judge its answers, and explain wrong answers."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Protocol
@@ -125,7 +125,7 @@ def judge_cases(
     They are judged by what its greeting declares, or by another greeting. Its forward kinematics is
     known to have the `forward_faults`.
     """
-    exchanges = list(_ask(contestant, cases, partial(notify, task)))
+    exchanges = _ask(contestant, cases, partial(notify, task))
     judge = DISCIPLINES[task].judge
     if forward_faults and task == inverse_kinematics.TASK:
         judge = partial(inverse_kinematics.judge, base=forward_faults)
@@ -161,8 +161,12 @@ def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple
 
 def _ask(
     contestant: Contestant, cases: Sequence[Case], notify: Callable[[int, int], None]
-) -> Iterator[Exchange]:
-    """Ask each case, then each answered case a second time."""
+) -> list[Exchange]:
+    """Ask each case, then each answered case a second time.
+
+    Forces and energies are asked again in reverse, so that what is left over from the request
+    before shows.
+    """
     answers, hangs = [], 0
     for i, case in enumerate(cases):
         notify(i, 2 * len(cases))
@@ -170,7 +174,10 @@ def _ask(
         hangs += isinstance(answers[-1], Failure) and answers[-1].kind is FailureKind.HUNG
         if hangs == MAX_HANGS:
             break
-    for i, (case, answer) in enumerate(zip(cases, answers, strict=False)):
+    exchanges, asked = [], list(zip(cases, answers, strict=False))
+    order = -1 if cases and cases[0].task in (forces.TASK, energy.TASK) else 1
+    for i, (case, answer) in enumerate(asked[::order]):
         notify(len(cases) + i, 2 * len(cases))
         repeat = answer if isinstance(answer, Failure) else contestant.answer(case)
-        yield Exchange(case, with_lesser_time(answer, repeat), repeat)
+        exchanges.append(Exchange(case, with_lesser_time(answer, repeat), repeat))
+    return exchanges[::order]
