@@ -16,6 +16,8 @@ from .judgement import CaseJudgement, Finding, Verdict
 from .sentence import Sentence, sentence
 from .timing import time_call
 
+# Numbers that differ by less than this share are alike, in single precision too.
+ROUNDED = 1e-5
 HOLDS = sentence("It holds.")
 LAWS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
@@ -117,6 +119,43 @@ def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
     broken = {found.law for found in findings if found.verdict >= Verdict.WRONG}
     hints = (entry for law, entry in LAWS["hints"].items() if law in broken)
     return tuple(Sentence(entry["sentence"], {}) for entry in hints)
+
+
+def proportion_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
+    """Return which outputs are zero in all answers, or the right ones times one number."""
+    answers = [
+        (judgement.answer.values, judgement.expected)
+        for judgement in judgements
+        if isinstance(judgement.answer, Answer)
+    ]
+    sentences = []
+    for name in answers[0][0] if answers else ():
+        if not any(np.any(values.get(name, 0.0)) for values, _ in answers):
+            sentences.append(sentence("All numbers of {name} in its answers are zero.", name=name))
+            continue
+        pairs = [
+            (np.asarray(values[name], dtype=float), np.asarray(expected[name], dtype=float))
+            for values, expected in answers
+            if name in values and name in expected
+        ]
+        factor = _common_factor(pairs)
+        if factor is not None and abs(factor - 1.0) > ROUNDED and not name.endswith("rotations"):
+            sentences.append(sentence(
+                "All numbers of {name} in its answers are {factor:.6g} times the right ones: look "
+                "for a unit or a factor.", name=name, factor=factor,
+            ))  # fmt: skip
+    return tuple(sentences)
+
+
+def _common_factor(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float | None:
+    """Return the number that makes the first arrays of the second, None if there is none."""
+    if not pairs or any(a.shape != b.shape or not np.isfinite(a).all() for a, b in pairs):
+        return None
+    a, b = (np.concatenate([pair[i].ravel() for pair in pairs]) for i in range(2))
+    square = float(b @ b)
+    factor = float(a @ b) / square if square > 0.0 else 0.0
+    is_common = np.abs(a - factor * b).max() <= ROUNDED * np.abs(a).max(initial=0.0)
+    return factor if is_common else None
 
 
 def laws_that_hold(judgements: Sequence[CaseJudgement]) -> Sentence:

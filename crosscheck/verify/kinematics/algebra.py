@@ -29,9 +29,13 @@ from .switches import UNCAPPED, Switches
 # Of `multiply`, from this number on each of the 16 terms a_i b_j has the wrong sign; of `cross`,
 # from that one each of the six.
 FIRST_TERM, FIRST_CROSS_TERM = 5, 5
+# Of `rotate`, the first number of an element of a matrix that has the wrong sign.
+FIRST_ELEMENT = 4
 # Up to this number `angle` changes the angle of the right arc.
 OF_THE_ARC = 3
 DEGREE = math.pi / 180.0
+# Of `angle`, the number of an angle that is 90 degrees throughout.
+QUARTER_TURN = 19
 
 
 def product(a: Any, b: Any, faults: Switches) -> Any:
@@ -86,9 +90,14 @@ def inverse(q: Any, faults: Switches) -> Any:
 
 
 def rotated(q: Any, v: Any, faults: Switches) -> Any:
-    """Return the vector v rotated by q; or the vector part of q v (1), or rotated back (2)."""
+    """Return the vector v rotated by q; or the vector part of q v (1), or rotated back (2).
+
+    Or by a matrix without its factors of 2 (3), or with a wrong sign in one element (4 to 9).
+    """
     if faults.rotate == 2:
         return rotate(conjugate(q), v)
+    if faults.rotate > 2:
+        return by_matrix(q, v, faults.rotate)
     if faults.rotate == 0 and faults.rotating == 0:
         if faults.cross == 0:
             return rotate(q, v)
@@ -103,6 +112,19 @@ def rotated(q: Any, v: Any, faults: Switches) -> Any:
     else:
         _, x, y, z = product(q, product(pure, inverse(q, faults), faults), faults)
     return x, y, z
+
+
+def by_matrix(q: Any, v: Any, k: int) -> Any:
+    """Return a vector times the matrix of q, wrong by the number of `rotate`."""
+    u, right = (q[1], q[2], q[3]), rotate(q, v)
+    if k == 3:
+        return scale(0.5, add(v, right))
+    row, is_second = (k - FIRST_ELEMENT) // 2, (k - FIRST_ELEMENT) % 2
+    column = (row + 2 - is_second) % 3
+    sign = -1.0 if is_second else 1.0  # of 2 w u in the element of row and column
+    flip = -4.0 * q[0] * sign * u[3 - row - column] * v[column]
+    x, y, z = right
+    return x + flip * (row == 0), y + flip * (row == 1), z + flip * (row == 2)
 
 
 def made_unit(q: Any) -> Any:
@@ -150,6 +172,8 @@ def wrong_arc(a: Any, b: Any, axis: Any, sine: float, cosine: float, k: int) -> 
         (1.0 + raw * cosine, raw * sine), (raw * raw + raw * cosine, raw * sine),
         (math.cos(0.5 * root), math.sin(0.5 * root) * sine * raw),
     )  # fmt: skip
+    if k == QUARTER_TURN:
+        return rotation_about(axis, 0.5 * math.pi)
     w, length = numbers[k - OF_THE_ARC - 1 - len(angles)]
     x, y, z = scale(length, axis)
     return (w, x, y, z) if k < 16 or k == 18 else made_unit((w, x, y, z))

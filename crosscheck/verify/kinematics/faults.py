@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 from ..explain import either
 from ..judgement import Diagnosis
 from ..sentence import Sentence, sentence, with_code
-from .algebra import FIRST_CROSS_TERM, FIRST_TERM
+from .algebra import FIRST_CROSS_TERM, FIRST_ELEMENT, FIRST_TERM
 from .switches import Switches
-from .textbook import DROPPED
+from .textbook import DROPPED, FIXED, FIXED_TEST, SMALL
 
 TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 # The orders in which a rotation is split into Euler angles, and put together: X, Y and Z in another
@@ -21,6 +21,18 @@ EULER_ORDERS = (
     *itertools.permutations(map("".join, itertools.permutations("XYZ")), 2),
     *((f"{a}{b}{a}", f"{a}{b}{a}".lower()) for a, b in itertools.permutations("XYZ", 2)),
 )
+# The orders of Euler angles that are given in degrees, or of which a quaternion has the numbers.
+ANGLES = tuple(
+    (order, is_degrees)
+    for is_degrees in (True, False)
+    for order in map("".join, itertools.permutations("XYZ"))
+)
+# What a small angle of CCD ends or becomes, by the number of `small`.
+AT_SMALL = (
+    sentence("the sweep ends there"), sentence("the solve ends there"),
+    sentence("the angle is raised to it"),
+)  # fmt: skip
+SAVED = (sentence("rotations"), sentence("rotations and positions"))
 AS_THE_TEXTBOOK = sentence("It does what the textbook does.")
 
 
@@ -94,9 +106,23 @@ def _cross_term(number: int) -> tuple[str, str]:
     return f"a.{'xyz'[i]} b.{'xyz'[j]}", "xyz"[c]
 
 
+def _element(number: int) -> str:
+    """Return the element of a matrix that has the wrong sign."""
+    row, is_second = divmod(number - FIRST_ELEMENT, 2)
+    return f"m[{row}][{(row + 2 - is_second) % 3}]"
+
+
 # What the numbers of a switch stand for in keys and sentences.
 VALUES: Mapping[str, Callable[[int], Mapping[str, Any]]] = {
     "euler": lambda number: dict(zip(("order", "other"), EULER_ORDERS[number - 1], strict=True)),
+    "angles": lambda number: {"order": ANGLES[number - 1][0]},
+    "small": lambda number: {
+        "angle": SMALL[(number - 1) % len(SMALL)],
+        "what": AT_SMALL[(number - 1) // len(SMALL)],
+    },
+    "test": lambda number: {"distance": FIXED[number - FIXED_TEST]},
+    "rotate": lambda number: {"element": _element(number)},
+    "frame_saved": lambda number: {"what": SAVED[number - 2]},
     "dropped": lambda number: {"angle": DROPPED[number]},
     "multiply": lambda number: dict(zip(("term", "number"), _term(number), strict=True)),
     "cross": lambda number: dict(zip(("term", "number"), _cross_term(number), strict=True)),

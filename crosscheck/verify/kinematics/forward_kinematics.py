@@ -20,6 +20,8 @@ from .report import diagnosis_of, report
 from .skeletons import CaseFamily, drawn
 
 TASK = "forward_kinematics"
+# Below this w of a rotation a division by it has no meaning.
+HALF_TURN = 1e-6
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -102,7 +104,10 @@ def _rotations(rotations: Any, expected: Any, bound: float) -> Iterator[Finding]
     lengths = np.linalg.norm(rotations, axis=-1)
     usable = np.isfinite(lengths) & (lengths > 0.0)
     if not usable.all():
-        yield finding("rotations, not numbers", tolerance=bound, index=int(np.argmin(usable)))
+        joint = int(np.argmin(usable))
+        is_half = abs(expected[joint, 0]) < HALF_TURN
+        key = "rotations, not numbers at half a turn" if is_half else "rotations, not numbers"
+        yield finding(key, tolerance=bound, index=joint)
         return
     yield unit_quaternions(lengths, bound)
     angles = rotation.angle(rotations / lengths[:, None], expected)

@@ -77,10 +77,11 @@ def judge(
             trial.add([_equal_worlds(trial, original, comparison, greeting)])
     # what repeats its start is explained by chance by several faults at once
     diagnosis = _diagnosis(trials, comparison, greeting, 1 if idle else MAX_FAULTS, base)
-    points = None
+    points = lengths = None
     if not diagnosis.explained:
         points = sweeps.right_points(comparison, sweep_trials, greeting)
-    diagnosis = replace(diagnosis, hints=tuple(filter(None, [idle, points])))
+        lengths = sweeps.lengths(trials)
+    diagnosis = replace(diagnosis, hints=tuple(filter(None, [idle, points, lengths])))
     if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
             trial.correct(_aggravate)
@@ -228,6 +229,12 @@ def _equal_worlds(
     return finding("equal worlds", error, tolerance, verdict=verdict)
 
 
+def _ends_elsewhere(trial: PoseTrial) -> bool:
+    """Return whether a solve goes on within its tolerance, or ends short of the nearest point."""
+    laws = (STOPS, "nearest point")
+    return any(found.law in laws and found.verdict for found in trial.judgement.findings)
+
+
 def _diagnosis(
     trials: Sequence[PoseTrial],
     comparison: SweepComparison,
@@ -242,16 +249,18 @@ def _diagnosis(
     wrong = [trial for trial in sweep_trials if trial.is_wrong or trial.case.name in names]
     if wrong:
         return sweeps.explained(comparison, sweep_trials, wrong, greeting, max_faults, base)
-    solves = [
-        trial.comparable
+    whole = [
+        trial
         for trial in posed_trials
-        if not trial.is_sweep
-        and trial.case.requirement == "must"
-        and (trial.is_wrong or any(f.law == STOPS and f.verdict for f in trial.judgement.findings))
+        if not trial.is_sweep and trial.case.requirement == "must" and trial.pose.finite
     ]
+    solves = [trial.comparable for trial in whole if trial.is_wrong or _ends_elsewhere(trial)]
+    # of another tolerance, where tests that agree elsewhere differ
+    loose = [t.comparable for t in whole if t.case.inputs["tolerance"] == problems.LOOSE]
     if solves and comparison.method:
         bound = partial(sweeps.prediction_bound, greeting)
+        compared = [*solves, *(exchange for exchange in loose if exchange not in solves)]
         return diagnosis_of(
-            comparison.method, solves, solves, bound, comparison.behaviour, base=base
+            comparison.method, compared, solves, bound, comparison.behaviour, base=base
         )
     return Diagnosis(behaviour=comparison.behaviour)

@@ -13,7 +13,7 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 
 from ..case import Case
 from ..explain import Variant
-from .faults import EULER_ORDERS, SwitchFault, combinations, switches
+from .faults import ANGLES, EULER_ORDERS, SwitchFault, combinations, switches
 from .switches import Switches
 from .textbook import OF_GLOBAL_LINKS, SOLVERS, Ending, TextbookChain, TextbookPose, place_all
 
@@ -60,6 +60,10 @@ def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
         local[:, 0] = np.abs(local[:, 0])
     elif switched.numbers == 5:
         local[:, 1:] *= -1.0
+    elif switched.numbers in (8, 9):
+        local = np.roll(local, -1, axis=-1)
+    if switched.angles:
+        local = _as_euler_angles(local, *ANGLES[switched.angles - 1])
     if switched.euler:
         local = _through_euler_angles(local, *EULER_ORDERS[switched.euler - 1])
     return TextbookPose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
@@ -75,10 +79,24 @@ def _through_euler_angles(local: FloatArray, order: str, other_order: str) -> Fl
     return np.array(rotations.as_quat(scalar_first=True))
 
 
+def _as_euler_angles(local: FloatArray, order: str, is_degrees: bool) -> FloatArray:
+    """Return rotations of Euler angles in degrees as if in radians, or of x, y, z as angles."""
+    if is_degrees:
+        rotations = Rotation.from_quat(local, scalar_first=True)
+        angles = np.degrees(rotations.as_euler(order, suppress_warnings=True))
+    else:
+        angles = local[:, 1:][:, ["XYZ".index(axis) for axis in order]]
+    return np.array(Rotation.from_euler(order, angles).as_quat(scalar_first=True))
+
+
 def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:
     """Return quaternions in the order in which the solver writes them."""
     if switched.numbers == 6:  # the conjugates
         return rotations * [1.0, -1.0, -1.0, -1.0]
+    if switched.numbers == 9:
+        return np.roll(rotations, 1, axis=-1)
+    if switched.numbers == 10:
+        return np.abs(rotations)
     return np.roll(rotations, -1, axis=-1) if switched.numbers in (2, 3) else rotations
 
 
@@ -153,6 +171,8 @@ def programs(
 def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
     """Return the outputs of forward kinematics."""
     positions, rotations = forward(case.inputs, switched)
+    if switched.numbers == 7:
+        rotations = case.inputs["local_rotations"]
     return {"positions": positions, "rotations": _reordered(rotations, switched)}
 
 
@@ -204,7 +224,13 @@ def predict_track(method: str, switched: Switches, case: Case) -> Mapping[str, A
         frame, local = _outputs(method, switched, inputs)
         frames.append(frame)
         start = (local, first, rotation.identity(len(first)))[switched.frame_start]
+    if switched.frame_saved == 1:  # before it is solved
+        first_case = {**case.inputs, "target": curve[0], "max_iterations": 0}
+        frames = [_outputs(method, switched, first_case)[0], *frames[:-1]]
     outputs = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
+    for name in {2: ("local_rotations", "path_placed"), 3: outputs}.get(switched.frame_saved, ()):
+        if name in outputs:
+            outputs[name][:] = outputs[name][-1]
     for local in outputs.get("local_rotations", ()):
         with_effector_of(local, case.inputs)
     return outputs

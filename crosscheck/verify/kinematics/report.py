@@ -8,7 +8,7 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import explain, first_broken
 from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict, smallest_failures
-from ..laws import hints_of, laws_that_hold
+from ..laws import hints_of, laws_that_hold, proportion_of
 from ..sentence import Sentence
 from .faults import SwitchFault, describe
 from .predictions import variants
@@ -53,6 +53,8 @@ def report(
     if len(failures) == 1 and not diagnosis.explained:
         broken = first_broken(failures)
     hints = (*diagnosis.hints, *hints_of(judgements))
+    if broken:
+        hints += proportion_of(judgements)
     if max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED:
         hints += (laws_that_hold(judgements),)
     diagnosis = replace(diagnosis, first_broken=broken, hints=hints)

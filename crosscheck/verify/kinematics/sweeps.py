@@ -35,6 +35,8 @@ SMALLEST = 1e-3
 # The number of faults at once that the recognition of a method allows.
 RECOGNISED_FAULTS = 2
 LAW = "one sweep"
+# Products of unit quaternions, not normalised, stay nearer to the length 1.
+DRIFTED = 1e-2
 # Quaternions whose numbers differ by less are alike, in single precision too.
 ROUNDED = 1e-6
 
@@ -136,6 +138,19 @@ def idle(trials: Sequence[PoseTrial]) -> Sentence | None:
             "them?"
         )
     return None
+
+
+def lengths(trials: Sequence[PoseTrial]) -> Sentence | None:
+    """Return that answered rotations have another length than 1, None if not so."""
+    drift = max((trial.pose.drift for trial in trials if trial.pose.finite), default=0.0)
+    if drift < DRIFTED:
+        return None
+    return sentence(
+        "Its local rotations are no unit quaternions: their lengths differ from 1 by up to "
+        "{drift:.2g}. Normalise an axis before (cos(angle / 2), sin(angle / 2) axis) is made of "
+        "it, and each product of quaternions.",
+        drift=drift,
+    )
 
 
 def recognise_method(

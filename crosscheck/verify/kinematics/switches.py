@@ -9,6 +9,7 @@ class Switches(NamedTuple):
     """The number of the fault in each rule of a solver; 0 is right."""
 
     numbers: int = 0  # the order of a quaternion's numbers
+    angles: int = 0  # quaternions through Euler angles in degrees, or their numbers as such angles
     euler: int = 0  # the orders in which rotations are split and put together
     multiply: int = 0  # the product of two quaternions
     cross: int = 0  # the product of two vectors
@@ -27,8 +28,10 @@ class Switches(NamedTuple):
     aim: int = 0  # the two directions that d joins
     offsets: int = 0  # what becomes of a child's offset
     dropped: int = 0  # which angle is too small to rotate by
+    small: int = 0  # what a small angle ends, or is raised to
     returned: int = 0  # which positions are returned; FABRIK: its points, or (1) the placed joints
-    passes: int = 0  # FABRIK: which passes there are
+    stretch: int = 0  # FABRIK: when a chain is stretched instead of solved, and where to
+    passes: int = 0  # which passes there are
     loop: int = 0  # which links a pass leaves out
     stale: int = 0  # which points of before the pass are used
     base_joint: int = 0  # where the root goes back to
@@ -43,6 +46,7 @@ class Switches(NamedTuple):
     budget: int = 0  # how many sweeps are allowed
     frame_start: int = 0  # following a curve: where a frame starts
     frame_target: int = 0  # which target a frame has
+    frame_saved: int = 0  # which pose a frame gets
     # Choices of right programs, which only show beside a fault.
     rotating: int = 0  # a vector is rotated by cross products, by (q v) q* (1) or by q (v q*) (2)
     grouping: int = 0  # ((P* d) P) Q, P* (d R), (P* d) R or (P* (d P)) Q

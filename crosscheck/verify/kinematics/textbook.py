@@ -18,10 +18,13 @@ from plumbob.reference.quaternion import (
     IDENTITY,
     add,
     conjugate,
+    cross,
     load_quaternion,
     load_vector,
     logarithm,
     norm,
+    rotation_about,
+    scale,
     store_quaternion,
     store_vector,
     subtract,
@@ -38,6 +41,14 @@ OF_GLOBAL_LINKS = 13
 # CCD drops rotations smaller than these, by the number of `dropped` [rad]; among them are a degree,
 # and the angles with the cosines 0.99999, 0.9999 and 0.999.
 DROPPED = (0.0, 1e-4, 1e-3, 4.4721e-3, 1e-2, 1.41421e-2, 1.745329e-2, 4.47214e-2, 0.1)
+# Angles smaller than these end a sweep, end the solve or are raised to them, by `small` [rad].
+SMALL = (1e-5, 1e-4, 1e-3, 1e-2, 1.745329e-2, 5e-2)
+# The distances at which a solve ends whatever the tolerance, by `test` from `FIXED_TEST` on [m].
+FIXED, FIXED_TEST = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1), 5
+# Of `aim`, directions of which one is in the frame of the joint (two numbers) or of its parent.
+MIXED_FRAMES = 13
+# Of `aim`, directions that are rotated by the joint's rotation and not by its inverse.
+NOT_INVERTED = 18
 
 
 class TextbookChain(NamedTuple):
@@ -65,14 +76,36 @@ class Ending(NamedTuple):
 
 def place(chain: TextbookChain, faults: Switches, pose: TextbookPose) -> None:
     """Fill positions and global rotations of all joints."""
-    for j in range(len(chain.parents)):
-        p = j - 1 if faults.parent == 1 else chain.parents[j]
+    joints = len(chain.parents)
+    # a joint placed before j may have a higher number: then each pass places at least one more
+    for i in range(joints * joints if faults.parent == 3 else joints):
+        j = i % joints
+        parents = (chain.parents[j], j - 1, -1, before_in_depth(chain, j))
+        p = parents[faults.parent]
         if p < 0:
             x, R = root_pose(chain, faults, pose, j)
         else:
             x, R = joint_pose(chain, faults, pose, j, p)
         store_vector(pose.positions, j, x)
         store_quaternion(pose.rotations, j, R)
+
+
+def before_in_depth(chain: TextbookChain, j: int) -> int:
+    """Return the joint before j, depth first: the last one below the sibling before it."""
+    p, before = chain.parents[j], -1
+    for k in range(j):
+        if chain.parents[k] == p:
+            before = k
+    if before < 0 or p < 0:
+        return int(p)
+    while True:
+        last = -1
+        for k in range(before + 1, len(chain.parents)):
+            if chain.parents[k] == before:
+                last = k
+        if last < 0:
+            return before
+        before = last
 
 
 def root_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: int) -> Any:
@@ -92,6 +125,9 @@ def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: in
     products = (
         (R_parent, Q), (Q, R_parent), (R_parent, conjugate(Q)), (IDENTITY, Q), (R_parent, IDENTITY),
     )  # fmt: skip
+    if faults.base == 4:  # matrices multiplied in the other order
+        x = rotated(Q, load_vector(pose.positions, p), faults)
+        return add(load_vector(chain.offsets, j), x), product(Q, R_parent, faults)
     left, right = products[faults.product]
     R = product(left, right, faults)
     if faults.unit == 2:
@@ -100,17 +136,24 @@ def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: in
     R_above = load_quaternion(pose.rotations, above) if above >= 0 else IDENTITY
     frames = (
         R_parent, IDENTITY, R, conjugate(R_parent), R_above, load_quaternion(pose.local, p), Q,
-        R_parent,
+        R_parent, R_above if above >= 0 else R_parent,
     )  # fmt: skip
     offset = load_vector(chain.offsets, j)
     if faults.frame == 7:
         offset = subtract(offset, load_vector(chain.offsets, p))
+    if faults.base == 3:
+        return offset, R
     offset = rotated(frames[faults.frame], offset, faults)
     return add(base_of(chain, pose, p, faults.base), offset), R
 
 
 def base_of(chain: TextbookChain, pose: TextbookPose, p: int, fault: int) -> Any:
-    """Return what a rotated offset is added to: the parent's position, at rest (1), the root's."""
+    """Return what a rotated offset is added to: the parent's position, at rest (1), the root's.
+
+    Or nothing (5).
+    """
+    if fault == 5:
+        return ORIGIN
     if fault == 1:
         x = load_vector(chain.offsets, p)
         while chain.parents[p] >= 0:
@@ -128,6 +171,9 @@ def solve(
         for j in range(len(chain.parents)):
             store_quaternion(pose.local, j, IDENTITY)
     place(chain, faults, pose)
+    if method.stretch(chain, target, faults, pose):
+        method.finish(chain, 1, faults, pose)
+        return 1
     n = ending.sweeps
     allowed = (n, n + 1, n - 1, n, min(n, 1), 0)
     before, i = math.inf, 0
@@ -136,14 +182,17 @@ def solve(
         if is_reached(distance, before, ending.tolerance, i, faults.test):
             break
         before = distance
-        method.sweep(chain, target, i, faults, pose)
         i += 1
+        if method.sweep(chain, target, i - 1, faults, pose):
+            break
     method.finish(chain, i, faults, pose)
     return i
 
 
 def is_reached(distance: float, before: float, tolerance: float, sweeps: int, fault: int) -> bool:
     """Return whether the solve ends before its next sweep."""
+    if fault >= FIXED_TEST:
+        return distance <= FIXED[fault - FIXED_TEST]
     tests = (
         (distance, tolerance),
         (distance * distance, tolerance),
@@ -157,25 +206,34 @@ def is_reached(distance: float, before: float, tolerance: float, sweeps: int, fa
 
 def sweep_ccd(
     chain: TextbookChain, target: Any, i: int, faults: Switches, pose: TextbookPose
-) -> None:
-    """Rotate each joint from the effector's parent to the root; or only one of them, the i-th."""
+) -> bool:
+    """Rotate each joint from the effector's parent to the root; or only one of them, the i-th.
+
+    Return whether the solve ends, as no right one does.
+    """
     links = len(chain.path) - 1
     if faults.budget == 3:
-        rotate_joint(chain, links - 1 - i % links, target, faults, pose)
-        return
+        return rotate_joint(chain, links - 1 - i % links, target, faults, pose)
+    is_over = False
     for link in range(links):
         k = link if faults.order == 1 else links - 1 - link
         left_out = (-1, 0, links - 1, -1)
         if k != left_out[faults.joints] and (faults.joints != 3 or link == 0):
-            rotate_joint(chain, k, target, faults, pose)
+            is_over = rotate_joint(chain, k, target, faults, pose)
+        if is_over:
+            break
     if faults.update < 2 and faults.global_rotations == 0:
         place(chain, faults, pose)
+    return is_over and faults.small > len(SMALL)
 
 
 def rotate_joint(
     chain: TextbookChain, k: int, target: Any, faults: Switches, pose: TextbookPose
-) -> None:
-    """Rotate joint k of the path so that the effector comes nearest to the target."""
+) -> bool:
+    """Rotate joint k of the path so that the effector comes nearest to the target.
+
+    Return whether the angle is too small, by the number of `small`.
+    """
     joint = load_vector(pose.positions, chain.path[k])
     effector = load_vector(pose.positions, chain.path[-1])
     arm, direction = subtract(effector, joint), subtract(target, joint)
@@ -195,14 +253,29 @@ def rotate_joint(
         (arm, subtract(target, root)),
         (subtract(effector, root), direction),
         (subtract(effector, root), subtract(target, root)),
+        (arm, direction),
+        (arm, direction),
+        (arm, direction),
+        (arm, direction),
+        (arm, subtract(direction, root)),
+        (arm, direction),
     )
     a, b = directions[faults.aim]
+    if MIXED_FRAMES <= faults.aim < MIXED_FRAMES + 4:
+        a, b = in_mixed_frames(chain, k, a, b, faults, pose)
+    elif faults.aim == NOT_INVERTED:
+        R = load_quaternion(pose.rotations, chain.path[k])
+        a, b = rotated(R, a, faults), rotated(R, b, faults)
     d = arc(a, b, faults)
     if faults.dropped > 0 and norm(logarithm(d)) < DROPPED[faults.dropped]:
-        return
+        return False
+    if faults.small > 0 and norm(logarithm(d)) < SMALL[(faults.small - 1) % len(SMALL)]:
+        if faults.small <= 2 * len(SMALL):
+            return True
+        d = raised(a, b, SMALL[(faults.small - 1) % len(SMALL)])
     if faults.global_rotations == 1:
         rotate_below(chain, chain.path[k], d, faults, pose)
-        return
+        return False
     rotate_offset(chain, k, d, faults, pose)
     if faults.update < 3:
         apply_rotation(chain, k, d, faults, pose)
@@ -210,6 +283,26 @@ def rotate_joint(
         place(chain, faults, pose)
     elif faults.update >= 2:
         follow_by_hand(chain, k, d, faults, pose)
+    return False
+
+
+def in_mixed_frames(
+    chain: TextbookChain, k: int, a: Any, b: Any, faults: Switches, pose: TextbookPose
+) -> Any:
+    """Return two directions, one of them in the frame of joint k of the path, or of its parent."""
+    j, number = chain.path[k], faults.aim - MIXED_FRAMES
+    p = chain.parents[j] if number >= 2 else j
+    R = load_quaternion(pose.rotations, p) if p >= 0 else IDENTITY
+    if number % 2 == 0:
+        return a, rotated(inverse(R, faults), b, faults)
+    return rotated(inverse(R, faults), a, faults), b
+
+
+def raised(a: Any, b: Any, angle: float) -> Any:
+    """Return the rotation from one direction towards another by an angle."""
+    axis = cross(a, b)
+    sine = norm(axis)
+    return IDENTITY if sine == 0.0 else rotation_about(scale(1.0 / sine, axis), angle)
 
 
 def rotate_below(
@@ -264,7 +357,11 @@ def apply_rotation(
     if GIVEN_TO_CHILD[0] <= faults.applied <= GIVEN_TO_CHILD[1]:
         j = chain.path[k + 1]
     Q = load_quaternion(pose.local, j)
-    if faults.applied == 0:
+    if faults.aim == NOT_INVERTED or MIXED_FRAMES <= faults.aim < MIXED_FRAMES + 2:
+        Q = product(Q, d, faults)
+    elif MIXED_FRAMES + 2 <= faults.aim < MIXED_FRAMES + 4:
+        Q = product(d, Q, faults)
+    elif faults.applied == 0:
         Q = from_world(P, d, Q, R, faults)
     else:
         Q = wrong_rotation(P, d, Q, R, faults)
@@ -341,12 +438,51 @@ def local_from_global(P: Any, R: Any, faults: Switches) -> Any:
 
 def sweep_fabrik(
     chain: TextbookChain, target: Any, i: int, faults: Switches, pose: TextbookPose
-) -> None:
+) -> bool:
     """Pull the joints to the target, then back to the root."""
     positions, before = pose.positions, pose.positions.copy()
     if faults.passes == 0:
         pull_to_target(chain, target, faults, positions, before)
     pull_to_root(chain, faults, positions)
+    return False
+
+
+def never(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookPose) -> bool:
+    """Return False: CCD stretches no chain."""
+    return False
+
+
+def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookPose) -> bool:
+    """Stretch a chain towards a target beyond its reach, and return whether it has been stretched.
+
+    Aristidou & Lasenby 2011, Algorithm 1, has this step, which the sweeps approach without it. By
+    the number of `stretch` it is always made (1), where the distance is squared (2) or from the
+    effector (3), where the reach lacks the last (4) or the first link (5); or its direction is that
+    from the effector (6), or each link begins at the root (7) or has the next one's length (8).
+    """
+    k = faults.stretch
+    if k == 0:
+        return False
+    last, reach = len(chain.path) - 1, 0.0
+    for m in range(last):
+        if not (k == 4 and m == last - 1) and not (k == 5 and m == 0):
+            reach += link_length(chain, m, 0, pose.positions)
+    root = load_vector(pose.positions, chain.path[0])
+    effector = load_vector(pose.positions, chain.path[last])
+    to_target = subtract(target, root)
+    distance = norm(subtract(target, effector) if k == 3 else to_target)
+    if k != 1 and (distance * distance if k == 2 else distance) < reach:
+        return False
+    direction = subtract(target, effector) if k == 6 else to_target
+    length = norm(direction)
+    if length == 0.0:
+        return False
+    x = root
+    for m in range(last):
+        stretched = link_length(chain, m, 8 if k == 8 else 0, pose.positions)
+        x = add(root if k == 7 else x, scale(stretched / length, direction))
+        store_vector(pose.positions, chain.path[m + 1], x)
+    return True
 
 
 def pull_to_target(
@@ -393,10 +529,13 @@ def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) 
     """Return the length of link k, from joint k of the path to the next, or a wrong one.
 
     It is the next link's (1), the previous link's (2), that of now (3), the first link's (4), the
-    mean (5), 1 (6), or that of the offset of the link's first joint (7).
+    mean (5), 1 (6), that of the offset of the link's first joint (7), or the next one's, 0 if there
+    is none (8).
     """
     last = len(chain.path) - 2
-    links = (k, min(k + 1, last), max(k - 1, 0), k, 0, k, k, k - 1)
+    links = (k, min(k + 1, last), max(k - 1, 0), k, 0, k, k, k - 1, min(k + 1, last))
+    if kind == 8 and k == last:
+        return 0.0
     if kind == 3:
         start = load_vector(positions, chain.path[k])
         return norm(subtract(load_vector(positions, chain.path[k + 1]), start))
@@ -441,6 +580,9 @@ def point_link(
         P = load_quaternion(solved.rotations if faults.rotations == 4 else pose.rotations, p)
     rest = rest_of(chain, k, solved, faults, pose)
     link = link_of(chain, k, solved.points, faults.link)
+    if faults.rotations == 18:  # of the link before
+        rest = link_of(chain, k, solved.positions, 3)
+        link = link_of(chain, k, solved.points, 3) if k > 0 else rest
     if faults.rule == 1:  # in the parent's frame
         link = rotated(P if faults.rotations == 9 else inverse(P, faults), link, faults)
     d = arc(rest, link, faults)
@@ -448,7 +590,7 @@ def point_link(
         R = load_quaternion(solved.rotations, j)
     elif faults.rule in (1, 2):
         R = IDENTITY
-    if faults.rotations in (0, 3, 4, 9):
+    if faults.rotations in (0, 3, 4, 9, 18, 19):
         Q = local_of(P, d, Q, R, faults)
     else:
         Q = wrong_local(chain, k, P, d, R, faults, pose)
@@ -477,7 +619,7 @@ def rest_of(
     """
     j, child = chain.path[k], chain.path[k + 1]
     offset = load_vector(chain.offsets, child)
-    if faults.rule in (1, 2) or faults.rotations == 1:
+    if faults.rule in (1, 2) or faults.rotations in (1, 19):
         return offset
     if faults.rule == 0:
         return rotated(load_quaternion(pose.rotations, j), offset, faults)
@@ -552,15 +694,19 @@ def wrong_local(
 
 
 class Method(NamedTuple):
-    """The kernels of a solver: one sweep, and what makes rotations of its last positions."""
+    """The kernels of a solver: a sweep, what makes rotations of positions, what comes first."""
 
     sweep: Any
     finish: Any
+    stretch: Any
 
 
-method = Method(sweep_ccd, keep)
+method = Method(sweep_ccd, keep, never)
+FABRIK = Method(sweep_fabrik, follow, stretch)
 place_all = Kernel(place, label="forward kinematics with faults")
 SOLVERS = {
     "ccd": Kernel(solve, label="CCD with faults"),
-    "fabrik": Kernel(bind(solve, method=Method(sweep_fabrik, follow)), label="FABRIK with faults"),
+    "fabrik": Kernel(
+        bind(solve, method=Method(sweep_fabrik, follow, stretch)), label="FABRIK with faults"
+    ),
 }

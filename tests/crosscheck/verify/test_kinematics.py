@@ -67,7 +67,7 @@ OWN = {
     for method, faults in FAULTS.items()
 }
 # Faults of the rotations in answers, which positions do not show.
-WRITTEN = ("xyzw written", "conjugates written")
+WRITTEN = ("xyzw written", "conjugates written", "local rotations written", "signs lost")
 # Faults that cannot be told apart by one output.
 TWINS = {
     "local_rotations": [
@@ -133,9 +133,16 @@ def test_pair_is_named(method, pairs, allowed):
     assert len(missed) <= allowed * len(chosen), missed
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
-    "fault", [f for f in FAULTS["track ccd"] if f.part == "follow"], ids=lambda fault: fault.key
+    ("method", "fault"),
+    [
+        pytest.param(method, fault, id=f"{fault.key}-{method}")
+        for method in METHODS
+        for fault in FAULTS["track ccd"]
+        # points alone do not show what becomes of rotations
+        if fault.part == "follow"
+        and (method, fault.switch, fault.number) != ("fabrik", "frame_saved", 2)
+    ],
 )
 def test_fault_of_tracking_is_caught_and_named(method, fault):
     report = judged(TRACK, textbook(TRACK, [fault], method), method)
@@ -318,6 +325,22 @@ def changed_forward(change):
     return lambda parents, offsets, local_rotations: change(
         *students.forward_kinematics(parents, offsets, local_rotations)
     )
+
+
+@pytest.mark.parametrize(("factor", "words"), [(0.0, "are zero"), (0.01, "0.01 times the right")])
+def test_a_common_factor_of_positions_is_reported(factor, words):
+    report = judged(FORWARD, changed_forward(lambda x, R: (factor * x, R)))
+    assert [words in str(hint) for hint in report.diagnosis.hints] == [True]
+
+
+def test_a_rotation_without_w_is_not_a_number_at_half_a_turn_only():
+    def divided_by_w(x, R):
+        R[np.abs(R[:, 0]) < 1e-9] = np.nan
+        return x, R
+
+    report = judged(FORWARD, changed_forward(divided_by_w))
+    assert report.verdict is WRONG
+    assert "half a turn" in str(report.diagnosis.first_broken)
 
 
 @pytest.mark.parametrize("name", FORWARD_LIES)
