@@ -20,7 +20,6 @@ from ..quaternion import load_vector, logarithm, normalised, scale, subtract
 from .mechanism import (
     LEVER,
     effector_position,
-    least_residual,
     load_ball,
     position_error,
     rotation_error,
@@ -33,9 +32,6 @@ FULL_CIRCLE = 2.0 * math.pi
 LEAST_TURN = 1e-3
 # Where J J' is singular, a damping of so much of its trace keeps its factors above rounding.
 ROUNDING_DAMPING = 1e-14
-# The damping towards a target out of reach, over the reach times the error: of the first step, the
-# least, by how much it grows where the error rose and shrinks where it fell.
-FAR_DAMPING, SMALLEST_FAR_DAMPING, GROWTH, DECAY = 0.2, 0.001, 8.0, 1.3
 
 
 class TaskSystem(NamedTuple):
@@ -48,15 +44,25 @@ class TaskSystem(NamedTuple):
     step: FloatArray  # of the freedoms, lengths over the reach, (freedom,)
     # 1 where the upper limit stops a freedom, -1 where the lower does, else 0, (freedom,)
     active: FloatArray
+    # towards targets out of reach, see `far_step`: the Hessian of |e|²/2, the same damped and then
+    # its factors, (freedom, freedom); J e, and the two sides of a linear system, (freedom,)
+    H: FloatArray
+    damped: FloatArray
+    gradient: FloatArray
+    rhs: FloatArray
+    solution: FloatArray
 
 
 def new_system(equations, freedoms):
-    """Return a system, not filled, in a single block of memory."""
+    """Return a system, not filled, in two blocks of memory."""
     m, n = equations, freedoms
-    block = np.empty(n * m + m * m + 2 * m + 2 * n)
+    block, square = np.empty(n * m + m * m + 2 * m + 2 * n), np.empty((2 * n + 3, n))
     J, A, rows = block[: n * m], block[n * m : n * m + m * m], block[n * m + m * m :]
     e, z, step, active = rows[:m], rows[m : 2 * m], rows[2 * m : 2 * m + n], rows[2 * m + n :]
-    return TaskSystem(e, J.reshape(n, m), A.reshape(m, m), z, step, active)
+    return TaskSystem(
+        e, J.reshape(n, m), A.reshape(m, m), z, step, active,
+        square[:n], square[n : 2 * n], square[2 * n], square[2 * n + 1], square[2 * n + 2],
+    )  # fmt: skip
 
 
 def linearise_task(mechanism, target, data, system):
@@ -114,24 +120,6 @@ def damped_step(mechanism, data, system, damping):
             any_active = True
         elif not (any_active and release(system)):
             return
-
-
-def far_damping(mechanism, target, data, system, damping):
-    """Return the damping [m²] towards a target proven out of reach, else `damping`.
-
-    The Hessian of |e|²/2 has second derivatives of the effectors too, up to the reach times |e|,
-    which J' J leaves out. With a damping too small for them steps swing about the nearest pose for
-    ever; with one too large they creep. It therefore follows the error (Marquardt 1963), by the
-    factor and the squared error of the last step in `data.far_step`.
-    """
-    if least_residual(mechanism, target) <= 0.0:
-        return damping
-    square, factor, last_square = inner(system.e, system.e), data.far_step[0], data.far_step[1]
-    factor = factor * GROWTH if square > last_square else max(factor / DECAY, SMALLEST_FAR_DAMPING)
-    if last_square == 0.0:
-        factor = FAR_DAMPING
-    data.far_step[0], data.far_step[1] = factor, square
-    return factor * mechanism.reach * math.sqrt(square)
 
 
 def turn_the_long_way(mechanism, target, system):
@@ -254,13 +242,13 @@ def solve_system(system, damping):
     m = len(system.e)
     if m == 6:  # the compiler lays out what is of known size
         fill_matrix(system, damping, 6)
-        solve(system, 6)
+        solve(system.A, system.e, system.z, 6)
     elif m == 3:
         fill_matrix(system, damping, 3)
-        solve(system, 3)
+        solve(system.A, system.e, system.z, 3)
     else:
         fill_matrix(system, damping, m)
-        solve(system, m)
+        solve(system.A, system.e, system.z, m)
 
 
 def fill_matrix(system, damping, m):
@@ -283,11 +271,10 @@ def fill_matrix(system, damping, m):
         A[i, i] += damping
 
 
-def solve(system, m):
+def solve(A, e, z, m):
     """Fill z of A z = e by the factors L D L', which overwrite A; 1/D comes on the diagonal."""
-    A, z = system.A, system.z
     for i in range(m):
-        z[i] = system.e[i]
+        z[i] = e[i]
         for j in range(i):
             s = A[i, j]
             for k in range(j):

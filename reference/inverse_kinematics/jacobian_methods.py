@@ -28,8 +28,6 @@ from ..quaternion import (
 )
 from .box_step import (
     ROUNDING_DAMPING,
-    damped_step,
-    far_damping,
     inner,
     lean,
     linearise_task,
@@ -38,6 +36,7 @@ from .box_step import (
     turn_the_long_way,
 )
 from .chain import LINE_TOLERANCE, bend, drawn_near, update_positions
+from .far_step import step_towards
 
 # How far beyond reach a chain's target may be, over the reach; it is drawn nearer. From further off
 # steps would swing about the nearest point; at reach itself they would be slower the nearer it is.
@@ -89,7 +88,7 @@ def damped_least_squares_update(state, target):
     mechanism, data, system = state.mechanism, state.data, state.workspace.system
     linearise_task(mechanism, target, data, system)
     damping = FIXED_DAMPING * mechanism.reach * mechanism.reach
-    damped_step(mechanism, data, system, far_damping(mechanism, target, data, system, damping))
+    step_towards(mechanism, target, data, system, damping)
     take_step(mechanism, data, system)
 
 
@@ -120,7 +119,7 @@ def levenberg_marquardt_update(state, target):
     if phase > 0 and iteration < LEANING:
         lean(mechanism, data, system)
     data.phase[1] += 1.0
-    damped_step(mechanism, data, system, far_damping(mechanism, target, data, system, damping))
+    step_towards(mechanism, target, data, system, damping)
     take_step(mechanism, data, system)
 
 

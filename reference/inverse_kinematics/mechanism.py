@@ -74,10 +74,10 @@ class Mechanism(NamedTuple):
 class ConfigurationData(NamedTuple):
     """A mechanism's coordinates with their forward kinematics; effectors come behind the joints."""
 
-    # an attempt continues from it: `q`, `far_step` and `phase`, (coordinate + 4,)
+    # an attempt continues from it: `q`, `far_step` and `phase`, (coordinate + 5,)
     state: FloatArray
     q: FloatArray  # (coordinate,)
-    far_step: FloatArray  # see `box_step.far_damping`, (2,); zero before the first step
+    far_step: FloatArray  # see `far_step`, (3,); zero before the first step
     phase: FloatArray  # the number of the solver's phase, and the iterations made in it, (2,)
     positions: FloatArray  # in the world [m], (joint + effector, 3)
     rotations: FloatArray  # in the world, (joint + effector, 4)
@@ -86,9 +86,9 @@ class ConfigurationData(NamedTuple):
 def new_data(mechanism):
     """Return the data of a configuration, to be filled."""
     count, n = len(mechanism.joints) + len(mechanism.effectors), len(mechanism.columns)
-    state = np.zeros(n + 4)
+    state = np.zeros(n + 5)
     return ConfigurationData(
-        state, state[:n], state[n : n + 2], state[n + 2 :],
+        state, state[:n], state[n : n + 3], state[n + 3 :],
         np.empty((count, 3)), np.empty((count, 4)),
     )  # fmt: skip
 

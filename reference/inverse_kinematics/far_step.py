@@ -1,0 +1,179 @@
+"""Newton steps towards targets proven out of reach, within the limits.
+
+There the Jacobian methods leave out of the Hessian of |e|²/2 the second derivatives of the effector
+times e, which does not vanish: they creep or swing about the nearest pose. With w_i the angular
+velocity by freedom i and v_k the velocity of the effector by freedom k of the same joint or of a
+lower one, d²x / dq_i dq_k = w_i x v_k. For the rotation vector f to the target, |f|²/2 has the
+Hessian w_k · (1 + c [f x]²) w_i - f · (w_i x w_k) / 2, c = (1 - |f|/2 cot |f|/2) / |f|², by the
+inverse right Jacobian of the rotations (Sola et al. 2018).
+"""
+
+import math
+
+from ..articulation import FREEDOMS
+from ..jacobians import ZERO, motion, velocity_at
+from ..quaternion import add, cross, dot, load_vector, logarithm, norm, scale, subtract
+from .box_step import activate_limits, clear, damped_step, inner, solve, stop_at_limits
+from .mechanism import (
+    effector_position,
+    least_residual,
+    position_error,
+    rotation_error,
+    rotation_weight,
+)
+
+# The damping, over the reach times the error: of the first step, the least, by how much it grows
+# where the error rose, shrinks where it fell, and grows where the Hessian is not positive.
+FIRST_DAMPING, SMALLEST_DAMPING, GROWTH, DECAY, STIFFENING = 0.1, 1e-7, 4.0, 8.0, 2.0
+# Dampings that are tried; more only where numbers overflow.
+LARGEST_TRIES = 64
+# Limits of balls are met by projection only, so that the error may rise again and again: each time
+# the decay is raised to this power.
+FATIGUE = 0.9
+# Below this angle [rad] a series is exact to rounding.
+SMALL_ANGLE = 1e-4
+
+
+def step_towards(mechanism, target, data, system, damping):
+    """Fill the damped step, towards a target proven out of reach Newton's."""
+    if least_residual(mechanism, target) > 0.0:
+        newton_step(mechanism, target, data, system)
+    else:
+        damped_step(mechanism, data, system, damping)
+
+
+def newton_step(mechanism, target, data, system):
+    """Fill the step that minimises the quadratic model of |e|²/2 within the limits.
+
+    The damping (Marquardt 1963) follows the error, by the factor, the squared error and the decay
+    of the last step in `data.far_step`. `system` has been linearised; its errors are used up.
+    """
+    square, far_step = inner(system.e, system.e), data.far_step
+    factor, last_square, decay = far_step[0], far_step[1], far_step[2]
+    if last_square == 0.0:
+        factor, decay = FIRST_DAMPING, DECAY
+    elif square > last_square:
+        factor, decay = factor * GROWTH, decay**FATIGUE
+    else:
+        factor = max(factor / decay, SMALLEST_DAMPING)
+    fill_hessian(mechanism, target, data, system)
+    for k in range(len(system.step)):
+        system.gradient[k] = inner(system.J[k], system.e)
+    unit = mechanism.reach * math.sqrt(square)
+    is_positive, tries = False, 0
+    while not is_positive and tries < LARGEST_TRIES:
+        is_positive = step_within_limits(mechanism, data, system, factor * unit)
+        tries += 1
+        if not is_positive:
+            factor *= STIFFENING
+            clear(system.step)
+    far_step[0], far_step[1], far_step[2] = factor, square, decay
+
+
+def fill_hessian(mechanism, target, data, system):
+    """Fill the Hessian of |e|²/2, (freedom, freedom)."""
+    joints, H, reach = mechanism.joints, system.H, mechanism.reach
+    for k in range(len(H)):
+        for i in range(k + 1):
+            H[k, i] = H[i, k] = inner(system.J[k], system.J[i])
+    for e in range(len(mechanism.effectors)):
+        x, j = effector_position(mechanism, data, e), mechanism.effectors["joint"][e]
+        force = scale(target["weight"][e], position_error(mechanism, target, data, e))
+        turn, twist, bow = ZERO, 0.0, 0.0
+        if mechanism.effectors["oriented"][e]:
+            turn = logarithm(rotation_error(mechanism, target, data, e))
+            twist = 2.0 * rotation_weight(mechanism) * target["weight"][e]
+            bow = twist * bow_of(norm(turn))
+        while j >= 0:
+            arm = subtract(x, load_vector(data.positions, j))
+            for k in range(FREEDOMS[joints["kind"][j]]):
+                angular, linear = motion(joints, j, k, data.rotations, reach)
+                moment = cross(
+                    velocity_at(angular, linear, arm), force
+                )  # e · (w x v) = w · (v x e)
+                moment = add(moment, scale(0.5 * twist, cross(angular, turn)))
+                moment = add(moment, scale(bow, cross(cross(turn, angular), turn)))
+                add_curvatures(mechanism, data, H, j, joints["freedom"][j] + k, moment)
+            j = joints["parent"][j]
+
+
+def bow_of(angle):
+    """Return (1 - a/2 cot a/2) / a² of an angle a [rad]."""
+    if angle < SMALL_ANGLE:
+        return 1.0 / 12.0
+    return (1.0 - 0.5 * angle / math.tan(0.5 * angle)) / (angle * angle)
+
+
+def add_curvatures(mechanism, data, H, j, column, moment):
+    """Subtract what a freedom of joint j has with all freedoms of it and of the joints above."""
+    joints, i = mechanism.joints, j
+    while i >= 0:
+        share = 0.5 if i == j else 1.0  # two freedoms of a ball meet twice
+        for k in range(FREEDOMS[joints["kind"][i]]):
+            angular, _ = motion(joints, i, k, data.rotations, mechanism.reach)
+            row, curvature = joints["freedom"][i] + k, share * dot(angular, moment)
+            H[row, column] -= curvature
+            H[column, row] -= curvature
+        i = joints["parent"][i]
+
+
+def step_within_limits(mechanism, data, system, damping):
+    """Fill the step with a damping; return whether the damped Hessian is positive.
+
+    A freedom that the step would take beyond its limit becomes active, as in `damped_step`. Those
+    that the gradient holds at their limits are so from the start (Bertsekas 1982).
+    """
+    n, any_active = len(system.step), hold_at_limits(mechanism, data, system)
+    for _ in range(2 * n + 1):
+        fill_damped(system, damping)
+        solve(system.damped, system.rhs, system.solution, n)
+        for k in range(n):
+            if not system.damped[k, k] > 0.0:
+                return False
+            system.step[k] = system.solution[k]
+        if activate_limits(mechanism, data, system):
+            any_active = True
+        elif not (any_active and release(system, damping)):
+            return True
+    return True
+
+
+def hold_at_limits(mechanism, data, system):
+    """Make the freedoms active that the gradient holds at limits; return whether there are any."""
+    n = len(system.step)
+    clear(system.active)
+    for k in range(n):
+        system.step[k] = system.gradient[k]
+    any_active = stop_at_limits(mechanism, data, system)
+    for k in range(n):
+        if system.active[k] != 0.0:
+            system.active[k] = 1.0 if system.gradient[k] > 0.0 else -1.0
+        system.step[k] = 0.0
+    return any_active
+
+
+def fill_damped(system, damping):
+    """Fill the equations of the step; active freedoms keep theirs."""
+    n = len(system.step)
+    for k in range(n):
+        is_free = system.active[k] == 0.0
+        system.rhs[k] = system.gradient[k] if is_free else system.step[k]
+        for i in range(n):
+            both_free = is_free and system.active[i] == 0.0
+            system.damped[k, i] = system.H[k, i] if both_free else 0.0
+            if is_free and not both_free:
+                system.rhs[k] -= system.H[k, i] * system.step[i]
+        system.damped[k, k] = system.damped[k, k] + damping if is_free else 1.0
+
+
+def release(system, damping):
+    """Release the active freedom whose limit holds it most; return whether there is any."""
+    worst, largest = -1, 0.0
+    for k in range(len(system.step)):
+        if system.active[k] != 0.0:
+            slope = system.gradient[k] - inner(system.H[k], system.step) - damping * system.step[k]
+            if -system.active[k] * slope > largest:
+                worst, largest = k, -system.active[k] * slope
+    if worst >= 0:
+        system.active[worst] = 0.0
+    return worst >= 0
