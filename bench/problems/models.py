@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from plumbob.crosscheck.verify.kinematics.robot_models import roll_pitch_yaw
+from plumbob.crosscheck.verify.kinematics.robot_textbook import roll_pitch_yaw
 from plumbob.reference import (
     Articulation,
     MassSpring,

@@ -21,6 +21,7 @@ from .contestant import Answer, Contestant, Failure
 from .explain import largest_gap
 from .greeting import Greeting, System
 from .judgement import Explanation, TaskReport, Verdict
+from .kinematics.robot_models import urdf
 from .sentence import Sentence, sentence
 from .task import TASKS
 
@@ -185,7 +186,7 @@ def _unchanged(
         full = {key: value for key, value in plain.items() if key != name or name not in _ADDED}
         full |= {name: case.inputs[name]} if name in case.inputs else {}
         if largest_gap(full.get(name, np.nan), plain.get(name, np.nan)) != 0.0:
-            pairs.append((replace(case, inputs=plain), replace(case, inputs=full)))
+            pairs.append([replace(case, inputs=_with_urdf(inputs)) for inputs in (plain, full)])
     reason = None
     for plain_case, full_case in pairs[:TRIALS]:
         answer = contestant.answer(plain_case)
@@ -206,6 +207,11 @@ def _is_unused(
         replace(case, inputs={**case.inputs, name: 2.0 * case.inputs[name]})
     )
     return isinstance(doubled, Answer) and _are_same(answer, doubled)
+
+
+def _with_urdf(inputs: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a request whose robot is the same as URDF, which many programs read alone."""
+    return {**inputs, "urdf": urdf(inputs)} if "urdf" in inputs else inputs
 
 
 def _plain(case: Case, names: set[str]) -> dict[str, Any]:

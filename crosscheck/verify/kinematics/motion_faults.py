@@ -14,7 +14,7 @@ from ..sentence import Sentence, with_code
 from .faults import TABLE
 from .robot_faults import FAULTS as POSE_FAULTS
 from .robot_faults import JACOBIAN_FAULTS, POSITION_ONLY, RIGHT, RobotFault
-from .robot_textbook import rotation_error, sine_error
+from .robot_textbook import roll_pitch_yaw, rotation_error, sine_error
 from .trajectories import AT_LIMIT, LENIENT, Trajectory
 
 # Steps agree if they differ by less than this share, with one of these squared dampings [m^2].
@@ -35,6 +35,17 @@ WHOLE_TURN = 0.7
 REDUCED = 0.9
 
 
+# Steps of some length agree to this share; factors of steps that are too short, dampings that are
+# too large [m^2]; a step goes nowhere if the cosine of its angle with the right one is smaller.
+SAME_SCALE, SHORT, OVERDAMPED = 0.02, (1e-3, 0.3), np.geomspace(0.3, 1e3, 60)[:, None]
+NOWHERE = 0.05
+# Coordinates that are at a limit are so near to it [rad, m]; speeds agree to this share.
+EXACT, SAME_SPEED = 1e-9, 1e-3
+# A test that is looser than the tolerance lets pass up to so many tolerances; a rotation that has
+# been reduced to less than this share has been solved for.
+LOOSER, SOLVED = 20.0, 0.3
+
+
 class Evidence(NamedTuple):
     """Frames that a fault concerns, and those of them that it explains, (frame) each."""
 
@@ -42,6 +53,8 @@ class Evidence(NamedTuple):
     explained: BoolArray
 
 
+# Returns whether errors pass, given those at the start and at the end, (frame, 2), and tolerances.
+TestOfErrors = Callable[[FloatArray, FloatArray, FloatArray], BoolArray]
 # Returns the frames, given a motion and the laws that it breaks.
 Signature = Callable[[Trajectory, set[str]], Evidence]
 
@@ -61,11 +74,11 @@ def diagnosis_of(
         if (motion := motions.get(judgement.case.name))
         and (judgement.verdict >= Verdict.WRONG or motion.inputs["max_iterations"] == 1)
     ]
-    count = sum(len(signatures) for signatures, _ in TIERS)
-    for signatures, by_family in TIERS:
+    count = sum(len(signatures) for signatures, *_ in TIERS)
+    for signatures, by_family, least in TIERS:
         shares = {key: _share(rule, wrong, by_family) for key, rule in signatures.items()}
         key = max(shares, key=shares.__getitem__)
-        if shares[key] >= MIN_SHARE:
+        if shares[key] >= least:
             explanation = Explanation((key,), sentence_of(key), shares[key], 0.0)
             return Diagnosis((explanation,), variant_count=count)
     return Diagnosis(variant_count=count)
@@ -129,6 +142,12 @@ def _errors(
     return np.concatenate([targets.positions - frames.position, turned], axis=-1)
 
 
+def is_falling_at(motion: Trajectory) -> bool:
+    """Return whether the error of a pose has fallen from the start and can fall further."""
+    before, after = (np.linalg.norm(motion.twists(q), axis=-1) for q in (motion.previous, motion.q))
+    return bool(((after < REDUCED * before) & ~_is_at_minimum(motion)).any())
+
+
 def _is_at_minimum(motion: Trajectory) -> BoolArray:
     """Return whether no joint off its limits would reduce the error, (frame)."""
     e, J = motion.twists(motion.q), next(RIGHT.jacobians(motion.inputs, motion.q))
@@ -159,15 +178,59 @@ def _clamped(motion: Trajectory, laws: set[str]) -> Evidence:
 def _claimed(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the targets beyond reach that are said to be reached."""
     is_beyond = ~motion.case.facts["reachable"] & ("claims" in laws)
-    return Evidence(is_beyond, np.full(len(is_beyond), motion.is_claimed))
+    return Evidence(is_beyond, np.full(len(is_beyond), motion.is_claimed is True))
 
 
 def _stopped(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames that end while the error still falls."""
-    before, after = (np.linalg.norm(motion.twists(q), axis=-1) for q in (motion.previous, motion.q))
-    is_moving = (after < REDUCED * before) & ~_is_at_minimum(motion)
     concerned = motion.is_missed & (motion.inputs["max_iterations"] > 1)
-    return Evidence(concerned & (motion.is_pose), is_moving)
+    return Evidence(concerned & motion.is_pose, np.full(len(motion.q), is_falling_at(motion)))
+
+
+def _with_another_tolerance(
+    is_enough: TestOfErrors, motion: Trajectory, laws: set[str]
+) -> Evidence:
+    """Return the poses that end off the target without a report of failure, and pass a test."""
+    before, after = (
+        np.linalg.norm(motion.twists(q).reshape(-1, 2, 3), axis=-1)
+        for q in (motion.previous, motion.q)
+    )
+    concerned = motion.errors(motion.twists(motion.q)) > 1.0
+    concerned &= motion.case.facts["reachable"] & (motion.inputs["max_iterations"] > 1)
+    concerned &= motion.is_pose & (motion.is_claimed is not False)
+    tolerances = np.array([motion.inputs["tolerance"], motion.inputs["tolerance_rotation"]])
+    return Evidence(concerned, np.asarray(is_enough(before, after, tolerances).all(axis=-1)))
+
+
+def _one_sided(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames with joints beyond limits on one side, and at limits on the other."""
+    q, (lower, upper) = motion.q, (motion.inputs["lower"], motion.inputs["upper"])
+    is_low, is_high = (x.any(axis=-1) for x in (q <= lower + EXACT, q >= upper - EXACT))
+    is_below, is_above = (x.any(axis=-1) for x in (q < lower - AT_LIMIT, q > upper + AT_LIMIT))
+    explained = (is_below & is_high & ~is_above) | (is_above & is_low & ~is_below)
+    return Evidence(np.asarray((is_below & is_high) | (is_above & is_low)), np.asarray(explained))
+
+
+def _within(
+    limits: Callable[[Trajectory], FloatArray], motion: Trajectory, laws: set[str]
+) -> Evidence:
+    """Return the frames beyond limits, and those in which joints are at most at other limits."""
+    q, other = motion.q, limits(motion)
+    is_beyond = motion.excess > AT_LIMIT
+    is_within = (np.abs(q) <= other + EXACT) | (~is_beyond & (other < np.abs(q)))
+    is_at = (np.abs(np.abs(q) - other) <= EXACT) & is_beyond
+    explained = is_within.all(axis=-1) & is_at.any(axis=-1)
+    return Evidence(np.asarray(is_beyond.any(axis=-1)), np.asarray(explained))
+
+
+def _speeds(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames whose reported speeds are those of a fault."""
+    if motion.velocities is None or "velocities and coordinates" not in laws:
+        return Evidence(*np.zeros((2, len(motion.q)), dtype=bool))
+    expected = SPEEDS[key](motion.changes / motion.inputs["h"], motion)
+    gaps = np.abs(motion.velocities - expected).max(axis=-1)
+    scale = np.abs(motion.changes).max(axis=-1) / motion.inputs["h"]
+    return Evidence(scale > 0.0, gaps <= SAME_SPEED * np.maximum(scale, np.abs(expected).max(-1)))
 
 
 def _late(motion: Trajectory, shift: int) -> Evidence:
@@ -206,18 +269,46 @@ def _step_gap(motion: Trajectory, J: FloatArray, q: FloatArray, twists: FloatArr
     return np.asarray(gap / np.maximum(np.linalg.norm(changes * is_free, axis=-1), 1e-300))
 
 
+def _scaled(
+    dampings: FloatArray, factors: tuple[float, float], motion: Trajectory, laws: set[str]
+) -> Evidence:
+    """Return the frames that are right steps with one of these dampings, times such a factor."""
+    q, e = motion.previous, motion.twists(motion.previous)
+    J, changes = motion.jacobians * ~motion.at_limits[:, None], motion.changes * ~motion.at_limits
+    values, U = np.linalg.eigh(J @ np.swapaxes(J, 1, 2))
+    parts = np.einsum("fij,fi->fj", U, e)[:, None] / (np.maximum(values, 0.0)[:, None] + dampings)
+    steps = np.einsum("fij,fik,fdk->fdj", J, U, parts)
+    lengths = (steps * steps).sum(axis=-1)
+    scales = np.clip(
+        np.einsum("fdj,fj->fd", steps, changes) / np.maximum(lengths, 1e-300), *factors
+    )
+    gaps = np.linalg.norm(changes[:, None] - scales[..., None] * steps, axis=-1).min(axis=-1)
+    is_single = np.full(len(q), motion.inputs["max_iterations"] == 1 and q.shape[1] >= MIN_FREE)
+    is_single &= np.linalg.norm(changes, axis=-1) > AT_LIMIT
+    return Evidence(is_single, gaps <= SAME_SCALE * np.linalg.norm(changes, axis=-1))
+
+
+def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames that end off the minimum, and those where a fault's step goes nowhere.
+
+    A solver that accepts only steps that reduce the error ends where its own do not.
+    """
+    e, R = motion.twists(motion.q), RIGHT.frames(motion.inputs, motion.q).rotation
+    (J,) = RIGHT.jacobians(motion.inputs, motion.q)
+    J = J * ~motion.at_limits[:, None]
+    right, wrong = (np.einsum("fij,fi->fj", J, twist) for twist in (e, _twists(motion, e, R)[key]))
+    scale = np.linalg.norm(right, axis=-1) * np.linalg.norm(wrong, axis=-1)
+    cosine = (right * wrong).sum(axis=-1) / np.maximum(scale, 1e-300)
+    is_at_start = np.abs(motion.changes).max(axis=-1) <= AT_LIMIT
+    concerned = motion.is_missed & (motion.inputs["max_iterations"] > 1) & ~_is_at_minimum(motion)
+    explained = (np.abs(cosine) <= NOWHERE) | (is_at_start & (cosine < 0.0))
+    return Evidence(concerned & motion.is_pose, explained)
+
+
 def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
     """Return the gaps to a right step and to those of faults, by key."""
     J, q, e = motion.jacobians, motion.previous, motion.twists(motion.previous)
-    R = RIGHT.frames(motion.inputs, q).rotation
-    twists = {
-        "": e,
-        "Jacobian in the tool's frame": _both(R, e),
-        "error in the tool's frame": _both(np.swapaxes(R, 1, 2), e),
-        "rotation error reversed": e * np.repeat([1.0, -1.0], 3),
-        "linear and angular swapped": np.roll(e, 3, axis=-1),
-        "step reversed": -e,
-    }
+    twists = _twists(motion, e, RIGHT.frames(motion.inputs, q).rotation)
     if len(q) > 1:
         twists["no feedback"] = motion.displacements
     gaps = {key: _step_gap(motion, J, q, twist) for key, twist in twists.items()}
@@ -228,6 +319,31 @@ def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
         first, start = np.repeat(J[:1], len(q), axis=0), np.tile(q[0], (len(q), 1))
         gaps["frames start anew"] = _step_gap(motion, first, start, motion.twists(start))
     return gaps
+
+
+def _twists(motion: Trajectory, e: FloatArray, R: FloatArray) -> dict[str, FloatArray]:
+    """Return the right twists e of tools with rotation matrices R, and those of faults, by key."""
+    return {
+        "": e,
+        "Jacobian in the tool's frame": _both(R, e),
+        "error in the tool's frame": _both(np.swapaxes(R, 1, 2), e),
+        "rotation error reversed": e * np.repeat([1.0, -1.0], 3),
+        "linear and angular swapped": np.roll(e, 3, axis=-1),
+        "step reversed": -e,
+        "position error reversed": e * np.repeat([-1.0, 1.0], 3),
+        "rotation error in the tool's frame": np.concatenate(
+            [e[:, :3], np.einsum("fji,fj->fi", R, e[:, 3:])], axis=-1
+        ),
+        "rotation error doubled": e * np.repeat([1.0, 2.0], 3),
+        "difference of Euler angles": np.concatenate([e[:, :3], _angles_between(motion, R)], -1),
+    }
+
+
+def _angles_between(motion: Trajectory, R: FloatArray) -> FloatArray:
+    """Return the differences of roll, pitch and yaw from matrices to targets, (frame, 3)."""
+    goals = rotation.to_matrix(motion.targets().rotations)
+    pairs = zip(R, goals, strict=True)
+    return np.array([np.subtract(roll_pitch_yaw(b), roll_pitch_yaw(a)) for a, b in pairs])
 
 
 def _fault_gaps(fault: RobotFault, motion: Trajectory) -> Iterator[FloatArray]:
@@ -336,27 +452,54 @@ def _branch(motion: Trajectory, laws: set[str]) -> Evidence:
     return _jumping(motion, is_on_target & before & ~whole & ~_is_singular(motion))
 
 
+# The speeds that faults report, given those that lead to the coordinates.
+SPEEDS: Mapping[str, Callable[[FloatArray, Trajectory], FloatArray]] = {
+    "velocities zero": lambda v, motion: 0.0 * v,
+    "velocities reversed": lambda v, motion: -v,
+    "velocities as changes": lambda v, motion: motion.inputs["h"] * v,
+    "velocities times the step": lambda v, motion: motion.inputs["h"] ** 2 * v,
+    "velocities of the frame before": lambda v, motion: np.concatenate([0.0 * v[:1], v[:-1]]),
+    "central differences": lambda v, motion: np.gradient(motion.q, motion.inputs["h"], axis=0),
+}
 # What explains whole poses comes before what explains steps, jumps and misses.
 POSES: Mapping[str, Signature] = {
     "angles from zero": _from_zero,
+    "limits on one side": _one_sided,
+    "limits mirrored": partial(_within, lambda motion: motion.inputs["upper"]),
+    "limits of half a turn": partial(_within, lambda motion: np.full(motion.q.shape[1], np.pi)),
     "limits ignored": _limits_ignored,
     "one frame late": lambda motion, laws: _late(motion, -1),
     "one frame early": lambda motion, laws: _late(motion, 1),
     "long way round": partial(_by_law, "both signs of a quaternion"),
+    **{key: partial(_speeds, key) for key in SPEEDS},
     "wrong time step": partial(_by_law, "velocities and coordinates"),
     "clamped after the solve": _clamped,
+    "looser tolerance": partial(_with_another_tolerance, lambda a, b, tol: b <= LOOSER * tol),
+    "squared errors": partial(_with_another_tolerance, lambda a, b, tol: b <= 1.01 * np.sqrt(tol)),
+    "rotation not tested": partial(
+        _with_another_tolerance,
+        lambda a, b, tol: b <= np.stack([0 * a[:, 0] + tol[0], SOLVED * a[:, 1]], -1),
+    ),
     **{k: partial(_reached, fault) for k, fault in POSE_FAULTS.items() if k != POSITION_ONLY},
 }
 STEP_FAULTS = {
     key: fault
     for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()
-    if not (fault.relative or fault.reversed or key in ("columns negated", POSITION_ONLY))
+    if not (
+        fault.relative
+        or fault.order
+        or key in ("columns negated", "lever arms reversed", POSITION_ONLY)
+    )
 }
 STEP_KEYS = (
     "Jacobian in the tool's frame", "error in the tool's frame", "rotation error reversed",
-    "linear and angular swapped", "no feedback", "frames start anew", "step reversed", *STEP_FAULTS,
+    "linear and angular swapped", "no feedback", "frames start anew", "step reversed",
+    "position error reversed", "rotation error in the tool's frame", "rotation error doubled",
+    "difference of Euler angles", *STEP_FAULTS,
 )  # fmt: skip
 STEPS: Mapping[str, Signature] = {
+    "damping too large": partial(_scaled, OVERDAMPED, (1.0, 1.0)),
+    "steps too short": partial(_scaled, DAMPINGS[DAMPINGS < 0.1][:, None], SHORT),
     **{key: partial(_is_step, key) for key in STEP_KEYS},
     "transposed Jacobian": _transposed,
     "single step": _single_step,
@@ -369,11 +512,19 @@ VAGUE: Mapping[str, Signature] = {
     "success always claimed": _claimed,
     "stopped early": _stopped,
 }
-# Signatures, and whether the family of cases that shows a fault best decides.
-TIERS: Sequence[tuple[Mapping[str, Signature], bool]] = (
-    (POSES, False),
-    (STEPS, True),
-    ({POSITION_ONLY: partial(_reached, POSE_FAULTS[POSITION_ONLY])}, False),
-    (VAGUE, False),
+STUCK: Mapping[str, Signature] = {
+    key: partial(_is_stuck, key)
+    for key in (
+        "rotation error reversed", "position error reversed", "error in the tool's frame",
+        "rotation error in the tool's frame", "difference of Euler angles",
+    )
+}  # fmt: skip
+# Signatures, whether the family of cases that shows a fault best decides, and the least share.
+TIERS: Sequence[tuple[Mapping[str, Signature], bool, float]] = (
+    (POSES, False, MIN_SHARE),
+    (STEPS, True, MIN_SHARE),
+    (STUCK, False, 0.8),
+    ({POSITION_ONLY: partial(_reached, POSE_FAULTS[POSITION_ONLY])}, False, MIN_SHARE),
+    (VAGUE, False, MIN_SHARE),
 )
-FAULTS = tuple(key for signatures, _ in TIERS for key in signatures)
+FAULTS = tuple(key for signatures, *_ in TIERS for key in signatures)

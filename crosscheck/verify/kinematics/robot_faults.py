@@ -13,8 +13,17 @@ from plumbob.reference.skeleton import Pose
 
 from ..sentence import Sentence, with_code
 from .faults import TABLE
-from .robot_models import IDENTITY, roll_pitch_yaw
-from .robot_textbook import Inputs, RobotFrames, RobotSwitches, frames_at, jacobians_at
+from .robot_models import IDENTITY
+from .robot_textbook import (
+    UPRIGHT,
+    Inputs,
+    RobotFrames,
+    RobotSwitches,
+    ancestors,
+    frames_at,
+    jacobians_at,
+    roll_pitch_yaw,
+)
 
 POSITION_ONLY = "position only"
 # Faults in reading the target alone.
@@ -28,7 +37,7 @@ class RobotFault(NamedTuple):
     misread: Callable[[Inputs], Inputs] = dict  # returns the inputs with another meaning
     scale: float = 1.0  # of the coordinates of hinges, in radians
     relative: bool = False  # whether coordinates count from the start
-    reversed: bool = False  # whether the last joint comes first
+    order: str = ""  # of the coordinates, if not that of the joints
     switches: RobotSwitches = RobotSwitches()
 
     def read(self, inputs: Inputs) -> Inputs:
@@ -37,7 +46,7 @@ class RobotFault(NamedTuple):
 
     def coordinates(self, inputs: Inputs, q: FloatArray) -> FloatArray:
         """Return the coordinates that an answer q stands for."""
-        q = q[..., ::-1] if self.reversed else q
+        q = q[..., np.argsort(self._order(inputs))]
         scaled = np.where(inputs["slides"], q, self.scale * q)
         return inputs["start"] + scaled if self.relative else scaled
 
@@ -47,7 +56,15 @@ class RobotFault(NamedTuple):
 
     def jacobians(self, inputs: Inputs, q: FloatArray) -> Iterator[FloatArray]:
         """Yield the Jacobians at an answer q that the solver may compute."""
-        return jacobians_at(self.read(inputs), self.coordinates(inputs, q), self.switches)
+        for J in jacobians_at(self.read(inputs), self.coordinates(inputs, q), self.switches):
+            yield J[..., self._order(inputs)]
+
+    def _order(self, inputs: Inputs) -> np.ndarray:
+        """Return the joint of each coordinate."""
+        joints = np.arange(len(inputs["parents"]))
+        if self.order == "chain":
+            return np.argsort(1.0 - ancestors(inputs), kind="stable")
+        return joints[::-1] if self.order == "reversed" else joints
 
     def targets(self, inputs: Inputs, targets: Pose) -> Pose:
         """Return targets as the solver understands them."""
@@ -94,6 +111,12 @@ MISREAD: Mapping[str, Callable[[Inputs], Inputs]] = {
     "inverse rotations": partial(_converted, rotation.conjugate, _QUATERNIONS),
     "inverse frames": partial(_converted, rotation.conjugate, _QUATERNIONS[:2]),
     "yaw first": partial(_converted, _other_angles, _QUATERNIONS[:2]),
+    "axes along z": lambda inputs: {"axes": np.tile(UPRIGHT, (len(inputs["parents"]), 1))},
+    "signs of axes lost": lambda inputs: {"axes": np.abs(inputs["axes"])},
+    "origins rotated by their frames": lambda inputs: {
+        "origins": rotation.rotate(inputs["orientations"], inputs["origins"]),
+        "tool_position": rotation.rotate(inputs["tool_rotation"], inputs["tool_position"]),
+    },
     "parents ignored": lambda inputs: {"parents": np.arange(len(inputs["parents"])) - 1},
     "effector ignored": lambda inputs: {"effector": len(inputs["parents"]) - 1},
     "slides rotate": lambda inputs: {"slides": np.zeros_like(inputs["slides"])},
@@ -107,7 +130,7 @@ MISREAD: Mapping[str, Callable[[Inputs], Inputs]] = {
 def _load(entries: Mapping[str, Any]) -> Iterator[tuple[str, RobotFault]]:
     """Yield the faults of a table by their keys: that of an entry, or one of each in a range."""
     for key, entry in entries.items():
-        settings = {k: entry[k] for k in ("scale", "relative", "reversed") if k in entry}
+        settings = {k: entry[k] for k in ("scale", "relative", "order") if k in entry}
         words = with_code(entry["code"], Sentence(entry["sentence"], {}))
         fault = RobotFault(words, MISREAD.get(key, dict), **settings)
         switch, numbers = next(iter(entry.get("switch", {}).items()), ("hinge", 0))

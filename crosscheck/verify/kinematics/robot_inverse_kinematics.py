@@ -1,6 +1,7 @@
 """Robots with limits: whether tools reach their targets, limits are kept and claims are true."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -16,21 +17,38 @@ from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
+from ..sentence import sentence
 from . import motion_faults, robot_models, rounding
+from .motion_faults import is_falling_at
 from .report import report
-from .robot_models import ANYWHERE, AT_A_LIMIT, BEYOND, FARTHEST, STEP, judgement_of, target_of
+from .robot_models import (
+    ANYWHERE,
+    AT,
+    AT_A_LIMIT,
+    BEYOND,
+    CLOSE,
+    FARTHEST,
+    REDUNDANT,
+    STEP,
+    judgement_of,
+    target_of,
+)
 from .trajectories import Trajectory
 
 TASK = robot_models.TASK
+# Coordinates that differ by less are the same answer [rad, m].
+SAME = 1e-9
 cases = robot_models.cases
 
 
 def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Judge coordinates by the laws of poses; name the faults."""
+    fails_at_zero = _fails_at_zero(exchanges)
     judgements = [
         judge_case(
-            exchange, partial(_findings, exchange.case, greeting),
+            exchange, partial(_findings, exchange.case, greeting, fails_at_zero),
             rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
+            robot_models.timed_solve(exchange.case.inputs),
         )
         for exchange in exchanges
     ]  # fmt: skip
@@ -40,16 +58,45 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         if isinstance(exchange.answer, Answer)
         and np.isfinite(exchange.answer.values.get("q", np.nan)).all()
     }
-    return report(TASK, method, judgements, motion_faults.diagnosis_of(judgements, motions))
+    diagnosis = motion_faults.diagnosis_of(judgements, motions)
+    if not diagnosis.explained and _ignores_start(motions.values()):
+        words = sentence("Its answers do not depend on start.")
+        diagnosis = replace(diagnosis, behaviour=words)
+    return report(TASK, method, judgements, diagnosis)
+
+
+def _fails_at_zero(exchanges: Sequence[Exchange]) -> bool:
+    """Return whether failure is reported where the start is at the target, and not near it."""
+    claims: dict[str, list[bool]] = {}
+    for exchange in exchanges:
+        if isinstance(exchange.answer, Answer) and "converged" in exchange.answer.values:
+            is_claimed = bool(exchange.answer.values["converged"])
+            claims.setdefault(exchange.case.family, []).append(is_claimed)
+    return not all(claims.get(AT, [True])) and all(claims.get(CLOSE, [False]))
+
+
+def _ignores_start(motions: Iterable[Trajectory]) -> bool:
+    """Return whether robots with joints to spare have the same answer from different starts."""
+    answers: dict[bytes, list[FloatArray]] = {}
+    for motion in motions:
+        inputs = motion.inputs
+        is_redundant = len(inputs["start"]) >= REDUNDANT and inputs["effector"] >= REDUNDANT - 1
+        if is_redundant and motion.case.family in (AT, CLOSE, ANYWHERE):
+            answers.setdefault(inputs["target_position"].tobytes(), []).append(motion.q[0])
+    groups = [q for q in answers.values() if len(q) > 1]
+    return bool(groups) and all(np.ptp(q, axis=0).max() <= SAME for q in groups)
 
 
 def trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
     """Return an answer as a motion of one frame."""
     q = np.clip(outputs["q"], -FARTHEST, FARTHEST)[None]
-    return Trajectory(case, q, bool(outputs.get("converged", False)))
+    is_claimed = outputs.get("converged")
+    return Trajectory(case, q, None if is_claimed is None else bool(is_claimed))
 
 
-def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> list[Finding]:
+def _findings(
+    case: Case, greeting: Greeting, fails_at_zero: bool, outputs: Mapping[str, Any]
+) -> list[Finding]:
     q = outputs.get("q")
     if q is None:
         return [finding("numbers, no coordinates")]
@@ -57,7 +104,7 @@ def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> lis
         return [not_finite("numbers, of a joint", q)]
     judgement = judgement_of(case.inputs, q)
     limits = _limits(judgement, q, case, greeting)
-    laws = [limits, *_target_laws(judgement, outputs, case, greeting)]
+    laws = [limits, *_target_laws(judgement, outputs, case, greeting, fails_at_zero)]
     if case.family == AT_A_LIMIT:
         laws.append(finding("limits in the solve", trajectory_of(case, outputs).is_clamped[0]))
     return laws
@@ -77,8 +124,9 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
 
 
 def _target_laws(
-    judgement: PoseJudgement, outputs: Mapping[str, Any], case: Case, greeting: Greeting
-) -> Iterator[Finding]:
+    judgement: PoseJudgement, outputs: Mapping[str, Any], case: Case, greeting: Greeting,
+    fails_at_zero: bool,
+) -> Iterator[Finding]:  # fmt: skip
     """Yield whether the target is reached; from any start another minimum may be found.
 
     A single iteration need not reach it.
@@ -87,15 +135,19 @@ def _target_laws(
     joints, size = len(case.inputs["parents"]), case.facts["size"]
     bound = judgement.tolerance + rounding.positions(greeting.epsilon, joints, size)
     angle_bound = judgement.tolerance_rotation + rounding.rotations(greeting.epsilon, joints)
+    # The larger of both errors, in multiples of its bound.
+    error = max(distance / bound, angle / angle_bound)
     if case.family not in (BEYOND, STEP):
         is_hard = case.family in (ANYWHERE, AT_A_LIMIT)
         verdict = Verdict.RIGHT_EXCEPT if is_hard else None
-        yield finding("target reached", distance, bound, verdict=verdict)
+        is_falling = is_hard and error > 1.0 and is_falling_at(trajectory_of(case, outputs))
+        key = "target reached, still falling" if is_falling else "target reached"
+        yield finding(key, distance, bound, verdict=verdict)
         yield finding("rotation reached", angle, angle_bound, verdict=verdict)
-    # The larger of both errors, in multiples of its bound.
-    error = max(distance / bound, angle / angle_bound)
     if "converged" in outputs and outputs["converged"] != (error <= 1.0):
         key = "claims, success of a tool" if outputs["converged"] else "claims, failure of a tool"
+        if fails_at_zero and case.family == AT:
+            key = "claims, failure without error"
         yield finding(key, abs(error - 1.0), distance=distance, angle=angle)
 
 

@@ -28,6 +28,9 @@ TASK = "robot_jacobian"
 _SEED = 1972
 # A fault is compared with all answers only if it explains one of the first.
 TRIAL = 2
+# A fault explains an answer if it leaves this share of the answer's error: rounding is larger in
+# differences.
+REMAINDER = 1e-4
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -113,12 +116,15 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     for exchange in exchanges:
         J = right_jacobian(exchange.case.inputs, CONVENTIONS[name])
         laws = partial(_findings, exchange.case, J, greeting)
+        inputs = exchange.case.inputs
+        reference = partial(jacobian, mechanism(inputs), inputs["q"], -1)
         allowed = rounding.repeats(greeting.epsilon, exchange.case.facts["size"])
-        judgements.append(judge_case(exchange, laws, allowed, None, {"jacobian": J}))
+        judgements.append(judge_case(exchange, laws, allowed, reference, {"jacobian": J}))
     wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
     missed = [exchange for exchange, is_right in zip(answered, matches[name], strict=True)
               if not is_right]  # fmt: skip
-    diagnosis = _diagnosis(missed, greeting) if wrong else Diagnosis()
+    others = [exchange for exchange in answered if exchange not in missed]
+    diagnosis = _diagnosis(missed, others, greeting) if wrong else Diagnosis()
     if not wrong and answered:
         words = sentence("The Jacobian's convention: {convention}.", convention=name)
         diagnosis = Diagnosis(behaviour=words)
@@ -132,24 +138,38 @@ def _bound(case: Case, greeting: Greeting) -> float:
 
 def _matches(exchange: Exchange, greeting: Greeting, J: FloatArray) -> bool:
     """Return whether an answer is a Jacobian."""
+    return _gap(exchange, J) <= _bound(exchange.case, greeting)
+
+
+def _gap(exchange: Exchange, J: FloatArray) -> float:
     assert isinstance(exchange.answer, Answer)
-    gap = np.abs(exchange.answer.values["jacobian"] - J).max()
-    return bool(gap <= _bound(exchange.case, greeting))
+    return float(np.abs(exchange.answer.values["jacobian"] - J).max())
 
 
 def _share(fault: RobotFault, exchanges: Sequence[Exchange], greeting: Greeting) -> float:
-    """Return the share of the answers that a fault explains in one of the conventions."""
-    counts = np.zeros(len(CONVENTIONS))
+    """Return the share of the answers that a fault explains in one of the conventions.
+
+    Right answers that the fault does not change are not counted; those that it would are.
+    """
+    conventions = CONVENTIONS.values()
+    is_right, is_explained = np.zeros((2, len(exchanges), len(conventions)), dtype=bool)
     for i, exchange in enumerate(exchanges):
-        if i == TRIAL and not counts.any():
+        if i == TRIAL and not is_explained.any():
             return 0.0
         inputs = exchange.case.inputs
         frames = fault.frames(inputs, inputs["q"])
         jacobians = list(fault.jacobians(inputs, inputs["q"]))
-        for k, convention in enumerate(CONVENTIONS.values()):
+        for k, convention in enumerate(conventions):
             predictions = (convention(J, frames.position, frames.rotation) for J in jacobians)
-            counts[k] += any(_matches(exchange, greeting, J) for J in predictions)
-    return float(counts.max()) / len(exchanges)
+            bound, error = (
+                _bound(exchange.case, greeting),
+                _gap(exchange, right_jacobian(inputs, convention)),
+            )
+            is_right[i, k] = error <= bound
+            gap = min(_gap(exchange, J) for J in predictions)
+            is_explained[i, k] = gap <= max(bound, REMAINDER * error)
+    explained, counted = is_explained & ~is_right, ~(is_explained & is_right)
+    return float((explained.sum(axis=0) / np.maximum(counted.sum(axis=0), 1)).max())
 
 
 def _findings(
@@ -163,11 +183,13 @@ def _findings(
     yield of_joints("Jacobian", errors, _bound(case, greeting))
 
 
-def _diagnosis(exchanges: Sequence[Exchange], greeting: Greeting) -> Diagnosis:
-    """Return the fault that explains most Jacobians, those of robots with many joints first."""
-    exchanges = sorted(exchanges, key=lambda exchange: -len(exchange.case.inputs["q"]))
-    if not exchanges:
+def _diagnosis(
+    wrong: Sequence[Exchange], right: Sequence[Exchange], greeting: Greeting
+) -> Diagnosis:
+    """Return the fault that explains most Jacobians, wrong ones with many joints first."""
+    if not wrong:
         return Diagnosis()
+    exchanges = [*sorted(wrong, key=lambda exchange: -len(exchange.case.inputs["q"])), *right]
     shares = {key: _share(fault, exchanges, greeting) for key, fault in FAULTS.items()}
     key = max(shares, key=shares.__getitem__, default="")
     if not key or shares[key] < LEAST_SHARE:

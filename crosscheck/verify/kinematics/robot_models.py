@@ -1,8 +1,8 @@
 """Robots of joints with limits: as the reference's articulations, as URDF, and as cases."""
 
-import math
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,12 @@ from plumbob.reference.skeleton import Pose
 from ..case import Case
 from ..greeting import Greeting
 from ..sentence import sentence
+from .robot_textbook import roll_pitch_yaw
 from .skeletons import suits
 
 TASK = "robot_inverse_kinematics"
 ITERATIONS = 200
+PRECISION = ("tolerance", "tolerance_rotation", "max_iterations")
 TOLERANCES = {"double": 1e-5, "single": 1e-3}
 # From a start so near to an answer [rad, m] no other minimum than the target's is nearer.
 NEAR = 0.1
@@ -120,18 +122,6 @@ def _urdf_joint(inputs: Mapping[str, Any], j: int) -> str:
 def _urdf_origin(position: FloatArray, quaternion: FloatArray) -> str:
     angles = roll_pitch_yaw(rotation.to_matrix(quaternion))
     return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(angles)}"/>'
-
-
-def roll_pitch_yaw(R: FloatArray) -> tuple[float, float, float]:
-    """Return the angles about the fixed axes x, y and z whose rotations in turn make R [rad].
-
-    Roll is read off after yaw is undone, so that it is exact also where pitch is a right angle.
-    """
-    yaw = math.atan2(R[1, 0], R[0, 0])
-    sine, cosine = math.sin(yaw), math.cos(yaw)
-    pitch = math.atan2(-R[2, 0], cosine * R[0, 0] + sine * R[1, 0])
-    roll = math.atan2(sine * R[0, 2] - cosine * R[1, 2], cosine * R[1, 1] - sine * R[0, 1])
-    return roll, pitch, yaw
 
 
 def _numbers(vector: Iterable[float]) -> str:
@@ -230,6 +220,15 @@ def solved(
         tolerance=1e-9, tolerance_rotation=1e-9, max_iterations=ITERATIONS,
     )  # fmt: skip
     return solution.coordinates, bool(solution.outcome == Outcome.CONVERGED)
+
+
+def timed_solve(inputs: Mapping[str, Any]) -> Callable[[], object]:
+    """Return the call of the reference that answers a request, to be timed."""
+    options = {name: inputs[name] for name in PRECISION}
+    return partial(
+        solve_ik, mechanism(inputs), inputs["start"], target_of(inputs), "levenberg_marquardt",
+        restarts=0, **options,
+    )  # fmt: skip
 
 
 def robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:

@@ -1,7 +1,8 @@
 """Motions of a robot's tool, as cases: along a curve, in laps, across the boundary of the reach."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from plumbob.reference.tracking import track
 from ..case import Case
 from ..greeting import Greeting
 from ..sentence import Sentence
-from .robot_models import TOLERANCES, mechanism, robots, tool_pose, urdf
+from .robot_models import PRECISION, TOLERANCES, mechanism, robots, tool_pose, urdf
 from .skeletons import suits
 
 TASK = "robot_track"
@@ -174,6 +175,14 @@ def followed(
         mechanism(inputs), targets, solver, start, tolerance=1e-9, tolerance_rotation=1e-9,
         max_iterations=ITERATIONS,
     ).coordinates  # fmt: skip
+
+
+def timed_track(inputs: Mapping[str, Any]) -> Callable[[], object]:
+    """Return the call of the reference that answers a request, to be timed."""
+    targets = Target(inputs["target_positions"], inputs["target_rotations"], -1)
+    within = np.clip(inputs["start"], inputs["lower"], inputs["upper"])
+    options = {name: inputs[name] for name in PRECISION}
+    return partial(track, mechanism(inputs), targets, "levenberg_marquardt", within, **options)
 
 
 def _case(

@@ -40,7 +40,11 @@ RETURN = 10
 def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Judge motions by the laws of tracking; name the faults."""
     motions = {
-        exchange.case.name: Trajectory(exchange.case, np.clip(q, -FARTHEST, FARTHEST))
+        exchange.case.name: Trajectory(
+            exchange.case,
+            np.clip(q, -FARTHEST, FARTHEST),
+            velocities=exchange.answer.values.get("velocities"),
+        )
         for exchange in exchanges
         if isinstance(exchange.answer, Answer)
         and np.isfinite(q := exchange.answer.values.get("q", np.nan)).all()
@@ -49,6 +53,7 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         judge_case(
             exchange, partial(_findings, exchange.case.name, motions, greeting),
             rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
+            robot_motions.timed_track(exchange.case.inputs),
         )
         for exchange in exchanges
     ]  # fmt: skip
@@ -72,7 +77,7 @@ def _findings(
         *_rest(motion),
         *_laps(motion),
         *_signs(motion, motions),
-        *_velocities(motion, outputs.get("velocities")),
+        *_velocities(motion),
     ]
 
 
@@ -196,9 +201,9 @@ def _signs(motion: Trajectory, motions: Mapping[str, Trajectory]) -> Iterator[Fi
         yield _at(frame, finding("both signs of a quaternion", differences[frame], SAME))
 
 
-def _velocities(motion: Trajectory, velocities: Any) -> Iterator[Finding]:
+def _velocities(motion: Trajectory) -> Iterator[Finding]:
     """Yield whether joints keep their greatest speeds, and whether reported speeds are theirs."""
-    h, changes = motion.inputs["h"], motion.changes
+    h, changes, velocities = motion.inputs["h"], motion.changes, motion.velocities
     if "velocity_limits" in motion.inputs:
         ratios = np.abs(changes / h) / motion.inputs["velocity_limits"]
         frame, joint = divmod(int(np.argmax(ratios)), ratios.shape[1])

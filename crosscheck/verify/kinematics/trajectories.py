@@ -44,7 +44,8 @@ class Trajectory:
 
     case: Case
     q: FloatArray  # (frame, joint)
-    is_claimed: bool = False  # whether the solver reports success
+    is_claimed: bool | None = None  # whether the solver reports success, if it does
+    velocities: FloatArray | None = None  # that the solver reports, (frame, joint)
 
     @property
     def is_pose(self) -> bool:

@@ -160,7 +160,7 @@ def named(exchanges):
     return report.verdict, [one.faults[0] for one in report.diagnosis.explanations]
 
 
-@pytest.mark.parametrize("key", ["axes not rotated", "lever arms reversed", "plus the cosine"])
+@pytest.mark.parametrize("key", ["axes not rotated", "z columns", "plus the cosine"])
 def test_wrong_kinematics_are_named_by_single_iterations(key):
     exchanges = [exchange_of(FEW[0], FEW[0].inputs["start"] + 0.5)]
     for case in [case for case in CASES if case.family == STEP][:3]:
