@@ -146,6 +146,8 @@ def _target_laws(
         yield finding("rotation reached", angle, angle_bound, verdict=verdict)
     if "converged" in outputs and outputs["converged"] != (error <= 1.0):
         key = "claims, success of a tool" if outputs["converged"] else "claims, failure of a tool"
+        if outputs["converged"] and distance <= bound:
+            key = "claims, success of a position"
         if fails_at_zero and case.family == AT:
             key = "claims, failure without error"
         yield finding(key, abs(error - 1.0), distance=distance, angle=angle)

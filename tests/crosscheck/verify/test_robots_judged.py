@@ -209,3 +209,52 @@ def test_a_single_step_where_a_solve_is_asked_is_named():
         step = J.T @ np.linalg.solve(J @ J.T + 1e-3 * np.eye(6), e)
         exchanges.append(exchange_of(case, case.inputs["start"] + step))
     assert named(exchanges) == (Verdict.WRONG, ["single step"])
+
+
+@pytest.mark.parametrize(
+    ("key", "limit"), [("limits mirrored", -2.4), ("limits of half a turn", np.pi)]
+)
+def test_other_limits_than_the_request_s_are_named(key, limit):
+    near = [case for case in FEW if case.family == CLOSE]
+    exchanges = [exchange_of(case, np.full_like(case.inputs["start"], limit)) for case in near]
+    assert named(exchanges) == (Verdict.WRONG, [key])
+
+
+@pytest.mark.parametrize(("share", "key"), [(20.0, "looser tolerance"), (200.0, "squared errors")])
+def test_another_test_of_convergence_is_named(share, key):
+    """Answers whose tool is off by many tolerances, on its way from a start near the target."""
+    exchanges = []
+    for case in [case for case in CASES if case.family == CLOSE]:
+        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
+        right, _ = robot_models.solved(case.inputs, case.inputs["start"], tool)
+        e = twists_between(tool_pose(case.inputs, case.inputs["start"]), tool)
+        error = np.linalg.norm(e[3:]) / case.inputs["tolerance_rotation"]
+        part = min(share / max(error, 1.0), 1.0)
+        exchanges.append(
+            exchange_of(case, right + part * (case.inputs["start"] - right), converged=True)
+        )
+    assert named(exchanges) == (Verdict.WRONG, [key])
+
+
+def test_an_answer_that_does_not_depend_on_the_start_is_reported():
+    answers = {}
+    for case in [c for c in CASES if c.family in (robot_models.AT, CLOSE, robot_models.ANYWHERE)]:
+        answers.setdefault(case.inputs["target_position"].tobytes(), case.inputs["start"])
+    exchanges = [
+        exchange_of(case, answers[case.inputs["target_position"].tobytes()])
+        for case in CASES
+        if case.inputs["target_position"].tobytes() in answers
+    ]
+    assert "start" in str(judge(exchanges, GREETING, "").diagnosis.behaviour)
+
+
+def test_failure_at_the_target_alone_says_what_divides_by_zero():
+    near = [case for case in CASES if case.family in (robot_models.AT, CLOSE)]
+    exchanges = []
+    for case in near:
+        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
+        q, _ = robot_models.solved(case.inputs, case.inputs["start"], tool)
+        exchanges.append(exchange_of(case, q, converged=case.family == CLOSE))
+    report = judge(exchanges, GREETING, "")
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    assert "0 / 0" in str([words for one in report.judgements for words in one.complaints])
