@@ -42,9 +42,9 @@ OF_GLOBAL_LINKS = 13
 # and the angles with the cosines 0.99999, 0.9999 and 0.999.
 DROPPED = (0.0, 1e-4, 1e-3, 4.4721e-3, 1e-2, 1.41421e-2, 1.745329e-2, 4.47214e-2, 0.1)
 # Angles smaller than these end a sweep, end the solve or are raised to them, by `small` [rad].
-SMALL = (1e-5, 1e-4, 1e-3, 1e-2, 1.745329e-2, 5e-2)
+SMALL = (1e-4, 1e-3, 1e-2, 1.745329e-2, 5e-2)
 # The distances at which a solve ends whatever the tolerance, by `test` from `FIXED_TEST` on [m].
-FIXED, FIXED_TEST = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1), 5
+FIXED, FIXED_TEST = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2), 5
 # Of `aim`, directions of which one is in the frame of the joint (two numbers) or of its parent.
 MIXED_FRAMES = 13
 # Of `aim`, directions that are rotated by the joint's rotation and not by its inverse.

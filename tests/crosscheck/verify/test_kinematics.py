@@ -73,8 +73,12 @@ TWINS = {
     "local_rotations": [
         {"target from the root", "root offset dropped"},
         {"root not put back", "forward pass begins late"},
+        {"reach without the last link", "reach without the first link"},
     ],
-    "positions": [{"xyzw read", "xyzw throughout"}],
+    "positions": [
+        {"xyzw read", "xyzw throughout"},
+        {"reach without the last link", "reach without the first link"},
+    ],
 }
 
 
