@@ -25,8 +25,11 @@ class Division(NamedTuple):
     link: int  # the place of a joint in the path
 
 
-def forgiven(case: Case, method: str, failure: Sentence) -> Finding:
-    """Return the reservation about an unusable answer to a degenerate case, with its guard."""
+def forgiven(case: Case, method: str, failure: Sentence, *, is_law: bool = False) -> Finding:
+    """Return the reservation about an unusable answer to a degenerate case, with its guard.
+
+    The failure is a phrase, or (`is_law`) the whole sentence of a broken law.
+    """
     path = case.facts["path"]
     x, target = forward(case.inputs)[0][path], case.inputs["target"]
     divisions = DIVISIONS.get(method, _no_division)(x, target, TINY * case.facts["reach"])
@@ -34,7 +37,8 @@ def forgiven(case: Case, method: str, failure: Sentence) -> Finding:
     joint, child = path[division.link], path[min(division.link + 1, len(path) - 1)]
     values: Mapping[str, Any] = {"joint": joint, "child": child, "about": case.about}
     cause = Sentence(LAWS["divisions"][division.cause]["sentence"], values)
-    return finding("numbers, degenerate", index=int(joint), failure=failure, cause=cause)
+    key = "numbers, degenerate, of a law" if is_law else "numbers, degenerate"
+    return finding(key, index=int(joint), failure=failure, cause=cause)
 
 
 def _no_division(x: FloatArray, target: FloatArray, tiny: float) -> Iterator[Division]:

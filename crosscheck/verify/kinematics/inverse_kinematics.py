@@ -112,7 +112,7 @@ def _judge(trial: PoseTrial, method: str, greeting: Greeting) -> CaseJudgement:
         if case.requirement != "must" and worst.verdict >= Verdict.WRONG:
             is_number = worst.verdict is Verdict.WRONG and not pose.is_huge(case.facts["size"])
             failure = worst.sentence if is_number else NO_NUMBER
-            return [degenerate.forgiven(case, method, failure)]
+            return [degenerate.forgiven(case, method, failure, is_law=is_number)]
         if worst.verdict is Verdict.BROKEN:
             return findings
         return findings + target_laws(pose, outputs, case, method, greeting)
