@@ -19,7 +19,7 @@ from .problem import SpringProblem, frames
 # Aspects of a step in the order of the computation.
 ASPECTS = (
     "time", "inertia", "masses", "gravity", "springs", "damping", "damper", "integrator",
-    "matrix", "substeps", "pins", "velocity", "update", "scaling", "factorisation",
+    "matrix", "substeps", "pins", "velocity", "update", "scaling", "frames", "factorisation",
 )  # fmt: skip
 # Aspects of which the forces and the matrix of an implicit step may have different versions.
 IN_PARTS = ("masses", "springs", "damping")
@@ -42,7 +42,7 @@ class Option(NamedTuple):
     energy: tuple[Any, ...] = ()
     output: bool = False  # whether it changes all forces at the end
     rare: bool = False  # whether it is not tried together with faults
-    part: str = ""  # the part of a step that it changes alone: forces, matrix; else both
+    part: str = ""  # the part of a step that it changes alone: forces, matrix; "" or both
 
 
 def _with_masses(p: SpringProblem, masses: FloatArray) -> dict[str, Any]:
@@ -87,6 +87,9 @@ FIELDS = {
 CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
     "mass inverse missing": lambda p: {"masses": np.ones(p.count)},
     "mass inverse squared": lambda p: {"masses": p.masses**2},
+    "mass multiplied": lambda p: {"masses": 1.0 / p.masses},
+    "h in place of h²": lambda p: {"stiffnesses": p.stiffnesses / p.h},
+    "h² missing": lambda p: {"stiffnesses": p.stiffnesses / p.h**2},
     "mass 1 for all": lambda p: _with_masses(p, np.ones(p.count)),
     "first mass for all": lambda p: _with_masses(p, np.full(p.count, p.masses[0])),
     "gravity g/m": lambda p: {"weights": np.tile(p.gravity, (p.count, 1))},
@@ -184,6 +187,8 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
         output = entry.get("output", False)
         option = Option(key, aspect, message, change, fields, parts, energy, output, rare, part)
         yield option
+        if aspect == "inertia":
+            yield option._replace(fields={**fields, "right_start": True})
         if "matrix" in entry and "dv" not in fields and entry["matrix"].get("masses", 1.0) == 1.0:
             yield option._replace(fields={**fields, "dv": True})
 
@@ -260,7 +265,7 @@ def apply(
             linear = linear.changed(**option.change(linear))
         if option.fields:
             model = model._replace(**option.fields)
-    is_apart = any(option.part for option in options)
+    is_apart = any(option.part in _FAULTS["part"] for option in options)
     return p.changed(linear=linear) if is_apart else p, model
 
 

@@ -112,8 +112,8 @@ def compatible(options: Mapping[str, Option]) -> bool:
     inverse = fields["matrix"].inverse if "matrix" in fields else "exact"
     if not is_linearised and (fields.get("dv") or inverse == "first order"):
         return False
-    parts = {option.part for option in options.values()} - {""}
-    if method in EXPLICIT and (parts or "update" in fields):
+    parts = {option.part for option in options.values()} - {"", "both"}
+    if method in EXPLICIT and (parts or ("update" in fields and method != "symplectic")):
         return False
     if fields.get("dampers_apart") and "matrix" not in fields:
         return False

@@ -101,6 +101,7 @@ class StepContext:
     description: Sentence  # the model in words
     expected: Mapping[str, Any]  # its prediction, or {} if it has none
     pins_declared: bool  # whether the greeting says how pins are held
+    explicit_declared: bool = False  # whether the greeting declares an explicit method
 
     @cached_property
     def judgement(self) -> StepJudgement | None:
@@ -196,7 +197,8 @@ def _indefinite(p: SpringProblem) -> bool:
 def minimiser(context: StepContext) -> Finding | None:
     """Return how far positions are from converged implicit Euler, relative to how far y is."""
     p = context.problem
-    judgement = context.judgement if "positions" in context.answers else None
+    is_meant = "positions" in context.answers and not context.explicit_declared
+    judgement = context.judgement if is_meant else None
     if judgement is None or not judgement.outcome.solved:
         return None
     rounded = judgement.distance <= context.allowed.positions * np.sqrt(3.0 * p.count)
@@ -224,6 +226,18 @@ def velocities(context: StepContext) -> Finding | None:
     if not np.isfinite(gap):
         verdict = Verdict.UNDECIDED
     return finding("velocities", error, SOLVED, verdict=verdict, gap=gap)
+
+
+def pin_velocities(context: StepContext) -> Finding | None:
+    """Return how fast pins are that do not move."""
+    p, v = context.problem, context.answers.get("velocities")
+    if v is None or len(p.pinned) == 0 or context.model.pins not in ("eliminated", "overwritten"):
+        return None
+    speeds = np.linalg.norm(v, axis=-1)[..., p.pinned].reshape(-1, len(p.pinned)).max(axis=0)
+    if not np.isfinite(speeds).all():
+        return None
+    index = int(p.pinned[speeds.argmax()])
+    return finding("pin velocities", speeds.max(), context.allowed.velocities, index=index)
 
 
 def momentum(context: StepContext) -> Finding | None:

@@ -91,6 +91,8 @@ class StepModel(NamedTuple):
     # the unknown, a displacement or a change of velocity, stays zero or what memory held
     factorisation: str = "LU"
     update: str = "solved"  # of positions and velocities by the solution; else a key of UPDATES
+    right_start: bool = False  # whether iterations begin at x + h v, whatever stands for y
+    frames: str = "each"  # of several steps, or a key of FRAMES
 
     @property
     def pin_kind(self) -> str:
@@ -121,6 +123,19 @@ class Substep(NamedTuple):
         return free
 
 
+State = tuple[FloatArray, FloatArray]  # positions and velocities
+# What a wrong motion has in place of the state at the end of a step, and in place of all states.
+BETWEEN: Mapping[str, Callable[[SpringProblem, FloatArray, FloatArray], State]] = {
+    "restarts": lambda p, x, v: (p.positions, p.velocities),
+    "velocity zero": lambda p, x, v: (x, np.zeros_like(v)),
+    "velocity first": lambda p, x, v: (x, p.velocities),
+}
+FRAMES: Mapping[str, Callable[[SpringProblem, list[State]], list[State]]] = {
+    "start first": lambda p, states: [(p.positions, p.velocities), *states[:-1]],
+    "last only": lambda p, states: states[-1:] * len(states),
+}
+
+
 def simulate(p: SpringProblem, model: StepModel) -> dict[str, FloatArray]:
     """Return positions and velocities after the step, or after each of several."""
     p = _with_pins(p, model)
@@ -130,8 +145,11 @@ def simulate(p: SpringProblem, model: StepModel) -> dict[str, FloatArray]:
     for _ in range(p.steps or 1):
         x, v = _step(p, model, x, v)
         states.append((x, v))
+        x, v = BETWEEN[model.frames](p, x, v) if model.frames in BETWEEN else (x, v)
     if p.steps is None:
         return {"positions": x, "velocities": v}
+    if model.frames in FRAMES:
+        states = FRAMES[model.frames](p, states)
     positions, velocities = map(np.array, zip(*states, strict=True))
     return {"positions": positions, "velocities": velocities}
 
@@ -247,7 +265,7 @@ def _explicit_rates(start: Substep, x: FloatArray, v: FloatArray) -> FloatArray:
 
 
 # The share of the new velocity, beside the old one, that moves positions.
-SHARES = {"explicit": 0.0, "taylor": 0.5, "symplectic": 1.0}
+SHARES = {"explicit": 0.0, "taylor": 0.5, "symplectic": 1.0, "beyond": 1.5}
 
 
 def _by_one_rate(start: Substep) -> tuple[FloatArray, FloatArray]:
@@ -255,6 +273,13 @@ def _by_one_rate(start: Substep) -> tuple[FloatArray, FloatArray]:
     _, model, x, v, h = start
     a = _explicit_rates(start, x, v)
     return x + h * (v + SHARES[model.integrator.method] * h * a), v + h * a
+
+
+def _half_a(start: Substep) -> tuple[FloatArray, FloatArray]:
+    """Step by x + h v + h/2 a, where h²/2 a is meant."""
+    _, _, x, v, h = start
+    a = _explicit_rates(start, x, v)
+    return x + h * v + 0.5 * h * a, v + h * a
 
 
 def _runge_kutta(start: Substep) -> tuple[FloatArray, FloatArray]:
@@ -282,6 +307,8 @@ EXPLICIT: Mapping[str, Callable[[Substep], tuple[FloatArray, FloatArray]]] = {
     "explicit": _by_one_rate,
     "symplectic": _by_one_rate,
     "taylor": _by_one_rate,
+    "beyond": _by_one_rate,
+    "half_a": _half_a,
     "runge_kutta": _runge_kutta,
     "in_place": _in_place,
 }
@@ -322,6 +349,9 @@ UPDATES: Mapping[str, Update] = {
     "change of position only": lambda s, x, v: (x - s.h * s.v, v),
     "without h": lambda s, x, v: (s.x + (x - s.x) / s.h, v),
     "twice": lambda s, x, v: (2.0 * x - s.x, v),
+    "mean velocity": lambda s, x, v: (s.x + 0.5 * s.h * (s.v + v), v),
+    "with h²": lambda s, x, v: (s.x + s.h * (x - s.x), v),
+    "over 1/60 s": lambda s, x, v: (s.x + v / 60.0, v),
 }
 
 
@@ -355,8 +385,9 @@ class StepEquation:
     def starts(self) -> dict[str, FloatArray]:
         """Where iterations may begin; s_n = y + h² M⁻¹ f_ext (Bouaziz et al. 2014, Algorithm 1)."""
         start = self.start
+        y = start.x + start.h * start.v if start.model.right_start else self.y
         s_n = self.y + start.h**2 * self.constant / start.p.masses[:, None]
-        return {"x_n": start.x, "y": self.y, "s_n": s_n}
+        return {"x_n": start.x, "y": y, "s_n": s_n}
 
     @property
     def uncoupled(self) -> bool:

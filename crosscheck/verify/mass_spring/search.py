@@ -99,7 +99,7 @@ class Probe(NamedTuple):
     def aspects(self) -> list[str]:
         """Return the aspects that matter, in the order in which they are chosen."""
         p = self.problem
-        more = {"damper": p.damped, "damping": p.damped, "pins": p.pinned.size}
+        more = {"damper": p.damped, "damping": p.damped, "pins": p.pinned.size, "frames": p.steps}
         return [*ALWAYS, *(aspect for aspect, matters in more.items() if matters)]
 
     def stages(self) -> list["Probe"]:
@@ -127,6 +127,12 @@ class ModelSearch:
         self.domains["flight"] = [
             (pairs[0][0]._replace(fields={"integrator": flight}), min(cost for _, cost in pairs))
             for flight, pairs in self.classes.items()
+        ]
+        # it flies as implicit Euler does, so that no flight tells that it is not what is declared
+        self.symplectic = [
+            (option, cost)
+            for option, cost in self.domains["integrator"]
+            if cost and option.fields["integrator"].method == "symplectic"
         ]
         self.costs = {id(option): cost for pairs in self.domains.values() for option, cost in pairs}
         self.declared_aspects = [
@@ -264,6 +270,7 @@ class ModelSearch:
                 aspect, domain = "flight", self.domains["flight"]
             elif aspect == "integrator":
                 domain = self.classes[in_flight(branch[aspect].fields["integrator"], self.flight)]
+                domain = domain + self.symplectic
             if not self.costs[id(branch[aspect])]:
                 yield from ((aspect, option) for option, cost in domain if cost)
 

@@ -26,13 +26,14 @@ from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
 from .honest import compatible, domains, honest
 from .laws import SOLVED, StepContext, rounding
-from .model import StepModel, predicted
+from .model import EXPLICIT, StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
 from .search import ModelMatch, ModelSearch, Probe, gaps_of, probes_of, with_factorisation
 
 MAX_EXPLANATIONS = 3
 LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
-    laws.pins, laws.declared_step, laws.velocities, laws.momentum, laws.minimiser,
+    laws.pins, laws.declared_step, laws.velocities, laws.pin_velocities, laws.momentum,
+    laws.minimiser,
 )  # fmt: skip
 
 
@@ -160,6 +161,7 @@ def _judge_case(
     context = StepContext(
         p, answer.values, rounding(p, model, greeting.epsilon), model, recognised,
         describe_model(options), expected, greeting.step.pins is not None,
+        greeting.step.method in EXPLICIT,
     )  # fmt: skip
     correct_digits = None
     if recognised and expected and positions is not None:
@@ -217,8 +219,7 @@ def _diagnose(
     behaviour, step = None, search.step
     if matches and matches[0].faults:
         explanations = (_explanation(matches, probes, search.epsilon),)
-    elif matches and any(getattr(step, name) is None for name in _DECLARED):
-        options = honest_options(matches, step)
+    elif matches and _leaves_open(step, options := honest_options(matches, step)):
         is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
         declaration = "" if is_wrong else declaration_of(options)
         behaviour = sentence(
@@ -243,6 +244,18 @@ def _diagnose(
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
 
 
+def _leaves_open(step: Step, options: Sequence[Option]) -> bool:
+    """Return whether a greeting leaves something open that is not as usual."""
+    fields = {name: value for option in options for name, value in option.fields.items()}
+    usual = {"substeps": 1, "velocity": VELOCITY_OF[fields["integrator"].explicit]}
+    return any(
+        getattr(step, name) is None and (name not in usual or fields[name] != usual[name])
+        for name in _DECLARED
+    )
+
+
+# The usual velocity of implicit and of explicit methods.
+VELOCITY_OF = ("displacement", "separate")
 # What a greeting may say of its step; anything else is inferred.
 _DECLARED = ("method", "substeps", "damper", "pins", "velocity")
 
