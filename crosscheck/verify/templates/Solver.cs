@@ -12,7 +12,13 @@ class Request { // positions are x, y, z [m]; rotations are unit quaternions w, 
     public double[][] positions = null!, velocities = null!;
     public double[] masses = null!, rest_lengths = null!, stiffnesses = null!, dampings = null!;
     public double[] target = null!, gravity = null!; // gravity is an acceleration
-    public double tolerance, h;
+    public double tolerance, tolerance_rotation, h;
+    public double[][] origins = null!, orientations = null!, axes = null!; // of a robot's joints
+    public bool[] slides = null!; // along the axis; else the joint rotates about it
+    public double[] lower = null!, upper = null!, start = null!, q = null!;
+    public double[] tool_position = null!, tool_rotation = null!; // of the joint `effector`
+    public double[] target_position = null!, target_rotation = null!;
+    public string urdf = ""; // the same robot as a text
 }
 
 static class Solver {
@@ -28,12 +34,22 @@ static class Solver {
     static void MassSpringStep(Request ask, Dictionary<string, object> answer) =>
         throw new Exception("mass_spring_step is not written yet");
 
+    // Fill in "q", coordinates within their limits that bring the tool to the target, as double[].
+    static void RobotInverseKinematics(Request ask, Dictionary<string, object> answer) =>
+        throw new Exception("robot_inverse_kinematics is not written yet");
+
+    // Fill in "jacobian", the tool's linear and angular velocity by joint, as 6 rows double[][].
+    static void RobotJacobian(Request ask, Dictionary<string, object> answer) =>
+        throw new Exception("robot_jacobian is not written yet");
+
     // GREETING_FIELDS
     static void Main() {
         var tasks = new Dictionary<string, Action<Request, Dictionary<string, object>>> {
             ["forward_kinematics"] = ForwardKinematics,
             ["inverse_kinematics"] = InverseKinematics,
             ["mass_spring_step"] = MassSpringStep,
+            ["robot_inverse_kinematics"] = RobotInverseKinematics,
+            ["robot_jacobian"] = RobotJacobian,
         };
         var offered = new List<string>(tasks.Keys);
         tasks["greeting"] = (ask, answer) => {

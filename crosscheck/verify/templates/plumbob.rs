@@ -225,6 +225,38 @@ pub struct System {
     pub gravity: [f64; 3],
 }
 
+pub struct Robot {
+    pub parents: Vec<i64>,          // -1 is the base
+    pub origins: Vec<[f64; 3]>,     // of each joint's frame, in its parent's
+    pub orientations: Vec<[f64; 4]>, // of that frame, likewise
+    pub axes: Vec<[f64; 3]>,        // in the joint's frame
+    pub slides: Vec<bool>,          // along its axis; else the joint rotates about it
+    pub lower: Vec<f64>,
+    pub upper: Vec<f64>,
+    pub effector: usize, // the joint that carries the tool
+    pub tool_position: [f64; 3],
+    pub tool_rotation: [f64; 4],
+    pub urdf: String, // the same robot as a text
+}
+
+impl Request {
+    pub fn robot(&self) -> Result<Robot, String> {
+        Ok(Robot {
+            parents: self.get("parents")?,
+            origins: self.get("origins")?,
+            orientations: self.get("orientations")?,
+            axes: self.get("axes")?,
+            slides: self.get("slides")?,
+            lower: self.get("lower")?,
+            upper: self.get("upper")?,
+            effector: self.get("effector")?,
+            tool_position: self.get("tool_position")?,
+            tool_rotation: self.get("tool_rotation")?,
+            urdf: self.get("urdf")?,
+        })
+    }
+}
+
 impl Request {
     pub fn system(&self) -> Result<System, String> {
         Ok(System {

@@ -37,7 +37,56 @@ void mass_spring_step(const System& system, Positions& x, Positions& v, double h
     throw plumbob::missing("mass_spring_step");
 }
 
+struct Robot {
+    std::vector<int> parents;  // -1 is the base
+    Positions origins;         // of each joint's frame, in its parent's
+    Rotations orientations;    // of that frame, likewise
+    Positions axes;            // in the joint's frame
+    std::vector<bool> slides;  // along its axis; else the joint rotates about it
+    std::vector<double> lower, upper;
+    int effector;              // the joint that carries the tool
+    Vec3 tool_position;
+    Quat tool_rotation;
+    std::string urdf;          // the same robot
+};
+
+// Change the coordinates q within their limits so that the tool has a position and a rotation.
+void robot_inverse_kinematics(const Robot& robot, std::vector<double>& q, const Vec3& position,
+                              const Quat& rotation, double tolerance, double tolerance_rotation,
+                              int max_iterations) {
+    throw plumbob::missing("robot_inverse_kinematics");
+}
+
+// Fill in the tool's linear and angular velocity by joint: 6 rows.
+void robot_jacobian(const Robot& robot, const std::vector<double>& q,
+                    std::vector<std::vector<double>>& jacobian) {
+    throw plumbob::missing("robot_jacobian");
+}
+
+void solve_robot(const plumbob::Request& in, plumbob::Answer& out) {
+    Robot robot{in["parents"], in["origins"], in["orientations"], in["axes"], in["slides"],
+                in["lower"], in["upper"], in["effector"], in["tool_position"],
+                in["tool_rotation"], in["urdf"]};
+    if (in.task == "robot_jacobian") {
+        std::vector<double> q = in["q"];
+        std::vector<std::vector<double>> jacobian(6, std::vector<double>(q.size()));
+        out.time([&] { robot_jacobian(robot, q, jacobian); });
+        return out.set("jacobian", jacobian);
+    }
+    std::vector<double> q = in["start"];
+    Vec3 position = in["target_position"];
+    Quat rotation = in["target_rotation"];
+    double tolerance = in["tolerance"], tolerance_rotation = in["tolerance_rotation"];
+    int limit = in["max_iterations"];
+    out.time([&] {
+        robot_inverse_kinematics(robot, q, position, rotation, tolerance, tolerance_rotation,
+                                 limit);
+    });
+    out.set("q", q);
+}
+
 void solve(const plumbob::Request& in, plumbob::Answer& out) {
+    if (in.task.rfind("robot", 0) == 0) return solve_robot(in, out);
     if (in.task == "mass_spring_step") {
         System s{in["masses"], in["rest_lengths"], in["stiffnesses"], in["dampings"],
                  in["springs"], in["pinned"], in["gravity"]};
@@ -66,5 +115,6 @@ void solve(const plumbob::Request& in, plumbob::Answer& out) {
 // GREETING_FIELDS
 int main() {
     return plumbob::serve(R"("name": "my solver", "language": "C++", "precision": "double",
-        "tasks": ["forward_kinematics", "inverse_kinematics", "mass_spring_step"])", solve);
+        "tasks": ["forward_kinematics", "inverse_kinematics", "mass_spring_step",
+        "robot_inverse_kinematics", "robot_jacobian"])", solve);
 }

@@ -3,7 +3,8 @@ const readline = require("node:readline");
 // GREETING_FIELDS
 const greeting = {
   protocol: 1, name: "my solver", language: "JavaScript", precision: "double",
-  tasks: ["forward_kinematics", "inverse_kinematics", "mass_spring_step"],
+  tasks: ["forward_kinematics", "inverse_kinematics", "mass_spring_step",
+    "robot_inverse_kinematics", "robot_jacobian"],
 };
 
 // Answers go where they are read; what else is printed goes to the errors and does no harm.
@@ -39,6 +40,27 @@ const tasks = {
     const { positions, velocities, h } = request;
     missing("mass_spring_step");
     return { positions, velocities };
+  },
+
+  // Return coordinates q of the joints, within lower and upper, that bring the tool to a position
+  // and a rotation. Joint `effector` carries the tool; urdf is the same robot as a text.
+  robot_inverse_kinematics(request) {
+    const { parents, origins, orientations, axes, slides, lower, upper, effector } = request;
+    const { tool_position, tool_rotation, urdf, start } = request;
+    const { target_position, target_rotation } = request;
+    const { tolerance, tolerance_rotation, max_iterations } = request;
+    const q = Float64Array.from(start);
+    missing("robot_inverse_kinematics");
+    return { q };
+  },
+
+  // Return the tool's linear and angular velocity by joint: 6 rows, a column for each joint.
+  robot_jacobian(request) {
+    const { q, parents, origins, orientations, axes, slides, effector } = request;
+    const { tool_position, tool_rotation, urdf } = request;
+    const jacobian = Array.from({ length: 6 }, () => new Float64Array(q.length));
+    missing("robot_jacobian");
+    return { jacobian };
   },
 };
 

@@ -39,6 +39,23 @@ def mass_spring_step(positions: Vectors, velocities: Vectors, h: float, **system
     raise RuntimeError("mass_spring_step is not written yet")
 
 
+def robot_inverse_kinematics(
+    start: list[float], target_position: list[float], target_rotation: list[float], **robot: Any
+) -> Any:
+    """Return {"q": coordinates of the joints, within lower and upper, that bring the tool there}.
+
+    The robot has parents, origins, orientations, axes, slides, lower, upper, effector (the joint
+    that carries the tool), tool_position and tool_rotation, and is in urdf as well; the other
+    inputs are tolerance, tolerance_rotation and max_iterations.
+    """
+    raise RuntimeError("robot_inverse_kinematics is not written yet")
+
+
+def robot_jacobian(q: list[float], **robot: Any) -> Any:
+    """Return {"jacobian": the tool's linear and angular velocity by joint, 6 rows}."""
+    raise RuntimeError("robot_jacobian is not written yet")
+
+
 def _answer(task: str, **inputs: Any) -> dict[str, Any]:
     functions = {name: f for name, f in globals().items() if name.count("_") and name[0] != "_"}
     if task == "greeting":

@@ -2,14 +2,15 @@
 // Build: rustc -O solver.rs     Offer only what you have: see GREETING.
 #![allow(unused)]
 mod plumbob;
-use plumbob::{member, timed, Request, System};
+use plumbob::{member, timed, Request, Robot, System};
 
 type Vec3 = [f64; 3]; // [m]
 type Quat = [f64; 4]; // unit quaternion, w first
 
 // GREETING_FIELDS
 const GREETING: &str = r#""name": "my solver", "language": "Rust", "precision": "double",
-    "tasks": ["forward_kinematics", "inverse_kinematics", "mass_spring_step"]"#;
+    "tasks": ["forward_kinematics", "inverse_kinematics", "mass_spring_step",
+    "robot_inverse_kinematics", "robot_jacobian"]"#;
 
 // Parents precede children, the root's is -1. An offset is in the parent's frame, the root's is
 // its global position. Return the global positions and rotations of all joints.
@@ -34,7 +35,39 @@ fn mass_spring_step(system: &System, positions: Vec<Vec3>, velocities: Vec<Vec3>
     Err("mass_spring_step is not written yet".into())
 }
 
+// The robot has parents, origins, orientations, axes, slides, limits, the joint `effector` that
+// carries the tool, tool_position, tool_rotation, and all of it in urdf: see plumbob.rs. Return
+// coordinates within the limits that bring the tool to a position and a rotation.
+fn robot_inverse_kinematics(robot: &Robot, start: &[f64], position: Vec3, rotation: Quat,
+    tolerance: f64, tolerance_rotation: f64, max_iterations: usize) -> Result<Vec<f64>, String> {
+    Err("robot_inverse_kinematics is not written yet".into())
+}
+
+// Return the tool's linear and angular velocity by joint: 6 rows.
+fn robot_jacobian(robot: &Robot, q: &[f64]) -> Result<Vec<Vec<f64>>, String> {
+    Err("robot_jacobian is not written yet".into())
+}
+
+fn solve_robot(task: &str, ask: &Request) -> Result<String, String> {
+    let robot = ask.robot()?;
+    if task == "robot_jacobian" {
+        let q: Vec<_> = ask.get("q")?;
+        let (jacobian, seconds) = timed(|| robot_jacobian(&robot, &q))?;
+        return Ok(member("jacobian", &jacobian) + &seconds);
+    }
+    let start: Vec<_> = ask.get("start")?;
+    let (position, rotation) = (ask.get("target_position")?, ask.get("target_rotation")?);
+    let (close, narrow) = (ask.get("tolerance")?, ask.get("tolerance_rotation")?);
+    let limit = ask.get("max_iterations")?;
+    let (q, seconds) = timed(|| robot_inverse_kinematics(&robot, &start, position, rotation,
+        close, narrow, limit))?;
+    Ok(member("q", &q) + &seconds)
+}
+
 fn solve(task: &str, ask: &Request) -> Result<String, String> {
+    if task.starts_with("robot") {
+        return solve_robot(task, ask);
+    }
     if task == "mass_spring_step" {
         let system = ask.system()?;
         let (x, v, h) = (ask.get("positions")?, ask.get("velocities")?, ask.get("h")?);

@@ -13,13 +13,23 @@ import msgspec
 import planted_programs
 import pytest
 
-from plumbob.crosscheck.verify.greeting import Greeting, Step, System
+from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting, Step, System
+from plumbob.crosscheck.verify.kinematics import robot_jacobian, robot_models
+from plumbob.crosscheck.verify.message import encode_case
 from plumbob.crosscheck.verify.solvers import open_contestant
 from plumbob.crosscheck.verify.task import TASKS
 from plumbob.crosscheck.verify.templates import GREETING_FIELDS, LANGUAGES, template
 
-REQUESTS = planted_programs.requests()
-OFFERED = ["forward_kinematics", "inverse_kinematics", "mass_spring_step"]
+ROBOT = next(iter(robot_models.cases(Greeting(PROTOCOL, ()), "", 0, False)))
+JACOBIAN = next(iter(robot_jacobian.cases(Greeting(PROTOCOL, ()), "", 0, False)))
+REQUESTS = [
+    *planted_programs.requests(),
+    *(json.loads(encode_case(1000 + i, case)) for i, case in enumerate((ROBOT, JACOBIAN))),
+]
+OFFERED = [
+    "forward_kinematics", "inverse_kinematics", "mass_spring_step",
+    "robot_inverse_kinematics", "robot_jacobian",
+]  # fmt: skip
 # In each language: where the user's forward kinematics goes and what could stand there, with a
 # print and a wait of 50 ms. It puts every joint where its offset is: right for a root alone.
 FILLED = {
@@ -48,6 +58,24 @@ FILLED = {
         'raise RuntimeError("forward_kinematics is not written yet")',
         'print("stray"); time.sleep(0.05); '
         'return {"positions": offsets, "rotations": local_rotations}',
+    ),
+}
+
+# Likewise of robots: the tool stays where it starts.
+FILLED_ROBOT = {
+    "cpp": ('throw plumbob::missing("robot_inverse_kinematics");', "q.resize(robot.axes.size());"),
+    "rust": (
+        'Err("robot_inverse_kinematics is not written yet".into())',
+        "Ok(start[..robot.axes.len()].to_vec())",
+    ),
+    "javascript": ('missing("robot_inverse_kinematics");', ""),
+    "csharp": (
+        'throw new Exception("robot_inverse_kinematics is not written yet")',
+        'answer["q"] = ask.start',
+    ),
+    "python": (
+        'raise RuntimeError("robot_inverse_kinematics is not written yet")',
+        'return {"q": start[: len(robot["axes"])]}',
     ),
 }
 
@@ -103,14 +131,18 @@ def test_starter_greets_and_fails_only_where_code_is_missing(replies):
 def test_a_filled_in_starter_answers_and_times_itself_through_stray_prints(language, tmp_path):
     missing, code = FILLED[language]
     assert sum(text.count(missing) for text in template(language).values()) == 1
-    run = build(language, tmp_path, lambda text: text.replace(missing, code))
+    run = build(
+        language, tmp_path,
+        lambda text: text.replace(missing, code).replace(*FILLED_ROBOT[language]),
+    )  # fmt: skip
     pose = {
         "parents": [-1],
         "offsets": [[0.1, 1e-17, -1e22]],
         "local_rotations": [[0.6, 0, 0.8, 0]],
     }
     request = {"id": 7, "task": "forward_kinematics", **pose}
-    (reply,), printed = ask(run, tmp_path, [request])
+    (reply, of_robot), printed = ask(run, tmp_path, [request, REQUESTS[-2]])
+    assert of_robot["q"] == ROBOT.inputs["start"].tolist()
     assert reply["positions"] == pose["offsets"]  # to the last digit
     assert reply["rotations"] == pose["local_rotations"]
     assert "stray" in printed
@@ -177,7 +209,7 @@ def test_starter_is_short_and_lists_every_field_of_the_greeting(language):
     first, *others = LANGUAGES[language].files
     text = template(language)[first]
     lines = text.splitlines()
-    assert len(lines) - len(GREETING_FIELDS.splitlines()) <= 69
+    assert len(lines) - len(GREETING_FIELDS.splitlines()) <= 120
     assert max(map(len, lines)) <= 100
     assert set(others) <= template(language).keys()
     words = re.findall(r"\w+", " ".join(re.findall(r"(?://|#) (.*)", text)))
