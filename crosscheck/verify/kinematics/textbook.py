@@ -493,7 +493,7 @@ def pull_to_target(
     ends = (target, add(target, root), subtract(target, root))
     store_vector(positions, chain.path[last], ends[faults.end])
     kind = in_pass(faults.pull, 1)
-    for k in range(last - (2 if faults.loop == 1 else 1), -1, -1):
+    for k in range(last - (2 if faults.loop == 1 else 1), 1 if faults.loop == 4 else -1, -1):
         length = link_length(chain, k, in_pass(faults.lengths, 1), positions)
         j, fixed = chain.path[k], load_vector(positions, chain.path[k + 1])
         moved = load_vector(positions, j)
