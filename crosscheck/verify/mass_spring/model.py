@@ -520,7 +520,8 @@ class StepEquation:
         drift = np.zeros_like(right)
         if self.start.model.dv:
             drift = h * self.start.v
-            drag = rule.drag * h ** (2 + rule.drag_power) * _assemble(p, springs) @ drift.ravel()
+            K = _assemble(p, springs * np.eye(3) if not rule.components else springs, rule)
+            drag = rule.drag * h ** (2 + rule.drag_power) * K @ drift.ravel()
             right = right - p.masses[:, None] * drift - drag.reshape(right.shape)
             right = right + h**2 * damper_forces(p, x, self.start.v) if self.damped else right
         right = right * h**rule.right_power if rule.right_power else right

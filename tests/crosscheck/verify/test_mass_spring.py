@@ -434,6 +434,25 @@ def test_right_forces_are_not_accused(precision):
     assert judged.verdict is Verdict.RIGHT
 
 
+def test_forces_left_over_from_the_request_before_are_told():
+    right, kept = force_function([], np.float64), [np.zeros((1, 3))]
+
+    def leaking(**inputs):
+        forces = right(**inputs)
+        total = forces + kept[0] if kept[0].shape == forces.shape else forces
+        kept[0] = forces
+        return total
+
+    judged = report(leaking, "mass_spring_forces")
+    assert "'equal answers'" in str(judged.diagnosis.first_broken)
+    assert not judged.diagnosis.explanations
+
+
+def test_of_energies_that_are_all_zero_just_that_is_told():
+    judged = report(lambda **inputs: dict.fromkeys(energy.PARTS, 0.0), "energy")
+    assert str(judged.diagnosis.first_broken) == "Every energy is 0 in all cases."
+
+
 def energies(faults, shift=0.0):
     def function(**inputs):
         values = energy.predict(faults, problem_of(inputs))

@@ -125,6 +125,10 @@ EDGES = {
     "imprecise velocities have a reservation": (
         laws.velocities, triangle(), {},
         lambda p, share: {"velocities": one_moved(2, share * speed(p))}, GRADES),
+    "a pin that has a velocity has a reservation": (
+        laws.pin_velocities, triangle([1]), {},
+        lambda p, share: {"velocities": one_moved(1, share * rounding(p, LINEARISED, EPSILON)[1])},
+        [(0.5, RIGHT), (2.0, RIGHT_EXCEPT)]),
     "velocities are held against the positions answered": (
         laws.velocities, triangle(), {},
         lambda p, share: {"positions": one_moved(2, 0.01),
