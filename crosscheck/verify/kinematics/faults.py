@@ -29,8 +29,8 @@ ANGLES = tuple(
 )
 # What a small angle of CCD ends or becomes, by the number of `small`.
 AT_SMALL = (
-    sentence("the sweep ends there"), sentence("the solve ends there"),
-    sentence("the angle is raised to it"),
+    sentence("the sweep ends"), sentence("the solve ends"),
+    sentence("the angle is raised to that"),
 )  # fmt: skip
 SAVED = (sentence("rotations"), sentence("rotations and positions"))
 AS_THE_TEXTBOOK = sentence("It does what the textbook does.")
