@@ -77,7 +77,8 @@ def _faults_of(part: Any) -> Iterator[CodedFault]:
     """Yield the faults in a table of a file: entries by their keys, or a list of entries."""
     for key, entry in part.items() if isinstance(part, dict) else ((None, entry) for entry in part):
         values = {name: numbers[0] for name, numbers in entry.get("each", {}).items()}
-        values |= entry.get("example", {})
+        for field, value in entry.get("example", {}).items():
+            values[field] = Sentence(value, {}) if isinstance(value, str) else value
         family, name = entry["code"].split("-")[1], key or entry.get("key", entry.get("value", ""))
         program = entry.get("program", FAMILIES[family]["program"])
         lines = tuple((right, wrong) for right, wrong in entry.get("lines", ()))
