@@ -136,7 +136,7 @@ def all_finite(result):
         return all_finite(result.minimiser)
     if isinstance(result, Iterate):
         return not result.finite or np.isfinite(result.gradient).all()
-    if hasattr(result, "outcome") and np.size(result.residual) == 1 and result.outcome == 4:
+    if np.size(getattr(result, "residual", ())) == 1 and getattr(result, "outcome", 0) == 4:
         return all_finite(result.state)
     if scipy.sparse.issparse(result):
         return all_finite(result.data)

@@ -276,6 +276,21 @@ def _skeletons():
 def _articulations():
     model = robot()
     q = model.random(RNG(), 5)
+    targets = [Target((0.1, 0.2, 1.0), effector=5)]
+    settings = {"tolerance": 1e-3, "max_iterations": 5, "restarts": 1, "seed": 3}
+    yield entry(
+        lambda q, **options: reference.solve_tasks(model, q, targets, **options),
+        {"q": q[0]} | settings, of=reference.solve_tasks,
+    )  # fmt: skip
+    prepared = settings | {"tolerance_rotation": 1e-3, "effector": 5}
+    yield entry(
+        lambda **options: int(reference.prepare_ik(model, **options)(q[0], q[0, :3])), prepared,
+        of=reference.prepare_ik,
+    )  # fmt: skip
+    yield entry(
+        lambda q, target: reference.prepare_ik(model, effector=5, restarts=1)(q, target),
+        {"q": q[0], "target": np.array([0.1, 0.2, 0.3])}, of=reference.PreparedIK,
+    )  # fmt: skip
     built = {
         "skeleton": tree(), "kinds": list(model.kinds), "axes": np.array(model.axes),
         "frames": rotation.random(RNG(), 6), "lower": np.full(6, -1.0), "upper": np.full(6, 1.5),

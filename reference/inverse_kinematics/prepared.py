@@ -125,7 +125,13 @@ def prepare_ik(
         solver, default_restarts = default_solver(checked, likely)
         restarts = default_restarts if restarts is None else restarts
     settings = checked_settings(
-        solver, tolerance, tolerance_rotation, max_iterations, restarts or 0, seed, False
+        solver,
+        tolerance,
+        tolerance_rotation,
+        max_iterations,
+        0 if restarts is None else restarts,
+        seed,
+        False,
     )
     if isinstance(checked, Skeleton) and (is_oriented or settings.limits.restarts):
         raise ValueError(
