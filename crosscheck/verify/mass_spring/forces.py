@@ -171,14 +171,17 @@ def _predict(
     numbers: Mapping[str, float],
     case: Case,
 ) -> Mapping[str, Any]:
-    p = apply(faults, problems[case.name], StepModel())[0]
+    return {"forces": forces_with(faults, problems[case.name], numbers)}
+
+
+def forces_with(
+    faults: Sequence[Option], p: SpringProblem, numbers: Mapping[str, float]
+) -> FloatArray:
+    """Return the forces of a solver with faults; numbers are those that `OUTPUTS` take."""
+    p = apply(faults, p, StepModel())[0]
     key = next((fault.key for fault in faults if fault.output), "")
     name, _, number = key.partition(" at ")
-    return {
-        "forces": OUTPUTS[name](p, float(number or numbers.get(name, 0.0)))
-        if key
-        else all_forces(p)
-    }
+    return OUTPUTS[name](p, float(number or numbers.get(name, 0.0))) if key else all_forces(p)
 
 
 def variants(exchanges: Sequence[Exchange]) -> Iterator[Variant]:
