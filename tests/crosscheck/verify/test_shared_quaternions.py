@@ -104,7 +104,11 @@ def test_a_right_fabrik_of_any_rule_is_not_accused(rule):
     assert not report.diagnosis.explanations
 
 
-SWEPT = [f for f in FAULTS["fabrik"] if f.part == "fabrik" and not f.honest]
+# Where the last link has no length, no rule has a direction to rotate to.
+SWEPT = [
+    f for f in FAULTS["fabrik"]
+    if f.part == "fabrik" and not f.honest and "none for the last" not in f.key
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(

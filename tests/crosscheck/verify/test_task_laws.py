@@ -217,7 +217,7 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
     """Sixteen epsilons of the largest limit, 2.4 rad."""
     q = robot.inputs["start"].copy()
     q[3] = robot.inputs[side][3] + sign * share * 16 * EPSILON * 2.4
-    (found, *_) = robot_inverse_kinematics._findings(robot, ROBOTS, {"q": q})
+    (found, *_) = robot_inverse_kinematics._findings(robot, ROBOTS, False, {"q": q})
     assert (found.law, found.verdict, found.index) == ("limits kept", verdict, 3)
 
 
@@ -234,7 +234,7 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
 )
 def test_a_claim_is_about_the_position_and_the_rotation(robot, distance, angle, claim, verdicts):
     pose = SimpleNamespace(distance=distance, angle=angle, tolerance=1.0, tolerance_rotation=1.0)
-    found = robot_inverse_kinematics._target_laws(pose, {"converged": claim}, robot, ROBOTS)
+    found = robot_inverse_kinematics._target_laws(pose, {"converged": claim}, robot, ROBOTS, False)
     assert [finding.verdict for finding in found if finding.law == "claims"] == verdicts
 
 
