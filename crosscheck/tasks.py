@@ -2,6 +2,7 @@
 
 import functools
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -57,12 +58,7 @@ def relative_frames(engine: str, case: int) -> Comparison:
         parts = residual[:3], rotation.to_matrix(Q), J[:3], angular
         return np.concatenate([part.ravel() for part in parts])
 
-    return Comparison(
-        np.array([actual(q) for q in rows]),
-        np.array([expected(q) for q in rows]),
-        np.array([actual(robot.home)] * len(rows)),
-        scale=float(BODIES),
-    )
+    return _compared(robot, rows, actual, expected)
 
 
 def centre_of_mass(engine: str, case: int) -> Comparison:
@@ -74,12 +70,7 @@ def centre_of_mass(engine: str, case: int) -> Comparison:
         _set(robot, adapter, q)
         return adapter.centre_of_mass()
 
-    return Comparison(
-        np.array([_evaluate(robot, q, task)[0] for q in rows]),
-        np.array([expected(q) for q in rows]),
-        np.array([_evaluate(robot, robot.home, task)[0]] * len(rows)),
-        scale=float(BODIES),
-    )
+    return _compared(robot, rows, lambda q: _evaluate(robot, q, task)[0], expected)
 
 
 def equalities(case: int) -> Comparison:
@@ -99,6 +90,16 @@ def equalities(case: int) -> Comparison:
         parts = np.split(data.efc_pos[: data.ne], sizes)
         return np.concatenate([_measures(part, False) for part in parts])
 
+    return _compared(robot, rows, actual, expected)
+
+
+def _compared(
+    robot: Robot,
+    rows: FloatArray,
+    actual: Callable[[FloatArray], FloatArray],
+    expected: Callable[[FloatArray], FloatArray],
+) -> Comparison:
+    """Compare two functions of the coordinates; nothing would move if all were those of home."""
     return Comparison(
         np.array([actual(q) for q in rows]),
         np.array([expected(q) for q in rows]),

@@ -234,6 +234,31 @@ def rotate_joint(
 
     Return whether the angle is too small, by the number of `small`.
     """
+    a, b = directions_of(chain, k, target, faults, pose)
+    d = arc(a, b, faults)
+    if faults.dropped > 0 and norm(logarithm(d)) < DROPPED[faults.dropped]:
+        return False
+    if faults.small > 0 and norm(logarithm(d)) < SMALL[(faults.small - 1) % len(SMALL)]:
+        if faults.small <= 2 * len(SMALL):
+            return True
+        d = raised(a, b, SMALL[(faults.small - 1) % len(SMALL)])
+    if faults.global_rotations == 1:
+        rotate_below(chain, chain.path[k], d, faults, pose)
+        return False
+    rotate_offset(chain, k, d, faults, pose)
+    if faults.update < 3:
+        apply_rotation(chain, k, d, faults, pose)
+    if faults.update == 0:
+        place(chain, faults, pose)
+    elif faults.update >= 2:
+        follow_by_hand(chain, k, d, faults, pose)
+    return False
+
+
+def directions_of(
+    chain: TextbookChain, k: int, target: Any, faults: Switches, pose: TextbookPose
+) -> Any:
+    """Return the two directions that the rotation of joint k of the path joins, by `aim`."""
     joint = load_vector(pose.positions, chain.path[k])
     effector = load_vector(pose.positions, chain.path[-1])
     arm, direction = subtract(effector, joint), subtract(target, joint)
@@ -266,24 +291,7 @@ def rotate_joint(
     elif faults.aim == NOT_INVERTED:
         R = load_quaternion(pose.rotations, chain.path[k])
         a, b = rotated(R, a, faults), rotated(R, b, faults)
-    d = arc(a, b, faults)
-    if faults.dropped > 0 and norm(logarithm(d)) < DROPPED[faults.dropped]:
-        return False
-    if faults.small > 0 and norm(logarithm(d)) < SMALL[(faults.small - 1) % len(SMALL)]:
-        if faults.small <= 2 * len(SMALL):
-            return True
-        d = raised(a, b, SMALL[(faults.small - 1) % len(SMALL)])
-    if faults.global_rotations == 1:
-        rotate_below(chain, chain.path[k], d, faults, pose)
-        return False
-    rotate_offset(chain, k, d, faults, pose)
-    if faults.update < 3:
-        apply_rotation(chain, k, d, faults, pose)
-    if faults.update == 0:
-        place(chain, faults, pose)
-    elif faults.update >= 2:
-        follow_by_hand(chain, k, d, faults, pose)
-    return False
+    return a, b
 
 
 def in_mixed_frames(
