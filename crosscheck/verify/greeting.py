@@ -106,6 +106,7 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         system: which mass-spring systems it takes.
         step: the time step that it declares.
         velocity_limits: whether its robots keep the greatest speeds of a request.
+        limits: whether its inverse kinematics keeps the limits of a request's joints.
     """
 
     protocol: int
@@ -123,6 +124,7 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     system: System = System()
     step: Step = Step()
     velocity_limits: bool = False
+    limits: bool = False
 
     @property
     def epsilon(self) -> float:

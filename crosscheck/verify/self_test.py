@@ -23,6 +23,7 @@ from .functions import FunctionContestant
 from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
 from .judgement import Verdict
 from .kinematics.faults import FAULTS, switches
+from .kinematics.limits import solve_within
 from .kinematics.predictions import predict_forward, predict_track, solve
 from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
 from .kinematics.robot_inverse_kinematics import solve_by_reference
@@ -111,7 +112,8 @@ ELSEWHERE = {
 
 def subjects() -> Iterator[Subject]:
     """Yield every fault on its own, then the honest solvers."""
-    for make in (_kinematic_faults, _mass_spring_faults, _robots, _right_kinematics, _right_steps):
+    families = (_kinematic_faults, _mass_spring_faults, _robots, _right_kinematics, _right_steps)
+    for make in (*families, _limits):
         yield from make()
 
 
@@ -134,6 +136,17 @@ def _kinematic_faults() -> Iterator[Subject]:
         }
         functions = {key: partial(_textbook, method, setting) for key, setting in faults.items()}
         yield from _subjects(family, task, functions, methods=(method,))
+
+
+def _limits() -> Iterator[Subject]:
+    programs = [fault for fault in coded_faults().values() if fault.family == "LIMIT"]
+    wrong = {fault.name: _function("ccd", fault.wrong_program) for fault in programs}
+    yield from _subjects("limits", IK, wrong, methods=("ccd",), limits=True)
+    right = {"program, limits": _function("ccd", programs[0].right_program)}
+    yield from _subjects(HONEST, IK, right, methods=("ccd",), limits=True)
+    for solver in ("ccd", "fabrik"):
+        function = {f"reference, {solver}, limits": partial(_solved, solver)}
+        yield from _subjects(HONEST, IK, function, methods=(solver,), limits=True)
 
 
 def _robots() -> Iterator[Subject]:
@@ -285,6 +298,12 @@ def _placed_by(engine: str, /, parents: Any, offsets: Any, local_rotations: Any)
 
 
 def _solved(solver: str, /, parents: Any, offsets: Any, method: str, **inputs: Any) -> Any:
+    if "cones" in inputs:
+        return {
+            "local_rotations": solve_within(
+                solver, inputs | {"parents": parents, "offsets": offsets}
+            )
+        }
     solution = solve_ik(Skeleton(parents, offsets), solver=solver, **inputs)
     return {"local_rotations": solution.local_rotations, "positions": solution.positions}
 

@@ -1,6 +1,6 @@
 """Inverse kinematics: whether poses are honest and reach their targets, and by which sweeps."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from plumbob.reference import rotation
-from plumbob.reference.arguments import distinct_texts
 from plumbob.reference.inverse_kinematics import solve_ik
 from plumbob.reference.skeleton import Skeleton
 
@@ -18,7 +17,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case
 from ..sentence import sentence
-from . import degenerate, pose_laws, problems, rounding, sweeps
+from . import degenerate, limits, pose_laws, problems, rounding, sweeps
 from .faults import SwitchFault
 from .pose_laws import AnsweredPose
 from .predictions import solve
@@ -26,7 +25,6 @@ from .report import diagnosis_of, report
 from .sweeps import PoseTrial, SweepComparison
 
 TASK = "inverse_kinematics"
-cases = problems.cases
 STOPS, SLOW = "sweeps made", "target reached, slow"
 # The methods of the textbook.
 METHODS = ("ccd", "fabrik")
@@ -46,6 +44,12 @@ NO_NUMBER = sentence("the answer is not a number, or too large")
 EXCEPTIONS = (FailureKind.RAISED, FailureKind.REFUSED)
 
 
+def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
+    """Return the problems without limits, then those with limits."""
+    arguments = greeting, method, seed, thorough
+    return [*problems.cases(*arguments), *limits.cases(*arguments)]
+
+
 def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
@@ -56,6 +60,20 @@ def judge(
 
     `base` are the faults that the solver's forward kinematics is known to have.
     """
+    limited = [exchange for exchange in exchanges if "cones" in exchange.case.inputs]
+    unlimited = [exchange for exchange in exchanges if exchange not in limited]
+    judgements, diagnosis = _judge_unlimited(unlimited, greeting, method, base)
+    limited_judgements, readings = limits.judge(limited, greeting)
+    explanations = (*diagnosis.explanations, *readings.explanations)
+    count = diagnosis.variant_count + readings.variant_count
+    diagnosis = replace(diagnosis, explanations=explanations, variant_count=count)
+    return report(TASK, method, [*judgements, *limited_judgements], diagnosis)
+
+
+def _judge_unlimited(
+    exchanges: Sequence[Exchange], greeting: Greeting, method: str, base: Sequence[SwitchFault]
+) -> tuple[list[CaseJudgement], Diagnosis]:
+    """Return the judgements of answers to requests without limits, and the faults."""
     declared = method.lower() if method.lower() in METHODS else ""
     trials = [PoseTrial(exchange) for exchange in exchanges]
     sweep_trials = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
@@ -85,7 +103,7 @@ def judge(
     if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
             trial.correct(_aggravate)
-    return report(TASK, method, [trial.judgement for trial in trials], diagnosis)
+    return [trial.judgement for trial in trials], diagnosis
 
 
 def _forgive(case: Case, broken: Finding) -> Finding:
@@ -149,7 +167,7 @@ def target_laws(
             findings += in_time(pose, case, method, greeting)
     elif method:
         findings.append(not_farther(distance, slack, case))
-    return [*findings, *claims(distance, slack, outputs, case)]
+    return [*findings, *pose_laws.claims(distance, slack, outputs, case)]
 
 
 def reached(distance: float, slack: float, case: Case, method: str, greeting: Greeting) -> Finding:
@@ -196,21 +214,6 @@ def in_time(pose: AnsweredPose, case: Case, method: str, greeting: Greeting) -> 
 def not_farther(distance: float, slack: float, case: Case) -> Finding:
     """Return whether sweeps have not taken the effector farther away, which none ever does."""
     return finding("distance does not grow", distance - case.facts["before"], slack)
-
-
-def claims(
-    distance: float, slack: float, outputs: Mapping[str, Any], case: Case
-) -> Iterator[Finding]:
-    """Yield whether `converged` and `residual` are true."""
-    tolerance = case.inputs["tolerance"]
-    if outputs.get("converged"):
-        yield finding("claims, success", distance, tolerance + slack)
-    elif "converged" in outputs and distance <= tolerance - slack:
-        yield finding("claims, failure", tolerance - distance, distance=distance)
-    if "residual" in outputs and np.isfinite(outputs["residual"]):
-        error, bound = abs(outputs["residual"] - distance), slack + 1e-3 * distance
-        claim, actual = distinct_texts(outputs["residual"], distance, 3)
-        yield finding("claims, residual", error, bound, claimed=claim, distance=actual)
 
 
 def _equal_worlds(

@@ -1,6 +1,6 @@
 """Laws of an answered pose: local rotations, positions, or both."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -212,3 +212,18 @@ def _agreement(pose: AnsweredPose, case: Case, bound: float, greeting: Greeting)
     dead = DEAD_JOINTS * rounding.DEAD_ANGLE[greeting.precision] * case.facts["reach"]
     verdict = Verdict.RIGHT_EXCEPT if errors.max() <= dead else None
     return [of_joints("rotations agree with positions", errors, bound, verdict)]
+
+
+def claims(
+    distance: float, slack: float, outputs: Mapping[str, Any], case: Case
+) -> Iterator[Finding]:
+    """Yield whether `converged` and `residual` are true."""
+    tolerance = case.inputs["tolerance"]
+    if outputs.get("converged"):
+        yield finding("claims, success", distance, tolerance + slack)
+    elif "converged" in outputs and distance <= tolerance - slack:
+        yield finding("claims, failure", tolerance - distance, distance=distance)
+    if "residual" in outputs and np.isfinite(outputs["residual"]):
+        error, bound = abs(outputs["residual"] - distance), slack + 1e-3 * distance
+        claim, actual = distinct_texts(outputs["residual"], distance, 3)
+        yield finding("claims, residual", error, bound, claimed=claim, distance=actual)

@@ -33,6 +33,7 @@ FAMILIES = (
     "FABRIK",
     "STOP",
     "TRACK",
+    "LIMIT",
     "RESAMPLE",
     "ROBOT",
     "STEP",
@@ -113,7 +114,7 @@ def reports(program, task):
 
 def samples():
     for number, fault in enumerate(coded_faults().values()):
-        is_quick = number % QUICK == 0 and fault.family not in ("ROBOT", "STEP")
+        is_quick = number % QUICK == 0 and fault.family not in ("LIMIT", "ROBOT", "STEP")
         marks = () if is_quick else pytest.mark.slow
         yield pytest.param(fault, id=fault.code, marks=marks)
 
@@ -137,7 +138,7 @@ STEPS = (
     "step", "substeps", "local-global step", "Newton iterations", "change of velocity",
     "damped change of velocity", "particle by particle", "motion",
 )  # fmt: skip
-SLOW = ("robot", "robot_track", "newton step", *STEPS[2:])
+SLOW = ("limited ccd", "robot", "robot_track", "newton step", *STEPS[2:])
 RESERVED = ("robot", "robot_track", *STEPS[2:6])
 
 

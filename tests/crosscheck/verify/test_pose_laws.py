@@ -191,5 +191,5 @@ def test_a_sweep_takes_no_effector_farther_away(case, growth, verdict):
     ],
 )
 def test_what_a_solver_says_of_its_answer_is_true(case, claims, distance, verdicts):
-    found = list(inverse_kinematics.claims(distance, 1e-11, claims, case))
+    found = list(pose_laws.claims(distance, 1e-11, claims, case))
     assert [one.verdict for one in found] == verdicts

@@ -35,6 +35,7 @@ def test_every_family_has_subjects_with_names_of_their_own():
         "robots",
         "steps",
         "forces",
+        "limits",
         *QUICK,
     }
 
