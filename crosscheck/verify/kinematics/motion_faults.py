@@ -75,14 +75,13 @@ def diagnosis_of(
         if (motion := motions.get(judgement.case.name))
         and (judgement.verdict >= Verdict.WRONG or motion.inputs["max_iterations"] == 1)
     ]
-    count = sum(len(signatures) for signatures, *_ in TIERS)
     for signatures, by_family, least in TIERS:
         shares = {key: _share(rule, wrong, by_family) for key, rule in signatures.items()}
         key = max(shares, key=shares.__getitem__)
         if shares[key] >= least:
             explanation = Explanation((key,), sentence_of(key), shares[key], 0.0)
-            return Diagnosis((explanation,), variant_count=count)
-    return Diagnosis(variant_count=count)
+            return Diagnosis((explanation,), variant_count=len(FAULTS))
+    return Diagnosis(variant_count=len(FAULTS))
 
 
 def sentence_of(key: str) -> Sentence:
@@ -512,8 +511,11 @@ STUCK: Mapping[str, Signature] = {
         "rotation error in the tool's frame", "difference of Euler angles",
     )
 }  # fmt: skip
+# Joints in another order leave their limits, but reach their targets.
+ORDERS: Mapping[str, Signature] = {k: POSES[k] for k, fault in POSE_FAULTS.items() if fault.order}
 # Signatures, whether the family of cases that shows a fault best decides, and the least share.
 TIERS: Sequence[tuple[Mapping[str, Signature], bool, float]] = (
+    (ORDERS, False, 0.97),
     (OTHER_LIMITS, False, 0.97),
     (POSES, False, MIN_SHARE),
     (STEPS, True, MIN_SHARE),
@@ -521,4 +523,4 @@ TIERS: Sequence[tuple[Mapping[str, Signature], bool, float]] = (
     ({POSITION_ONLY: partial(_reached, POSE_FAULTS[POSITION_ONLY])}, False, MIN_SHARE),
     (VAGUE, False, MIN_SHARE),
 )
-FAULTS = tuple(key for signatures, *_ in TIERS for key in signatures)
+FAULTS = tuple(dict.fromkeys(key for signatures, *_ in TIERS for key in signatures))
