@@ -58,6 +58,8 @@ LONG = (
     "test_kinematics.py::test_pair_is_named[ccd",
     "test_kinematics.py::test_fault_is_named_without_a_declared_method",
     "test_robot_track.py::test_a_fault_is_named_by_its_code[error",
+    "test_robot_track.py::test_a_fault_is_named_by_its_code[inverse",
+    "test_robot_track.py::test_a_fault_is_named_by_its_code[tool",
     "test_robot_track.py::test_a_fault_is_named_by_its_code[linear",
     "test_robot_track.py::test_a_fault_is_named_by_its_code[rotation",
     "test_robot_track.py::test_a_fault_is_named_by_its_code[another",
