@@ -49,20 +49,21 @@ def explain(
     exchanges: Sequence[Exchange],
     tolerance: Callable[[Case], float],
     describe: Callable[[Sequence[str]], Sentence],
+    trial: int = TRIAL,
 ) -> tuple[tuple[Explanation, ...], int]:
     """Return the variants that reproduce most answers, nearest first, and the number compared.
 
     The variants come in ascending order of the number of faults, special ones of a number last, the
     most telling answers first: small, and wrong. `tolerance` is the relative difference that
     rounding explains; `describe` puts the faults into words, given the keys of a class that no
-    answer tells apart.
+    answer tells apart. Of the first `trial` answers a variant has to reproduce one.
     """
     answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
     count, matches = 0, list[Match]()
     for _, same_size in groupby(variants, key=lambda v: (len(v.faults), v.is_special)):
         for variant in same_size:
             count += 1
-            match = _match(variant, answers, tolerance)
+            match = _match(variant, answers, tolerance, trial)
             if match is not None:
                 matches.append(match)
         if any(match.share == 1.0 for match in matches):
@@ -95,12 +96,15 @@ def _telling(matches: Sequence[Match]) -> list[Match]:
 
 
 def _match(
-    variant: Variant, answers: Sequence[Exchange], tolerance: Callable[[Case], float]
+    variant: Variant,
+    answers: Sequence[Exchange],
+    tolerance: Callable[[Case], float],
+    trial: int,
 ) -> Match | None:
     hits, largest = 0, 0.0
     predictions: list[Mapping[str, Any]] = []
     for i, exchange in enumerate(answers):
-        if i == TRIAL and not hits:
+        if i == trial and not hits:
             return None
         assert isinstance(exchange.answer, Answer)
         outputs = exchange.answer.values

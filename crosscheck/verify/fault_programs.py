@@ -45,9 +45,7 @@ class CodedFault(NamedTuple):
     @property
     def right_program(self) -> str:
         """The source of the right program."""
-        entry = PROGRAMS[self.program]
-        texts = [*(PROGRAMS["parts"][part] for part in entry["parts"]), entry["text"]]
-        return "\n\n\n".join(text.strip("\n") for text in texts) + "\n"
+        return source_of(self.program)
 
     @property
     def wrong_program(self) -> str:
@@ -61,6 +59,13 @@ class CodedFault(NamedTuple):
                 )
             text = text.replace(right, wrong)
         return text
+
+
+def source_of(program: str) -> str:
+    """Return the source of a right program, given its name."""
+    entry = PROGRAMS[program]
+    texts = [*(PROGRAMS["parts"][part] for part in entry["parts"]), entry["text"]]
+    return "\n\n\n".join(text.strip("\n") for text in texts) + "\n"
 
 
 @cache

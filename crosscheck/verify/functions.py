@@ -4,7 +4,7 @@ import contextlib
 import inspect
 import reprlib
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter  # before a solver is loaded, which may replace `time.perf_counter`
 from typing import Any
@@ -43,12 +43,13 @@ class FunctionContestant:
 
 def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) -> Answer | Failure:
     """Call a function with copies of its inputs; exceptions are failures, changes are remarks."""
-    if reason := _missing_input(function, task, inputs):
+    parameters = _parameters(function)
+    if reason := _missing_input(parameters or (), task, inputs):
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=reason))
     arguments = {
         name: np.array(value) if isinstance(value, np.ndarray) else value
         for name, value in inputs.items()
-        if takes(function, name)
+        if _is_taken(name, parameters)
     }
     start = perf_counter()
     try:
@@ -79,19 +80,24 @@ def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter] | None:
 
 def takes(function: Callable[..., Any], name: str) -> bool:
     """Return whether a function takes an argument, True if it does not list its parameters."""
-    parameters = _parameters(function)
+    return _is_taken(name, _parameters(function))
+
+
+def _is_taken(name: str, parameters: Sequence[inspect.Parameter] | None) -> bool:
     return parameters is None or any(
         parameter.name == name or parameter.kind is inspect.Parameter.VAR_KEYWORD
         for parameter in parameters
     )
 
 
-def _missing_input(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) -> str:
+def _missing_input(
+    parameters: Sequence[inspect.Parameter], task: Task, inputs: Mapping[str, Any]
+) -> str:
     """Return an error if a function needs an argument that the inputs lack, else ""."""
     variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     missing = [
         parameter.name
-        for parameter in _parameters(function) or ()
+        for parameter in parameters
         if parameter.kind not in variadic
         and parameter.default is parameter.empty
         and parameter.name not in inputs

@@ -26,6 +26,7 @@ from .kinematics import (
 from .kinematics.faults import SwitchFault
 from .mass_spring import energy, forces
 from .mass_spring.stepping import Stepping
+from .one_line.search import with_changed_line
 from .sentence import Sentence, sentence
 from .timing import with_lesser_time
 
@@ -87,7 +88,8 @@ def verify(
             cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
             return judge_cases(contestant, task, method, cases, notify, greeting, known)
 
-        reports.append(inferred(contestant, judge(contestant.greeting), judge))
+        report = inferred(contestant, judge(contestant.greeting), judge)
+        reports.append(with_changed_line(report, contestant.greeting, partial(notify, task)))
         if task == forward_kinematics.TASK:
             forward_faults = faults.explaining(reports[-1].diagnosis)
     return Report(contestant.greeting, reports, seed, remarks)

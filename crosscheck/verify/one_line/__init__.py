@@ -1,0 +1,1 @@
+"""Explain answers by a right program with a changed line."""

@@ -1,0 +1,211 @@
+"""Mistakes in an expression, or in a statement among its neighbours.
+
+The kinds of changes are the keys of `faults.toml`; operators of mutation testing (DeMillo, Lipton
+& Sayward 1978).
+"""
+
+import ast
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+# Functions that are taken for one another, and comparisons.
+FUNCTIONS = (
+    ("sin", "cos"), ("arcsin", "arccos"), ("asin", "acos"), ("min", "max"), ("ceil", "floor"),
+    ("degrees", "radians"), ("zeros", "ones"), ("sum", "mean"),
+)  # fmt: skip
+COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
+# What is made of a number or of each number of an array, by the kind of change.
+OF_NUMBERS = {
+    "unit": ("np.degrees({})", "np.radians({})"), "factor": ("2.0 * {}", "0.5 * {}"),
+    "power": ("{} ** 2", "np.sqrt({})"), "sign": ("-{}", "abs({})"),
+}  # fmt: skip
+NUMBER = "()"
+
+Change = tuple[str, ast.expr]  # the kind, and what an expression becomes
+# The kind, the line in the place of a statement, and the statements of its block.
+Rearrangement = tuple[str, str, list[ast.stmt]]
+
+
+class Scope(NamedTuple):
+    """The expressions of a function whose values have been seen."""
+
+    shapes: Mapping[str, str]  # by the text of an expression: "int", "()", "(3,)", "list"
+    plain: frozenset[str]  # the texts of names and of elements x[i]
+    has_conjugate: bool  # whether the program has quaternions
+
+    def alike(self, text: str) -> list[str]:
+        """Return the other names and elements that have the shape of an expression."""
+        shape = self.shapes.get(text)
+        return [
+            name for name in sorted(self.plain) if name != text and self.shapes.get(name) == shape
+        ]
+
+
+def of_expression(node: Any, parent: ast.AST, scope: Scope) -> Iterator[Change]:
+    """Yield the mistakes in an expression."""
+    yield from _operands(node)
+    yield from _other_operators(node)
+    yield from _bounds(node, parent)
+    if isinstance(node, ast.Call):
+        yield from _calls(node)
+    if isinstance(node, ast.Constant):
+        yield from _numbers(node.value, parent)
+    text = ast.unparse(node)
+    if text in scope.shapes:
+        yield from _names(text, scope)
+        yield from _conversions(text, scope)
+        yield from _lost_factors(node, scope)
+
+
+def _operands(node: Any) -> Iterator[Change]:
+    """Yield the operands of an operation, each alone, and both exchanged."""
+    if isinstance(node, ast.UnaryOp):
+        yield "condition" if isinstance(node.op, ast.Not) else "sign", node.operand
+    elif isinstance(node, ast.BoolOp):
+        yield from (("condition", value) for value in node.values)
+    elif isinstance(node, ast.IfExp):
+        yield from (("condition", value) for value in (node.body, node.orelse))
+    elif isinstance(node, ast.BinOp):
+        kinds = {ast.Add: "term", ast.Sub: "term", ast.Pow: "power"}
+        kind = kinds.get(type(node.op), "factor")
+        yield from ((kind, operand) for operand in (node.left, node.right))
+        yield "order", ast.BinOp(node.right, node.op, node.left)
+
+
+def _other_operators(node: Any) -> Iterator[Change]:
+    """Yield an operation with another operator."""
+    opposite: dict[type, ast.operator] = {
+        ast.Add: ast.Sub(), ast.Sub: ast.Add(), ast.Mult: ast.Div(), ast.Div: ast.Mult(),
+    }  # fmt: skip
+    if isinstance(node, ast.Compare):
+        for comparison in COMPARISONS:
+            yield "condition", ast.Compare(node.left, [comparison()], node.comparators)
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        yield from (("condition", ast.Constant(value)) for value in (True, False))
+    elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
+        yield "function", parsed(f"np.linalg.norm({ast.unparse(node.left)})")
+    elif isinstance(node, ast.BinOp) and type(node.op) in opposite:
+        kind = "sign" if isinstance(node.op, ast.Add | ast.Sub) else "factor"
+        yield kind, ast.BinOp(node.left, opposite[type(node.op)], node.right)
+
+
+def _bounds(node: Any, parent: ast.AST) -> Iterator[Change]:
+    """Yield a slice without its bounds, with others, or a loop that is shorter or reversed."""
+    text = ast.unparse(node)
+    parts = ("1:", ":-1", "::-1")
+    if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
+        yield "loop", node.value
+        yield from (("loop", parsed(f"({ast.unparse(node.value)})[{part}]")) for part in parts)
+    if isinstance(parent, ast.For):
+        yield from (("loop", parsed(f"list({text})[{part}]")) for part in parts)
+
+
+def _calls(node: ast.Call) -> Iterator[Change]:
+    """Yield a call with two arguments exchanged, an argument alone, or another function."""
+    for i in range(len(node.args) - 1):
+        args = [*node.args[:i], node.args[i + 1], node.args[i], *node.args[i + 2 :]]
+        yield "order", ast.Call(node.func, args, node.keywords)
+    yield from (("call", arg) for arg in node.args)
+    if isinstance(node.func, ast.Attribute):
+        yield "call", node.func.value
+        for names in (names for names in FUNCTIONS if node.func.attr in names):
+            other = names[names[0] == node.func.attr]
+            func = ast.Attribute(node.func.value, other, ast.Load())
+            yield "function", ast.Call(func, node.args, node.keywords)
+
+
+def _numbers(value: object, parent: ast.AST) -> Iterator[Change]:
+    """Yield other numbers in the place of a number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return
+    is_power = isinstance(parent, ast.BinOp) and isinstance(parent.op, ast.Pow)
+    is_index = isinstance(parent, ast.Subscript | ast.Call)
+    kind = "power" if is_power else "index" if is_index else "number"
+    for number in (0, 1, -value, 2 * value, value / 2, value + 1, value - 1):
+        if number != value:
+            yield kind, parsed(repr(type(value)(number)))
+
+
+def _names(text: str, scope: Scope) -> Iterator[Change]:
+    """Yield the names of values of the same shape; of an index, also its neighbours."""
+    if text not in scope.plain:
+        return
+    kind = "index" if scope.shapes[text] == "int" else "name"
+    near = ("0", "-1", f"{text} + 1", f"{text} - 1") if kind == "index" else ()
+    yield from ((kind, parsed(other)) for other in (*scope.alike(text), *near))
+
+
+def _conversions(text: str, scope: Scope) -> Iterator[Change]:
+    """Yield a value with a wrong unit, factor or power, or inverted."""
+    shape = scope.shapes[text]
+    for kind, patterns in OF_NUMBERS.items() if shape.startswith("(") else ():
+        if shape == NUMBER or kind != "unit":
+            yield from ((kind, parsed(pattern.format(f"({text})"))) for pattern in patterns)
+    if shape == "(3, 3)":
+        yield "inverse", parsed(f"({text}).T")
+    if shape == "(4,)" and scope.has_conjugate:
+        yield "inverse", parsed(f"conjugate({text})")
+    if shape == NUMBER:
+        for other in scope.alike(text):
+            yield from (("factor", parsed(f"({text}) {sign} {other}")) for sign in "*/")
+
+
+def _lost_factors(node: Any, scope: Scope) -> Iterator[Change]:
+    """Yield a product of arrays without its first or second factor, in the shape of both."""
+    if not isinstance(node, ast.BinOp) or not isinstance(node.op, ast.Mult):
+        return
+    shape = scope.shapes[ast.unparse(node)]
+    for factor, product in ((node.left, node.right), (node.right, node.left)):
+        if scope.shapes.get(ast.unparse(product), shape) != shape:
+            yield "factor", parsed(f"np.ones_like({ast.unparse(factor)}) * {ast.unparse(product)}")
+
+
+def of_statement(statements: list[ast.stmt], i: int) -> Iterator[Rearrangement]:
+    """Yield a block without statement i, with another statement there, or with a later place."""
+    statement, before, after = statements[i], statements[:i], statements[i + 1 :]
+    if not isinstance(statement, ast.Return | ast.FunctionDef):
+        yield "missing line", "", [*before, ast.Pass(), *after]
+    if isinstance(statement, ast.AugAssign):
+        assigned = ast.Assign([statement.target], statement.value, lineno=0)
+        yield "accumulation", header(assigned), [*before, assigned, *after]
+        operator = ast.Sub() if isinstance(statement.op, ast.Add) else ast.Add()
+        other = ast.AugAssign(statement.target, operator, statement.value)
+        yield "sign", header(other), [*before, other, *after]
+    if isinstance(statement, ast.Assign | ast.AugAssign):
+        for k in range(1, len(after) + 1):
+            line = f"{header(statement)}  # after {header(after[k - 1])}"
+            yield "moved line", line, [*before, *after[:k], statement, *after[k:]]
+    if isinstance(statement, ast.For | ast.While):
+        yield from _around_loop(statement, before, after)
+
+
+def _around_loop(
+    loop: ast.For | ast.While, before: list[ast.stmt], after: list[ast.stmt]
+) -> Iterator[Rearrangement]:
+    """Yield a loop that ends after its first pass, and lines moved into it or out of it."""
+
+    def with_body(body: list[ast.stmt]) -> Any:
+        values = {**dict(ast.iter_fields(loop)), "body": body, "lineno": 0}
+        return type(loop)(**values)
+
+    single_pass = with_body([*loop.body, ast.Break()])
+    yield "loop", f"{header(loop)}  # once", [*before, single_pass, *after]
+    for k in range(1, len(loop.body)):  # the first counts the passes
+        line, rest = loop.body[k], with_body([*loop.body[:k], *loop.body[k + 1 :]])
+        text = f"{header(line)}  # {{}} the loop: {header(loop)}"
+        yield "moved line", text.format("before"), [*before, line, rest, *after]
+        yield "moved line", text.format("after"), [*before, rest, line, *after]
+    if before and isinstance(before[-1], ast.Assign):
+        text = f"{header(before[-1])}  # in the loop: {header(loop)}"
+        body = [*loop.body[:1], before[-1], *loop.body[1:]]
+        yield "moved line", text, [*before, with_body(body), *after]
+
+
+def parsed(text: str) -> ast.expr:
+    """Return the expression of a text."""
+    return ast.parse(text, mode="eval").body
+
+
+def header(statement: ast.stmt) -> str:
+    """Return the first line of a statement, without the lines of its block."""
+    return ast.unparse(statement).splitlines()[0]

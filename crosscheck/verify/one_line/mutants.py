@@ -1,0 +1,232 @@
+"""The programs that differ from a right program in a single line.
+
+Whoever writes a known method down makes mistakes of few kinds: a wrong sign or index, a name for
+another, a line left out or in the wrong place.
+"""
+
+import ast
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from types import FunctionType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .changes import Scope, header, of_expression, of_statement, parsed
+
+FILE, PASS = "right program", "_pass"
+# A program is stopped after so many times the passes through loops of the right one.
+MAX_PASSES = 5
+UNLIMITED = 10**9
+MODULES = ("np", "np.linalg", "math")
+# What an expression raises whose names have no value yet, or not the usual one.
+NO_VALUE = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
+
+
+class FastNumpy:
+    """NumPy with a cross product of two vectors that takes an eighth of the time.
+
+    Programs of mechanics spend most of their time in it: their search is three times as fast.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(np, name)
+
+    @staticmethod
+    def cross(a: Any, b: Any, **options: Any) -> Any:
+        """Return the cross product of two vectors, or of arrays of them as NumPy does."""
+        if np.shape(a) != (3,) or np.shape(b) != (3,):
+            return np.cross(a, b, **options)
+        (a0, a1, a2), (b0, b1, b2) = a, b
+        return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
+class Mutant(NamedTuple):
+    """A right program with a changed line."""
+
+    kind: str  # a key of `faults.toml`
+    function: str  # the function that the line is in
+    right: str  # the line, as it is in the right program
+    wrong: str  # the line in its place; "" if there is none
+    changed: FunctionType  # the function with the change
+
+
+class Program:
+    """A right program that runs with any of its functions changed."""
+
+    def __init__(self, source: str) -> None:
+        self._tree = ast.parse(source)
+        for loop in ast.walk(self._tree):
+            if isinstance(loop, ast.For | ast.While):
+                loop.body.insert(0, ast.Expr(parsed(f"{PASS}()")))
+        ast.fix_missing_locations(self._tree)
+        self.names: dict[str, Any] = {PASS: self._pass}
+        self._passes, self._max_passes = 0, UNLIMITED
+        self._scopes: dict[str, Scope] = {}  # of the functions that were observed
+        exec(_compiled(self._tree), self.names)
+        if "np" in self.names:
+            self.names["np"] = FastNumpy()
+
+    def _pass(self) -> None:
+        self._passes += 1
+        if self._passes > self._max_passes:
+            raise ArithmeticError("a loop without end")
+
+    def count_passes(self, run: Callable[[], Any]) -> int:
+        """Run the right program and return the passes through its loops."""
+        self._passes = 0
+        run()
+        return self._passes
+
+    @contextmanager
+    def changed(self, mutant: Mutant, passes: int) -> Iterator[None]:
+        """Run the program with a change, given the passes that the right program takes."""
+        right = self.names[mutant.function]
+        self._passes, self._max_passes = 0, MAX_PASSES * (passes + 1)
+        self.names[mutant.function] = mutant.changed
+        try:
+            yield
+        finally:
+            self.names[mutant.function], self._max_passes = right, UNLIMITED
+
+    @property
+    def _functions(self) -> list[ast.FunctionDef]:
+        return [part for part in self._tree.body if isinstance(part, ast.FunctionDef)]
+
+    def observe(self, run: Callable[[], Any]) -> None:
+        """Run the right program and note the shapes of its values."""
+        texts = {function.name: _texts(function) for function in self._functions}
+        codes = {text: compile(text, FILE, "eval") for text in set().union(*texts.values())}
+        shapes: dict[str, dict[str, str]] = {}
+
+        def trace(frame: Any, event: str, _: Any) -> Any:
+            function = frame.f_code.co_name
+            if frame.f_code.co_filename != FILE or function not in texts:
+                return None
+            shapes_here = shapes.setdefault(function, {})
+            for text in texts[function].keys() - shapes_here.keys() if event != "call" else ():
+                with suppress(*NO_VALUE):
+                    shapes_here[text] = _shape(eval(codes[text], frame.f_globals, frame.f_locals))
+            return trace
+
+        before = sys.gettrace()
+        sys.settrace(trace)
+        try:
+            self.count_passes(run)
+        finally:
+            sys.settrace(before)
+        has_conjugate = "conjugate" in self.names
+        for function, shapes_here in shapes.items():
+            plain = frozenset(text for text, is_plain in texts[function].items() if is_plain)
+            self._scopes[function] = Scope(shapes_here, plain, has_conjugate)
+
+    def mutants(self) -> Iterator[Mutant]:
+        """Yield each change of a line of the functions that were observed."""
+        for function in self._functions:
+            if function.name in self._scopes:
+                yield from self._of_block(function, function)
+
+    def _of_block(self, function: ast.FunctionDef, block: Any) -> Iterator[Mutant]:
+        """Yield the changes of the statements of a block, and of the statements within them."""
+        for name in ("body", "orelse"):
+            statements = getattr(block, name, [])
+            for i, statement in enumerate(statements):
+                if isinstance(statement, ast.Expr):
+                    continue  # a docstring, or the count of passes
+                yield from self._of_expressions(function, statement)
+                for kind, wrong, changed in of_statement(statements, i):
+                    change = kind, header(statement), wrong
+                    yield from self._mutant(function, change, (block, name), changed)
+                yield from self._of_block(function, statement)
+
+    def _of_expressions(self, function: ast.FunctionDef, statement: ast.stmt) -> Iterator[Mutant]:
+        """Yield the changes of a statement's expressions."""
+        right, scope = header(statement), self._scopes[function.name]
+        for parent, field, node in list(_expressions(statement)):
+            for kind, new in of_expression(node, parent, scope):
+                with _replaced(parent, field, new):
+                    wrong = header(statement)
+                if wrong != right:
+                    change = kind, right, wrong
+                    yield from self._mutant(function, change, (parent, field), new)
+
+    def _mutant(
+        self, function: ast.FunctionDef, change: tuple[str, str, str], place: Any, new: Any
+    ) -> Iterator[Mutant]:
+        """Yield a change, unless Python refuses it: a `break` outside of its loop."""
+        kind, right, wrong = change
+        names = dict[str, Any]()
+        for node in new if isinstance(new, list) else [new]:
+            if not hasattr(node, "col_offset"):
+                ast.fix_missing_locations(node)
+        with _replaced(place[0], place[1], new), suppress(SyntaxError):
+            exec(_compiled(ast.Module([function], [])), self.names, names)
+            yield Mutant(kind, function.name, right, wrong, names[function.name])
+
+
+def _expressions(node: ast.AST) -> Iterator[tuple[ast.AST, Any, Any]]:
+    """Yield the expressions of a statement: the node that holds each, where, and the expression."""
+    for name, value in ast.iter_fields(node):
+        for key, part in enumerate(value) if isinstance(value, list) else [(None, value)]:
+            if not isinstance(part, ast.AST) or isinstance(part, ast.stmt | ast.arguments):
+                continue
+            is_read = isinstance(getattr(part, "ctx", ast.Load()), ast.Load) and name != "func"
+            if isinstance(part, ast.expr) and is_read:
+                yield node, (name if key is None else (name, key)), part
+            if isinstance(part, ast.Subscript) and not is_read:
+                yield part, "slice", part.slice  # of x[i] that is assigned
+                yield from _expressions(part.slice)
+            elif not isinstance(part, ast.Name):
+                yield from _expressions(part)
+
+
+@contextmanager
+def _replaced(parent: Any, field: Any, new: Any) -> Iterator[None]:
+    """Put something else in the field of a node, or at a place of a list in a field."""
+    holder, key = (getattr(parent, field[0]), field[1]) if isinstance(field, tuple) else (
+        vars(parent), field
+    )  # fmt: skip
+    before, holder[key] = holder[key], new
+    try:
+        yield
+    finally:
+        holder[key] = before
+
+
+def _texts(function: ast.FunctionDef) -> dict[str, bool]:
+    """Return the expressions of a function, and whether each is a name or an element x[i]."""
+    texts = {
+        ast.unparse(node): isinstance(node, ast.Name) or _is_element(node)
+        for node in ast.walk(function)
+        if isinstance(node, ast.BinOp | ast.Call | ast.Name | ast.Subscript | ast.UnaryOp)
+        and not any(map(_is_method, ast.walk(node)))
+    }
+    return {text: is_plain for text, is_plain in texts.items() if PASS not in text}
+
+
+def _is_method(node: ast.AST) -> bool:
+    """Return whether a node is a method, which may change its object, and no function of NumPy."""
+    return isinstance(node, ast.Attribute) and ast.unparse(node.value) not in MODULES
+
+
+def _is_element(node: ast.AST) -> bool:
+    """Return whether a node is x[i], and not x[0], of which there are many."""
+    return isinstance(node, ast.Subscript) and any(
+        isinstance(part, ast.Name) for part in ast.walk(node.slice)
+    )
+
+
+def _shape(value: Any) -> str:
+    """Return the kind of a value: "int", the shape of an array or a number, or the type's name."""
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        return "int"
+    is_array = isinstance(value, float | np.ndarray | np.floating)
+    return str(np.shape(value)) if is_array else type(value).__name__
+
+
+def _compiled(tree: ast.Module) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SyntaxWarning)
+        return compile(tree, FILE, "exec")

@@ -1,0 +1,191 @@
+"""Search the right program with a changed line that gives a solver's wrong answers."""
+
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
+
+from ..case import Case
+from ..contestant import Answer, Exchange
+from ..explain import MORE, Variant, explain
+from ..fault_programs import PROGRAMS, source_of
+from ..functions import call
+from ..greeting import Greeting
+from ..judgement import Explanation, TaskReport, Verdict
+from ..kinematics.sweeps import PoseTrial
+from ..precision import judging_greeting
+from ..sentence import Sentence, sentence, with_code
+from ..task import TASKS
+from .mutants import Mutant, Program
+
+FAULTS = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))["line"]
+# Of changes that no answer tells apart the first of these kinds is named.
+KINDS = list(FAULTS)
+# The most small answers and large ones that are compared with programs, wrong ones first; a program
+# has to give the first of them.
+SMALL, LARGE, TRIAL = 9, 3, 1
+# The share of the answers that a program has to give.
+MIN_SHARE = 0.75
+# Cases for which a right program goes through its loops more often are left out: they take long.
+MAX_PASSES = 200
+# Longer lines are cut to what differs, with so many letters before and after.
+LINE, AROUND = 60, 20
+# Relative differences that rounding and the ends of iterations explain, by precision.
+TOLERANCE = {"double": 1e-7, "single": 2e-4}
+
+
+def with_changed_line(
+    report: TaskReport, greeting: Greeting, notify: Callable[[int, int], None]
+) -> TaskReport:
+    """Return a report on wrong answers with the changed line that explains them.
+
+    A line has to explain more answers than the mistakes that are already named. `notify` is called
+    before each right program with the number of programs done, and of all.
+    """
+    named_share = max(
+        (explanation.share for explanation in report.diagnosis.explanations), default=0.0
+    )
+    if report.verdict <= Verdict.RIGHT_EXCEPT or named_share == 1.0:
+        return report
+    explanations = changed_lines(report, greeting, notify)
+    if not explanations or explanations[0].share < named_share + MORE:
+        return report
+    diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None)
+    return replace(report, diagnosis=diagnosis)
+
+
+def changed_lines(
+    report: TaskReport, greeting: Greeting, notify: Callable[[int, int], None]
+) -> tuple[Explanation, ...]:
+    """Return the change of a line that gives most of the answers, () if none gives enough."""
+    compared = _compared(report)
+    if not compared:
+        return ()
+    precision = judging_greeting(compared, greeting)[0].precision
+    best: tuple[Explanation, ...] = ()
+    programs = list(_programs(report, greeting.step.method))
+    for i, program in enumerate(programs):
+        notify(i, len(programs))
+        run = partial(_answer, program, report)
+        passes = {e.case.name: program.count_passes(partial(run, e.case)) for e in compared}
+        short = [e for e in compared if passes[e.case.name] <= MAX_PASSES]
+        if not short:
+            continue
+        program.observe(partial(run, short[0].case))
+        mutants = {str(number): mutant for number, mutant in enumerate(program.mutants())}
+        variants = (
+            Variant((key,), partial(_changed_answer, program, mutant, passes, run))
+            for key, mutant in mutants.items()
+        )
+        explanations, _ = explain(
+            variants, short, lambda _: TOLERANCE[precision], partial(_describe, mutants), TRIAL
+        )
+        best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
+        if best and best[0].share == 1.0:
+            break
+    return best if best and best[0].share >= MIN_SHARE else ()
+
+
+def _programs(report: TaskReport, step: str | None) -> Iterator[Program]:
+    """Yield the right programs of a task that have its method, and its kind of step if declared."""
+    for name, entry in PROGRAMS.items():
+        if entry.get("task") == report.task and f"def {report.method}" in entry["text"]:
+            program = Program(source_of(name))
+            declared = program.names.get("PLUMBOB", {}).get("step", {}).get("method")
+            if step is None or declared in (None, step):
+                yield program
+
+
+def _compared(report: TaskReport) -> list[Exchange]:
+    """Return small and large answers, the wrong answers first."""
+    judgements = [
+        judgement
+        for judgement in report.judgements
+        if isinstance(judgement.answer, Answer) and judgement.case.requirement == "must"
+    ]
+    is_sweep = [j for j in judgements if "sweeps" in j.case.facts]
+    if any(j.verdict >= Verdict.UNDECIDED for j in is_sweep):
+        judgements = is_sweep
+    wrong = [j for j in judgements if j.verdict >= Verdict.UNDECIDED]
+    if not wrong:
+        return []
+    judgements = sorted(wrong if len(wrong) >= SMALL else judgements, key=lambda j: j.case.size)
+    judgements.sort(key=lambda j: j.verdict < Verdict.UNDECIDED)
+    exchanges = (
+        Exchange(j.case, j.answer, j.answer)
+        for j in [*judgements[:SMALL], *judgements[SMALL:][-LARGE:]]
+    )
+    return [_comparable(exchange) for exchange in exchanges]
+
+
+def _comparable(exchange: Exchange) -> Exchange:
+    """Return an exchange with the outputs that no choice of a program changes."""
+    if exchange.case.task != "inverse_kinematics":
+        return exchange
+    return PoseTrial(exchange).comparable
+
+
+def _answer(program: Program, report: TaskReport, case: Case) -> Mapping[str, Any]:
+    function = program.names.get(report.method) or program.names.get(report.task)
+    if function is None:
+        function = next(program.names[m] for m in ("ccd", "fabrik") if m in program.names)
+    answer = call(function, TASKS[case.task], case.inputs)
+    if not isinstance(answer, Answer):
+        raise ArithmeticError(answer.sentence)
+    comparable = _comparable(Exchange(case, answer, answer)).answer
+    assert isinstance(comparable, Answer)
+    return comparable.values
+
+
+def _changed_answer(
+    program: Program,
+    mutant: Mutant,
+    passes: Mapping[str, int],
+    run: Callable[[Case], Mapping[str, Any]],
+    case: Case,
+) -> Mapping[str, Any]:
+    with program.changed(mutant, passes[case.name]):
+        return run(case)
+
+
+def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
+    """Return the sentence of the likeliest of some changes that no answer tells apart."""
+    mutant = min((mutants[key] for key in keys), key=lambda m: (KINDS.index(m.kind), len(m.wrong)))
+    entry = FAULTS[mutant.kind]
+    right, wrong = excerpts(mutant.right, mutant.wrong)
+    if wrong:
+        words = sentence(
+            "{what} The answers are those of a right program in which `{right}` is replaced by "
+            "`{wrong}`.", what=Sentence(entry["sentence"], {}), right=right, wrong=wrong,
+        )  # fmt: skip
+    else:
+        words = sentence(
+            "{what} The answers are those of a right program without the line `{right}`.",
+            what=Sentence(entry["sentence"], {}), right=right,
+        )  # fmt: skip
+    return with_code(entry["code"], words)
+
+
+def excerpts(right: str, wrong: str) -> tuple[str, str]:
+    """Return two lines, of long lines only the difference and some letters around it."""
+    if max(len(right), len(wrong)) <= LINE or not wrong:
+        return right, wrong
+    before = _common_length(right, wrong)
+    after = _common_length(right[before:][::-1], wrong[before:][::-1])
+    start = max(0, right.rfind(" ", 0, max(0, before - AROUND)) + 1)
+
+    def excerpt(line: str) -> str:
+        end = line.find(" ", len(line) - after + AROUND)
+        end = len(line) if end < 0 else end
+        return f"{'… ' * (start > 0)}{line[start:end]}{' …' * (end < len(line))}"
+
+    return excerpt(right), excerpt(wrong)
+
+
+def _common_length(first: str, second: str) -> int:
+    """Return the number of letters with which both texts begin."""
+    pairs = zip(first, second, strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))

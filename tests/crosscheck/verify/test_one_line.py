@@ -1,0 +1,122 @@
+"""A right program with one line changed explains answers that no known mistake explains."""
+
+from functools import partial
+
+import pytest
+
+from plumbob.crosscheck.verify.fault_programs import coded_faults, contestant_of, source_of
+from plumbob.crosscheck.verify.kinematics.sweeps import PoseTrial
+from plumbob.crosscheck.verify.one_line import search
+from plumbob.crosscheck.verify.one_line.mutants import Program
+from plumbob.crosscheck.verify.output import terminal
+from plumbob.crosscheck.verify.output.words import Presentation, speaker
+from plumbob.crosscheck.verify.verify import DISCIPLINES, judge_cases, trials, verify
+
+# Of these kinds the programs are judged in half a second; the others are slow tests.
+QUICK = ("term", "order", "condition", "loop")
+
+
+def report_on(source, task):
+    """Judge a program by its task's laws, and name no mistakes by lines."""
+    contestant = contestant_of(source)
+    ((task, method),) = trials(contestant.greeting, [task])
+    cases = DISCIPLINES[task].cases(contestant.greeting, method, 0, False)
+    return judge_cases(contestant, task, method, cases), contestant.greeting
+
+
+def changed_lines(source, task):
+    report, greeting = report_on(source, task)
+    return search.changed_lines(report, greeting, lambda done, total: None)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(fault, id=fault.name, marks=() if fault.name in QUICK else pytest.mark.slow)
+        for fault in coded_faults().values()
+        if fault.family == "LINE"
+    ],
+)
+def test_a_changed_line_is_named(fault):
+    (explanation,) = changed_lines(fault.wrong_program, fault.task)
+    assert explanation.codes == (fault.code,)
+    assert explanation.share == 1.0
+
+
+@pytest.mark.parametrize("program", ["energy in loops", "forces term by term"])
+def test_right_answers_need_no_changed_line(program):
+    task = "energy" if program.startswith("energy") else "mass_spring_forces"
+    assert changed_lines(source_of(program), task) == ()
+
+
+def test_the_line_is_printed_where_the_catalogue_knows_no_mistake():
+    right, wrong = "length - rest_lengths[s]", "length - stiffnesses[s]"
+    source = source_of("energy in loops").replace(right, wrong)
+    report = verify(contestant_of(source))
+    screen = " ".join(
+        "\n".join(terminal.lines(report, Presentation(speaker("en"), "en", ["solver.py"]))).split()
+    )
+    assert "(lengths - rest_lengths) ** 2)` is replaced by `" in screen
+    assert "(lengths - stiffnesses) ** 2)`" in screen
+    assert "[PB-LINE-013]" in screen
+
+
+def test_a_mistake_of_the_catalogue_is_named_rather_than_a_line():
+    fault = coded_faults()["PB-ENERGY-003"]
+    (report,) = verify(contestant_of(fault.wrong_program)).tasks
+    assert report.diagnosis.explanations[0].codes == (fault.code,)
+
+
+def test_a_second_mistake_makes_no_line_likely():
+    source = source_of("energy in loops")
+    source = source.replace("- rest_lengths[s]", "- stiffnesses[s]").replace("0.5 * st", "0.3 * st")
+    assert changed_lines(source, "energy") == ()
+
+
+LOOP = """
+def count(end):
+    i, total = 0, 0
+    while i < end:
+        total = total + i
+        i = i + 1
+    return total
+"""
+
+
+def test_a_changed_program_without_end_is_stopped():
+    program = Program(LOOP)
+    run = partial(program.names["count"], 4)
+    program.observe(run)
+    passes = program.count_passes(run)
+    assert passes == 4
+    endless = next(m for m in program.mutants() if m.right == "i = i + 1" and m.wrong == "")
+    with program.changed(endless, passes), pytest.raises(ArithmeticError, match="without end"):
+        program.names["count"](4)
+    assert program.names["count"](4) == 6  # the right function is back
+
+
+def test_the_program_is_as_it_was_after_all_changes():
+    program = Program(LOOP)
+    program.observe(partial(program.names["count"], 4))
+    first = [(mutant.kind, mutant.wrong) for mutant in program.mutants()]
+    assert first == [(mutant.kind, mutant.wrong) for mutant in program.mutants()]
+    assert {kind for kind, _ in first} <= set(search.FAULTS)
+
+
+def test_long_lines_are_cut_to_what_differs():
+    line = "result = " + " + ".join(f"term_{i}" for i in range(30))
+    right, wrong = search.excerpts(line, line.replace("term_15", "term_51"))
+    assert "term_15" in right
+    assert "term_51" in wrong
+    assert len(right) < 75
+    assert (right[0], right[-1]) == ("…", "…")
+    assert search.excerpts("a = b", "a = c") == ("a = b", "a = c")
+
+
+@pytest.mark.slow
+def test_poses_are_compared_as_the_laws_read_them():
+    """Local rotations of the last joint, which move nothing, are no one's mistake."""
+    report, _ = report_on(coded_faults()["PB-CCD-010"].wrong_program, "inverse_kinematics")
+    for exchange in search._compared(report):
+        assert exchange.answer.values.keys() >= {"local_rotations"}
+        assert PoseTrial(exchange).is_sweep
