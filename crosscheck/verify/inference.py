@@ -199,9 +199,9 @@ def _unchanged(
 def _is_unused(
     contestant: Contestant, case: Case, answer: Answer | Failure, restriction: Restriction
 ) -> bool:
-    """Return whether answers do not even depend on the first number of an input of many."""
+    """Return whether answers do not even depend on what is left of a vector or of many numbers."""
     name = restriction.input
-    if name not in _SHARED or not isinstance(answer, Answer):
+    if name not in ("gravity", *_SHARED) or not isinstance(answer, Answer):
         return False
     doubled = contestant.answer(
         replace(case, inputs={**case.inputs, name: 2.0 * case.inputs[name]})

@@ -661,9 +661,10 @@ def _implicit(equation: StepEquation) -> FloatArray:
     start, free = equation.start, equation.free[:, None]
     integrator = start.model.integrator
     x = np.where(free, equation.starts[integrator.start], start.x)
-    if equation.uncoupled and integrator.method != "descent":
+    if equation.uncoupled:  # g is quadratic: each iteration leaves the same share of the way
         minimum = equation.starts["s_n"]
-        remainder = (1.0 - integrator.rate) ** integrator.iterations
+        scale = start.p.masses[:, None] if integrator.method == "descent" else 1.0
+        remainder = (1.0 - integrator.rate * scale) ** integrator.iterations
         return np.where(free, minimum + remainder * (x - minimum), x)
     return _METHODS[integrator.method](equation, x, integrator)
 
@@ -683,15 +684,19 @@ def _local_global(equation: StepEquation, x: FloatArray, integrator: Integrator)
     weights = equation.linear.stiffnesses if start.model.matrix.stiffness else np.ones_like(k)
     c_matrix = (c if equation.linear is p else equation.linear.dampings / h)[:, None, None]
     A = equation.put_together(weights[:, None, None], c_matrix if equation.damped else None)
-    pinned_x = np.where(equation.free[:, None] | (start.model.pins == "origin"), 0.0, x)
+    free = equation.free[:, None]
+    pinned_x = np.where(free | (start.model.pins == "origin"), 0.0, x)
+    fixed = p.masses[:, None] * equation.y + h * h * equation.constant - A @ pinned_x
+    fixed[equation.pins] += equation.hold * p.positions[equation.pins]
+    is_exact = start.model.matrix.inverse == "exact"
+    inverse = equation.solve(A, np.eye(len(A))) if is_exact else A
     for _ in range(integrator.iterations):
         length, u = frames(p, x)
         rest = np.where(p.tension_only & (length < p.rest_lengths), length, p.rest_lengths)
         rest = rest if p.normalised else rest * length
         pull = (k * rest + c * equation.length_n)[:, None] * u
-        right = p.masses[:, None] * equation.y + h * h * (equation.constant + p.pulled.T @ pull)
-        right[equation.pins] += equation.hold * p.positions[equation.pins]
-        x = np.where(equation.free[:, None], equation.solve(A, right - A @ pinned_x, x), x)
+        right = fixed + h * h * (p.pulled.T @ pull)
+        x = np.where(free, inverse @ right if is_exact else equation.solve(A, right, x), x)
     return x
 
 
