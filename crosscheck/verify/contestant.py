@@ -40,6 +40,11 @@ class Failure:
     sentence: Sentence
 
 
+def is_hung(answer: "Answer | Failure") -> bool:
+    """Return whether a request was given no answer in time."""
+    return isinstance(answer, Failure) and answer.kind is FailureKind.HUNG
+
+
 class NoGreetingError(ValueError):
     """A solver sent no greeting, for the reason in `failure`."""
 

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from .case import Case
-from .contestant import Answer, Contestant, Failure
+from .contestant import Answer, Contestant, Failure, is_hung
 from .explain import largest_gap
 from .greeting import Greeting, System
 from .judgement import Explanation, TaskReport, Verdict
@@ -84,7 +84,8 @@ def inferred(
     assumptions, and keeps the faults that explain the other answers.
     """
     greeting = contestant.greeting
-    if report.verdict <= Verdict.RIGHT_EXCEPT or greeting.system.continues:
+    is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
+    if report.verdict <= Verdict.RIGHT_EXCEPT or greeting.system.continues or is_stuck:
         return report
     evidence = [(r, why) for r in RESTRICTIONS if (why := _evidence(contestant, report, r))]
     if not evidence:
@@ -199,7 +200,7 @@ def _unchanged(
 def _is_unused(
     contestant: Contestant, case: Case, answer: Answer | Failure, restriction: Restriction
 ) -> bool:
-    """Return whether answers do not even depend on what is left of a vector or of many numbers."""
+    """Return whether answers do not even depend on the first of many numbers, or on gravity."""
     name = restriction.input
     if name not in ("gravity", *_SHARED) or not isinstance(answer, Answer):
         return False

@@ -9,7 +9,7 @@ import msgspec
 
 from . import precision
 from .case import Case
-from .contestant import Contestant, Exchange, Failure, FailureKind
+from .contestant import Contestant, Exchange, Failure, is_hung
 from .greeting import Greeting
 from .inference import inferred, methods_of
 from .judgement import Report, TaskReport, Verdict
@@ -30,7 +30,7 @@ from .one_line.search import with_changed_line
 from .sentence import Sentence, sentence
 from .timing import with_lesser_time
 
-# After so many timeouts in a task its other cases are not asked.
+# After so many timeouts in a task its other cases are not asked, nor are they asked again.
 MAX_HANGS = 2
 # Tasks that are tried once for every method that the greeting names.
 WITH_METHODS = ("inverse_kinematics", "track")
@@ -142,6 +142,16 @@ def judge_cases(
         is_right = single.verdict <= Verdict.RIGHT_EXCEPT and precision.is_off_by_single(report)
         if is_right or single.diagnosis.explained:
             report, reason = single, precision.INEXACT
+    if unsent := len(cases) - len(exchanges):
+        hint = sentence(
+            "Two requests got no answer in time, so the last {count} of {total} cases were not "
+            "sent. If your program is only slow, allow more time with --time-limit 120; if not, "
+            "look for an endless loop in the case below.",
+            count=unsent,
+            total=len(cases),
+        )
+        hints = (*report.diagnosis.hints, hint)
+        report = replace(report, diagnosis=replace(report.diagnosis, hints=hints))
     return replace(report, assumptions=(reason,) if reason else ())
 
 
@@ -173,13 +183,15 @@ def _ask(
     for i, case in enumerate(cases):
         notify(i, 2 * len(cases))
         answers.append(contestant.answer(case))
-        hangs += isinstance(answers[-1], Failure) and answers[-1].kind is FailureKind.HUNG
+        hangs += is_hung(answers[-1])
         if hangs == MAX_HANGS:
             break
     exchanges, asked = [], list(zip(cases, answers, strict=False))
     order = -1 if cases and cases[0].task in (forces.TASK, energy.TASK) else 1
     for i, (case, answer) in enumerate(asked[::order]):
         notify(len(cases) + i, 2 * len(cases))
-        repeat = answer if isinstance(answer, Failure) else contestant.answer(case)
+        is_last = isinstance(answer, Failure) or hangs >= 2 * MAX_HANGS
+        repeat = answer if is_last else contestant.answer(case)
+        hangs += not is_last and is_hung(repeat)
         exchanges.append(Exchange(case, with_lesser_time(answer, repeat), repeat))
     return exchanges[::order]

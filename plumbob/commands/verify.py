@@ -147,7 +147,8 @@ def _judge(
                 row, description=task, completed=count, total=total))  # fmt: skip
     except NoGreetingError as error:
         raise ValueError(say(sentence(
-            "solver: it could not be started: {why}", why=error.failure.sentence
+            "solver: it did not start, or did not answer the greeting (the first request). {why}",
+            why=error.failure.sentence,
         ))) from None  # fmt: skip
     return files.write(report, question, Presentation(say, language, words))
 

@@ -321,7 +321,7 @@ class ModelSearch:
     def _explains_enough(self, choices: Choices) -> bool:
         """Return whether no more than a few answers are left out because of singular matrices."""
         explained = [self._gap(choices, i) is not None for i in range(len(self.stages))]
-        return 2 * explained.count(True) >= min(8, len(explained))
+        return any(explained) and 2 * explained.count(True) >= min(8, len(explained))
 
     def _explains(self, choices: Choices, index: int) -> bool:
         """Return whether choices reproduce an answer, or neither is a number of use."""

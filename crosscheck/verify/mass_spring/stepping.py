@@ -19,7 +19,7 @@ from ..contestant import Answer, Exchange
 from ..explain import either, first_broken
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
-from ..laws import digits, finding, hints_of, judge_case, laws_that_hold
+from ..laws import digits, finding, hints_of, judge_case, laws_that_hold, proportion_of
 from ..sentence import Sentence, sentence
 from . import laws
 from .cases import task_cases, trace_of
@@ -58,7 +58,9 @@ class Stepping(NamedTuple):
         `notify` is called with the progress of the search of faults.
         """
         problems = problems_of(exchanges, greeting)
-        search = ModelSearch(probes_of(exchanges, problems), greeting.step, greeting.epsilon)
+        is_constant = _repeats(exchanges, 0.0) or _repeats(exchanges, 1.0)  # no step to be found
+        telling = [] if is_constant else probes_of(exchanges, problems)
+        search = ModelSearch(telling, greeting.step, greeting.epsilon)
         probes = probes_of(exchanges, problems, every=True)
         matches = with_factorisation(search.run(notify, probes), probes, greeting.epsilon)
         options = honest_options(matches, greeting.step)
@@ -232,6 +234,12 @@ def _diagnose(
             declaration=declaration,
         )
     hints = hints_of(judgements)
+    if _repeats(judgements, 1.0):
+        first = sentence(
+            "Positions are those of the request in all its answers: nothing moves. Answer the "
+            "state at the end of the step."
+        )
+        return Diagnosis((), behaviour, first, hints, search.prediction_count)
     diagnosis = Diagnosis(explanations, behaviour, None, hints, search.prediction_count)
     if diagnosis.explained:
         return diagnosis
@@ -239,9 +247,21 @@ def _diagnose(
         max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED
     )
     diagnosis = replace(diagnosis, is_double=search.is_double())
+    if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
+        hints += proportion_of(judgements)
     if search.probes and behaviour is None and (step.method is None or is_undecided):
         hints += (_nearest(search), laws_that_hold(judgements))
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
+
+
+def _repeats(asked: Sequence[Exchange] | Sequence[CaseJudgement], factor: float) -> bool:
+    """Return whether all answers are the positions of their requests times a factor."""
+    pairs = [
+        (factor * item.case.inputs["positions"], item.answer.values["positions"])
+        for item in asked
+        if isinstance(item.answer, Answer) and "positions" in item.answer.values
+    ]
+    return bool(pairs) and all(np.allclose(before, after, atol=SOLVED) for before, after in pairs)
 
 
 def _leaves_open(step: Step, options: Sequence[Option]) -> bool:

@@ -18,6 +18,8 @@ _HIDDEN = (
     *(str(Path(__file__).parents[1]), 'File "<string>"'),
     *("Extension modules:", "Timeout (", "Thread 0x"),
 )
+# What Python prints below a line to mark a part of it.
+_MARKS = " ^~"
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
@@ -62,7 +64,7 @@ def failure_of(
     message = Sentence(entry["sentence"], values)
     if entry.get("last_words", True):
         lines = list(dict.fromkeys(map(shown, bytes(process.last_words).splitlines())))
-        lines = [line for line in lines if line and not any(text in line for text in _HIDDEN)]
+        lines = [line for line in lines if line.strip(_MARKS) and not any(map(line.count, _HIDDEN))]
         if lines:
             message = sentence(
                 "{what} Its last lines on standard error: {lines}",

@@ -9,7 +9,7 @@ import pytest
 
 from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
 from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Answer
+from plumbob.crosscheck.verify.contestant import Answer, Failure, FailureKind
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting, Step, System
 from plumbob.crosscheck.verify.judgement import CaseJudgement, Finding, Report, Verdict
@@ -40,7 +40,7 @@ from plumbob.crosscheck.verify.self_test import (
     Stepper,
 )
 from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.verify import verify
+from plumbob.crosscheck.verify.verify import MAX_HANGS, verify
 from plumbob.reference.explicit import runge_kutta, symplectic_euler
 from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
 
@@ -281,6 +281,31 @@ def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told(monkeypat
     sentences = {str(f.sentence) for one in judged.judgements for f in one.findings if f.verdict}
     assert not any("inf" in words.split() for words in sentences)
     assert not any("Another model than converged" in words for words in sentences)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(0.0, "positions in its answers are zero"), (1.0, "nothing moves")]
+)
+def test_of_a_step_that_gives_no_new_state_just_that_is_told(factor, words):
+    judged = report(lambda **inputs: {"positions": factor * inputs["positions"]},
+                    step=Step(method="symplectic"))  # fmt: skip
+    told = (judged.diagnosis.first_broken, *judged.diagnosis.hints)
+    assert judged.verdict is Verdict.WRONG
+    assert not judged.diagnosis.explained
+    assert any(words in str(line) for line in told)
+
+
+def test_a_solver_that_hangs_is_asked_no_more_and_the_cases_left_out_are_told():
+    class Hung(FunctionContestant):
+        def answer(self, case):
+            asked.append(case)
+            return Failure(FailureKind.HUNG, sentence("It computed."))
+
+    asked, task = [], "mass_spring_step"
+    (judged,) = verify(Hung({task: None}, Greeting(1, (task,)))).tasks
+    assert len(asked) == len(judged.judgements) == MAX_HANGS
+    assert "cases were not sent" in str(judged.diagnosis.hints[-1])
+    assert judged.diagnosis.behaviour is None
 
 
 @pytest.mark.slow
