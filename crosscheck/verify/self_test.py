@@ -47,6 +47,7 @@ PINS: dict[str, Literal["overwritten", "penalty", "heavy"]] = {
 }
 PRECISIONS: dict[Precision, type] = {"double": np.float64, "single": np.float32}
 FK, IK, STEP = "forward_kinematics", "inverse_kinematics", "mass_spring_step"
+MOTION = "mass_spring_motion"
 FAMILIES = {"forward": "forward kinematics", "ccd": "CCD", "fabrik": "FABRIK"}
 ALL_SYSTEMS = System(external_forces=True, tension_only=True)
 
@@ -258,7 +259,8 @@ def _mass_spring_faults() -> Iterator[Subject]:
     for key, option in _by_key([fault for fault in STEP_FAULTS if not fault.part]).items():
         model, step = DECLARED[_BASES.get(key, "linearised")]
         stepper = {key: Stepper(model, [option])}
-        yield from _subjects("steps", STEP, stepper, system=ALL_SYSTEMS, step=step)
+        task = MOTION if option.aspect == "frames" else STEP
+        yield from _subjects("steps", task, stepper, system=ALL_SYSTEMS, step=step)
 
 
 def _by_key(options: Sequence[Option]) -> dict[str, Option]:
