@@ -181,12 +181,20 @@ def position_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Fi
     parents, offsets = case.inputs["parents"], case.inputs["offsets"]
     assert pose.judgement is not None
     assert pose.judgement.length_errors is not None
+    gathered = bound * _repetitions(case)
+    # each joint of a path is rotated in each iteration
+    length_bound = max(bound, min(gathered * len(x), AGREEMENT * case.facts["size"]))
     return [
         finding("root in place", float(np.linalg.norm(x[0] - offsets[0])), bound, index=0),
-        of_joints("link lengths", pose.judgement.length_errors, bound),
-        _branches(x, parents, offsets, 2.0 * bound),
-        *_agreement(pose, case, 2.0 * bound, greeting),
+        of_joints("link lengths", pose.judgement.length_errors, length_bound),
+        _branches(x, parents, offsets, 2.0 * length_bound),
+        *_agreement(pose, case, 2.0 * gathered, greeting),
     ]
+
+
+def _repetitions(case: Case) -> int:
+    """Return how often a solver may rotate by hand: rounding gathers in each iteration."""
+    return max(1, int(case.inputs["max_iterations"])) * len(case.inputs.get("curve", " "))
 
 
 def _branches(x: FloatArray, parents: IndexArray, offsets: FloatArray, bound: float) -> Finding:
@@ -207,8 +215,6 @@ def _agreement(pose: AnsweredPose, case: Case, bound: float, greeting: Greeting)
     carriers = case.inputs["parents"][1:]
     if errors is None or pose.local is None or not np.isfinite(pose.local[carriers]).all():
         return []
-    # positions that a solver rotates by hand gather rounding in each iteration of each frame
-    bound *= max(1, int(case.inputs["max_iterations"])) * len(case.inputs.get("curve", " "))
     dead = DEAD_JOINTS * rounding.DEAD_ANGLE[greeting.precision] * case.facts["reach"]
     verdict = Verdict.RIGHT_EXCEPT if errors.max() <= dead else None
     return [of_joints("rotations agree with positions", errors, bound, verdict)]

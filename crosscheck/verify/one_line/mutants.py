@@ -10,12 +10,13 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FunctionType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from .changes import Scope, header, of_expression, of_statement, parsed
 
+T = TypeVar("T")
 FILE, PASS = "right program", "_pass"
 # A program is stopped after so many times the passes through loops of the right one.
 MAX_PASSES = 5
@@ -74,11 +75,10 @@ class Program:
         if self._passes > self._max_passes:
             raise ArithmeticError("a loop without end")
 
-    def count_passes(self, run: Callable[[], Any]) -> int:
-        """Run the right program and return the passes through its loops."""
+    def count_passes(self, run: Callable[[], T]) -> tuple[T, int]:
+        """Run the right program and return its answer and the passes through its loops."""
         self._passes = 0
-        run()
-        return self._passes
+        return run(), self._passes
 
     @contextmanager
     def changed(self, mutant: Mutant, passes: int) -> Iterator[None]:

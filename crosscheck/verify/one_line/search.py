@@ -8,9 +8,11 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..case import Case
 from ..contestant import Answer, Exchange
-from ..explain import MORE, Variant, explain
+from ..explain import MORE, Variant, difference, explain
 from ..fault_programs import PROGRAMS, source_of
 from ..functions import call
 from ..greeting import Greeting
@@ -57,6 +59,7 @@ def with_changed_line(
     return replace(report, diagnosis=diagnosis)
 
 
+@np.errstate(all="ignore")  # changed programs divide by zero
 def changed_lines(
     report: TaskReport, greeting: Greeting, notify: Callable[[int, int], None]
 ) -> tuple[Explanation, ...]:
@@ -64,29 +67,47 @@ def changed_lines(
     compared = _compared(report)
     if not compared:
         return ()
-    precision = judging_greeting(compared, greeting)[0].precision
+    tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     best: tuple[Explanation, ...] = ()
     programs = list(_programs(report, greeting.step.method))
     for i, program in enumerate(programs):
         notify(i, len(programs))
-        run = partial(_answer, program, report)
-        passes = {e.case.name: program.count_passes(partial(run, e.case)) for e in compared}
-        short = [e for e in compared if passes[e.case.name] <= MAX_PASSES]
-        if not short:
-            continue
-        program.observe(partial(run, short[0].case))
-        mutants = {str(number): mutant for number, mutant in enumerate(program.mutants())}
-        variants = (
-            Variant((key,), partial(_changed_answer, program, mutant, passes, run))
-            for key, mutant in mutants.items()
-        )
-        explanations, _ = explain(
-            variants, short, lambda _: TOLERANCE[precision], partial(_describe, mutants), TRIAL
-        )
+        explanations = _of_program(program, partial(_answer, program, report), compared, tolerance)
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         if best and best[0].share == 1.0:
             break
     return best if best and best[0].share >= MIN_SHARE else ()
+
+
+def _of_program(
+    program: Program,
+    run: Callable[[Case], Mapping[str, Any]],
+    compared: Sequence[Exchange],
+    tolerance: float,
+) -> tuple[Explanation, ...]:
+    """Return the changes of a line of a program that give answers, most answers first.
+
+    Answers that the program gives as it is come last, and no more of them than of the others: they
+    do not speak for a change.
+    """
+    passes, different, same = {}, list[Exchange](), list[Exchange]()
+    for exchange in compared:
+        assert isinstance(exchange.answer, Answer)
+        right, count = program.count_passes(partial(run, exchange.case))
+        if count <= MAX_PASSES:
+            passes[exchange.case.name] = count
+            is_same = difference(right, exchange.answer.values) <= tolerance
+            (same if is_same else different).append(exchange)
+    if not different:
+        return ()
+    program.observe(partial(run, different[0].case))
+    mutants = {str(number): mutant for number, mutant in enumerate(program.mutants())}
+    variants = (
+        Variant((key,), partial(_changed_answer, program, mutant, passes, run))
+        for key, mutant in mutants.items()
+    )
+    telling = [*different, *same[: len(different)]]
+    return explain(variants, telling, lambda _: tolerance, partial(_describe, mutants), TRIAL)[0]
 
 
 def _programs(report: TaskReport, step: str | None) -> Iterator[Program]:

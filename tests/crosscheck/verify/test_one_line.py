@@ -1,10 +1,12 @@
 """A right program with one line changed explains answers that no known mistake explains."""
 
+from dataclasses import replace
 from functools import partial
 
 import pytest
 
 from plumbob.crosscheck.verify.fault_programs import coded_faults, contestant_of, source_of
+from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.kinematics.sweeps import PoseTrial
 from plumbob.crosscheck.verify.one_line import search
 from plumbob.crosscheck.verify.one_line.mutants import Program
@@ -67,6 +69,17 @@ def test_a_mistake_of_the_catalogue_is_named_rather_than_a_line():
     assert report.diagnosis.explanations[0].codes == (fault.code,)
 
 
+def test_answers_of_a_right_program_speak_for_no_change():
+    """A line that may be left out without effect would explain all answers."""
+    report, greeting = report_on(source_of("energy in loops"), "energy")
+    (judgement, *_) = report.judgements
+    broken = replace(judgement.findings[0], verdict=Verdict.WRONG)
+    judgements = [replace(each, findings=(broken,)) for each in report.judgements]
+    report = replace(report, judgements=judgements)
+    assert search._compared(report)
+    assert search.changed_lines(report, greeting, lambda done, total: None) == ()
+
+
 def test_a_second_mistake_makes_no_line_likely():
     source = source_of("energy in loops")
     source = source.replace("- rest_lengths[s]", "- stiffnesses[s]").replace("0.5 * st", "0.3 * st")
@@ -87,8 +100,8 @@ def test_a_changed_program_without_end_is_stopped():
     program = Program(LOOP)
     run = partial(program.names["count"], 4)
     program.observe(run)
-    passes = program.count_passes(run)
-    assert passes == 4
+    answer, passes = program.count_passes(run)
+    assert (answer, passes) == (6, 4)
     endless = next(m for m in program.mutants() if m.right == "i = i + 1" and m.wrong == "")
     with program.changed(endless, passes), pytest.raises(ArithmeticError, match="without end"):
         program.names["count"](4)
