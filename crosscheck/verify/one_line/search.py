@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..contestant import Answer, Exchange, Failure
 from ..explain import MORE, Variant, difference, explain
 from ..fault_programs import PROGRAMS, source_of
 from ..functions import call
@@ -125,7 +125,7 @@ def _compared(report: TaskReport) -> list[Exchange]:
     judgements = [
         judgement
         for judgement in report.judgements
-        if isinstance(judgement.answer, Answer) and judgement.case.requirement == "must"
+        if judgement.case.requirement == "must" and _is_finite(judgement.answer)
     ]
     is_sweep = [j for j in judgements if "sweeps" in j.case.facts]
     if any(j.verdict >= Verdict.UNDECIDED for j in is_sweep):
@@ -140,6 +140,13 @@ def _compared(report: TaskReport) -> list[Exchange]:
         for j in [*judgements[:SMALL], *judgements[SMALL:][-LARGE:]]
     )
     return [_comparable(exchange) for exchange in exchanges]
+
+
+def _is_finite(answer: Answer | Failure) -> bool:
+    """Return whether an answer has numbers alone: NaN is like any other NaN."""
+    return isinstance(answer, Answer) and all(
+        np.isfinite(np.asarray(value, dtype=float)).all() for value in answer.values.values()
+    )
 
 
 def _comparable(exchange: Exchange) -> Exchange:
