@@ -44,13 +44,13 @@ def with_changed_line(
 ) -> TaskReport:
     """Return a report on wrong answers with the changed line that explains them.
 
-    A line has to explain more answers than the mistakes that are already named. `notify` is called
-    before each right program with the number of programs done, and of all.
+    A line has to explain many more answers than the mistakes that are already named. `notify` is
+    called before each right program with the number of programs done, and of all.
     """
     named_share = max(
         (explanation.share for explanation in report.diagnosis.explanations), default=0.0
     )
-    if report.verdict <= Verdict.RIGHT_EXCEPT or named_share == 1.0:
+    if report.verdict <= Verdict.RIGHT_EXCEPT or named_share + MORE > 1.0:
         return report
     explanations = changed_lines(report, greeting, notify)
     if not explanations or explanations[0].share < named_share + MORE:
@@ -125,7 +125,7 @@ def _compared(report: TaskReport) -> list[Exchange]:
     judgements = [
         judgement
         for judgement in report.judgements
-        if judgement.case.requirement == "must" and _is_finite(judgement.answer)
+        if judgement.case.requirement == "must" and _is_telling(judgement.case, judgement.answer)
     ]
     is_sweep = [j for j in judgements if "sweeps" in j.case.facts]
     if any(j.verdict >= Verdict.UNDECIDED for j in is_sweep):
@@ -142,11 +142,17 @@ def _compared(report: TaskReport) -> list[Exchange]:
     return [_comparable(exchange) for exchange in exchanges]
 
 
-def _is_finite(answer: Answer | Failure) -> bool:
-    """Return whether an answer has numbers alone: NaN is like any other NaN."""
-    return isinstance(answer, Answer) and all(
-        np.isfinite(np.asarray(value, dtype=float)).all() for value in answer.values.values()
+def _is_telling(case: Case, answer: Answer | Failure) -> bool:
+    """Return whether an answer has numbers alone, and not only zeros and numbers of the request."""
+    if not isinstance(answer, Answer):
+        return False
+    outputs = [np.asarray(value, dtype=float) for value in answer.values.values()]
+    inputs = [np.zeros(()), *(np.asarray(v) for v in case.inputs.values() if np.ndim(v) > 0)]
+    is_new = (
+        not any(np.array_equal(output, given) for given in inputs) and output.any()
+        for output in outputs
     )
+    return all(np.isfinite(output).all() for output in outputs) and any(is_new)
 
 
 def _comparable(exchange: Exchange) -> Exchange:

@@ -80,6 +80,16 @@ def test_answers_of_a_right_program_speak_for_no_change():
     assert search.changed_lines(report, greeting, lambda done, total: None) == ()
 
 
+@pytest.mark.parametrize("factor", [0.0, 1.0])
+def test_answers_that_repeat_the_request_tell_nothing(factor):
+    """Many lines may be missing where nothing is computed."""
+    source = source_of("newton step").replace(
+        'return {"positions": x, "velocities": (x - positions) / h}',
+        f'return {{"positions": {factor} * positions}}',
+    )
+    assert changed_lines(source, "mass_spring_step") == ()
+
+
 def test_a_second_mistake_makes_no_line_likely():
     source = source_of("energy in loops")
     source = source.replace("- rest_lengths[s]", "- stiffnesses[s]").replace("0.5 * st", "0.3 * st")
