@@ -29,6 +29,8 @@ KINDS = list(FAULTS)
 # The most small answers and large ones that are compared with programs, wrong ones first; a program
 # has to give the first of them.
 SMALL, LARGE, TRIAL = 9, 3, 1
+# So many answers a right program has to miss: fewer would be met by many changes by chance.
+MIN_DIFFERENT = 3
 # The share of the answers that a program has to give.
 MIN_SHARE = 0.75
 # Cases for which a right program goes through its loops more often are left out: they take long.
@@ -98,7 +100,7 @@ def _of_program(
             passes[exchange.case.name] = count
             is_same = difference(right, exchange.answer.values) <= tolerance
             (same if is_same else different).append(exchange)
-    if not different:
+    if len(different) < MIN_DIFFERENT:
         return ()
     program.observe(partial(run, different[0].case))
     mutants = {str(number): mutant for number, mutant in enumerate(program.mutants())}
