@@ -145,7 +145,7 @@ def _conversions(text: str, scope: Scope) -> Iterator[Change]:
         yield "inverse", parsed(f"({text}).T")
     if shape == "(4,)" and scope.has_conjugate:
         yield "inverse", parsed(f"conjugate({text})")
-    if shape == NUMBER:
+    if shape == NUMBER and text in scope.plain:
         for other in scope.alike(text):
             yield from (("factor", parsed(f"({text}) {sign} {other}")) for sign in "*/")
 
