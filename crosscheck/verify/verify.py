@@ -144,9 +144,10 @@ def judge_cases(
             report, reason = single, precision.INEXACT
     if unsent := len(cases) - len(exchanges):
         hint = sentence(
-            "Two requests got no answer in time, so the last {count} of {total} cases were not "
-            "sent. If your program is only slow, allow more time with --time-limit 120; if not, "
-            "look for an endless loop in the case below.",
+            "{hangs} requests got no answer in time, so the last {count} of {total} cases were not "
+            "sent. If your program is only slow, allow more time with --time-limit SECONDS; if "
+            "not, look for an endless loop in the case below.",
+            hangs=MAX_HANGS,
             count=unsent,
             total=len(cases),
         )

@@ -26,8 +26,8 @@ from .mutants import Mutant, Program
 FAULTS = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))["line"]
 # Of changes that no answer tells apart the first of these kinds is named.
 KINDS = list(FAULTS)
-# The most small answers and large ones that are compared with programs, wrong ones first; a program
-# has to give the first of them.
+# The most small and large wrong answers, and small right ones, that are compared with programs; a
+# program has to give the first of them.
 SMALL, LARGE, TRIAL = 9, 3, 1
 # So many answers a right program has to miss: fewer would be met by many changes by chance.
 MIN_DIFFERENT = 3
@@ -132,16 +132,11 @@ def _compared(report: TaskReport) -> list[Exchange]:
     is_sweep = [j for j in judgements if "sweeps" in j.case.facts]
     if any(j.verdict >= Verdict.UNDECIDED for j in is_sweep):
         judgements = is_sweep
+    judgements.sort(key=lambda j: j.case.size)
     wrong = [j for j in judgements if j.verdict >= Verdict.UNDECIDED]
-    if not wrong:
-        return []
-    judgements = sorted(wrong if len(wrong) >= SMALL else judgements, key=lambda j: j.case.size)
-    judgements.sort(key=lambda j: j.verdict < Verdict.UNDECIDED)
-    exchanges = (
-        Exchange(j.case, j.answer, j.answer)
-        for j in [*judgements[:SMALL], *judgements[SMALL:][-LARGE:]]
-    )
-    return [_comparable(exchange) for exchange in exchanges]
+    right = [j for j in judgements if j.verdict < Verdict.UNDECIDED]
+    telling = [*wrong[:SMALL], *wrong[SMALL:][-LARGE:], *right[:SMALL]]
+    return [_comparable(Exchange(j.case, j.answer, j.answer)) for j in telling if wrong]
 
 
 def _is_telling(case: Case, answer: Answer | Failure) -> bool:

@@ -64,7 +64,8 @@ def failure_of(
     message = Sentence(entry["sentence"], values)
     if entry.get("last_words", True):
         lines = list(dict.fromkeys(map(shown, bytes(process.last_words).splitlines())))
-        lines = [line for line in lines if line.strip(_MARKS) and not any(map(line.count, _HIDDEN))]
+        lines = [line for line in lines if not any(text in line for text in _HIDDEN)]
+        lines = [line for line in lines if line.strip(_MARKS)]
         if lines:
             message = sentence(
                 "{what} Its last lines on standard error: {lines}",
