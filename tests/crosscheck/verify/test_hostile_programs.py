@@ -41,7 +41,7 @@ def ask(folder, name):
 def greet(folder, name):
     """Why a program does not greet, twice."""
     row = AT_THE_START[name]
-    limits = LIMITS._replace(first=0.5 if row["kind"] == "hung" else LIMITS.first)
+    limits = LIMITS._replace(first=1.5 if row["kind"] == "hung" else LIMITS.first)
     contestant = program(folder, "pass", limits, loop=f"{row['does']}\nwhile True: tick()")
     failures = []
     for _ in range(2):
