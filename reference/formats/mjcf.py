@@ -13,13 +13,13 @@ limited by that angle, which allows all that MuJoCo does, and more. Frames, nest
 includes from one folder are supported. Active equalities `connect` and `weld` between bodies, and
 `joint`, become tasks (`Robot.equalities`); those between sites, tendons and flexes, and elements
 that do not affect forward kinematics, such as sites and keyframes, are ignored. A body's mass is
-that of its `inertial`, NaN if it is left to its geoms. Elements that generate bodies (replicate,
-attach, composite, flexcomp) are refused, except for a replicate without bodies, which is ignored
-with a warning.
+that of its `inertial`, else of its geoms, by their mass or density; NaN if one of them is a mesh or
+a shell of a density. Elements that generate bodies (replicate, attach, composite, flexcomp) are
+refused, except for a replicate without bodies, which is ignored with a warning.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,6 +38,7 @@ from ..quaternion import (
     exponential,
     magnitude,
     multiply,
+    norm,
     normalised,
     rotate,
     scale,
@@ -65,7 +66,25 @@ MOVING = ("body", "joint", "freejoint", *GENERATORS[1:])
 Z = (0.0, 0.0, 1.0)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 POLYNOMIAL = (0.0, 1.0, 0.0, 0.0, 0.0)  # of a coupling, where the file gives no coefficients
-OF_JOINTS = ("type", "pos", "axis", "range", "limited", "ref")
+# The attributes of a default class that are read, by the tag of the elements they are for.
+DEFAULTS = {
+    "joint": ("type", "pos", "axis", "range", "limited", "ref"),
+    "geom": (
+        "type", "size", "fromto", "pos", "mass", "density", "mesh", "shellinertia", "group",
+    ),
+}  # fmt: skip
+# The volumes of geoms [m³] by the three numbers of their size: a radius and half a length, three
+# semi-axes, or half of three edges. A plane has none.
+VOLUMES: dict[str, Callable[[float, float, float], float]] = {
+    "plane": lambda a, b, c: 0.0,
+    "hfield": lambda a, b, c: 0.0,
+    "sphere": lambda a, b, c: 4.0 / 3.0 * math.pi * a**3,
+    "capsule": lambda a, b, c: math.pi * a * a * (4.0 / 3.0 * a + 2.0 * b),
+    "cylinder": lambda a, b, c: 2.0 * math.pi * a * a * b,
+    "ellipsoid": lambda a, b, c: 4.0 / 3.0 * math.pi * a * b * c,
+    "box": lambda a, b, c: 8.0 * a * b * c,
+}
+DENSITY = 1000.0  # of a geom that has none [kg/m³]
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
 
@@ -164,6 +183,10 @@ class _Transform(NamedTuple):
         return _Transform(self.apply(inner.x), multiply(self.R, inner.R))
 
 
+# The attributes of a default class by the tag of the elements they are for.
+_Class = dict[str, dict[str, str]]
+
+
 class _CompilerSettings(NamedTuple):
     """The compiler's settings and the default classes of a file."""
 
@@ -172,7 +195,10 @@ class _CompilerSettings(NamedTuple):
     autolimits: bool  # whether a range implies a limit
     alignfree: bool  # whether the frames of free bodies are aligned with their inertia
     from_geoms: bool  # whether masses are those of the geoms, whatever a body says
-    classes: dict[str, dict[str, str]]  # the joint attributes of each default class
+    groups: tuple[float, float]  # the first and the last group of geoms that have a mass
+    smallest_mass: float  # of a body [kg]
+    total_mass: float  # to which all are scaled [kg]; none if not positive
+    classes: dict[str, _Class]  # the default classes by name
 
     def transform(self, element: Element) -> _Transform:
         """Return the transform of a body or a frame in its parent."""
@@ -185,10 +211,10 @@ class _CompilerSettings(NamedTuple):
             raise element.error(f"expected a default class, got {name!r:.80}")
         return name
 
-    def with_defaults(self, joint: Element, inherited: str) -> Element:
-        """Return a joint with missing attributes taken from its class."""
-        defaults = self.classes[self.class_of(joint, "class", inherited)]
-        return joint._replace(attributes=defaults | joint.attributes)
+    def with_defaults(self, element: Element, inherited: str) -> Element:
+        """Return a joint or a geom with missing attributes taken from its class."""
+        defaults = self.classes[self.class_of(element, "class", inherited)][element.tag]
+        return element._replace(attributes=_merged(defaults, element.attributes))
 
     def _orientation(self, element: Element) -> Quaternion:
         present = [name for name in ORIENTATIONS if name in element.attributes]
@@ -238,6 +264,9 @@ def _settings(root: Element) -> _CompilerSettings:
         _one_of(merged, "autolimits", ("true", "false"), "true") == "true",
         _one_of(merged, "alignfree", ("true", "false"), "false") == "true",
         merged.attributes.get("inertiafromgeom") == "true",
+        merged.numbers("inertiagrouprange", (0.0, 5.0)),
+        *merged.numbers("boundmass", (0.0,)),
+        *merged.numbers("settotalmass", (-1.0,)),
         _classes(root),
     )
 
@@ -267,9 +296,9 @@ def _from_axes(element: Element, axes: Sequence[float]) -> Quaternion:
     return float(w), float(i), float(j), float(k)
 
 
-def _classes(root: Element) -> dict[str, dict[str, str]]:
-    """Return the joint attributes of each default class, with those of outer classes."""
-    classes: dict[str, dict[str, str]] = {"main": {}}
+def _classes(root: Element) -> dict[str, _Class]:
+    """Return each default class by name, with the attributes of outer classes."""
+    classes: dict[str, _Class] = {"main": {tag: {} for tag in DEFAULTS}}
     waiting = [(element, "") for element in reversed(root.children_named("default"))]
     while waiting:
         element, outer = waiting.pop()
@@ -280,11 +309,27 @@ def _classes(root: Element) -> dict[str, dict[str, str]]:
             classes[name] = classes[outer]
         elif name != "main":
             raise element.error(f"expected the outermost class to be 'main', got {name!r:.80}")
-        joint = element.single("joint")
-        own = joint.attributes if joint else {}
-        classes[name] = classes[name] | {key: own[key] for key in OF_JOINTS if key in own}
+        classes[name] = {
+            tag: _merged(classes[name][tag], _own_defaults(element, tag)) for tag in DEFAULTS
+        }
         waiting += [(inner, name) for inner in reversed(element.children_named("default"))]
     return classes
+
+
+def _own_defaults(element: Element, tag: str) -> dict[str, str]:
+    """Return the attributes that a <default> itself gives to elements of a tag."""
+    child = element.single(tag)
+    own = child.attributes if child else {}
+    return {key: own[key] for key in DEFAULTS[tag] if key in own}
+
+
+def _merged(defaults: dict[str, str], own: dict[str, str]) -> dict[str, str]:
+    """Return attributes, where missing the defaults; of a size, each missing number alone."""
+    merged = defaults | own
+    if "size" in own and "size" in defaults:
+        size = own["size"].split()
+        merged["size"] = " ".join([*size, *defaults["size"].split()[len(size) :]])
+    return merged
 
 
 class _Part(NamedTuple):
@@ -317,7 +362,10 @@ def _robot(root: Element, origin: str) -> Robot:
     home = np.array(built.home)
     for joint, coordinates in tree.homes.items():
         home[built.articulation.coordinates_of(joint)] = coordinates
-    built = built._replace(home=frozen(home))
+    masses, total = built.masses, tree.settings.total_mass
+    if total > 0.0 and masses.any():
+        masses = frozen(masses * (total / masses.sum()))
+    built = built._replace(home=frozen(home), masses=masses)
     return built._replace(equalities=tuple(_equalities(root, built)))
 
 
@@ -394,7 +442,7 @@ class _Tree:
 
     def add_world(self, world: Element) -> None:
         """Add all bodies of a <worldbody>."""
-        joints, bodies = self.parts(_Part(world, _Transform(), "main"))
+        joints, bodies, _ = self.parts(_Part(world, _Transform(), "main"))
         if joints:
             raise joints[0].element.error("expected no joint in the world, which cannot move")
         waiting = [(body, 0) for body in reversed(bodies)]
@@ -412,7 +460,7 @@ class _Tree:
         self.bodies.add(name)
         pose = part.frame.compose(self.settings.transform(body))
         inherited = self.settings.class_of(body, "childclass", part.inherited)
-        tags, bodies = self.parts(_Part(body, _Transform(), inherited))
+        tags, bodies, geoms = self.parts(_Part(body, _Transform(), inherited))
         joints = [self.joint(tag, index) for index, tag in enumerate(tags)]
         is_free = any(joint.kind == "free" for joint in joints)
         if is_free and (len(joints) > 1 or parent != 0):
@@ -420,15 +468,33 @@ class _Tree:
         for number, (joint, tag) in enumerate(zip(joints, tags, strict=True), len(self.links)):
             self.record(tag.element, joint, f"{name}/{joint.label}", number, pose)
         self.links += _chain(name, parent, len(self.links), pose, joints)
-        inertial = None if self.settings.from_geoms else body.single("inertial")
-        if inertial or _has_geom(body):
+        inertial = body.single("inertial")
+        leaves_mass = inertial is None or self.settings.from_geoms
+        mass, centre = self.mass_of_geoms(geoms if leaves_mass else [])
+        if inertial and mass == 0.0:
             mass, centre = mass_of(inertial, "mass"), centre_of(inertial, "pos")
-            self.links[-1] = self.links[-1]._replace(mass=mass, centre=centre)
+        mass = max(mass, self.settings.smallest_mass)
+        self.links[-1] = self.links[-1]._replace(mass=mass, centre=centre)
         return bodies
 
-    def parts(self, body: _Part) -> tuple[list[_Part], list[_Part]]:
-        """Return the joints and the child bodies of a body, also inside frames."""
-        joints, bodies = [], []
+    def mass_of_geoms(self, geoms: list[_Part]) -> tuple[float, Vector]:
+        """Return the mass of geoms [kg], NaN if one is not known, and its centre [m]."""
+        total, moment = 0.0, ORIGIN
+        first, last = self.settings.groups
+        for element, frame, inherited in geoms:
+            try:
+                geom = self.settings.with_defaults(element, inherited)
+                (group,) = geom.numbers("group", (0.0,))
+                mass, centre = _mass_of_geom(geom)
+            except ValueError:
+                return math.nan, ORIGIN
+            if first <= group <= last:
+                total, moment = total + mass, add(moment, scale(mass, frame.apply(centre)))
+        return total, scale(1.0 / total, moment) if total > 0.0 else ORIGIN
+
+    def parts(self, body: _Part) -> tuple[list[_Part], list[_Part], list[_Part]]:
+        """Return the joints, the child bodies and the geoms of a body, also inside frames."""
+        joints, bodies, geoms = [], [], []
         waiting = [body._replace(element=child) for child in reversed(body.element.children)]
         while waiting:
             part = waiting.pop()
@@ -437,6 +503,8 @@ class _Tree:
                 joints.append(part)
             elif element.tag == "body":
                 bodies.append(part)
+            elif element.tag == "geom":
+                geoms.append(part)
             elif element.tag == "frame":
                 frame = frame.compose(self.settings.transform(element))
                 inherited = self.settings.class_of(element, "childclass", inherited)
@@ -446,7 +514,7 @@ class _Tree:
                 warn(str(element.error("expected bodies or joints, got none: passed over")))
             elif element.tag in GENERATORS:
                 raise element.error("expected every body to be written out, got a rule for some")
-        return joints, bodies
+        return joints, bodies, geoms
 
     def joint(self, part: _Part, index: int) -> _Joint:
         """Return a joint, the default attributes of its class included."""
@@ -500,12 +568,25 @@ class _Tree:
             self.homes[number] = (joint.ref,)
 
 
-def _has_geom(body: Element) -> bool:
-    """Return whether a body has geoms, also inside frames."""
-    return any(
-        child.tag == "geom" or (child.tag == "frame" and _has_geom(child))
-        for child in body.children
-    )
+def _mass_of_geom(geom: Element) -> tuple[float, Vector]:
+    """Return the mass of a geom [kg], NaN of a mesh, and its centre in the body or frame [m]."""
+    kind = "mesh" if "mesh" in geom.attributes else geom.word("type", "sphere")
+    count = len(geom.attributes.get("size", "").split())
+    a, b, c = (*geom.numbers("size", (0.0,) * count), 0.0, 0.0, 0.0)[:3]
+    centre = geom.numbers("pos", ORIGIN)
+    if "fromto" in geom.attributes:
+        ends = geom.numbers("fromto", (*ORIGIN, *ORIGIN))
+        start, end = ends[:3], ends[3:]
+        centre, half = scale(0.5, add(start, end)), 0.5 * norm(subtract(end, start))
+        b, c = (half, c) if kind in ("capsule", "cylinder") else (a, half)
+    is_given = "mass" in geom.attributes
+    (amount,) = geom.numbers("mass", (0.0,)) if is_given else geom.numbers("density", (DENSITY,))
+    if amount == 0.0:
+        return 0.0, centre
+    is_shell = geom.attributes.get("shellinertia") == "true"
+    if kind not in VOLUMES or (is_shell and not is_given):
+        return math.nan, centre
+    return amount if is_given else amount * VOLUMES[kind](a, b, c), centre
 
 
 def _chain(

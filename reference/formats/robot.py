@@ -30,7 +30,7 @@ class Robot(NamedTuple):
     # `articulation.coordinates_of(joints[name])`
     joints: dict[str, int]
     home: FloatArray  # the coordinates of the configuration in the file, (coordinate,)
-    masses: FloatArray  # of the links [kg], NaN where the file leaves them to shapes, (joint,)
+    masses: FloatArray  # of the links [kg], NaN where the file leaves them to meshes, (joint,)
     centres: FloatArray  # the links' centres of mass in the joints' frames [m], (joint, 3)
     equalities: tuple[IKTask, ...] = ()  # loop closures and couplings, as tasks
 

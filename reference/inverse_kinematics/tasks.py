@@ -183,7 +183,8 @@ class CentreOfMass:
     """The centre of mass at a position.
 
     Attributes:
-        masses: of each joint's link [kg], (joint,); `Robot.masses` of a file.
+        masses: of each joint's link [kg], (joint,); `Robot.masses` of a file, unless it leaves some
+            to meshes, whose masses are not computed.
         centres: their centres in the frames of the joints [m], (joint, 3); `Robot.centres`.
         position: target in the world [m], (3,).
         axes: factors of the three errors; 0 leaves one free, such as the height.
@@ -201,6 +202,9 @@ class CentreOfMass:
     def __post_init__(self) -> None:
         """Check and copy; a ValueError names the argument."""
         _check(self, vectors=("position",))
+        unknown = np.flatnonzero(np.isnan(arguments.floats("masses", self.masses, "joint")))
+        if len(unknown):
+            raise ValueError(f"masses: expected that of joint {unknown[0]}, got NaN, as of a mesh")
         masses = frozen(arguments.sizes("masses", self.masses, "joint"))
         if not masses.sum() > 0.0:
             raise ValueError("masses: expected a positive sum, got 0")

@@ -361,3 +361,46 @@ def test_what_is_no_character_is_refused_and_named(name, refusal):
 def test_what_is_no_setting_is_refused_and_named(name, refusal):
     head, message = WRONG_HEADS[name]
     assert message in refusal(character, "<body><freejoint/></body><body><joint/></body>", head)
+
+
+# Bodies with geoms of all kinds, by mass, density and size, of their own and of default classes.
+SOLIDS = """<default><geom density="300" size=".2 .3 .4"/><default class="light">
+<geom density="10" size=".7"/><default class="inner"><geom size=".1 .9" mass="2"/></default>
+</default></default><worldbody><geom/>
+<body><joint/><geom pos=".1 .2 .3"/><geom type="capsule" pos="1 0 0"/><geom type="cylinder"
+ fromto="0 0 0 1 2 3" density="50"/></body>
+<body childclass="light"><freejoint/><geom type="box" size=".5 .6"/><geom class="inner" pos="0 1 0"
+ type="ellipsoid"/><frame pos="1 2 3" euler="40 50 60"><geom pos="1 1 1" group="4"/></frame></body>
+<body><joint pos="1 0 0"/><inertial pos="1 0 0" mass="3" diaginertia="1 1 1"/>
+<geom type="box" fromto="0 0 1 1 1 1"/><geom type="ellipsoid" fromto="0 0 1 1 0 1" size=".3"/><body>
+<inertial pos="1 2 0" mass=".1" diaginertia="1 1 1"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    "settings",
+    ["", 'boundmass="3"', 'settotalmass="7"', 'inertiafromgeom="true"', 'inertiagrouprange="0 3"'],
+)
+def test_masses_and_their_centres_are_mujocos(settings):
+    text = f"<mujoco><compiler {settings}/>{SOLIDS}"
+    mujoco.set_mju_user_warning(lambda message: None)  # of a setting that it is to drop
+    robot, model = mjcf.parse(text), mujoco.MjModel.from_xml_string(text)
+    bodies = [robot.articulation.index(f"body#{i}") for i in range(1, model.nbody)]
+    assert model.body_mass[1:].min() > 0.0
+    np.testing.assert_allclose(robot.masses[bodies], model.body_mass[1:], rtol=1e-12)
+    np.testing.assert_allclose(robot.centres[bodies], model.body_ipos[1:], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("geom", "mass"),
+    [
+        ('type="mesh" mesh="a"', np.nan),
+        ('mesh="a" mass="2"', np.nan),
+        ('type="mesh" mesh="a" density="0"', 0.0),
+        ('size="1" shellinertia="true"', np.nan),
+        ('size="1" shellinertia="true" mass="2"', 2.0),
+        ('size="a"', np.nan),
+    ],
+)
+def test_the_mass_of_a_mesh_is_unknown(geom, mass):
+    robot = character(f'<body name="b"><geom {geom}/></body>')
+    np.testing.assert_equal(robot.masses[1], mass)

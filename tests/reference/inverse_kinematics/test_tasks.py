@@ -197,12 +197,13 @@ def test_loop_closures_are_solved():
     assert solution.errors[:-1].max() <= 1e-4
 
 
-def test_masses_of_a_file_are_those_of_its_inertials():
+def test_a_mass_that_a_file_leaves_to_a_mesh_is_refused():
+    geom = '<geom size=".1"/>'
     robot = mjcf.parse(LOOP)
-    masses = dict(zip(robot.articulation.names, robot.masses, strict=True))
-    assert (masses["crank"], masses["rod"], masses["plate"]) == (2.0, 1.0, 0.0)
-    assert np.isnan(masses["rocker"])
-    with pytest.raises(ValueError, match="masses"):
+    tasks.CentreOfMass(robot.masses, robot.centres, (0.0, 0.0, 0.0))
+    robot = mjcf.parse(LOOP.replace(geom, '<geom type="mesh" mesh="shell"/>', 1))
+    assert np.isnan(robot.masses[robot.articulation.index("rocker")])
+    with pytest.raises(ValueError, match="masses: expected that of joint 3, got NaN"):
         tasks.CentreOfMass(robot.masses, robot.centres, (0.0, 0.0, 0.0))
 
 
