@@ -4,28 +4,13 @@ A folder of `bench/experiments` holds a measurement, its tables and its figures.
 """
 
 import importlib
+import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 from .block import Block, Scale
-
-# The suites of the command line, and the subject of each.
-SUITES = {
-    "check": "the reference against Pinocchio and MuJoCo, claim by claim",
-    "self_test": "planted faults and honest solvers, judged by plumbob verify",
-    "robot_models": "published robot and character files, read by Plumbob and both engines",
-    "ik": "ten ball joints, robots and a character, by every installed solver",
-    "ik_proofs": "answers for robots that are proven: exact solutions, impossible targets",
-    "tracking": "closed curves: frames from rest, from the last solution, and all together",
-    "arm": "the lab's arm on every curve and at targets out of reach",
-    "pictures": "the poses and cloths that the report draws",
-    "cloth": "the lab's cloth at three stiffnesses; a falling cloth by every solver",
-    "newton": "one step of a heavy cloth by every solver, with proven error bounds",
-    "energy": "the energy of a cloth over 10,000 steps of each integrator",
-    "timing": "times of forward kinematics, solves and steps, with both engines",
-    "cloth_scale": "time and memory of factorisations and solves of large cloths",
-}
 
 
 class Experiment(NamedTuple):
@@ -44,32 +29,13 @@ class Experiment(NamedTuple):
             yield replace(block, times=self.times)
 
 
-# Whether times are among the numbers of an experiment.
-WITH_TIMES, WITHOUT_TIMES = True, False
-
-_BENCH = __package__.rpartition(".")[0]
-# Folder, suite, and chapter of the report, in whose order they are measured and shown.
+_CATALOGUE = tomllib.loads(Path(__file__).with_name("experiments.toml").read_text(encoding="utf-8"))
+_FOLDERS = f"{__package__.rpartition('.')[0]}.experiments"
+# The suites of the command line with their subjects, and the experiments in order.
+SUITES: dict[str, str] = _CATALOGUE["suites"]
 EXPERIMENTS = [
-    Experiment(f"{_BENCH}.experiments.{folder}", suite, chapter, times)
-    for folder, suite, chapter, times in (
-        ("check", "check", "right", WITHOUT_TIMES),
-        ("self_test", "self_test", "right", WITHOUT_TIMES),
-        ("robot_models", "robot_models", "right", WITHOUT_TIMES),
-        ("chain", "ik", "chains", WITH_TIMES),
-        ("closed_curves", "tracking", "chains", WITHOUT_TIMES),
-        ("arm", "arm", "chains", WITHOUT_TIMES),
-        ("pictures", "pictures", "chains", WITHOUT_TIMES),
-        ("robots", "ik", "kinematics", WITH_TIMES),
-        ("branches", "ik", "kinematics", WITH_TIMES),
-        ("published", "ik", "kinematics", WITH_TIMES),
-        ("ik_proofs", "ik_proofs", "kinematics", WITH_TIMES),
-        ("cloth", "cloth", "cloth", WITHOUT_TIMES),
-        ("newton", "newton", "cloth", WITHOUT_TIMES),
-        ("cloth_peers", "cloth", "cloth", WITH_TIMES),
-        ("energy", "energy", "cloth", WITHOUT_TIMES),
-        ("timing", "timing", "speed", WITH_TIMES),
-        ("cloth_scale", "cloth_scale", "speed", WITH_TIMES),
-    )
+    Experiment(**{**row, "package": f"{_FOLDERS}.{row['package']}"})
+    for row in _CATALOGUE["experiments"]
 ]
 
 
