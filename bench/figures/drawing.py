@@ -22,45 +22,10 @@ from ..peers.registry import Style
 from ..tables.results import label
 from ..text import shortened
 from .chart import GREY, LINE, SPAN, Axis, Chart, Panel, Series, looks
-from .style import COLOURS, plain_label
+from .style import COLOURS, PARAMETERS, plain_label
 
 # Width of a figure [inch], at least 48 rem on the page, where letters stay above 7 points.
 WIDTH = 9.0
-SMALLEST = 8.0
-STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "plumbob",
-    "pdf.fonttype": 42,
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.titlelocation": "left",
-    "axes.titleweight": "bold",
-    "axes.labelsize": 8.5,
-    "axes.edgecolor": COLOURS["faint"],
-    "axes.labelcolor": COLOURS["ink"],
-    "axes.titlecolor": COLOURS["ink"],
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.linewidth": 0.7,
-    "grid.color": COLOURS["rule"],
-    "grid.linewidth": 0.6,
-    "text.color": COLOURS["ink"],
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "legend.handlelength": 3.2,
-    "lines.linewidth": 1.6,
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
-    "savefig.facecolor": "none",
-    "mathtext.default": "regular",
-}
-for _axis in ("xtick", "ytick"):
-    STYLE |= {f"{_axis}.color": COLOURS["faint"], f"{_axis}.labelcolor": COLOURS["ink"]}
-    STYLE[f"{_axis}.labelsize"] = SMALLEST
 # Heights [inch] of a panel, of a row of marks, of a line of the legend.
 PANEL, ROW, LEGEND = 2.3, 0.3, 0.19
 # Distance of the names of curves, in heights of a panel.
@@ -77,7 +42,7 @@ _MARKS = 5
 @contextlib.contextmanager
 def styled() -> Iterator[None]:
     """Draw in the common style, without warnings on letters that a font lacks."""
-    with mpl.rc_context(STYLE), warnings.catch_warnings():
+    with mpl.rc_context(PARAMETERS), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         warnings.filterwarnings("ignore", "constrained_layout not applied")
         yield

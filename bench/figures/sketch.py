@@ -57,10 +57,8 @@ class Sketch:
         return digest.hexdigest()
 
 
-_SOURCES = [
-    Path(__file__).with_name(f"{name}.py")
-    for name in ("sketch", "style", "drawing", "chart", "scene_drawing", "view")
-]
+# The code and the style of all drawings.
+_SOURCES = sorted(Path(__file__).parent.glob("*.*"))
 _cache: OrderedDict[str, tuple[str, bytes]] = OrderedDict()
 
 

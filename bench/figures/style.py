@@ -1,16 +1,16 @@
-"""Colours of figures, and names in them."""
+"""The common style of figures (`style.toml`), and names in them."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
 
 from ..text import shortened
 
-COLOURS = {
-    "ink": "#22272e",
-    "faint": "#68717d",
-    "rule": "#d5d9df",
-    "blue": "#0b62a8",
-    "orange": "#c4500c",
-    "green": "#0b7a5b",
-    "purple": "#8a4a9f",
-    "brass": "#96690f",
+_STYLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+COLOURS: dict[str, str] = _STYLE["colours"]
+# Of matplotlib, for all figures.
+PARAMETERS: dict[Any, Any] = {
+    name: COLOURS.get(str(value), value) for name, value in _STYLE["parameters"].items()
 }
 # The most letters of a name.
 LONGEST = 60

@@ -15,22 +15,21 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ..figures.drawing import STYLE
 from ..figures.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
-from ..figures.style import COLOURS, plain_label
+from ..figures.style import COLOURS, PARAMETERS, plain_label
 from ..figures.view import project
 from ..motion.motion import Moving, Scene, decades, length
 
 # Moments of a picture.
 MOMENTS = 4
 MARGIN = 0.1
-_STYLE: dict[Any, Any] = {**STYLE, "savefig.facecolor": "white", "figure.facecolor": "white"}
+_ON_WHITE = {**PARAMETERS, "savefig.facecolor": "white", "figure.facecolor": "white"}
 Progress = Callable[[int, int], None]
 
 
 def animate(scene: Scene, path: Path, progress: Progress, dpi: int = 96) -> None:
     """Write a GIF: the solvers beside each other and, if there are several, a colour bar."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(_ON_WHITE):
         count = len(scene.motions)
         figure = Figure(figsize=(4.8 * count, 4.8 if count == 1 else 5.4), dpi=dpi)
         base, top = (0.0, 1.0) if count == 1 else (0.18, 0.94)
@@ -51,7 +50,7 @@ def animate(scene: Scene, path: Path, progress: Progress, dpi: int = 96) -> None
 
 def picture(scene: Scene, path: Path, progress: Progress) -> None:
     """Write an SVG: the curve that an arm has drawn, or moments of a cloth, for each solver."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(_ON_WHITE):
         count, is_arm = len(scene.motions), scene.curve is not None
         rows, columns, size = (1, count, 4.8) if is_arm else (count, MOMENTS, 2.4)
         figure = Figure(figsize=(size * columns, size * rows + 0.6), layout="constrained")
