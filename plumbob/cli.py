@@ -19,7 +19,7 @@ from .commands import compare as comparison
 from .commands import explain as explain
 from .commands import verify as verify
 from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh, flag, option
-from .help_text import Command, FittingGroup, block
+from .help_text import Command, FittingGroup, epilog
 
 _UsageError: Any = typer.BadParameter.__base__
 
@@ -90,20 +90,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         return _complain(str(error))
 
 
-@app.callback(
-    invoke_without_command=True,
-    epilog=block(
-        "Examples",
-        ("plumbob", "check, measure quickly and write a report"),
-        ("plumbob verify my_solver.py", "judge your solver"),
-        ("plumbob explain PB-CCD-003", "explain a mistake that verify names"),
-        ("plumbob which robot.urdf", "find the best solver for your robot"),
-        ("plumbob check", "check the reference"),
-        ("plumbob bench ik cloth", "measure two suites at full length"),
-        ("plumbob report", "write the report again from the records"),
-        ("plumbob show cloth", "write an animation of the falling cloth"),
-    ),
-)
+@app.callback(invoke_without_command=True, epilog=epilog("plumbob"))
 def plumbob(
     context: typer.Context,
     output: Annotated[
@@ -129,15 +116,18 @@ def plumbob(
     return bench.main_job(output or REPORT, fresh)
 
 
-app.command(cls=verify.SolverCommand, epilog=block("Examples", *verify.EXAMPLES))(verify.verify)
-app.command(cls=Command, epilog=explain.EXAMPLES)(explain.explain)
-app.command(cls=Command, epilog=check.EXAMPLES)(check.check)
-app.command(cls=verify.SolverCommand, epilog=bench.EXAMPLES)(bench.bench)
-app.command("which", cls=Command, epilog=which.EXAMPLES)(which.robot_solvers)
-app.command(cls=Command, epilog=report.EXAMPLES)(report.report)
-app.command(cls=verify.SolverCommand, epilog=show.EXAMPLES)(show.show)
-app.command(cls=Command, epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
-app.command(cls=Command, epilog=comparison.HISTORY_EXAMPLES)(comparison.history)
+for run, kind in (
+    (verify.verify, verify.SolverCommand),
+    (explain.explain, Command),
+    (check.check, Command),
+    (bench.bench, verify.SolverCommand),
+    (which.which, Command),
+    (report.report, Command),
+    (show.show, verify.SolverCommand),
+    (comparison.compare, Command),
+    (comparison.history, Command),
+):
+    app.command(cls=kind, epilog=epilog(run.__name__))(run)
 app.add_typer(records.app, name="records")
 
 

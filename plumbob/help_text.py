@@ -3,21 +3,33 @@
 import re
 import shutil
 import textwrap
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from plumbob.bench.experiments import SUITES
+
 # The most letters of a line however wide the terminal is, and the fewest.
 WIDEST, NARROWEST = 80, 30
 
+_EPILOGS = tomllib.loads(Path(__file__).with_name("help.toml").read_text(encoding="utf-8"))
+_EPILOGS["bench"]["Suites"] = list(SUITES.items())
 _Formatter: Any = typer.Context.formatter_class
 _Context: Any = TyperCommand.context_class
 
 
-def block(title: str, *rows: str | tuple[str, str]) -> str:
-    """Return lines for the end of a help text; pairs of command and description are aligned."""
-    width = max((len(row[0]) for row in rows if isinstance(row, tuple)), default=0)
+def epilog(command: str) -> str:
+    """Return what stands below the options of a command, from `help.toml`."""
+    return "\n\n".join(_block(title, rows) for title, rows in _EPILOGS[command].items())
+
+
+def _block(title: str, rows: Sequence[str | Sequence[str]]) -> str:
+    """Return lines below a title; pairs of command and description are aligned."""
+    width = max((len(row[0]) for row in rows if not isinstance(row, str)), default=0)
     lines = (row if isinstance(row, str) else f"{row[0]:<{width}}  {row[1]}" for row in rows)
     return "\n".join(["\b", f"{title}:", *(f"  {line}" for line in lines)])
 

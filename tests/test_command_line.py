@@ -18,6 +18,7 @@ from plumbob.bench.harness.record import Record, RecordFile
 from plumbob.commands import bench
 from plumbob.crosscheck.claims import CLAIMS
 from plumbob.crosscheck.verdict import ClaimVerdict
+from plumbob.help_text import epilog
 
 
 @pytest.fixture(autouse=True)
@@ -422,6 +423,6 @@ def test_variables_of_numba_cost_no_traceback(empty_folder, arguments, variable,
 
 
 def test_an_example_in_the_help_of_bench_finds_what_it_names(capsys, empty_folder):
-    line = next(line for line in bench.EXAMPLES.splitlines() if "--robot" in line)
+    line = next(line for line in epilog("bench").splitlines() if "--robot" in line)
     code, out, _ = plumbob(capsys, *shlex.split(line)[1:], "--dry-run")
     assert (code, "Plumbob LM" in out) == (0, True)

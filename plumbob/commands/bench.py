@@ -16,7 +16,7 @@ from plumbob.bench.harness.compile_ahead import compiling_ahead
 from plumbob.bench.harness.progress import TROUBLE, Progress, listening
 from plumbob.bench.text import visible
 
-from ..help_text import block, fitted
+from ..help_text import fitted
 from ..terminal import (
     lines_in_a_pipe,
     print_ending,
@@ -49,30 +49,6 @@ if TYPE_CHECKING:
     from plumbob.bench.harness.run import Event
 
 QUICK, FULL = "quick", "full"
-EXAMPLES = "\n\n".join([
-    block(
-        "Examples",
-        ("plumbob bench", "measure everything, at full length"),
-        ("plumbob bench --quick timing", "measure one suite, quickly"),
-        ("plumbob bench cloth --fresh", "measure again, without the old records"),
-        "plumbob bench --executor dask://node1:8786",
-    ),
-    block(
-        "Your solver",
-        ("plumbob bench ik --with my_ik.py", "in all tables, with the peers"),
-        "plumbob bench cloth --with my_package.cloth:Solver",
-        "plumbob bench ik --with 'Mine 2=my_ik.py' --with my_ik_before.py",
-        "plumbob bench ik -- ./my_solver --flag",
-    ),
-    block(
-        "Your problems, and parts of the work",
-        "plumbob bench ik --problem my_problems.py --problem robots/",
-        "plumbob bench ik --solver 'Plumbob LM' --robot panda --targets 50",
-        ("plumbob bench ik --list", "list problems and solvers"),
-        ("plumbob bench --dry-run", "list what would be measured, and the time"),
-    ),
-    block("Suites", *SUITES.items()),
-])  # fmt: skip
 # Between the columns of a line.
 _GAP = re.compile(r"( {2,})")
 

@@ -3,16 +3,8 @@
 from collections.abc import Sequence
 from typing import Annotated
 
-from ..help_text import block
 from ..terminal import print_aligned, print_verdicts, progress
 from .options import FAILED, SUCCESS, Texts, argument, flag, valid_name
-
-EXAMPLES = block(
-    "Examples",
-    ("plumbob check", "check all claims"),
-    'plumbob check "spring forces" "Gauss-Newton step"',
-    ("plumbob check --files robots/", "read your files with each engine"),
-)
 
 
 def check(

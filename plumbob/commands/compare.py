@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from plumbob.bench.text import visible
 
-from ..help_text import block
 from ..terminal import print_aligned, width
 from .options import (
     FAILED,
@@ -27,21 +26,6 @@ from .options import (
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import RunComparison
     from plumbob.bench.harness.record import Record
-
-COMPARE_EXAMPLES = block(
-    "Examples",
-    ("plumbob compare before after", "two folders of records"),
-    "plumbob compare before after --fail accuracy,time:10% --markdown comment.md",
-    ("plumbob compare report --save v1", "keep a run as a baseline,"),
-    ("plumbob compare v1 report", "and compare with it"),
-    ("plumbob compare --rerun v1 --with my.py", "your solver then and now"),
-    ("plumbob compare --rerun main --only ccd", "two revisions of Plumbob"),
-)
-HISTORY_EXAMPLES = block(
-    "Examples",
-    ("plumbob history runs/*", "times, the largest change first"),
-    "plumbob history runs/* --only ccd --quantity iterations -o iterations.svg",
-)
 
 
 # What is measured of the user's solvers: two robots, targets of a chain, steps of a cloth.

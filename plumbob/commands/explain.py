@@ -3,15 +3,8 @@
 import sys
 from typing import Annotated
 
-from ..help_text import block
 from .options import SUCCESS, Text, argument
 from .verify import Language
-
-EXAMPLES = block(
-    "Examples",
-    ("plumbob explain PB-CCD-003", "a fault that verify names"),
-    ("plumbob explain", "list all codes"),
-)
 
 
 def explain(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..help_text import Command, FittingGroup, block
+from ..help_text import Command, FittingGroup, epilog
 from .options import REPORT, SUCCESS, Texts, argument, flag, option
 
 if TYPE_CHECKING:
@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table
 
 app = typer.Typer(cls=FittingGroup, rich_markup_mode=None)
-LIST = "plumbob records list report"
-MERGE = "plumbob records merge laptop desktop --into both"
-DROP = 'plumbob records drop --solver "My solver"'
 
 Folder = Annotated[Path, argument("[FOLDER]", "Folder of the records.")]
 Suites = Annotated[Texts, option("NAME", "Only this suite.", "--suite")]
@@ -26,12 +23,12 @@ Failed = Annotated[bool, flag("Only failed measurements.", "--failed")]
 Superseded = Annotated[bool, flag("Only records with outdated settings.", "--superseded")]
 
 
-@app.callback(epilog=block("Examples", LIST, MERGE, DROP))
+@app.callback(epilog=epilog("records"))
 def records() -> None:
     """List, merge or drop records. Only `drop` and the option --fresh delete records."""
 
 
-@app.command("list", cls=Command, epilog=block("Examples", LIST))
+@app.command("list", cls=Command, epilog=epilog("records list"))
 def list_records(
     folder: Folder = REPORT,
     *,
@@ -53,7 +50,7 @@ def list_records(
     return SUCCESS
 
 
-@app.command("merge", cls=Command, epilog=block("Examples", MERGE))
+@app.command("merge", cls=Command, epilog=epilog("records merge"))
 def merge(
     folders: Annotated[list[Path], argument("FOLDER...", "Folders to take records from.")],
     into: Annotated[Path, option("DIR", "Folder to add to.", "--into")],
@@ -85,7 +82,7 @@ def merge(
     return SUCCESS
 
 
-@app.command("drop", cls=Command, epilog=block("Examples", DROP))
+@app.command("drop", cls=Command, epilog=epilog("records drop"))
 def drop(
     folder: Folder = REPORT,
     *,

@@ -5,23 +5,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from plumbob.bench.text import visible
 
-from ..help_text import block
 from ..terminal import print_lines, print_outcome
 from .options import REPORT, SUCCESS, File, Texts, argument, flag, option, valid_name
 
 if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table
 
-EXAMPLES = block(
-    "Examples",
-    "plumbob report",
-    "plumbob report results/laptop",
-    "plumbob report --list",
-    "plumbob report --table cloth_dampers --list",
-    "plumbob report --table cloth_dampers --format tex -o dampers.tex",
-    "plumbob report --table accuracy --columns 'solver, within tolerance'",
-    "plumbob report --table accuracy --rows 'problem~circle' --sort solver",
-)
 FORMATS = ("md", "tex", "csv", "html")
 
 

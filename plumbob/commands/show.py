@@ -7,24 +7,12 @@ import typer
 
 from plumbob.bench.text import visible
 
-from ..help_text import block
 from ..terminal import progress
 from .options import REPORT, SUCCESS, File, Text, argument, flag, option, valid_name, writable
 from .verify import program_of
 
 if TYPE_CHECKING:
     from plumbob.bench.show.your_solver import YourSolver
-
-EXAMPLES = block(
-    "Examples",
-    "plumbob show arm",
-    "plumbob show heart --solver fabrik",
-    "plumbob show star --output star.svg",
-    "plumbob show heart --coherent --output heart.bvh",
-    "plumbob show heart --with my_ik.py -o heart.html",
-    "plumbob show cloth -o cloth.gif -- ./my_solver --flag",
-    "plumbob show gallery -o pictures",
-)
 
 
 Scene = Annotated[Text, argument("SCENE", "arm, cloth, a curve that the arm draws, or gallery.")]

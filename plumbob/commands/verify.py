@@ -18,16 +18,6 @@ if TYPE_CHECKING:
 
 RIGHT, WRONG = 0, 1
 PROGRAM = "plumbob.program"
-EXAMPLES = (
-    ("plumbob verify my_ik.py", "the functions of a Python file"),
-    ("plumbob verify my_package.cloth:Solver", "an object of a module"),
-    ("plumbob verify -- ./my_solver --flag", "a program that speaks the protocol"),
-    ("plumbob verify --template cpp", "write a starter for a program"),
-    ("plumbob verify --export-cases cases", "write cases as files,"),
-    ("plumbob verify --answers cases", "and judge the answers"),
-    "plumbob verify my_ik.py --html verdict.html --junit verdict.xml",
-    "plumbob verify my_ik.py --rerun plumbob_failures/CASE.json",
-)
 
 
 class SolverCommand(Command):

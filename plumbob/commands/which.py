@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ..help_text import block
 from ..terminal import print_filled, print_lines
 from .bench import run_with_progress
 from .options import SUCCESS, Text, argument, option, valid_name
@@ -14,16 +13,10 @@ from .report import FORMATS, formatted
 if TYPE_CHECKING:
     from plumbob.bench.harness.block import Choice
 
-EXAMPLES = block(
-    "Examples",
-    ("plumbob which robot.urdf", "to the end of the longest chain"),
-    ("plumbob which robot.urdf --link tool0", "to another link"),
-    ("plumbob which robot.urdf --format csv", "for a spreadsheet"),
-)
 SUFFIXES = (".urdf", ".xml", ".mjcf")
 
 
-def robot_solvers(
+def which(
     robot: Annotated[Path, argument("ROBOT", "Your robot: .urdf, or .xml or .mjcf of MuJoCo.")],
     *,
     link: Annotated[Text, option("NAME", "Link or body that must reach the targets.")] = None,
