@@ -1,19 +1,28 @@
 """All claims about the reference, each against an engine or a closed form."""
 
+import tomllib
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from plumbob.reference import arguments
 from plumbob.reference.inverse_kinematics import IK_SOLVERS
 
 from . import kinematics, tasks
 from .engines import ROBOT_ENGINES, SKELETON_ENGINES
-from .mass_spring.claims import MASS_SPRING_CLAIMS
+from .mass_spring import equilibria, forces, integrators, orders, steps
 from .robots import comparisons
 from .robots.models import CHARACTERS, PACKAGES, ROBOTS, comparable, models
-from .tolerances import JACOBIAN, POSITION, ROTATION
+from .tolerances import JACOBIAN, POSITION, ROTATION, TOLERANCES
 from .verdict import Claim, ClaimVerdict, check_claim, each_case
 
+MODULES: dict[str, ModuleType] = {
+    module.__name__.rpartition(".")[2]: module
+    for module in (kinematics, tasks, equilibria, forces, integrators, orders, steps)
+}
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 READS = {ROBOTS: "formats.urdf.read", CHARACTERS: "formats.mjcf.read"}
 FILES = {ROBOTS: "the URDFs of example-robot-data", CHARACTERS: "characters in MJCF"}
 POSES = "forward_kinematics in random configurations"
@@ -24,24 +33,23 @@ QUANTITIES = {
 }
 
 
-def skeleton_claims(engine: str) -> list[Claim]:
-    """Return the claims about kinematics against an engine."""
-    poses = "forward_kinematics on random chains and trees of 2 to 50 joints"
-    joints = f"{engine}'s ball joints, matched by name"
-    local = f"local_from_global of the rotations {engine} computes"
-    inputs = f"the local rotations given to {engine}"
-    solutions = f"solve_ik by {', '.join(IK_SOLVERS)}: all joints' positions and the residual"
-    forward = f"{engine}'s forward kinematics of the local rotations found"
-    rows = (
-        ("joint positions", poses, joints, kinematics.joint_positions, POSITION, 100),
-        ("joint rotations", poses, joints, kinematics.joint_rotations, ROTATION, 100),
-        ("local rotations", local, inputs, kinematics.back_to_local, ROTATION, 100),
-        ("IK answers", solutions, forward, kinematics.ik_answers, POSITION, 50 * len(IK_SOLVERS)),
+def claims_about(subject: str, *engine: str) -> list[Claim]:
+    """Return the claims about a subject of `claims.toml`, against an engine if it names one."""
+    return [_claim(name, entry, *engine) for name, entry in _TABLE[subject].items()]
+
+
+def _claim(name: str, entry: dict[str, Any], engine: str = "") -> Claim:
+    module, _, function = entry["compare"].partition(".")
+    settings = [*filter(None, [engine]), *entry.get("arguments", ())]
+    words = {"engine": engine, "solvers": ", ".join(IK_SOLVERS)}
+    return Claim(
+        f"{name}, {engine}" if engine else name,
+        entry["quantity"].format(**words),
+        entry["counterpart"].format(**words),
+        each_case(partial(getattr(MODULES[module], function), *settings)),
+        TOLERANCES[entry["tolerance"]],
+        entry["cases"],
     )
-    return [
-        Claim(f"{name}, {engine}", quantity, counterpart, each_case(partial(f, engine)), t, cases)
-        for name, quantity, counterpart, f, t, cases in rows
-    ]
 
 
 def robot_claims(family: str, engine: str) -> list[Claim]:
@@ -59,33 +67,12 @@ def robot_claims(family: str, engine: str) -> list[Claim]:
     ]
 
 
-def task_claims(engine: str) -> list[Claim]:
-    """Return the claims about the tasks of inverse kinematics against an engine."""
-    frames = "tasks.FrameTask between links of random trees: place, rotation and their derivatives"
-    masses = "tasks.CentreOfMass with the masses that formats.mjcf.parse reads"
-    poses = f"{engine}'s link poses and Jacobians, transformed to the frame of the link"
-    centre = f"{engine}'s centre of mass"
-    rows = (
-        ("task frames", frames, poses, tasks.relative_frames, JACOBIAN),
-        ("task centre of mass", masses, centre, tasks.centre_of_mass, POSITION),
-    )
-    return [
-        Claim(f"{name}, {engine}", quantity, counterpart, each_case(partial(f, engine)), t, 20)
-        for name, quantity, counterpart, f, t in rows
-    ]
-
-
+skeleton_claims = partial(claims_about, "skeletons")
 TASK_CLAIMS = [
-    *(claim for engine in ROBOT_ENGINES for claim in task_claims(engine)),
-    Claim(
-        "task equalities, MuJoCo",
-        "residuals of connect, weld and joint that formats.mjcf.parse reads",
-        "MuJoCo's efc_pos of the equality constraints",
-        each_case(tasks.equalities),
-        POSITION,
-        20,
-    ),
+    *(claim for engine in ROBOT_ENGINES for claim in claims_about("tasks", engine)),
+    *claims_about("equalities"),
 ]
+MASS_SPRING_CLAIMS = claims_about("masses and springs")
 ROBOT_CLAIMS = [
     claim
     for family in PACKAGES
