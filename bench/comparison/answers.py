@@ -44,11 +44,6 @@ def is_time(suite: str, name: str) -> bool:
     return name in _TIMES.get(suite, _DEFAULT_TIMES)
 
 
-def is_answer(suite: str, name: str) -> bool:
-    """Return whether repeated measurements give an array the same bits."""
-    return not is_time(suite, name) and (suite, name) not in _MEMORY
-
-
 def worse_sign(suite: str, name: str) -> int:
     """Return 1 if larger is worse, -1 if larger is better, 0 if neither is known."""
     if name in _ERRORS or (suite, name) in _DISTANCES:
@@ -70,7 +65,7 @@ def compare_answers(key: RowKey, pair: Pair) -> RowChange:
         if name not in pair.new.arrays:
             why = "no longer measured"
             changes.append(RowChange(key, name, ChangeVerdict.CHANGED, 1.0, why))
-        elif is_answer(key[0], name):
+        elif not is_time(key[0], name) and (key[0], name) not in _MEMORY:
             changes.append(_compare_array(key, name, pair))
     order = (ChangeVerdict.LESS_RIGHT, ChangeVerdict.CHANGED, ChangeVerdict.MORE_RIGHT)
     by_verdict = {change.verdict: change for change in reversed(changes)}

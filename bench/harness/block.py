@@ -21,6 +21,10 @@ class Group(NamedTuple):
     measure: Callable[[Sequence[Any]], "Sequence[Measured]"]  # the results of jobs
     job: Any  # what this block asks for
 
+    def measure_alone(self) -> "Measured":
+        """Return the result of this block by itself."""
+        return self.measure([self.job])[0]
+
 
 class Measured(NamedTuple):
     """The result of a block.

@@ -294,11 +294,6 @@ def ratio(a: float, b: float) -> float:
     return a / b if b else math.nan
 
 
-def gigabytes_per_second(moved: float, seconds: float) -> float:
-    """Return the bandwidth of so many bytes in so many seconds [GB/s]."""
-    return moved / seconds / 1e9
-
-
 def mean(values: Floats) -> float:
     """Return the mean; NaN if there are no values."""
     return float(np.mean(values)) if np.size(values) else math.nan

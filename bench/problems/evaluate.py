@@ -70,10 +70,6 @@ class Targets(NamedTuple):
         """The number of targets, and of coordinates."""
         return len(self.starts), self.starts.shape[-1]
 
-    def poses_of_first(self, count: int) -> tuple[FloatArray, FloatArray]:
-        """Return the positions and rotations of the first `count` targets."""
-        return self.positions[:count], self.rotations[:count]
-
     def request(self, i: int) -> PoseRequest:
         """Return a target."""
         return PoseRequest(self.positions[i], self.rotations[i], self.starts[i].copy())
@@ -194,7 +190,8 @@ class Evaluator:
         is_answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
         poses = np.where(is_answered[:, None], q, targets.starts[:count])
         by_engine = {MUJOCO: self.forward(poses), PINOCCHIO: self.forward_by_pinocchio(poses)}
-        distance, angle = _distances(by_engine[arbiter], targets.poses_of_first(count))
+        target_poses = targets.positions[:count], targets.rotations[:count]
+        distance, angle = _distances(by_engine[arbiter], target_poses)
         difference = np.maximum(*_distances(by_engine[MUJOCO], by_engine[PINOCCHIO]))
         excess = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
         errors = np.stack([distance, angle * self.robot.oriented, excess])

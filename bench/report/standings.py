@@ -51,8 +51,7 @@ def standings(results: Results) -> list[Headline]:
             ranks += _target_ranks(f"{robots}, {start}", "robots_overall", fields)
     steps = points(results, cloth_peers.ONE_STEP)
     motions = [point for point in points(results, cloth_peers.MOTION) if point.is_whole]
-    ranks += _cloth_ranks("step", "error", "error {}", steps)
-    ranks += _cloth_ranks("motion", "error", "error {}", motions)
+    ranks += [*_cloth_ranks("step", steps), *_cloth_ranks("motion", motions)]
     headlines = [*_failures(results, "ik"), *_failures(results, "cloth"), *ranks]
     return sorted(headlines, key=lambda headline: " ranks " not in headline.sentence)
 
@@ -144,14 +143,12 @@ def speed(ratio: metrics.Interval, rival: str) -> str:
     return f"{factor(max(mean, 1.0 / mean))} times {adverb} than {full_name(rival)}"
 
 
-def _cloth_ranks(task: str, error: str, phrase: str, field: Sequence[Point]) -> Iterator[Headline]:
+def _cloth_ranks(task: str, field: Sequence[Point]) -> Iterator[Headline]:
     """Yield the ranks of solvers by their errors, cloth by cloth."""
     for solver in dict.fromkeys(p.solver for p in field if p.record.facts.get("entrant")):
         cloths = dict.fromkeys(point.cloth for point in field if point.solver == solver)
         by_cloth = [[point for point in field if point.cloth == cloth] for cloth in cloths]
-        ranks, details = zip(
-            *(_cloth_rank(c, solver, error, phrase) for c in by_cloth), strict=True
-        )
+        ranks, details = zip(*(_cloth_rank(points, solver) for points in by_cloth), strict=True)
         span = "–".join(dict.fromkeys((str(min(ranks)), str(max(ranks)))))
         count = max(len({point.solver for point in points}) for points in by_cloth)
         question = f"{solver}, {task} of {counted(len(cloths), 'cloth')}"
@@ -159,10 +156,10 @@ def _cloth_ranks(task: str, error: str, phrase: str, field: Sequence[Point]) -> 
         yield Headline("", question, sentence, f"cloth_peers_{task}")
 
 
-def _cloth_rank(field: Sequence[Point], solver: str, error: str, phrase: str) -> tuple[int, str]:
+def _cloth_rank(field: Sequence[Point], solver: str) -> tuple[int, str]:
     """Return a solver's rank, and its error and time relative to solvers with an error as small."""
-    errors = np.array([float(f"{point.values[error]:.2e}") for point in field])  # as displayed
-    seconds = np.array([point.values["seconds"] for point in field])
+    errors = np.array([float(f"{point.error:.2e}") for point in field])  # as displayed
+    seconds = np.array([point.seconds for point in field])
     solvers = np.array([point.solver for point in field])
     own_error = errors[solvers == solver].min()
     near = errors <= own_error
@@ -171,6 +168,6 @@ def _cloth_rank(field: Sequence[Point], solver: str, error: str, phrase: str) ->
     rivals = _fastest(sorted(times, key=lambda rival: times[rival]))
     ratios = [times[rival] / own_time for rival in rivals]
     speeds = [speed(metrics.Interval(r, r, r), s) for r, s in zip(ratios, rivals, strict=True)]
-    result = f"{phrase.format(words(own_error))} in {words_in(own_time, 'ms')}"
+    result = f"error {words(own_error)} in {words_in(own_time, 'ms')}"
     detail = f"on {field[0].cloth} {result}, {listed(speeds) or 'no other solver as near'}"
     return 1 + len(set(solvers[errors < own_error])), detail

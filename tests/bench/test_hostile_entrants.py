@@ -189,7 +189,7 @@ def solved(spec, targets):
     limits = chain.SolverLimits(1e-4, HOSTILE)
     job = chain.job_of(problem, limits, peer.module, {"method": "", **peer.spec}, "hostile")
     answers = partial(chain.solve_one_by_one, problem, job, limits)
-    found = chain.solve_alone(chain.ChainJob(answers, job))
+    found = chain.solve_together([chain.ChainJob(answers, job)])[0]
     if found.values is None:
         raise NoAnswerError(found.notes["failed"])
     return found

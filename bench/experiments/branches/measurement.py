@@ -6,7 +6,6 @@ confirms, within the limits. Solutions that differ by whole revolutions count as
 
 import importlib
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,14 +57,9 @@ def blocks(scale: Scale) -> Iterator[Block]:
             job = BranchJob(name, peer, count, scale.seed)
             settings = {"version": peer.version, "starts": STARTS, "seed": scale.seed}
             solver = PLUMBOB if peer is PLUMBOB_LM else peer.title
-            measure, group = partial(compare_alone, job), Group(problem, compare, job)
-            size = count * len(STRATA)
+            group, size = Group(problem, compare, job), count * len(STRATA)
+            measure = group.measure_alone
             yield Block(SUITE, problem, solver, measure, settings, size, facts, group=group)
-
-
-def compare_alone(job: BranchJob) -> Measured:
-    """Compare the lists of a solver with the search."""
-    return compare([job])[0]
 
 
 def compare(jobs: Sequence[BranchJob]) -> list[Measured]:

@@ -90,13 +90,8 @@ class ChainJob(NamedTuple):
 
     def block(self, problem: TargetsForSkeleton, solver: str, limits: SolverLimits) -> Block:
         """Return the block of the targets; solvers of the same targets are measured together."""
-        measure, group = partial(solve_alone, self), Group(problem.name, solve_together, self)
-        return Block(SUITE, problem.name, solver, measure, limits._asdict(), group=group)
-
-
-def solve_alone(job: ChainJob) -> Measured:
-    """Solve and time the targets of a solver by itself."""
-    return solve_together([job])[0]
+        group, settings = Group(problem.name, solve_together, self), limits._asdict()
+        return Block(SUITE, problem.name, solver, group.measure_alone, settings, group=group)
 
 
 def solve_together(jobs: Sequence[ChainJob]) -> list[Measured]:

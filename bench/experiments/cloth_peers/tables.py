@@ -247,10 +247,6 @@ def _liu_row(record: Record) -> Row:
     }
 
 
-def _vertices(rows: Sequence[Row]) -> dict[str, str]:
-    return {"vertices": words(int(rows[0]["record"].values.vertices))}
-
-
 def _liu_summary(rows: Sequence[Row]) -> Summary:
     sentences = (
         f"{row['solver']}, {row['setting for a frame']}: {words_in(row['our time'], 'ms')} with an "
@@ -264,7 +260,9 @@ def _liu_summary(rows: Sequence[Row]) -> Summary:
 
 
 liu_2013 = Layout(
-    **CAPTIONS.of("cloth_liu_2013", _vertices),
+    **CAPTIONS.of(
+        "cloth_liu_2013", lambda rows: {"vertices": words(rows[0]["record"].values.vertices)}
+    ),
     subjects=lambda results: [
         _liu_row(record)
         for record in results.all("cloth", task=LIU)

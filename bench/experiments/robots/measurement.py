@@ -86,10 +86,9 @@ class RobotJob(NamedTuple):
             "seed": self.seed,
         }
         solver = self.peer.label_of(self.entry)
-        group = None if self.entry.has_time_limit else Group(problem, solve_together, self)
-        block = Block(
-            *(SUITE, problem, solver, partial(solve, self), settings, self.size, facts), group=group
-        )
+        group = Group(problem, solve_together, self)
+        block = Block(SUITE, problem, solver, group.measure_alone, settings, self.size, facts)
+        block = block if self.entry.has_time_limit else dataclasses.replace(block, group=group)
         return block.of(self.peer.entrant)
 
 
@@ -159,11 +158,6 @@ def _drawn(blocks: Iterable[Block]) -> list[Block]:
         return problems.index(block.problem), block.group is None, lot
 
     return sorted(blocks, key=rank)
-
-
-def solve(job: RobotJob) -> Measured:
-    """Solve and time the targets of a solver by itself."""
-    return solve_together([job])[0]
 
 
 def solve_together(jobs: Sequence[RobotJob]) -> list[Measured]:
