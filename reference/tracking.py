@@ -11,17 +11,7 @@ from numpy.typing import ArrayLike
 from . import arguments, rotation, trajectory
 from .arguments import LARGEST_COORDINATE, FloatArray
 from .articulation import Articulation
-from .inverse_kinematics.problem import (
-    CheckedTarget,
-    IKSolution,
-    Settings,
-    Target,
-    are_targets,
-    check_numbers,
-    checked_settings,
-    checked_targets,
-    default_solver,
-)
+from .inverse_kinematics import problem
 from .inverse_kinematics.reduce import prepare
 from .inverse_kinematics.solve import balls, batch_shape, solve_checked, target_rows
 from .model import Model, checked_model
@@ -35,7 +25,7 @@ ON_TARGET = 1e-6
 
 def track(
     skeleton: Model,
-    curve: ArrayLike | Target | Sequence[Target],
+    curve: ArrayLike | problem.Target | Sequence[problem.Target],
     solver: str | None = None,
     start: ArrayLike | None = None,
     effector: int | str | None = None,
@@ -47,7 +37,7 @@ def track(
     tolerance_rotation: float = 1e-4,
     max_iterations: int | None = None,
     record: bool = False,
-) -> IKSolution:
+) -> problem.IKSolution:
     """Return the poses in which the effector follows a curve, a frame for each of its points.
 
     A coherent motion is a smooth trajectory (`trajectory/`): solved frame by frame first, then in
@@ -91,10 +81,10 @@ def track(
     model = checked_model(skeleton)
     targets = _along(model, curve, effector)
     if solver is None:
-        solver, _ = default_solver(model, curve)
+        solver, _ = problem.default_solver(model, curve)
         solver = "ccd" if solver == "fabrik" else solver
     chained = arguments.boolean("warm", warm)
-    settings = checked_settings(
+    settings = problem.checked_settings(
         solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, chained
     )
     settings = replace(settings, limits=settings.limits._replace(phased=False))
@@ -107,13 +97,13 @@ def track(
 
 def _along(
     skeleton: Skeleton | Articulation,
-    curve: ArrayLike | Target | Sequence[Target],
+    curve: ArrayLike | problem.Target | Sequence[problem.Target],
     effector: int | str | None,
-) -> list[CheckedTarget]:
+) -> list[problem.CheckedTarget]:
     """Return the targets of all effectors, each spread over all frames."""
-    if not (isinstance(curve, Target) or are_targets(curve)):
+    if not (isinstance(curve, problem.Target) or problem.are_targets(curve)):
         curve = arguments.coordinates("curve", cast(ArrayLike, curve), "frame", 3)
-    targets = checked_targets(skeleton, curve, effector)
+    targets = problem.checked_targets(skeleton, curve, effector)
     batch = batch_shape((), targets, "start")
     if len(batch) != 1:
         got = arguments.shape((*batch, 3))
@@ -122,7 +112,7 @@ def _along(
         raise ValueError("curve: expected at least one point, got none")
     return [
         target.mapped(lambda values: arguments.spread(values, (batch[0], values.shape[-1])))
-        for target in check_numbers(targets)
+        for target in problem.check_numbers(targets)
     ]
 
 
@@ -141,8 +131,8 @@ def _start(model: Skeleton | Articulation, start: ArrayLike | None) -> FloatArra
 
 def _smoothed(
     skeleton: Skeleton | Articulation,
-    motion: IKSolution,
-    targets: list[CheckedTarget],
+    motion: problem.IKSolution,
+    targets: list[problem.CheckedTarget],
     closed: bool,
 ) -> tuple[FloatArray, np.ndarray, int]:
     """Return the smooth trajectory, the frames that reach their targets, and its Newton steps."""
@@ -169,13 +159,13 @@ def _smoothed(
 
 def _finished(
     skeleton: Skeleton | Articulation,
-    motion: IKSolution,
-    targets: list[CheckedTarget],
+    motion: problem.IKSolution,
+    targets: list[problem.CheckedTarget],
     q: FloatArray,
     reached: np.ndarray,
     steps: int,
-    settings: Settings,
-) -> IKSolution:
+    settings: problem.Settings,
+) -> problem.IKSolution:
     """Return the motion q with its residuals; frames that missed the tolerance are solved again."""
     limits = settings.limits._replace(chained=False)
     unchained = replace(settings, limits=limits, record=False)

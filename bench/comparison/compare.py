@@ -14,6 +14,7 @@ from ..tables.columns import text
 from ..tables.results import counted
 from ..tables.table import Summary, Table, cells
 from ..text import visible
+from . import times
 from .answers import (
     ERROR,
     SHARE,
@@ -34,16 +35,6 @@ from .rows import (
     match_rows,
     worst_first,
 )
-from .times import (
-    ERROR_RATE,
-    ROUNDS,
-    Drift,
-    common_times,
-    has_rounds,
-    machine_drift,
-    time_change,
-    time_ratios,
-)
 
 # What --fail takes, by the first word; and what a gate of the user's solvers takes by default.
 LIMITS = {
@@ -61,7 +52,7 @@ _INDENT = " " * (3 + max(map(len, ORDER)))
 METHOD = (
     "Answers are compared to the bit. Times are ratios of medians with 95 % block-bootstrap "
     "intervals, widened by the machine's drift; the probability of any wrong verdict is at most "
-    f"{100 * ERROR_RATE:g} % over all rows (Holm)."
+    f"{100 * times.ERROR_RATE:g} % over all rows (Holm)."
 )
 
 
@@ -69,7 +60,7 @@ class RunComparison(NamedTuple):
     """Differences between two runs."""
 
     rows: list[RowChange]  # the worst first
-    drift: Drift  # of the machine between both runs
+    drift: times.Drift  # of the machine between both runs
     method: str  # a sentence on how times were compared
     is_rerun: bool = False  # whether both were measured side by side
     short: int = 0  # number of times with too few rounds to be compared
@@ -81,9 +72,11 @@ def compare(
     """Return the differences between the records of two runs, also of statistics if asked for."""
     before, after = by_row(old), by_row(new)
     pairs, changes = match_rows(before, after)
-    drift = machine_drift(pairs)
-    rows = [*changes, *row_changes(pairs, time_ratios(pairs, drift), statistics)]
-    short = sum(not has_rounds(p, name) for p in pairs.values() for name in common_times(p))
+    drift = times.machine_drift(pairs)
+    rows = [*changes, *row_changes(pairs, times.time_ratios(pairs, drift), statistics)]
+    short = sum(
+        not times.has_rounds(p, name) for p in pairs.values() for name in times.common_times(p)
+    )
     return RunComparison(worst_first(rows), drift, METHOD, short=short)
 
 
@@ -100,7 +93,7 @@ def row_changes(
     tested = {time: ratio for time, ratio in ratios.items() if isinstance(ratio, TimeRatio)}
     raw = [*limited.values(), *(ratio.chance for ratio in tested.values())]
     chances = iter(adjusted(raw).tolist())
-    rows = [compare_limited_answers(k, pairs[k], next(chances), ERROR_RATE) for k in limited]
+    rows = [compare_limited_answers(k, pairs[k], next(chances), times.ERROR_RATE) for k in limited]
     rows += [compare_answers(key, pair) for key, pair in pairs.items() if key not in limited]
     if statistics:
         decided = ((key, pairs[key]) for key in pairs if key not in limited)
@@ -109,7 +102,7 @@ def row_changes(
         if isinstance(ratio, str):
             rows.append(RowChange(key, name, ChangeVerdict.UNDECIDED, why=ratio))
         else:
-            rows.append(time_change(key, name, ratio, next(chances)))
+            rows.append(times.time_change(key, name, ratio, next(chances)))
     return rows
 
 
@@ -211,7 +204,7 @@ def _line(row: RowChange, settings: str) -> str:
 
 def _not_compared(comparison: RunComparison) -> str:
     return (
-        f"Not compared: {counted(comparison.short, 'time')} with fewer than {ROUNDS} rounds, "
+        f"Not compared: {counted(comparison.short, 'time')} with fewer than {times.ROUNDS} rounds, "
         "for which there is no interval"
     )
 

@@ -6,15 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from plumbob import reference
 from plumbob.crosscheck.verify.kinematics.robot_textbook import roll_pitch_yaw
-from plumbob.reference import (
-    Articulation,
-    MassSpring,
-    Skeleton,
-    State,
-    forward_kinematics,
-    rotation,
-)
 from plumbob.reference.arguments import FloatArray, IndexArray, name_list
 from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
 
@@ -50,7 +43,7 @@ def robot(path: Path, name: str, effector: str | None) -> BenchRobot:
     return chain_of(name, name, "base", list(_joints(model, steps)))
 
 
-def _effector(skeleton: Skeleton, names: tuple[str, ...], effector: str | None) -> int:
+def _effector(skeleton: reference.Skeleton, names: tuple[str, ...], effector: str | None) -> int:
     """Return a joint by name, else the leaf with the most joints before it."""
     if effector is not None:
         if effector not in names:
@@ -60,12 +53,12 @@ def _effector(skeleton: Skeleton, names: tuple[str, ...], effector: str | None) 
     return max(sorted(leaves), key=lambda leaf: len(skeleton.path(leaf)))
 
 
-def _joints(model: Articulation, steps: list[int]) -> Iterator[ElementTree.Element]:
+def _joints(model: reference.Articulation, steps: list[int]) -> Iterator[ElementTree.Element]:
     """Yield the joints of a path as URDF, which begins at the link `base`."""
     parent, half = "base", TWO_REVOLUTIONS / 2
     for i, j in enumerate(steps):
         child, kind = f"{i}_{model.names[j]}", "revolute" if model.kinds[j] == "hinge" else "fixed"
-        R = rotation.to_matrix(model.frames[j])
+        R = reference.rotation.to_matrix(model.frames[j])
         joint = ElementTree.Element("joint", name=f"joint_{child}", type=kind)
         origin = {"xyz": _numbers(model.skeleton.offsets[j]), "rpy": _numbers(roll_pitch_yaw(R))}
         ElementTree.SubElement(joint, "origin", origin)
@@ -95,8 +88,8 @@ def skeletons(
     tip = _effector(skeleton, skeleton.names, effector)
     chain = path_to(skeleton, tip)
     rng = np.random.default_rng(_SEED)
-    pool = rotation.random(rng, _POOL * count, chain.joint_count)
-    reached = forward_kinematics(chain, pool).positions[:, -1]
+    pool = reference.rotation.random(rng, _POOL * count, chain.joint_count)
+    reached = reference.forward_kinematics(chain, pool).positions[:, -1]
     order = np.argsort(np.linalg.norm(reached - chain.offsets[0], axis=-1))
     few = max(count, round(_EXTREME * len(order)))
     strata = {
@@ -104,7 +97,7 @@ def skeletons(
         OUTER: rng.choice(order[-few:], count, replace=False),
         INNER: rng.choice(order[:few], count, replace=False),
     }
-    starts = rotation.random(rng, count, chain.joint_count)
+    starts = reference.rotation.random(rng, count, chain.joint_count)
     return [
         TargetsForSkeleton(
             f"chain/{title}, {name}", f"{title}, {name}", chain, starts, reached[poses]
@@ -113,13 +106,13 @@ def skeletons(
     ]
 
 
-def path_to(skeleton: Skeleton, effector: int) -> Skeleton:
+def path_to(skeleton: reference.Skeleton, effector: int) -> reference.Skeleton:
     """Return the joints from the root to an effector: no other moves it."""
     path = skeleton.path(effector)
-    return Skeleton(np.arange(len(path)) - 1, skeleton.offsets[path])
+    return reference.Skeleton(np.arange(len(path)) - 1, skeleton.offsets[path])
 
 
-def cloth(path: Path, pins: str | None) -> tuple[MassSpring, State]:
+def cloth(path: Path, pins: str | None) -> tuple[reference.MassSpring, reference.State]:
     """Return the cloth of an OBJ file: its edges are springs at rest, its masses are equal.
 
     Raises:
@@ -131,8 +124,8 @@ def cloth(path: Path, pins: str | None) -> tuple[MassSpring, State]:
     x, edges = x[used], edges.reshape(-1, 2)
     rest = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1)
     masses = np.full(len(x), MASS / len(x))
-    system = MassSpring(masses, edges, rest, STIFFNESS, pinned=_pins(x, pins))
-    return system, State(x, np.zeros_like(x))
+    system = reference.MassSpring(masses, edges, rest, STIFFNESS, pinned=_pins(x, pins))
+    return system, reference.State(x, np.zeros_like(x))
 
 
 def _pins(x: FloatArray, rule: str | None) -> IndexArray:

@@ -7,15 +7,7 @@ import numpy as np
 
 from ..experiments import chain, cloth_peers
 from ..experiments.cloth_peers.readings import Point, points
-from ..experiments.robots.readings import (
-    STARTS,
-    Score,
-    by_robot,
-    fields_of,
-    in_groups,
-    ratio_of_times,
-    together,
-)
+from ..experiments.robots import readings
 from ..harness import metrics
 from ..harness.record import Record
 from ..peers import registry
@@ -43,9 +35,9 @@ class Headline(NamedTuple):
 def standings(results: Results) -> list[Headline]:
     """Return the ranks of the user's solvers task by task, then their failures."""
     chains = [r for r in results.all("ik", task=chain.CHAIN) if r.facts["stratum"] != chain.BEYOND]
-    ranks = [*_target_ranks("chain of balls", "accuracy", by_robot(chains))]
-    for start in STARTS:
-        groups = in_groups(fields_of(results, start))
+    ranks = [*_target_ranks("chain of balls", "accuracy", readings.by_robot(chains))]
+    for start in readings.STARTS:
+        groups = readings.in_groups(readings.fields_of(results, start))
         for group, fields in groups.items():
             robots = f"robots ({group})" if len(groups) > 1 else "robots"
             ranks += _target_ranks(f"{robots}, {start}", "robots_overall", fields)
@@ -69,16 +61,18 @@ def _failures(results: Results, suite: str) -> Iterator[Headline]:
             yield Headline("", f"{name}, suite {suite}", sentence, "entered")
 
 
-def _target_ranks(task: str, table: str, fields: dict[str, list[Score]]) -> Iterator[Headline]:
+def _target_ranks(
+    task: str, table: str, fields: dict[str, list[readings.Score]]
+) -> Iterator[Headline]:
     """Yield the ranks of solvers among the solvers that finished the same targets."""
     scores = [score for field in fields.values() for score in field]
     for solver in dict.fromkeys(s.solver for s in scores if s.records[0].facts.get("entrant")):
         problems = {score.robots for score in scores if score.solver == solver}
-        rows = {row.solver: row for row in together(problems, fields)}
+        rows = {row.solver: row for row in readings.together(problems, fields)}
         yield Headline("", f"{solver}, {task}", _rank(rows[solver], rows), table)
 
 
-def _rank(row: Score, rows: Mapping[str, Score]) -> str:
+def _rank(row: readings.Score, rows: Mapping[str, readings.Score]) -> str:
     """Return a sentence on a solver: its rank, share solved, the best share, relative times."""
     order, first = row.success
     share = f"it solves {percent(row.share)} of {counted(row.share.total, 'target')}"
@@ -89,7 +83,7 @@ def _rank(row: Score, rows: Mapping[str, Score]) -> str:
         share += f", the best solver, {full_name(order[0])}, {percent(rows[order[0]].share)}"
     if len(order) > 1:
         rivals = _fastest([solver for solver in row.time.order if solver != row.solver])
-        ratios = {rival: ratio_of_times(rows[rival], row) for rival in rivals}
+        ratios = {rival: readings.ratio_of_times(rows[rival], row) for rival in rivals}
         speeds = [speed(ratio, rival) for rival, ratio in ratios.items() if ratio.value > 0.0]
         share += f"; where both solve, it is {listed(speeds)}" if speeds else ""
     place = 1 if row.solver in first else order.index(row.solver) + 1

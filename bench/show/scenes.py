@@ -6,19 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.reference import (
-    IK_SOLVERS,
-    STEP_SOLVERS,
-    IKSolution,
-    ImplicitEuler,
-    MassSpring,
-    Skeleton,
-    State,
-    curves,
-    resample,
-    scenes,
-    track,
-)
+from plumbob import reference
 from plumbob.reference.arguments import FloatArray, choice
 from plumbob.reference.formats import bvh
 
@@ -30,7 +18,7 @@ from ..tables.results import label
 from .your_solver import ARM_TASKS, CLOTH_TASKS, H, YourSolver
 
 ARM, CLOTH, GALLERY = "arm", "cloth", "gallery"
-SCENES = (ARM, CLOTH, *curves)
+SCENES = (ARM, CLOTH, *reference.curves)
 GIF, SVG, HTML, BVH = ".gif", ".svg", ".html", ".bvh"
 SECONDS = 5
 # An animation shows every third step of a cloth; the frames of an arm are thinned to as many.
@@ -47,17 +35,17 @@ Progress = Callable[[int, int], None]
 class ArmMotion(NamedTuple):
     """An arm, its first pose, the points of its curve, a point a frame, and its motion."""
 
-    skeleton: Skeleton
+    skeleton: reference.Skeleton
     rest: FloatArray
     curve: FloatArray
-    motion: IKSolution
+    motion: reference.IKSolution
 
 
 class ClothMotion(NamedTuple):
     """A cloth, its start, and its positions after each step, the start first."""
 
-    system: MassSpring
-    start: State
+    system: reference.MassSpring
+    start: reference.State
     positions: FloatArray
 
 
@@ -91,7 +79,9 @@ def write(
     if competitor:
         competitor.offered(*(("a cloth", CLOTH_TASKS) if is_cloth else ("an arm", ARM_TASKS)))
     solver = choice(
-        "solver", solver or _DEFAULTS[is_cloth], STEP_SOLVERS if is_cloth else IK_SOLVERS
+        "solver",
+        solver or _DEFAULTS[is_cloth],
+        reference.STEP_SOLVERS if is_cloth else reference.IK_SOLVERS,
     )
     if is_cloth:
         cloth = cloth_motion(solver)
@@ -117,10 +107,12 @@ def _write_scene(scene: Scene, path: Path, progress: Progress) -> None:
 
 def arm_motion(name: str, solver: str, coherent: bool) -> ArmMotion:
     """Return the arm drawing a curve; a coherent motion is closed, and can be repeated."""
-    skeleton, rest = scenes.lab_arm()
-    points = curves[CUSTOM if name == ARM else name]()
-    even = resample(points, min_spacing=MIN_SPACING, max_spacing=MAX_SPACING, closed=coherent)
-    solution = track(skeleton, even, solver, rest, coherent=coherent, closed=coherent)
+    skeleton, rest = reference.scenes.lab_arm()
+    points = reference.curves[CUSTOM if name == ARM else name]()
+    even = reference.resample(
+        points, min_spacing=MIN_SPACING, max_spacing=MAX_SPACING, closed=coherent
+    )
+    solution = reference.track(skeleton, even, solver, rest, coherent=coherent, closed=coherent)
     return ArmMotion(skeleton, rest, even, solution)
 
 
@@ -155,8 +147,8 @@ def arm_scene(
 
 def cloth_motion(solver: str, mass: float = 1.0) -> ClothMotion:
     """Return the motion of the lab's cloth from rest, with a mass of each particle [kg]."""
-    system, start = scenes.lab_cloth(mass=mass)
-    integrator, state = ImplicitEuler(system, h=H, solver=solver), start
+    system, start = reference.scenes.lab_cloth(mass=mass)
+    integrator, state = reference.ImplicitEuler(system, h=H, solver=solver), start
     positions = [state.positions]
     for _ in range(FRAMES * EVERY):
         state = integrator.step(state).state

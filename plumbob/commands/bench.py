@@ -16,15 +16,8 @@ from plumbob.bench.harness.compile_ahead import compiling_ahead
 from plumbob.bench.harness.progress import TROUBLE, Progress, listening
 from plumbob.bench.text import visible
 
+from .. import terminal
 from ..help_text import fitted
-from ..terminal import (
-    lines_in_a_pipe,
-    print_ending,
-    print_filled,
-    print_tables,
-    progress,
-    width,
-)
 from .options import (
     FAILED,
     REPORT,
@@ -117,7 +110,7 @@ def _print_plan(names: list[str], choice: "Choice", output: Path | None) -> int:
     lines = plan.dry_run(names, choice, output) if output else plan.listed(names, choice)
     for line in lines:
         cells = (cell if cell.isspace() else visible(cell) for cell in _GAP.split(line))
-        print("\n".join(fitted("".join(cells), width())))
+        print("\n".join(fitted("".join(cells), terminal.width())))
     return SUCCESS
 
 
@@ -136,11 +129,11 @@ def _measure(
     with closing(executor_at(*address)) as place:
         code = run_suites(names, choice, output, fresh, place)
     if verbose:
-        print_tables(names, output)
-    print_ending(names, output)
+        terminal.print_tables(names, output)
+    terminal.print_ending(names, output)
     folder = "" if output == REPORT else f" -o {shlex.quote(str(output))}"
     tables = "" if verbose else f" `plumbob bench --verbose{folder}` prints all tables."
-    print_filled(visible(f"Read on: `plumbob report{folder}` writes the page.{tables}"))
+    terminal.print_filled(visible(f"Read on: `plumbob report{folder}` writes the page.{tables}"))
     return code
 
 
@@ -211,7 +204,7 @@ def run_with_progress(
 
     events: list[Event] = []
     timed_suites = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
-    with progress() as bar, lines_in_a_pipe(bar):
+    with terminal.progress() as bar, terminal.lines_in_a_pipe(bar):
         task, counts = bar.add_task("starting", total=run.count(suites, scale)), Counter[str]()
         is_serial = executor in (None, THIS_PROCESS)
         with listening(_listener(bar, task, events if is_serial else ())):

@@ -26,20 +26,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
+from .. import mass_spring
 from ..arguments import FloatArray, boolean, choice, coordinates, instance, number
 from ..backend.compiled import Kernel
 from ..backend.partition import Regions
 from ..backend.threads import in_slices
-from ..mass_spring import (
-    MassSpring,
-    State,
-    blocks,
-    checked_state,
-    constant_forces,
-    derivation,
-    pin_targets,
-    rest_vectors,
-)
 from .terms import (
     EPS,
     SUM_ROUNDING,
@@ -139,8 +130,8 @@ class Objective:
 
     def __init__(
         self,
-        system: MassSpring,
-        state: State,
+        system: mass_spring.MassSpring,
+        state: mass_spring.State,
         h: float,
         external_forces: ArrayLike | None = None,
         pin_positions: ArrayLike | None = None,
@@ -154,14 +145,14 @@ class Objective:
         """
         self.system = system
         self.h = h = number("h", h, above=0)
-        self.x_n, v_n = checked_state(system, state)
+        self.x_n, v_n = mass_spring.checked_state(system, state)
         self.y = np.multiply(v_n, h, out=v_n)
         self.y += self.x_n
         if pin_positions is not None:
-            self.y[system.pinned] = pin_targets(system, pin_positions)
+            self.y[system.pinned] = mass_spring.pin_targets(system, pin_positions)
         self.external = system.weights
         if external_forces is not None:
-            self.external = constant_forces(system, external_forces)
+            self.external = mass_spring.constant_forces(system, external_forces)
         self.effective, self._constant = _effective(system, self.x_n, h)
         arrays = self.effective.arrays
         particles = self.y, self.external, arrays.masses
@@ -233,7 +224,9 @@ class Objective:
     def hessian_at(self, x: FloatArray, *, geometric: bool = True) -> Any:
         """Return the Hessian at positions that are not checked."""
         springs = self.system.with_separate_dampers.free_blocks
-        hessian = springs.matrix(self.h * self.h * blocks(x, self.effective.arrays, geometric))
+        hessian = springs.matrix(
+            self.h * self.h * mass_spring.blocks(x, self.effective.arrays, geometric)
+        )
         hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
         return hessian
 
@@ -247,7 +240,7 @@ class Objective:
         if not displacement.any():
             return displacement
         i, j = self.effective.springs.T
-        K = self.h * self.h * blocks(x, self.effective.arrays, geometric)
+        K = self.h * self.h * mass_spring.blocks(x, self.effective.arrays, geometric)
         pulls = np.einsum("sab,sb->sa", K, displacement[i] - displacement[j])
         return self.system.with_separate_dampers.free_incidence @ pulls
 
@@ -262,7 +255,7 @@ class Objective:
         x, y, hh = self._positions(positions), self.y, self.h * self.h
         d = coordinates("d", d, len(self.effective.springs), 3)
         M = scipy.sparse.diags_array(self.system.masses)
-        _, _, L, J = derivation(self.effective)
+        _, _, L, J = mass_spring.derivation(self.effective)
         stored = 0.5 * np.sum(self.effective.stiffnesses[:, None] * d**2) + self._constant
         constant = 0.5 * np.sum(y * (M @ y)) + hh * stored
         linear = hh * (J @ d) + M @ y + hh * self.external
@@ -270,13 +263,13 @@ class Objective:
 
     def rest_vectors(self, positions: ArrayLike) -> FloatArray:
         """Return the optimal d of the effective springs at x, shape (spring, 3) [m]."""
-        return rest_vectors(self.effective, positions)
+        return mass_spring.rest_vectors(self.effective, positions)
 
     def _positions(self, positions: ArrayLike) -> FloatArray:
         return coordinates("positions", positions, self.system.particle_count, 3)
 
 
-def global_matrix(system: MassSpring, h: float) -> Any:
+def global_matrix(system: mass_spring.MassSpring, h: float) -> Any:
     """Return M + h² L of the effective springs [kg], sparse (particle, particle).
 
     It is the Hessian of the quadratic form of g for constant d, the same for each coordinate and
@@ -286,12 +279,14 @@ def global_matrix(system: MassSpring, h: float) -> Any:
     return system.free_blocks.scalar_matrix(weights, system.free_masses)
 
 
-def effective_stiffnesses(system: MassSpring, h: float) -> FloatArray:
+def effective_stiffnesses(system: mass_spring.MassSpring, h: float) -> FloatArray:
     """Return k + c/h, shape (spring,) [N/m]."""
     return system.stiffnesses + system.dampings / h
 
 
-def _effective(system: MassSpring, x_n: FloatArray, h: float) -> tuple[MassSpring, float]:
+def _effective(
+    system: mass_spring.MassSpring, x_n: FloatArray, h: float
+) -> tuple[mass_spring.MassSpring, float]:
     """Return the system with dampers replaced by springs, and the constant this leaves out of E."""
     if not system.damped:
         return system, 0.0

@@ -22,14 +22,7 @@ from ...peers import registry
 from ...peers.entrant import CHAIN_TASK
 from ...peers.ik import chain_loops
 from ...peers.protocol import NoAnswerError, describe
-from ...problems.chains import (
-    BEYOND,
-    SEED,
-    STRATA,
-    ChainRequests,
-    TargetsForSkeleton,
-    chain_targets,
-)
+from ...problems import chains
 from . import CHAIN
 from .values import ChainSolves
 
@@ -60,22 +53,22 @@ class SolverLimits(NamedTuple):
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every stratum, and a user's targets, for every solver."""
-    for stratum in STRATA:
-        share = _TARGETS_BEYOND if stratum == BEYOND else _TARGETS
-        problem = chain_targets(
+    for stratum in chains.STRATA:
+        share = _TARGETS_BEYOND if stratum == chains.BEYOND else _TARGETS
+        problem = chains.chain_targets(
             stratum,
             min(scale.targets, max(_LEAST_TARGETS, round(share * scale.targets))),
             scale.seed,
         )
-        tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
-        digest = {} if scale.seed == SEED else {"problem_digest": f"seed {scale.seed}"}
+        tolerance = BEYOND_TOLERANCE if stratum == chains.BEYOND else TOLERANCE
+        digest = {} if scale.seed == chains.SEED else {"problem_digest": f"seed {scale.seed}"}
         for block in _blocks_on(problem, stratum, SolverLimits(tolerance, MAX_ITERATIONS), scale):
             yield replace(block, facts={**block.facts, **digest})
     limits = SolverLimits(TOLERANCE, MAX_ITERATIONS)
     for own in scale.problems:
         if own.targets is not None:
             yield from (b.on(own) for b in _blocks_on(own.targets, "yours", limits, scale))
-    facts = {"task": CHAIN, "stratum": BEYOND, "title": "every chain"}
+    facts = {"task": CHAIN, "stratum": chains.BEYOND, "title": "every chain"}
     for entrant in scale.entrants:
         if entrant.offers(SUITE) and CHAIN_TASK not in entrant.tasks:
             measure = partial(not_asked, NO_BALLS)
@@ -88,7 +81,7 @@ class ChainJob(NamedTuple):
     answers: Callable[[], Measured]
     job: Job
 
-    def block(self, problem: TargetsForSkeleton, solver: str, limits: SolverLimits) -> Block:
+    def block(self, problem: chains.TargetsForSkeleton, solver: str, limits: SolverLimits) -> Block:
         """Return the block of the targets; solvers of the same targets are measured together."""
         group, settings = Group(problem.name, solve_together, self), limits._asdict()
         return Block(SUITE, problem.name, solver, group.measure_alone, settings, group=group)
@@ -119,7 +112,7 @@ def _answer_of(job: ChainJob) -> Measured:
 
 
 def _blocks_on(
-    problem: TargetsForSkeleton, stratum: str, limits: SolverLimits, scale: Scale
+    problem: chains.TargetsForSkeleton, stratum: str, limits: SolverLimits, scale: Scale
 ) -> Iterator[Block]:
     """Yield targets for every solver of ours, for one loop on each engine, and for users'."""
     facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
@@ -132,12 +125,12 @@ def _blocks_on(
             answers = partial(solve_targets, problem, name, limits, record=True)
         block = ChainJob(answers, job).block(problem, name, limits)
         yield replace(block, size=len(problem.targets), facts=facts)
-    for block in blocks_of_users(problem, limits, scale, followed=stratum != BEYOND):
+    for block in blocks_of_users(problem, limits, scale, followed=stratum != chains.BEYOND):
         yield replace(block, size=len(problem.targets), facts={**facts, **block.facts})
 
 
 def blocks_of_users(
-    problem: TargetsForSkeleton, limits: SolverLimits, scale: Scale, followed: bool = False
+    problem: chains.TargetsForSkeleton, limits: SolverLimits, scale: Scale, followed: bool = False
 ) -> Iterator[Block]:
     """Yield targets for each method of users' solvers."""
     for peer in registry.chain_peers(scale.entrants):
@@ -148,20 +141,20 @@ def blocks_of_users(
 
 
 def job_of(
-    problem: TargetsForSkeleton,
+    problem: chains.TargetsForSkeleton,
     limits: SolverLimits,
     module: str,
     settings: dict[str, str],
     entrant: str = "",
 ) -> Job:
     """Return the job of an adapter with these settings."""
-    requests = ChainRequests(problem, np.full(len(problem.targets), limits.max_iterations))
+    requests = chains.ChainRequests(problem, np.full(len(problem.targets), limits.max_iterations))
     model = (module, problem.skeleton, requests, limits.tolerance, settings)
     return Job(*model, entrant=entrant, warms_up=False)
 
 
 def solve_targets(
-    problem: TargetsForSkeleton, solver: str, limits: SolverLimits, record: bool = False
+    problem: chains.TargetsForSkeleton, solver: str, limits: SolverLimits, record: bool = False
 ) -> Measured:
     """Solve all targets with a solver of ours; Pinocchio recomputes residuals from the solutions.
 
@@ -179,7 +172,7 @@ def solve_targets(
 
 
 def solve_one_by_one(
-    problem: TargetsForSkeleton, job: Job, limits: SolverLimits, followed: bool = False
+    problem: chains.TargetsForSkeleton, job: Job, limits: SolverLimits, followed: bool = False
 ) -> Measured:
     """Have a solver solve all targets in a process of its own.
 
@@ -204,7 +197,7 @@ def solve_one_by_one(
     return Measured(ChainSolves(**arrays), {"remark": "; ".join(filter(None, remarks))}, facts)
 
 
-def _answers(requests: ChainRequests, outcome: JobOutcome) -> tuple[FloatArray, FloatArray]:
+def _answers(requests: chains.ChainRequests, outcome: JobOutcome) -> tuple[FloatArray, FloatArray]:
     """Return the joints' positions and the iterations of every target; NaN where there are none."""
     answers = np.full(requests.shape, np.nan)
     answers[: len(outcome.solved)] = [solve.q for solve in outcome.solved]
@@ -212,7 +205,7 @@ def _answers(requests: ChainRequests, outcome: JobOutcome) -> tuple[FloatArray, 
 
 
 def _evaluated(
-    problem: TargetsForSkeleton, limits: SolverLimits, positions: FloatArray, iterations: Any
+    problem: chains.TargetsForSkeleton, limits: SolverLimits, positions: FloatArray, iterations: Any
 ) -> dict[str, Any]:
     """Return the errors of the joints' positions, (target, joint, 3); NaN without an answer."""
     reach = problem.skeleton.reach()
@@ -233,14 +226,14 @@ def _evaluated(
     }
 
 
-def _history(problem: TargetsForSkeleton, job: Job) -> dict[str, FloatArray]:
+def _history(problem: chains.TargetsForSkeleton, job: Job) -> dict[str, FloatArray]:
     """Return the residuals by the iterations allowed; nothing if they do not depend on them."""
     allowed = np.arange(1, FOLLOWED_ITERATIONS + 1)
     starts, targets = problem.every_start[:FOLLOWED_TARGETS], problem.targets[:FOLLOWED_TARGETS]
     first = forward_kinematics(problem.skeleton, starts).positions[:, -1]
     starts, repeated = (np.repeat(part, len(allowed), axis=0) for part in (starts, targets))
     every = replace(problem, starts=starts, targets=repeated)
-    requests = ChainRequests(every, np.tile(allowed, len(targets)))
+    requests = chains.ChainRequests(every, np.tile(allowed, len(targets)))
     outcome = answers(job._replace(targets=requests))
     if len(outcome.solved) < len(repeated):
         return {}
