@@ -24,7 +24,6 @@ factor (Rump 2006, "Verification of Positive Definiteness") and the linear solve
 import contextlib
 import math
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +32,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, instance, number
 from ..mass_spring import lengths
+from ..outcome import SentenceEnum
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor, factorize
 from .objective import Objective
@@ -53,35 +53,22 @@ TINY = 1e-150
 FIRST_SHIFT, ESTIMATE_TOLERANCE = 0.98, 1e-2
 
 
-class Coverage(IntEnum):
+class Coverage(SentenceEnum):
     """Whether the distance to a minimiser is bounded, or why it is not."""
 
-    COVERED = 0
-    OVERFLOWN = 1
-    PINS_ASTRAY = 2
-    NOT_CONVEX = 3
-    COINCIDENT = 4
-    KINK = 5
-    TOO_FAR = 6
-
-    @property
-    def sentence(self) -> str:
-        """The answer in one sentence."""
-        return _SENTENCES[self]
-
-
-_SENTENCES = {
-    Coverage.COVERED: "A minimiser of g lies within the distance, and it is the only one near.",
-    Coverage.OVERFLOWN: "No bound: g or its gradient is not finite here or where the step starts.",
-    Coverage.PINS_ASTRAY: "No bound: a pinned particle is not where the step takes it.",
-    Coverage.NOT_CONVEX: "No bound: the Hessian of g is not positive definite here, or rounding "
-    "hides it.",
-    Coverage.COINCIDENT: "No bound: a spring with a rest length may shrink to a point as near as "
-    "the minimiser, and there g has no derivative.",
-    Coverage.KINK: "No bound: a tension-only spring may go slack, or taut, as near as the "
-    "minimiser, and there the Hessian jumps.",
-    Coverage.TOO_FAR: "No bound: the Hessian may change too much along the Newton step.",
-}
+    COVERED = "A minimiser of g lies within the distance, and it is the only one near."
+    OVERFLOWN = "No bound: g or its gradient is not finite here or where the step starts."
+    PINS_ASTRAY = "No bound: a pinned particle is not where the step takes it."
+    NOT_CONVEX = "No bound: the Hessian of g is not positive definite here, or rounding hides it."
+    COINCIDENT = (
+        "No bound: a spring with a rest length may shrink to a point as near as the minimiser, "
+        "and there g has no derivative."
+    )
+    KINK = (
+        "No bound: a tension-only spring may go slack, or taut, as near as the minimiser, and "
+        "there the Hessian jumps."
+    )
+    TOO_FAR = "No bound: the Hessian may change too much along the Newton step."
 
 
 @dataclass(frozen=True)

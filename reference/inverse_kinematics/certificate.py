@@ -30,7 +30,6 @@ second derivatives are bounded in the same way. L is the norm of Frobenius of th
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +41,7 @@ from ..articulation import BALL, FREE, FREEDOMS, HINGE, LIMIT_TOLERANCE, SLIDE, 
 from ..implicit_euler.certificate import kantorovich_distance
 from ..jacobians import difference, integrate, jacobians
 from ..model import Model, checked_model, coordinates_name
+from ..outcome import SentenceEnum
 from ..quaternion import conjugate, multiply
 from ..skeleton import Skeleton
 from .problem import (
@@ -69,30 +69,15 @@ EXTENT = 1.0
 SOLVED = 1e-9
 
 
-class IKCoverage(IntEnum):
+class IKCoverage(SentenceEnum):
     """What is proven about exact solutions, or why nothing is."""
 
-    COVERED = 0
-    IMPOSSIBLE = 1
-    TOO_FEW_FREEDOMS = 2
-    SINGULAR = 3
-    TOO_FAR = 4
-    AT_LIMIT = 5
-
-    @property
-    def sentence(self) -> str:
-        """The answer in one sentence."""
-        return _SENTENCES[self]
-
-
-_SENTENCES = {
-    IKCoverage.COVERED: "A pose within the limits and the distance meets the target exactly.",
-    IKCoverage.IMPOSSIBLE: "No pose within the limits meets the target.",
-    IKCoverage.TOO_FEW_FREEDOMS: "Open: fewer joints can move than the target has equations.",
-    IKCoverage.SINGULAR: "Open: the pose is singular, or rounding hides that it is not.",
-    IKCoverage.TOO_FAR: "Open: Newton's method does not find a solution from here.",
-    IKCoverage.AT_LIMIT: "Open: the solution nearby may lie beyond the limits.",
-}
+    COVERED = "A pose within the limits and the distance meets the target exactly."
+    IMPOSSIBLE = "No pose within the limits meets the target."
+    TOO_FEW_FREEDOMS = "Open: fewer joints can move than the target has equations."
+    SINGULAR = "Open: the pose is singular, or rounding hides that it is not."
+    TOO_FAR = "Open: Newton's method does not find a solution from here."
+    AT_LIMIT = "Open: the solution nearby may lie beyond the limits."
 
 
 @dataclass(frozen=True)
