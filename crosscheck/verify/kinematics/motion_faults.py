@@ -33,8 +33,6 @@ MIN_FRAMES, MIN_SHARE = 3, 0.5
 WHOLE_TURN = 0.7
 # Errors that fall to less than this share have been reduced.
 REDUCED = 0.9
-
-
 # Steps of some length agree to this share; factors of steps that are too short, dampings that are
 # too large [m^2]; a step goes nowhere if the cosine of its angle with the right one is smaller.
 SAME_SCALE, SHORT, OVERDAMPED = 0.02, (1e-3, 0.3), np.geomspace(0.3, 1e3, 60)[:, None]
@@ -121,8 +119,13 @@ def _reached(fault: RobotFault, motion: Trajectory, laws: set[str]) -> Evidence:
     Of robots with few joints, which reach no target in other kinematics, only frames that do count.
     """
     explained = motion.errors(_errors(fault, motion, motion.q, sine_error)) <= LENIENT
-    concerned = motion.is_missed & (motion.inputs["max_iterations"] > 1)
-    return Evidence(concerned & (explained | (motion.q.shape[1] >= POSE_FREEDOMS)), explained)
+    is_pose = explained | (motion.q.shape[1] >= POSE_FREEDOMS)
+    return Evidence(_ends_off_target(motion) & is_pose, explained)
+
+
+def _ends_off_target(motion: Trajectory) -> BoolArray:
+    """Return the frames of solves, not of single steps, that end off their targets."""
+    return np.asarray(motion.is_missed & (motion.inputs["max_iterations"] > 1))
 
 
 def _errors(
@@ -183,8 +186,8 @@ def _claimed(motion: Trajectory, laws: set[str]) -> Evidence:
 
 def _stopped(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames that end while the error still falls."""
-    concerned = motion.is_missed & (motion.inputs["max_iterations"] > 1)
-    return Evidence(concerned & motion.is_pose, np.full(len(motion.q), is_falling_at(motion)))
+    concerned = _ends_off_target(motion) & motion.is_pose
+    return Evidence(concerned, np.full(len(motion.q), is_falling_at(motion)))
 
 
 def _with_another_tolerance(
@@ -247,39 +250,39 @@ def _step_gap(motion: Trajectory, J: FloatArray, q: FloatArray, twists: FloatArr
 
     Relative to the step; joints that end at a limit are left out.
     """
-    is_free, changes = ~motion.at_limits, motion.q - q
-    values, U = np.linalg.eigh(J @ np.swapaxes(J, 1, 2))
-    parts = np.einsum("fij,fi->fj", U, twists)[:, None] / (
-        np.maximum(values, 0.0)[:, None] + DAMPINGS
-    )
-    steps = np.einsum("fij,fik,fdk->fdj", J, U, parts) * is_free[:, None]
-    scale = np.maximum((steps * steps).sum(axis=-1), 1e-300)
-    factors = np.einsum("fdj,fj->fd", steps, changes) / scale
-    gaps = np.linalg.norm(
-        (changes[:, None] - factors[..., None] * steps) * is_free[:, None], axis=-1
-    )
-    gap = np.where(factors > 0.0, gaps, np.inf).min(axis=-1)
+    is_free = ~motion.at_limits
+    changes, steps = (motion.q - q) * is_free, _damped_steps(J, twists, DAMPINGS)
+    gap = _least_gap(changes, steps * is_free[:, None], (0.0, np.inf))
     gap[is_free.sum(axis=-1) < MIN_FREE] = np.inf
-    return np.asarray(gap / np.maximum(np.linalg.norm(changes * is_free, axis=-1), 1e-300))
+    return np.asarray(gap / np.maximum(np.linalg.norm(changes, axis=-1), 1e-300))
+
+
+def _damped_steps(J: FloatArray, twists: FloatArray, dampings: FloatArray) -> FloatArray:
+    """Return the steps J' (J J' + damping I)^-1 e along twists e, (frame, damping, joint)."""
+    values, U = np.linalg.eigh(J @ np.swapaxes(J, 1, 2))
+    parts = np.einsum("fij,fi->fj", U, twists)[:, None]
+    parts = parts / (np.maximum(values, 0.0)[:, None] + dampings)
+    return np.asarray(np.einsum("fij,fik,fdk->fdj", J, U, parts))
+
+
+def _least_gap(changes: FloatArray, steps: FloatArray, factors: tuple[float, float]) -> FloatArray:
+    """Return the least distance of changes from steps times a factor in a range, (frame)."""
+    lengths = np.maximum((steps * steps).sum(axis=-1), 1e-300)
+    scales = np.clip(np.einsum("fdj,fj->fd", steps, changes) / lengths, *factors)
+    gaps = np.linalg.norm(changes[:, None] - scales[..., None] * steps, axis=-1)
+    return np.asarray(gaps.min(axis=-1))
 
 
 def _scaled(
     dampings: FloatArray, factors: tuple[float, float], motion: Trajectory, laws: set[str]
 ) -> Evidence:
     """Return the frames that are right steps with one of these dampings, times such a factor."""
-    q, e = motion.previous, motion.twists(motion.previous)
     J, changes = motion.jacobians * ~motion.at_limits[:, None], motion.changes * ~motion.at_limits
-    values, U = np.linalg.eigh(J @ np.swapaxes(J, 1, 2))
-    parts = np.einsum("fij,fi->fj", U, e)[:, None] / (np.maximum(values, 0.0)[:, None] + dampings)
-    steps = np.einsum("fij,fik,fdk->fdj", J, U, parts)
-    lengths = (steps * steps).sum(axis=-1)
-    scales = np.clip(
-        np.einsum("fdj,fj->fd", steps, changes) / np.maximum(lengths, 1e-300), *factors
-    )
-    gaps = np.linalg.norm(changes[:, None] - scales[..., None] * steps, axis=-1).min(axis=-1)
-    is_single = np.full(len(q), motion.inputs["max_iterations"] == 1 and q.shape[1] >= MIN_FREE)
-    is_single &= np.linalg.norm(changes, axis=-1) > AT_LIMIT
-    return Evidence(is_single, gaps <= SAME_SCALE * np.linalg.norm(changes, axis=-1))
+    steps = _damped_steps(J, motion.twists(motion.previous), dampings)
+    lengths = np.linalg.norm(changes, axis=-1)
+    is_single = motion.inputs["max_iterations"] == 1 and changes.shape[1] >= MIN_FREE
+    is_close = _least_gap(changes, steps, factors) <= SAME_SCALE * lengths
+    return Evidence((lengths > AT_LIMIT) & is_single, is_close)
 
 
 def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
@@ -294,9 +297,8 @@ def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
     scale = np.linalg.norm(right, axis=-1) * np.linalg.norm(wrong, axis=-1)
     cosine = (right * wrong).sum(axis=-1) / np.maximum(scale, 1e-300)
     is_at_start = np.abs(motion.changes).max(axis=-1) <= AT_LIMIT
-    concerned = motion.is_missed & (motion.inputs["max_iterations"] > 1) & ~_is_at_minimum(motion)
-    explained = (np.abs(cosine) <= NOWHERE) | (is_at_start & (cosine < 0.0))
-    return Evidence(concerned & motion.is_pose, explained)
+    concerned = _ends_off_target(motion) & motion.is_pose & ~_is_at_minimum(motion)
+    return Evidence(concerned, (np.abs(cosine) <= NOWHERE) | (is_at_start & (cosine < 0.0)))
 
 
 def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
@@ -374,9 +376,8 @@ def _is_step(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
 
 def _single_step(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames that make a single right step though more are allowed."""
-    is_single = motion.is_missed & (motion.inputs["max_iterations"] > 1)
-    is_single &= motion.is_pose
-    return Evidence(is_single, _is_step("", motion, laws).explained)
+    concerned = _ends_off_target(motion) & motion.is_pose
+    return Evidence(concerned, _is_step("", motion, laws).explained)
 
 
 def _both(R: FloatArray, twists: FloatArray) -> FloatArray:
@@ -470,14 +471,11 @@ POSES: Mapping[str, Signature] = {
     "squared errors": partial(_with_another_tolerance, lambda b, tol: b <= 1.01 * np.sqrt(tol)),
     **{k: partial(_reached, fault) for k, fault in POSE_FAULTS.items() if k != POSITION_ONLY},
 }
+NOT_STEPS = ("columns negated", "lever arms reversed", POSITION_ONLY)
 STEP_FAULTS = {
     key: fault
     for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()
-    if not (
-        fault.relative
-        or fault.order
-        or key in ("columns negated", "lever arms reversed", POSITION_ONLY)
-    )
+    if not (fault.relative or fault.order or key in NOT_STEPS)
 }
 STEP_KEYS = (
     "Jacobian in the tool's frame", "error in the tool's frame", "rotation error reversed",
