@@ -30,6 +30,7 @@ from .kinematics.robot_inverse_kinematics import solve_by_reference
 from .kinematics.robot_jacobian import TASK as ROBOT_JACOBIAN
 from .kinematics.robot_motions import TASK as ROBOT_TRACK
 from .kinematics.robot_motions import followed
+from .kinematics.robot_velocity import TASK as ROBOT_VELOCITY
 from .kinematics.switches import Switches
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
 from .mass_spring.forces import forces_with
@@ -151,7 +152,7 @@ def _limits() -> Iterator[Subject]:
 
 
 def _robots() -> Iterator[Subject]:
-    for task in (ROBOTS, ROBOT_TRACK, ROBOT_JACOBIAN):
+    for task in (ROBOTS, ROBOT_TRACK, ROBOT_JACOBIAN, ROBOT_VELOCITY):
         programs = [fault for fault in coded_faults().values() if fault.task == task]
         wrong = {fault.name: _function(task, fault.wrong_program) for fault in programs}
         yield from _subjects("robots", task, wrong)

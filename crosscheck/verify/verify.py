@@ -21,6 +21,7 @@ from .kinematics import (
     robot_inverse_kinematics,
     robot_jacobian,
     robot_track,
+    robot_velocity,
     track,
 )
 from .kinematics.faults import SwitchFault
@@ -59,6 +60,7 @@ DISCIPLINES: Mapping[str, Discipline] = {
     "robot_inverse_kinematics": robot_inverse_kinematics,
     "robot_track": robot_track,
     "robot_jacobian": robot_jacobian,
+    "robot_velocity": robot_velocity,
 }
 
 

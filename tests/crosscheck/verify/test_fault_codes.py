@@ -34,6 +34,7 @@ FAMILIES = (
     "STOP",
     "TRACK",
     "LIMIT",
+    "VELOCITY",
     "RESAMPLE",
     "ROBOT",
     "STEP",

@@ -1,0 +1,275 @@
+"""Speeds of robots' joints that give the tool a velocity, of least length or not, damped or not."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.jacobians import jacobian
+
+from ..case import Case
+from ..contestant import Answer, Exchange, Failure
+from ..explain import Variant, either, explain
+from ..greeting import Greeting
+from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..laws import finding, judge_case, not_finite
+from ..sentence import Sentence, sentence, with_code
+from . import robot_jacobian, robot_models, rounding
+from .faults import TABLE
+from .report import report
+from .robot_jacobian import CONVENTIONS, right_jacobian
+from .robot_models import mechanism
+from .robot_textbook import Inputs
+from .skeletons import suits
+
+TASK = "robot_velocity"
+_SEED = 1969
+# Singular values below this share of the largest are zero.
+RANK = 1e-6
+# The largest ratio of singular values in poses that are not singular, and how many are drawn.
+CONDITION, DRAWS = 60.0, 400
+# Damping that takes more than this share of the velocity away, far from singularities, is a fault.
+LARGEST_LOSS = 0.25
+# Speeds beyond so many times those of least length come from a division by almost zero.
+FACTOR = 1e3
+SINGULAR = "a singular pose"
+# Mistakes in reading the velocity or solving for the speeds, by their keys.
+READING_FAULTS: Mapping[str, Sentence] = {
+    key: with_code(entry["code"], Sentence(entry["sentence"], {}))
+    for key, entry in TABLE["robot_velocity"].items()
+}
+# Those that invert a singular matrix, which is so for robots with too few joints or too many.
+TOO_FEW, TO_SPARE = "too few joints", "joints to spare"
+# Those whose speeds may be short by any share: with a factor of the transposed matrix, or damping.
+SHORTENED = ("transposed matrix", "damping too large")
+SENTENCES = dict(READING_FAULTS) | {
+    key: fault.sentence for key, fault in robot_jacobian.FAULTS.items()
+}
+# A Jacobian, and the velocity that the speeds give by it.
+Equation = tuple[FloatArray, FloatArray]
+
+
+def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
+    """Return robots of one joint to seven, in random poses and in a singular one."""
+    rng = np.random.default_rng([_SEED, seed])
+    return [
+        case
+        for name, robot in robot_models.robots(rng).items()
+        if suits(robot["parents"], greeting, robot["effector"])
+        for case in _cases_of(name, robot, rng, 4 if thorough else 2)
+    ]
+
+
+def _cases_of(
+    name: str, robot: Mapping[str, Any], rng: np.random.Generator, count: int
+) -> Iterator[Case]:
+    draws = rng.uniform(robot["lower"], robot["upper"], (DRAWS, len(robot["lower"])))
+    rank = len(_singular_values(robot, draws[0]))
+    regular = (q for q in draws if _is_regular(_singular_values(robot, q), rank))
+    for number, q in enumerate(islice(regular, count)):
+        yield _case(f"{name}, pose {number + 1}", robot, q, rng, "any pose")
+    zero = np.zeros(len(robot["lower"]))
+    if len(_singular_values(robot, zero)) < rank:
+        case = _case(f"{name}, {SINGULAR}", robot, zero, rng, SINGULAR)
+        yield replace(case, requirement="may")
+
+
+def _case(
+    name: str, robot: Mapping[str, Any], q: FloatArray, rng: np.random.Generator, family: str
+) -> Case:
+    """Return a request for a velocity that the tool can have."""
+    J = jacobian(mechanism(robot), q, -1)
+    twist = J @ (rng.choice([-1.0, 1.0], len(q)) * rng.uniform(0.5, 1.5, len(q)))
+    reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
+    velocities = {"linear_velocity": twist[:3], "angular_velocity": twist[3:]}
+    inputs = {**robot, "q": q, **velocities, "urdf": robot_models.urdf(robot)}
+    about = sentence("A robot of {joints} joints.", joints=len(q))
+    return Case(name, TASK, inputs, family, about, facts={"size": max(reach, 1.0)})
+
+
+def _singular_values(robot: Mapping[str, Any], q: FloatArray) -> FloatArray:
+    """Return the singular values of the Jacobian other than zero, the largest first."""
+    values = np.linalg.svd(jacobian(mechanism(robot), q, -1), compute_uv=False)
+    return np.array(values[values > RANK * values[0]])
+
+
+def _is_regular(values: FloatArray, rank: int) -> bool:
+    return len(values) == rank and bool(values[0] <= CONDITION * values[-1])
+
+
+def _equation(inputs: Inputs) -> Equation:
+    twist = np.concatenate([inputs["linear_velocity"], inputs["angular_velocity"]])
+    return jacobian(mechanism(inputs), inputs["q"], -1), twist
+
+
+def _shortest(equation: Equation) -> FloatArray:
+    """Return the speeds of least length that solve an equation."""
+    J, twist = equation
+    return np.asarray(np.linalg.pinv(J, RANK) @ twist)
+
+
+def solving(
+    equation: Equation, speeds: FloatArray, largest_loss: float = 1.0
+) -> tuple[FloatArray, float]:
+    """Return the speeds that solve an equation, those nearest to an answer, and their damping d.
+
+    Along a singular vector damped least squares give s b / (s^2 + d^2) for the velocity b
+    (Wampler 1986), which is less than b / s by the share d^2 / (s^2 + d^2); what the speeds are in
+    the null space is free. The damping explains the speed along the vector on which it tells most.
+    """
+    J, twist = equation
+    U, s, V = np.linalg.svd(J, full_matrices=False)
+    rank = max(int(np.sum(s > RANK * s[0])), 1)
+    s, b, V = s[:rank], (twist @ U)[:rank], V[:rank]
+    c, square = V @ speeds, 0.0
+    i = int(np.argmax(np.abs(b) / np.maximum(s, 1e-300)))
+    if c[i]:
+        square = max(float(s[i] * b[i] / c[i] - s[i] ** 2), 0.0)
+    if largest_loss < 1.0:
+        square = min(square, float(s[-1]) ** 2 * largest_loss / (1.0 - largest_loss))
+    parts = s * b / np.maximum(s**2 + square, 1e-300)
+    return speeds + (parts - c) @ V, float(np.sqrt(square))
+
+
+def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+    """Judge speeds by the velocity that the tool has with them; name the faults."""
+    judgements = [_judgement(exchange, greeting) for exchange in exchanges]
+    if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
+        diagnosis = _diagnosis(judgements, greeting)
+    else:
+        diagnosis = Diagnosis(behaviour=_behaviour(judgements, greeting))
+    return report(TASK, method, judgements, diagnosis)
+
+
+def _judgement(exchange: Exchange, greeting: Greeting) -> CaseJudgement:
+    case = exchange.case
+    equation = _equation(case.inputs)
+    laws = partial(_findings, case, equation, greeting)
+    shortest = _shortest(equation)
+    allowed = _rounded(case, greeting) * max(1.0, float(np.abs(shortest).max()))
+    rank = len(_singular_values(case.inputs, case.inputs["q"]))
+    expected = {"velocities": shortest} if rank == len(shortest) else {}
+    judgement = judge_case(exchange, laws, allowed, partial(_shortest, equation), expected)
+    if case.family == SINGULAR and isinstance(exchange.answer, Failure):
+        failure = exchange.answer.sentence
+        judgement = replace(judgement, findings=(finding("speeds, failure", failure=failure),))
+    return judgement
+
+
+def _rounded(case: Case, greeting: Greeting) -> float:
+    """Return how far rounding moves speeds of 1 rad/s, and what they do to the tool."""
+    joints = len(case.inputs["q"])
+    return CONDITION * rounding.positions(greeting.epsilon, joints, case.facts["size"])
+
+
+def _findings(
+    case: Case, equation: Equation, greeting: Greeting, outputs: Mapping[str, Any]
+) -> Iterator[Finding]:
+    speeds, is_singular = outputs["velocities"], case.family == SINGULAR
+    if not np.isfinite(speeds).all():
+        yield not_finite("speeds, no number" if is_singular else "numbers, of a joint", speeds)
+        return
+    if is_singular:
+        yield finding("speeds", np.abs(speeds).max() / np.abs(_shortest(equation)).max(), FACTOR)
+    J, twist = equation
+    bound = _rounded(case, greeting) * max(1.0, float(np.abs(speeds).max()))
+    nearest, damping = solving(equation, speeds)
+    loss = float(np.linalg.norm(J @ speeds - twist) / np.linalg.norm(twist))
+    is_damped = np.abs(nearest - speeds).max() <= bound and (is_singular or loss <= LARGEST_LOSS)
+    key = "velocity of the tool, damped" if is_damped else "velocity of the tool"
+    verdict = Verdict.RIGHT_EXCEPT if is_singular else None
+    error = float(np.abs(J @ speeds - twist).max())
+    yield finding(key, error, bound, verdict=verdict, damping=damping, loss=loss)
+
+
+def _behaviour(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Sentence:
+    """Return whether the speeds of robots with joints to spare are of least length."""
+    for judgement in judgements:
+        J, _ = _equation(judgement.case.inputs)
+        if isinstance(judgement.answer, Answer) and judgement.case.family != SINGULAR:
+            speeds = judgement.answer.values["velocities"]
+            excess = np.abs(speeds - _shortest((J, J @ speeds))).max()
+            if excess > _rounded(judgement.case, greeting) * max(1.0, np.abs(speeds).max()):
+                return sentence("Joints also move where that does not move the tool.")
+    return sentence("Among the speeds that solve a request it gives those of least length.")
+
+
+def _readings(inputs: Inputs) -> Mapping[str, Equation]:
+    """Return what speeds with a fault solve, by its key."""
+    J, twist = _equation(inputs)
+    tool, spatial = (right_jacobian(inputs, CONVENTIONS[f"{frame}, linear part first"])
+                     for frame in ("tool", "spatial"))  # fmt: skip
+    return {
+        "transposed matrix": (np.eye(J.shape[1]), J.T @ twist),
+        "reversed": (J, -twist),
+        "angular part first": (J, np.roll(twist, 3)),
+        "along the tool's axes": (tool, twist),
+        "point at the origin": (spatial, twist),
+        "angular part ignored": (J[:3], twist[:3]),
+        "linear part ignored": (J[3:], twist[3:]),
+        "speeds in degrees": (np.radians(J), twist),
+        "velocity of length one": (J, twist / np.linalg.norm(twist)),
+        "damping too large": (J, twist),
+    }
+
+
+def _reading(key: str, inputs: Inputs) -> Iterator[Equation]:
+    yield _readings(inputs)[key]
+
+
+def _by_jacobian(key: str, inputs: Inputs) -> Iterator[Equation]:
+    """Yield what speeds solve with a wrong Jacobian."""
+    for J in robot_jacobian.FAULTS[key].jacobians(inputs, inputs["q"]):
+        yield J, _equation(inputs)[1]
+
+
+def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagnosis:
+    """Return the faults that explain most answers, those with wrong answers first."""
+    key = _inverted(judgements)
+    if key:
+        return Diagnosis((Explanation((key,), SENTENCES[key], 1.0, 0.0),))
+    ordered = sorted(judgements, key=lambda judgement: (-judgement.verdict, -judgement.case.size))
+    answers = {
+        judgement.case.name: judgement.answer.values["velocities"]
+        for judgement in ordered
+        if isinstance(judgement.answer, Answer) and judgement.case.family != SINGULAR
+    }
+
+    def nearest(
+        equations: Callable[[Inputs], Iterable[Equation]], loss: float, case: Case
+    ) -> dict[str, Any]:
+        speeds = answers[case.name]
+        solutions = [solving(equation, speeds, loss)[0] for equation in equations(case.inputs)]
+        return {"velocities": min(solutions, key=lambda one: float(np.abs(one - speeds).max()))}
+
+    readings = [key for key in READING_FAULTS if key not in (TOO_FEW, TO_SPARE)]
+    variants = [
+        *(Variant((key,), partial(nearest, partial(_reading, key),
+                                  1.0 if key in SHORTENED else LARGEST_LOSS)) for key in readings),
+        *(Variant((key,), partial(nearest, partial(_by_jacobian, key), LARGEST_LOSS))
+          for key in robot_jacobian.FAULTS),
+    ]  # fmt: skip
+    explanations, count = explain(
+        variants,
+        [Exchange(judgement.case, judgement.answer, judgement.answer)
+         for judgement in ordered if judgement.case.name in answers],
+        partial(_rounded, greeting=greeting),
+        lambda keys: either([[SENTENCES[key]] for key in keys]),
+        trial=2,
+    )  # fmt: skip
+    return Diagnosis(explanations, variant_count=count)
+
+
+def _inverted(judgements: Sequence[CaseJudgement]) -> str:
+    """Return the fault of a matrix that is singular just where answers are wrong, or ""."""
+    regular = [judgement for judgement in judgements if judgement.case.family != SINGULAR]
+    is_wrong = [judgement.verdict >= Verdict.WRONG for judgement in regular]
+    shapes = [(len(_singular_values(judgement.case.inputs, judgement.case.inputs["q"])),
+               len(judgement.case.inputs["q"])) for judgement in regular]  # fmt: skip
+    if is_wrong == [rank < 6 for rank, _ in shapes]:
+        return TOO_FEW
+    return TO_SPARE if is_wrong == [rank < joints for rank, joints in shapes] else ""
