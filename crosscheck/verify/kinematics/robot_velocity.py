@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from plumbob.reference import Articulation
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import jacobian
 
@@ -112,6 +113,11 @@ def _shortest(equation: Equation) -> FloatArray:
     return np.asarray(np.linalg.pinv(J, RANK) @ twist)
 
 
+def _speeds(robot: Articulation, q: FloatArray, twist: FloatArray) -> FloatArray:
+    """Return the same from the robot itself: what is timed."""
+    return _shortest((jacobian(robot, q, -1), twist))
+
+
 def solving(
     equation: Equation, speeds: FloatArray, largest_loss: float = 1.0
 ) -> tuple[FloatArray, float]:
@@ -153,7 +159,8 @@ def _judgement(exchange: Exchange, greeting: Greeting) -> CaseJudgement:
     allowed = _rounded(case, greeting) * max(1.0, float(np.abs(shortest).max()))
     rank = len(_singular_values(case.inputs, case.inputs["q"]))
     expected = {"velocities": shortest} if rank == len(shortest) else {}
-    judgement = judge_case(exchange, laws, allowed, partial(_shortest, equation), expected)
+    reference = partial(_speeds, mechanism(case.inputs), case.inputs["q"], equation[1])
+    judgement = judge_case(exchange, laws, allowed, reference, expected)
     if case.family == SINGULAR and isinstance(exchange.answer, Failure):
         failure = exchange.answer.sentence
         judgement = replace(judgement, findings=(finding("speeds, failure", failure=failure),))
