@@ -41,7 +41,7 @@ def rounded(subject):
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(one, marks=() if one in SOME or i % 120 == 0 else pytest.mark.slow)
+        pytest.param(one, marks=() if one in SOME or i % 240 == 0 else pytest.mark.slow)
         for i, one in enumerate(FAULTY)
     ],
 )

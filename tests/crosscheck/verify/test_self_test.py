@@ -14,9 +14,9 @@ QUICK = ("forward kinematics", "CCD", "FABRIK")
 
 def parameters():
     for i, subject in enumerate(SUBJECTS):
-        is_short = subject.family in QUICK and "Euler" not in subject.name and i % 12 == 0
+        is_short = subject.family in QUICK and "Euler" not in subject.name and i % 24 == 0
         is_honest_forward = not subject.fault and subject.task == "forward_kinematics"
-        is_quick = is_short or is_honest_forward or i % 60 == 0
+        is_quick = is_short or is_honest_forward or i % 120 == 0
         marks = () if is_quick else pytest.mark.slow
         yield pytest.param(subject, id=f"{subject.family}, {subject.name}", marks=marks)
 
