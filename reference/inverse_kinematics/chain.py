@@ -23,6 +23,7 @@ from ..quaternion import (
     store_vector,
     subtract,
 )
+from .anderson import Mixing, mixing_on, mixing_size
 
 # A chain and target are collinear if no joint is further off their line than this, over the reach.
 LINE_TOLERANCE = 1e-9
@@ -43,10 +44,11 @@ class Chain(NamedTuple):
     reach: float  # total length [m]
     longest: float  # the longest link [m]
     row: FloatArray  # positions and rotations, one number after the other
+    mixing: Mixing  # the last sweeps, of an accelerated solver
 
 
-def new_chain(offsets, path):
-    """Return a chain with no pose yet along a path of joints."""
+def new_chain(offsets, path, depth):
+    """Return a chain with no pose yet along a path of joints; it can remember `depth` sweeps."""
     n = len(path) - 1
     along = np.empty((n + 1, 3))
     lengths = np.empty(n)
@@ -60,7 +62,8 @@ def new_chain(offsets, path):
         longest = max(longest, lengths[k])
     row, deltas, split = np.empty(7 * (n + 1)), np.empty((n, 4)), 3 * (n + 1)
     positions, rotations = row[:split].reshape(n + 1, 3), row[split:].reshape(n + 1, 4)
-    return Chain(along, lengths, positions, rotations, deltas, reach, longest, row)
+    mixing = mixing_on(np.empty(mixing_size(split, depth)), split, depth)
+    return Chain(along, lengths, positions, rotations, deltas, reach, longest, row, mixing)
 
 
 def pose_chain(chain, path, local):

@@ -27,8 +27,6 @@ from ..quaternion import (
     subtract,
 )
 from .box_step import (
-    ROUNDING_DAMPING,
-    inner,
     lean,
     linearise_task,
     take_step,
@@ -37,6 +35,7 @@ from .box_step import (
 )
 from .chain import LINE_TOLERANCE, bend, drawn_near, update_positions
 from .far_step import step_towards
+from .linear_algebra import ROUNDING_DAMPING, inner
 
 # How far beyond reach a chain's target may be, over the reach; it is drawn nearer. From further off
 # steps would swing about the nearest point; at reach itself they would be slower the nearer it is.

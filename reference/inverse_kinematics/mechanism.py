@@ -85,8 +85,12 @@ class ConfigurationData(NamedTuple):
 
 def new_data(mechanism):
     """Return the data of a configuration, to be filled."""
+    return data_on(mechanism, np.zeros(len(mechanism.columns) + 5))
+
+
+def data_on(mechanism, state):
+    """Return the data of a configuration, to be filled, whose state is a row (coordinate + 5,)."""
     count, n = len(mechanism.joints) + len(mechanism.effectors), len(mechanism.columns)
-    state = np.zeros(n + 5)
     return ConfigurationData(
         state, state[:n], state[n : n + 3], state[n + 3 :],
         np.empty((count, 3)), np.empty((count, 4)),

@@ -9,7 +9,8 @@ from ..arguments import LARGEST_COORDINATE
 from ..backend.compiled import Kernel, bind
 from ..kinematics import forward_pose, normalise
 from ..quaternion import load_vector, norm, subtract
-from .ccd import ccd_sweep
+from .anderson import DEPTH, forget
+from .ccd import anderson_ccd_sweep, ccd_sweep
 from .chain import (
     bend,
     effector_error,
@@ -55,7 +56,7 @@ def solve_chains(
     and the fields of Result but its coordinates.
     """
     limits = limits_of(numbers)
-    chain = new_chain(offsets, path)
+    chain = new_chain(offsets, path, depth)
     count = 1 + SPARE_ROWS
     saved, progress = np.empty((count, len(chain.row))), np.empty((count, LIMIT + 1))
     rotations = np.empty((len(parents), 4))
@@ -65,6 +66,7 @@ def solve_chains(
         if not (normalise(start, pose) and is_within(target, LARGEST_COORDINATE)):
             return False
         pose_chain(chain, path, pose)
+        forget(chain.mixing)
         d = root_distance(chain, target)
         criteria, past = chain_criteria(chain, d, limits), history[i % len(history)]
         iterations, stalled = solve_with_restarts(
@@ -127,6 +129,7 @@ def begin_sweeps(_chain, n):
     return n == 0
 
 
+depth = 0  # of the sweeps that a solver remembers
 operations = Operations(
     ccd_sweep, chain_error, effector_error, perturb_chain, place_chain, draw_chain, begin_sweeps
 )
@@ -136,11 +139,17 @@ SWEEPS = {
     "levenberg_marquardt": levenberg_marquardt_sweep,
     "damped_least_squares": damped_least_squares_sweep,
     "jacobian_transpose": jacobian_transpose_sweep,
+    "anderson_ccd": anderson_ccd_sweep,
 }
 # The kernel that solves chains by the sweep of each solver.
 ON_CHAINS = {
     name: Kernel(
-        bind(solve_chains, operations=operations._replace(update=sweep)), label=f"{name} for chains"
+        bind(
+            solve_chains,
+            operations=operations._replace(update=sweep),
+            depth=DEPTH * (sweep is anderson_ccd_sweep),
+        ),
+        label=f"{name} for chains",
     )
     for name, sweep in SWEEPS.items()
 }

@@ -11,6 +11,7 @@ from ..articulation import (
     FIXED,
     FREE,
     HINGE,
+    SLIDE,
     WIDTHS,
     articulated_pose,
     clamp_joint,
@@ -29,8 +30,9 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .box_step import TaskSystem, clear, new_system
-from .ccd import ccd_update
+from .anderson import DEPTH, Mixing, forget, mixing_on, mixing_size
+from .box_step import TaskSystem, new_system
+from .ccd import anderson_ccd_update, ccd_update
 from .chain import BEND, POSITION_ROUNDING
 from .fabrik import BACKWARD, fabrik_update
 from .jacobian_methods import (
@@ -40,17 +42,18 @@ from .jacobian_methods import (
     levenberg_marquardt_update,
     only_phase,
 )
+from .linear_algebra import clear
 from .mechanism import (
     LEVER,
     ConfigurationData,
     Mechanism,
+    data_on,
     errors,
     gather,
     least_residual,
     load_ball,
     merit_of,
     move_by,
-    new_data,
     residuals,
     scatter,
     store_ball,
@@ -97,7 +100,8 @@ class MechanismState(NamedTuple):
 
     mechanism: Mechanism  # what moves
     data: ConfigurationData  # its configuration
-    row: FloatArray  # what an attempt continues from, `data.state`
+    row: FloatArray  # what an attempt continues from: `data.state` and `mixing`
+    mixing: Mixing  # the last sweeps, of an accelerated solver
     workspace: Workspace  # of the solver
     restarts: FloatArray  # coordinates of the mechanism for further attempts, (restart, coordinate)
     # where they put the effectors, positions [m] and rotations, (restart, effector, 7)
@@ -119,9 +123,13 @@ def solve_mechanisms(
     joints, mechanism_fields, restarts, restart_frames = model
     limits = limits_of(numbers)
     mechanism = Mechanism(*mechanism_fields)
-    data = new_data(mechanism)
+    n = len(mechanism.columns)
+    row = np.zeros(n + 5 + mixing_size(n, depth))
+    data, mixing = data_on(mechanism, row[: n + 5]), mixing_on(row[n + 5 :], n, depth)
+    if depth > 0:
+        scale_lengths(mechanism, mixing.scale)
     state = MechanismState(
-        mechanism, data, data.state, new_workspace(mechanism), restarts, restart_frames,
+        mechanism, data, row, mixing, new_workspace(mechanism), restarts, restart_frames,
         np.empty(len(restarts)),
     )  # fmt: skip
     count = len(restarts) + 1 + SPARE_ROWS
@@ -135,6 +143,7 @@ def solve_mechanisms(
             return False
         gather(mechanism, q, data.q)
         clear(data.far_step)
+        forget(mixing)
         for j in range(len(mechanism.joints)):
             clamp_joint(mechanism.joints, j, data.q)
         update_forward_kinematics(mechanism, data)
@@ -161,6 +170,15 @@ def new_workspace(mechanism):
     """Return a workspace, not filled."""
     system = new_system(mechanism.equations, mechanism.freedoms)
     return Workspace(system, np.empty(len(mechanism.joints), BACKWARD), np.empty((2, 4, 4)))
+
+
+def scale_lengths(mechanism, scale):
+    """Divide coordinates that are lengths by the reach, where sweeps are compared."""
+    joints = mechanism.joints
+    for j in range(len(joints)):
+        at, kind = joints["coordinate"][j], joints["kind"][j]
+        for k in range(3 if kind == FREE else 1 if kind == SLIDE else 0):
+            scale[at + k] = 1.0 / mechanism.reach
 
 
 def normalise_target(target):
@@ -215,6 +233,7 @@ def perturb_mechanism(state, _target, _criteria, first):
             bend = rotation_about(PERTURBATION_AXIS, angle)
             store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), bend)))
             clamp_joint(joints, j, q)
+    forget(state.mixing)
     update_forward_kinematics(mechanism, state.data)
     return True
 
@@ -237,6 +256,7 @@ def draw_mechanism(state, target, criteria, n):
             rank_restarts(state, target)
         take_nearest(state, state.data.q)
     clear(state.data.far_step)
+    forget(state.mixing)
     update_forward_kinematics(state.mechanism, state.data)
 
 
@@ -299,6 +319,7 @@ def take_nearest(state, q):
     copy_row(state.restarts[nearest], q)
 
 
+depth = 0  # of the sweeps that a solver remembers
 operations = Operations(
     ccd_update, residuals, merit_of, perturb_mechanism, place_mechanism, draw_mechanism, only_phase
 )
@@ -309,11 +330,16 @@ UPDATES = {
     "levenberg_marquardt": (levenberg_marquardt_update, levenberg_marquardt_phase),
     "damped_least_squares": (damped_least_squares_update, only_phase),
     "jacobian_transpose": (jacobian_transpose_update, only_phase),
+    "anderson_ccd": (anderson_ccd_update, only_phase),
 }
 # The kernel that solves mechanisms by the update of each solver.
 ON_MECHANISMS = {
     name: Kernel(
-        bind(solve_mechanisms, operations=operations._replace(update=update, begin=begin)),
+        bind(
+            solve_mechanisms,
+            operations=operations._replace(update=update, begin=begin),
+            depth=DEPTH * (update is anderson_ccd_update),
+        ),
         label=f"{name} for mechanisms",
     )
     for name, (update, begin) in UPDATES.items()

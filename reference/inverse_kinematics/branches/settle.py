@@ -8,13 +8,12 @@ from ...articulation import HINGE, LIMIT_TOLERANCE
 from ...backend.compiled import Kernel
 from ..box_step import (
     FULL_CIRCLE,
-    clear,
     fill_errors,
     fill_jacobian,
-    inner,
     new_system,
     solve_system,
 )
+from ..linear_algebra import clear, inner
 from ..mechanism import TARGET, Mechanism, errors, new_data, update_forward_kinematics
 from ..restarts import copy_row
 from ..solve_mechanism import normalise_target

@@ -22,8 +22,14 @@ from plumbob.reference.inverse_kinematics.mechanism import (
 from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.solve_mechanism import new_workspace
 
+# Anderson's CCD has tests of its own; here it is left to the sweep of slow tests.
+SOLVERS = [
+    pytest.param(name, marks=pytest.mark.slow if name == "anderson_ccd" else ())
+    for name in IK_SOLVERS
+]
 
-@pytest.fixture(params=IK_SOLVERS)
+
+@pytest.fixture(params=SOLVERS)
 def solver(request):
     return request.param
 

@@ -109,7 +109,7 @@ def test_a_straight_chain_is_bent_in_one_plane_however_its_joints_are_twisted(rn
     offsets = np.vstack([np.zeros(3), rotation.rotate(rotation.conjugate(rotations), links)])
     tree = Skeleton(range(-1, 4), offsets)
     local = local_from_global(tree, np.vstack([rotations, rotation.identity(1)]))
-    chain = new_chain(tree.offsets, tree.path())
+    chain = new_chain(tree.offsets, tree.path(), 0)
     pose_chain(chain, tree.path(), local)
     bend(chain)
     directions = np.diff(chain.positions, axis=0) / lengths[:, None]

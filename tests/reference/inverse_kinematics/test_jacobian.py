@@ -27,7 +27,7 @@ def test_damped_equations_are_solved(factor, b):
 
 def test_a_chain_that_had_to_be_bent_is_linearised_where_it_then_is():
     arm, rest = scenes.lab_arm()
-    chain = new_chain(arm.offsets, arm.path())
+    chain = new_chain(arm.offsets, arm.path(), 0)
     pose_chain(chain, arm.path(), rest)
     target = (0.0, 0.3, 0.0)
     e, A = linearise(chain, target, 0.0)
