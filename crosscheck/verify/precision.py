@@ -85,6 +85,13 @@ def _decimals(numbers: np.ndarray) -> list[DecimalTuple]:
     return [Decimal(repr(x)).normalize().as_tuple() for x in numbers.tolist()]
 
 
+def decimal_places(exchanges: Sequence[Exchange]) -> int | None:
+    """Return the few decimals that all answers are rounded to, None if they have more."""
+    numbers = np.concatenate([*_outputs(exchanges).values(), ()])
+    places = max((-int(decimal.exponent) for decimal in _decimals(numbers)), default=MIN_DIGITS)
+    return places if len(numbers) >= MIN_NUMBERS and places < MIN_DIGITS else None
+
+
 def _outputs(exchanges: Sequence[Exchange]) -> dict[str, np.ndarray]:
     """Return the numbers of each output that do not come from the request, residuals aside."""
     outputs: dict[str, np.ndarray] = {}

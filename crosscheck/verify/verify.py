@@ -12,7 +12,7 @@ from .case import Case
 from .contestant import Contestant, Exchange, Failure, is_hung
 from .greeting import Greeting
 from .inference import inferred, methods_of
-from .judgement import Report, TaskReport, Verdict
+from .judgement import Diagnosis, Report, TaskReport, Verdict
 from .kinematics import (
     faults,
     forward_kinematics,
@@ -137,8 +137,15 @@ def judge_cases(
         judge = partial(discipline.judge, notify=partial(notify, task))
     greeting, reason = precision.judging_greeting(exchanges, declared or contestant.greeting)
     report = judge(exchanges, greeting, method)
+    places = precision.decimal_places(exchanges) if report.verdict is Verdict.WRONG else None
+    if places is not None:
+        words = sentence(
+            "All numbers of its answers are rounded to {places} decimals. Return all digits.",
+            places=places,
+        )
+        report = replace(report, diagnosis=Diagnosis(first_broken=words))
     diagnosis = report.diagnosis
-    unexplained = report.verdict is Verdict.WRONG and not diagnosis.explained
+    unexplained = report.verdict is Verdict.WRONG and not diagnosis.explained and places is None
     if unexplained and greeting.precision == "double" and not diagnosis.is_double:
         single = judge(exchanges, msgspec.structs.replace(greeting, precision="single"), method)
         is_right = single.verdict <= Verdict.RIGHT_EXCEPT and precision.is_off_by_single(report)

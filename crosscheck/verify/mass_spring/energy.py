@@ -4,14 +4,13 @@ Zero of the gravitational energy is where the solver has it: the states of a cas
 several places, and only differences to the first of them count.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, islice, product
 from typing import Any
 
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
@@ -23,12 +22,12 @@ from ..laws import digits, finding, hints_of, judge_case
 from ..sentence import sentence
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, combined
+from .formulas import evaluate
 from .model import StepModel
 from .problem import (
     SpringProblem,
     all_forces,
     elastic_energy,
-    frames,
     problem_of,
     state_of,
     system_of,
@@ -79,63 +78,6 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     return TaskReport(TASK, "", judgements, _diagnose(judgements, greeting.epsilon))
 
 
-def _elastic(formula: Callable[..., FloatArray]) -> Callable[[SpringProblem], float]:
-    """Return k/2 times the sum of a formula of l and r as an energy of a problem [J]."""
-
-    def energy(p: SpringProblem) -> float:
-        return float(
-            (0.5 * p.stiffnesses * formula(frames(p, p.positions)[0], p.rest_lengths)).sum()
-        )
-
-    return energy
-
-
-def _above(p: SpringProblem, origin: FloatArray) -> float:
-    """Return the gravitational energy above a point [J]."""
-    return -float((p.constant * (p.positions - origin)).sum())
-
-
-def _lowest(p: SpringProblem) -> FloatArray:
-    return p.positions[int(np.argmax(p.positions @ p.gravity))]
-
-
-# Wrong formulas of energies by the keys of the faults.
-WRONG_FORMULAS: Mapping[str, Callable[[SpringProblem], float]] = {
-    "kinetic of speeds": lambda p: float(0.5 * p.masses @ np.linalg.norm(p.velocities, axis=1)),
-    "kinetic of the mean velocity": lambda p: float(
-        0.5 * p.masses.sum() * (p.velocities.mean(0) ** 2).sum()
-    ),
-    "kinetic of two sums": lambda p: float(0.5 * p.masses.sum() * (p.velocities**2).sum()),
-    "kinetic of summed components": lambda p: float(0.5 * p.masses @ p.velocities.sum(1) ** 2),
-    "kinetic with the first mass": lambda p: float(0.5 * p.masses[0] * (p.velocities**2).sum()),
-    "kinetic with m²": lambda p: float(0.5 * p.masses**2 @ (p.velocities**2).sum(1)),
-    "elastic of squares": _elastic(lambda length, rest: np.abs(length * length - rest * rest)),
-    "elastic of strains": _elastic(lambda length, rest: ((length - rest) / rest) ** 2),
-    "elastic over rest length": _elastic(lambda length, rest: (length - rest) ** 2 / rest),
-    "elastic without rest length": _elastic(lambda length, rest: length * length),
-    "elastic not squared": _elastic(lambda length, rest: np.abs(length - rest)),
-    "elastic of stretched springs": _elastic(
-        lambda length, rest: np.maximum(length - rest, 0.0) ** 2
-    ),
-    "elastic without k": lambda p: elastic_energy(
-        p.changed(stiffnesses=np.ones_like(p.stiffnesses))
-    ),
-    "elastic of two sums": lambda p: elastic_energy(
-        p.changed(stiffnesses=np.full_like(p.stiffnesses, p.stiffnesses.sum()))
-    ),
-    "gravitational without mass": lambda p: -float((p.positions @ p.gravity).sum()),
-    "gravitational with the first mass": lambda p: (
-        -float(p.masses[0] * (p.positions @ p.gravity).sum())
-    ),
-    "gravitational along y": lambda p: float(9.81 * p.masses @ p.positions[:, 1]),
-    "gravitational along z": lambda p: float(9.81 * p.masses @ p.positions[:, 2]),
-    "gravitational above the first": lambda p: _above(p, p.positions[0]),
-    "gravitational above the lowest": lambda p: _above(p, _lowest(p)),
-    "gravitational above the mean": lambda p: _above(p, p.positions.mean(0)),
-    "gravitational without sign": lambda p: abs(_above(p, np.zeros(3))),
-}
-
-
 def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
     """Return all energies by the formulas, as a solver with these faults has them [J]."""
     p, _ = apply(faults, p, StepModel())
@@ -144,7 +86,7 @@ def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
     for fault in faults:
         parts *= fault.parts or 1.0
         if len(fault.energy) == 1:
-            parts[ADDENDS.index(fault.energy[0])] = WRONG_FORMULAS[fault.key](p)
+            parts[ADDENDS.index(fault.energy[0])] = evaluate(fault.formula, p)
     energies = dict(zip(ADDENDS, parts.tolist(), strict=True))
     return {name: _sum(name, faults, energies) for name in SUMS} | energies
 
@@ -311,7 +253,7 @@ def _explains(fault: Option, name: str, answers: Answers, epsilon: float) -> boo
             values[name]
             - (_sum(name, (fault,), values) if is_of_sum else predict((fault,), p)[name])
         )
-        <= 8.0 * tolerance(p, epsilon)
+        <= 8.0 * (tolerance(p, epsilon) + epsilon * abs(values[name]))
         for p, values in answers
     )
 

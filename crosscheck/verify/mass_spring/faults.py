@@ -8,13 +8,10 @@ from itertools import combinations, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from plumbob.reference.arguments import FloatArray
-
 from ..sentence import Sentence, sentence, with_code
+from .formulas import evaluate
 from .model import Integrator, StepModel, SystemMatrix
-from .problem import SpringProblem, frames
+from .problem import SpringProblem
 
 # Aspects of a step in the order of the computation.
 ASPECTS = (
@@ -40,118 +37,25 @@ class Option(NamedTuple):
     parts: tuple[float, ...] = ()  # factors of the kinetic, elastic and gravitational energy
     # which energy has another formula, or a sum, one of its parts, and the factor of that
     energy: tuple[Any, ...] = ()
-    output: bool = False  # whether it changes all forces at the end
-    rare: bool = False  # whether it is not tried together with faults
+    # what it makes of all forces at the end: a formula, or true for a key of OUTPUTS in forces.py
+    output: str | bool = False
+    formula: str = ""  # of the energy that `energy` names
+    # whether it is not tried together with faults of a step, nor with two of forces, or "alone"
+    rare: bool | str = False
     part: str = ""  # the part of a step that it changes alone: forces, matrix; "" or both
-
-
-def _with_masses(p: SpringProblem, masses: FloatArray) -> dict[str, Any]:
-    """Return masses that are both inert and heavy."""
-    return {"masses": masses, "weighing": masses, "weights": masses[:, None] * p.gravity}
-
-
-def _with_gravity(p: SpringProblem, gravity: FloatArray) -> dict[str, Any]:
-    return {"gravity": gravity, "weights": p.weighing[:, None] * gravity}
-
-
-def _without_spring(p: SpringProblem, index: int) -> dict[str, Any]:
-    factors = np.ones(len(p.springs))
-    factors[index] = 0.0
-    return {"stiffnesses": factors * p.stiffnesses, "dampings": factors * p.dampings}
-
-
-def _first_for_all(p: SpringProblem, name: str) -> dict[str, Any]:
-    return {name: np.resize(getattr(p, name)[:1], len(p.springs))}
-
-
-def _lengths(p: SpringProblem) -> FloatArray:
-    return np.maximum(frames(p, p.positions)[0], 1e-150)
-
-
-def _as_if_long(p: SpringProblem, length: float) -> dict[str, Any]:
-    """Return the numbers with which springs pull as if all were that long."""
-    share, stretch = _lengths(p) / length, _lengths(p) - p.rest_lengths
-    stretch = np.where(stretch != 0.0, stretch, 1e-12)
-    return {
-        "stiffnesses": p.stiffnesses * share * (length - p.rest_lengths) / stretch,
-        "dampings": p.dampings * share**2,
-    }
 
 
 # What an entry of faults.toml may hold.
 FIELDS = {
     *("code", "program", "lines", "example", "key", "sentence", "tasks", "parts", "rare", "each"),
-    *("scale", "set", "model", "integrator", "matrix", "value", "part", "energy", "output"),
+    *("scale", "set", "change", "length", "formula", "model", "integrator", "matrix", "value"),
+    *("part", "energy", "output"),
 }
-# Faults that are no fixed factors or fields.
-CHANGES: Mapping[str, Callable[..., Mapping[str, Any]]] = {
-    "mass inverse missing": lambda p: {"masses": np.ones(p.count)},
-    "mass inverse squared": lambda p: {"masses": p.masses**2},
-    "mass multiplied": lambda p: {"masses": 1.0 / p.masses},
-    "h in place of h²": lambda p: {"stiffnesses": p.stiffnesses / p.h},
-    "h² missing": lambda p: {"stiffnesses": p.stiffnesses / p.h**2},
-    "mass 1 for all": lambda p: _with_masses(p, np.ones(p.count)),
-    "first mass for all": lambda p: _with_masses(p, np.full(p.count, p.masses[0])),
-    "gravity g/m": lambda p: {"weights": np.tile(p.gravity, (p.count, 1))},
-    "gravity of its own {gravity:g}": lambda p, gravity: _with_gravity(
-        p, np.array([0.0, -gravity, 0.0])
-    ),
-    "gravity m² g": lambda p: {"weights": p.weighing[:, None] * p.weights},
-    "rest length 1 for all": lambda p: {"rest_lengths": np.ones(len(p.springs))},
-    "stiffness 1 for all": lambda p: {"stiffnesses": np.ones(len(p.springs))},
-    "springs with h": lambda p: {"stiffnesses": p.stiffnesses / p.h},
-    "springs without h²": lambda p: {"stiffnesses": p.stiffnesses / p.h**2},
-    "gravity with h³": lambda p: {"weights": p.weights * p.h},
-    "gravity along z": lambda p: _with_gravity(p, np.array([0.0, 0.0, -np.linalg.norm(p.gravity)])),
-    "gravity without h²": lambda p: {"weights": p.weights / p.h**2},
-    "gravity with h": lambda p: {"weights": p.weights / p.h},
-    "external forces as accelerations": lambda p: {"external": p.weighing[:, None] * p.external},
-    "rest length from the state": lambda p: {"rest_lengths": frames(p, p.positions)[0]},
-    "stiffness over rest length": lambda p: {
-        "stiffnesses": p.stiffnesses / np.where(p.rest_lengths > 0.0, p.rest_lengths, 1.0)
-    },
-    "last spring left out": lambda p: _without_spring(p, -1),
-    "first spring left out": lambda p: _without_spring(p, 0),
-    "first stiffness for all": lambda p: _first_for_all(p, "stiffnesses"),
-    "first rest length for all": lambda p: _first_for_all(p, "rest_lengths"),
-    "first damping for all": lambda p: _first_for_all(p, "dampings"),
-    "damping times stiffness": lambda p: {"dampings": p.dampings * p.stiffnesses},
-    "damping with h": lambda p: {"dampings": p.h * p.dampings},
-    "damping without h": lambda p: {"dampings": p.dampings / p.h},
-    "stiffness and rest length swapped": lambda p: {
-        "stiffnesses": p.rest_lengths,
-        "rest_lengths": p.stiffnesses,
-    },
-    "stiffness and damping swapped": lambda p: {
-        "stiffnesses": p.dampings,
-        "dampings": p.stiffnesses,
-    },
-    "mass and h swapped": lambda p: (
-        _with_masses(p, np.full(p.count, p.h)) | {"h": float(p.masses[0])}
-    ),
-    "pins as a mask": lambda p: {"pinned": np.flatnonzero(p.pinned[: p.count])},
-    "kinetic without mass": lambda p: {"masses": np.ones(p.count)},
-    "mean rest length for all": lambda p: {
-        "rest_lengths": np.full(len(p.springs), p.rest_lengths.mean())
-    },
-    "mean stiffness for all": lambda p: {
-        "stiffnesses": np.full(len(p.springs), p.stiffnesses.mean())
-    },
-    "rest length of the next spring": lambda p: {"rest_lengths": np.roll(p.rest_lengths, -1)},
-    "stretch without sign": lambda p: {
-        "stiffnesses": p.stiffnesses * np.sign(_lengths(p) - p.rest_lengths)
-    },
-    "stretch squared": lambda p: {
-        "stiffnesses": p.stiffnesses * np.abs(_lengths(p) - p.rest_lengths)
-    },
-    "length with {length:g} added": lambda p, length: {
-        "stiffnesses": p.stiffnesses * _lengths(p) / (_lengths(p) + length),
-        "dampings": p.dampings * (_lengths(p) / (_lengths(p) + length)) ** 2,
-    },
-    "length of all springs together": lambda p: _as_if_long(p, float(np.linalg.norm(_lengths(p)))),
-    "damping over length": lambda p: {"dampings": p.dampings / _lengths(p)},
-    "damping times length": lambda p: {"dampings": p.dampings * _lengths(p)},
-    "damping times length squared": lambda p: {"dampings": p.dampings * _lengths(p) ** 2},
+# The numbers with which springs pull as if they were of another length L.
+OF_OTHER_LENGTH = {
+    "rest_lengths": "0.0 * r",
+    "stiffnesses": "k * (({L}) - r) / ({L})",
+    "dampings": "c * (l / ({L})) ** 2",
 }
 
 
@@ -185,7 +89,11 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
         change, part = _change(entry, values), entry.get("part", "")
         energy = tuple(values.get(name, name) for name in entry.get("energy", ()))
         output = entry.get("output", False)
-        option = Option(key, aspect, message, change, fields, parts, energy, output, rare, part)
+        formula = entry.get("formula", "").format(**values)
+        output = output.format(**values) if isinstance(output, str) else output
+        option = Option(
+            key, aspect, message, change, fields, parts, energy, output, formula, rare, part
+        )
         yield option
         if aspect == "inertia":
             yield option._replace(fields={**fields, "right_start": True})
@@ -222,8 +130,16 @@ def _change(entry: Mapping[str, Any], values: Mapping[str, Any]) -> Change | Non
         return lambda p: {name: f * getattr(p, name) for name, f in entry["scale"].items()}
     if "set" in entry:
         return lambda p: entry["set"]
-    function = CHANGES.get(entry.get("key", ""))
-    return partial(function, **values) if function else None
+    formulas = entry.get("change", {})
+    if "length" in entry:
+        formulas = {name: f.format(L=entry["length"]) for name, f in OF_OTHER_LENGTH.items()}
+    return partial(_evaluated, formulas, values) if formulas else None
+
+
+def _evaluated(
+    formulas: Mapping[str, str], values: Mapping[str, Any], p: SpringProblem
+) -> Mapping[str, Any]:
+    return {name: evaluate(formula, p, values) for name, formula in formulas.items()}
 
 
 _FAULTS = read_table("faults.toml")
@@ -271,8 +187,9 @@ def apply(
 
 def combined(options: Sequence[Option]) -> Iterator[tuple[Option, ...]]:
     """Yield each option, then each pair and each triple without rare ones, of other aspects."""
+    paired = [option for option in options if option.rare != "alone"]
     usual = [option for option in options if not option.rare]
-    for count in range(1, MAX_FAULTS + 1):
-        for faults in combinations(options if count < MAX_FAULTS else usual, count):
+    for count, choices in enumerate((options, paired, usual), start=1):
+        for faults in combinations(choices, count):
             if len({fault.aspect for fault in faults}) == count:
                 yield faults

@@ -18,6 +18,7 @@ from ..laws import digits, finding, hints_of, judge_case
 from ..sentence import Sentence, sentence
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, combined
+from .formulas import evaluate
 from .laws import symmetry
 from .model import StepModel
 from .problem import (
@@ -134,8 +135,6 @@ def _shortened(vectors: FloatArray, limit: float) -> FloatArray:
 
 # What faults make of all forces in the end, by their keys, and with a number that answers show.
 OUTPUTS: Mapping[str, Callable[[SpringProblem, float], FloatArray]] = {
-    "accelerations": lambda p, _: all_forces(p) / p.masses[:, None],
-    "forces reversed": lambda p, _: -all_forces(p),
     "components of forces clipped": lambda p, limit: np.clip(all_forces(p), -limit, limit),
     "components of springs' forces clipped": lambda p, limit: (
         p.constant + p.incidence.T @ np.clip(_pulls(p), -limit, limit)
@@ -179,9 +178,13 @@ def forces_with(
 ) -> FloatArray:
     """Return the forces of a solver with faults; numbers are those that `OUTPUTS` take."""
     p = apply(faults, p, StepModel())[0]
-    key = next((fault.key for fault in faults if fault.output), "")
-    name, _, number = key.partition(" at ")
-    return OUTPUTS[name](p, float(number or numbers.get(name, 0.0))) if key else all_forces(p)
+    fault = next((fault for fault in faults if fault.output), None)
+    if fault is None:
+        return all_forces(p)
+    if isinstance(fault.output, str):
+        return np.asarray(evaluate(fault.output, p))
+    name, _, number = fault.key.partition(" at ")
+    return OUTPUTS[name](p, float(number or numbers.get(name, 0.0)))
 
 
 def variants(exchanges: Sequence[Exchange]) -> Iterator[Variant]:

@@ -98,7 +98,7 @@ def compatible(options: Mapping[str, Option]) -> bool:
     damper, velocity = fields.get("damper"), fields.get("velocity")
     needs_substeps = (
         fields.get("pins") == "at_the_end"
-        or fields.get("time") == "undivided"
+        or fields.get("time") in ("undivided", "one substep less")
         or velocity == "over the whole h"
     )
     if needs_substeps and fields.get("substeps") == 1:

@@ -54,6 +54,7 @@ class SystemMatrix(NamedTuple):
     drag: float = 1.0
     drag_power: int = 0
     right_power: int = 0
+    is_by_columns: bool = False  # the right-hand side: all x, then all y, in rows of x, y and z
     # exact; "first order": multiplied by 1 - h²/m K; or a key of ITERATIONS with a number of them
     inverse: str = "exact"
 
@@ -73,7 +74,8 @@ class StepModel(NamedTuple):
     # eliminated, overwritten; with a number: penalty (weight), springs (stiffness), heavy or
     # falling (mass); at_the_end: free through the substeps; free; unattached: no springs to them;
     # first: only one is held; origin: their columns dropped, so that springs end at the origin;
-    # dropped: eliminated, then moved by gravity
+    # dropped: eliminated, then moved by gravity; identity rows: of the matrix, but the right-hand
+    # side is not zero
     pins: str = "eliminated"
     velocity: str = "displacement"  # displacement, separate; or a key of VELOCITIES
     matrix: SystemMatrix = RIGHT_MATRIX  # of an implicit step
@@ -83,14 +85,16 @@ class StepModel(NamedTuple):
     dampers_apart: bool = False  # whether a fault of the springs' part spares the dampers' part
     # what stands for y: y; x_n: no velocity; doubled: x_n + 2 h v; squared: x_n + h² v
     inertia: str = "y"
-    # divided among substeps; undivided; before: of the last request, in the matrix only; or a
+    # divided among substeps; undivided; one substep less: divided by a number that is one more;
+    # before: of the last request, in the matrix only; or a
     # number of seconds instead of h
     time: str | float = "divided"
     # of a matrix that is not positive definite: LU; or Cholesky's, unchecked. Eigen's dense LLT
     # stops at a pivot and solves with what it has (LLT); its SimplicialLLT does not solve, so that
     # the unknown, a displacement or a change of velocity, stays zero or what memory held
     factorisation: str = "LU"
-    update: str = "solved"  # of positions and velocities by the solution; else a key of UPDATES
+    # of positions and velocities by the solution; else a key of UPDATES, of some with a number
+    update: str = "solved"
     right_start: bool = False  # whether iterations begin at x + h v, whatever stands for y
     frames: str = "each"  # of several steps, or a key of FRAMES
 
@@ -98,6 +102,16 @@ class StepModel(NamedTuple):
     def pin_kind(self) -> str:
         """The first word of `pins`."""
         return self.pins.split()[0]
+
+    @property
+    def update_kind(self) -> str:
+        """The key of `update` in UPDATES."""
+        return self.update if self.update in UPDATES else self.update.split()[0]
+
+    @property
+    def update_number(self) -> float:
+        """The number in `update`."""
+        return float(self.update.split()[-1])
 
     @property
     def pin_strength(self) -> float:
@@ -133,6 +147,10 @@ BETWEEN: Mapping[str, Callable[[SpringProblem, FloatArray, FloatArray], State]] 
 FRAMES: Mapping[str, Callable[[SpringProblem, list[State]], list[State]]] = {
     "start first": lambda p, states: [(p.positions, p.velocities), *states[:-1]],
     "last only": lambda p, states: states[-1:] * len(states),
+    "last positions": lambda p, states: [(states[-1][0], v) for _, v in states],
+    "velocities late": lambda p, states: [
+        (x, v) for (x, _), v in zip(states, [p.velocities, *(v for _, v in states)], strict=False)
+    ],
 }
 
 
@@ -189,7 +207,7 @@ def _step(
     pins = x[p.pinned]
     if model.substeps > 1 and _falls_freely(p, model):
         return _free_fall(Substep(p, model, x, v, h))
-    for _ in range(model.substeps):
+    for _ in range(model.substeps - (model.time == "one substep less")):
         x, v = substep(Substep(p, model, x, v, h))
     if model.pins == "at_the_end":
         x, v = x.copy(), v.copy()
@@ -199,7 +217,8 @@ def _step(
 
 def _falls_freely(p: SpringProblem, model: StepModel) -> bool:
     """Return whether the forces of all substeps of an explicit method are the same."""
-    usual = (model.velocity, model.scaling) == ("separate", 1.0)
+    usual = (model.velocity, model.scaling) == ("separate", 1.0) and model.update == "solved"
+    usual &= model.time != "one substep less"
     coupled = p.stiff or p.damped or p.pinned.size
     return bool(usual and not coupled and model.integrator.method in SHARES)
 
@@ -225,7 +244,7 @@ def substep(start: Substep) -> tuple[FloatArray, FloatArray]:
             separate = separate + force / h
     v = VELOCITIES[model.velocity](start, x, separate) * model.scaling
     if model.update != "solved":
-        x, v = UPDATES[model.update](start, x, v)
+        x, v = UPDATES[model.update_kind](start, x, v)
     if model.pins == "overwritten" or not start.free.all():
         x, v = x.copy(), v.copy()
         fall = h * h * p.gravity if model.pins == "dropped" else 0.0
@@ -339,6 +358,9 @@ VELOCITIES: Mapping[str, Callable[[Substep, FloatArray, FloatArray], FloatArray]
     "times h": lambda s, x, separate: (x - s.x) * s.h,
     "with gravity": lambda s, x, separate: (x - s.x) / s.h + s.h * s.p.gravity,
     "over 1/60": lambda s, x, separate: (x - s.x) * 60.0,
+    "from s": lambda s, x, separate: (
+        (x - s.x) / s.h - s.v - s.h * s.p.constant / s.p.masses[:, None]
+    ),
 }
 
 # Positions and velocities after a substep from its start and the right ones.
@@ -352,7 +374,11 @@ UPDATES: Mapping[str, Update] = {
     "mean velocity": lambda s, x, v: (s.x + 0.5 * s.h * (s.v + v), v),
     "with h²": lambda s, x, v: (s.x + s.h * (x - s.x), v),
     "over 1/60 s": lambda s, x, v: (s.x + v / 60.0, v),
-}
+    "times": lambda s, x, v: (s.x + s.model.update_number * (x - s.x), s.model.update_number * v),
+    "floor": lambda s, x, v: (
+        np.where([False, True, False], np.maximum(x, s.model.update_number), x), v
+    ),
+}  # fmt: skip
 
 
 class StepEquation:
@@ -493,6 +519,9 @@ class StepEquation:
         Iterative solvers begin at a guess, by default zero.
         """
         free = np.repeat(self.free, len(A) // len(right))
+        if self.start.model.pins == "identity rows":
+            rows = np.isin(np.arange(len(A)) * len(right) // len(A), self.start.p.pinned)
+            A = np.where(rows[:, None], np.eye(len(A)), A)
         solution = np.zeros_like(right).reshape(len(A), -1)
         part = A if free.all() else A[np.ix_(free, free)]
         kind, inverse = self.start.model.factorisation, self.start.model.matrix.inverse
@@ -525,6 +554,7 @@ class StepEquation:
             right = right - p.masses[:, None] * drift - drag.reshape(right.shape)
             right = right + h**2 * damper_forces(p, x, self.start.v) if self.damped else right
         right = right * h**rule.right_power if rule.right_power else right
+        right = right.T.reshape(right.shape) if rule.is_by_columns else right
         if rule.inverse == "first order":
             right = np.where(self.free[:, None], right, 0.0)
             M = np.repeat(p.masses, 3)

@@ -170,6 +170,7 @@ RATES: Mapping[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] 
     "first": lambda v_i, v_j, u: along(v_i, u),
     "second": lambda v_i, v_j, u: along(-v_j, u),
     "speed": lambda v_i, v_j, u: np.linalg.norm(v_i - v_j, axis=1, keepdims=True) * u,
+    "of all": lambda v_i, v_j, u: ((v_i - v_j) * u).sum() * u,
     "components": lambda v_i, v_j, u: (v_i - v_j) * np.abs(u),
 }
 

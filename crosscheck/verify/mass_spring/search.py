@@ -472,7 +472,7 @@ def _relevant_in_flight(choices: Choices) -> Choices:
 def _acts_in_flight(option: Option) -> bool:
     """Return whether a matrix matters where no spring acts."""
     matrix = option.fields.get("matrix", RIGHT_MATRIX)
-    return bool(matrix.masses != 1.0 or matrix.right_power)
+    return bool(matrix.masses != 1.0 or matrix.right_power or matrix.is_by_columns)
 
 
 def in_flight(integrator: Integrator, usual: Integrator = ONE_STEP) -> Integrator:

@@ -1,0 +1,73 @@
+"""Formulas of the catalogue of faults: expressions of the numbers of a problem."""
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from types import CodeType
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from .problem import SpringProblem, all_forces, frames
+
+SHORTEST = 1e-150  # of the lengths by which a formula may divide [m]
+
+
+def _lengths(p: SpringProblem) -> FloatArray:
+    return np.maximum(frames(p, p.positions)[0], SHORTEST)
+
+
+def _stretches(p: SpringProblem) -> FloatArray:
+    stretch = _lengths(p) - p.rest_lengths
+    return np.where(stretch != 0.0, stretch, 1e-12)
+
+
+# What the names in a formula stand for.
+NAMES: Mapping[str, Callable[[SpringProblem], Any]] = {
+    "n": lambda p: p.count,
+    "m": lambda p: p.masses,
+    "heavy": lambda p: p.weighing,  # the masses that gravity pulls
+    "weights": lambda p: p.weights,
+    "g": lambda p: p.gravity,
+    "external": lambda p: p.external,
+    "x": lambda p: p.positions,
+    "v": lambda p: p.velocities,
+    "h": lambda p: p.h,
+    "pins": lambda p: p.pinned,
+    "r": lambda p: p.rest_lengths,
+    "k": lambda p: p.stiffnesses,
+    "c": lambda p: p.dampings,
+    "i": lambda p: p.springs[:, 0],
+    "j": lambda p: p.springs[:, 1],
+    "number": lambda p: np.arange(len(p.springs)),
+    "l": _lengths,
+    "stretch": _stretches,
+    "d": lambda p: p.incidence @ p.positions,  # from the second end to the first
+    # of the lengths [m/s]
+    "rate": lambda p: ((p.incidence @ p.velocities) * frames(p, p.positions)[1]).sum(axis=1),
+    "degree": lambda p: np.abs(p.incidence).sum(axis=0),  # the number of springs of a particle
+    "f": all_forces,
+}
+_GLOBALS = {"np": np, "norm": np.linalg.norm, "abs": np.abs}
+
+
+class _Values(dict[str, Any]):
+    """The values of names in a formula, computed where they are needed."""
+
+    def __init__(self, p: SpringProblem, values: Mapping[str, Any]) -> None:
+        super().__init__(values)
+        self._problem = p
+
+    def __missing__(self, name: str) -> Any:
+        return NAMES[name](self._problem)
+
+
+@cache
+def _compiled(formula: str) -> CodeType:
+    return compile(formula, "faults.toml", "eval")
+
+
+def evaluate(formula: str, p: SpringProblem, values: Mapping[str, Any] | None = None) -> Any:
+    """Return the value of a formula for a problem; `values` are those of further names."""
+    return eval(_compiled(formula), _GLOBALS, _Values(p, values or {}))
