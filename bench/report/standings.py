@@ -9,10 +9,9 @@ from ..experiments import chain, cloth_peers
 from ..experiments.cloth_peers.readings import Point, points
 from ..experiments.robots import readings
 from ..harness import metrics
-from ..harness.record import Record
 from ..peers import registry
 from ..tables.columns import words_in
-from ..tables.results import Results, counted, label, listed
+from ..tables.results import Results, counted, grouped, label, listed
 from ..tables.table import words
 
 # The most cloths with a sentence of their own.
@@ -50,10 +49,8 @@ def standings(results: Results) -> list[Headline]:
 
 def _failures(results: Results, suite: str) -> Iterator[Headline]:
     """Yield the first failure of each solver, and on how many problems it failed."""
-    doors: dict[str, list[Record]] = {}
-    for record in results.all(suite, failed=True, entrant=True):
-        doors.setdefault(str(record.facts.get("door")), []).append(record)
-    for records in doors.values():
+    entered = results.all(suite, failed=True, entrant=True)
+    for records in grouped(entered, lambda record: str(record.facts.get("door"))).values():
         if sentences := [f"{r.problem}: {why}" for r in records if (why := r.failed or r.trouble)]:
             name = min((record.solver for record in records), key=len)
             problems = f"{len(sentences)} of {counted(len(records), 'problem')}"

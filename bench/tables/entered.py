@@ -6,7 +6,7 @@ from dataclasses import replace
 from ..harness.record import Record
 from .columns import text
 from .layout import Layout
-from .results import Results, listed
+from .results import Results, grouped, listed
 from .table import Column, Summary
 
 NOT_ASKED = "not asked"
@@ -27,10 +27,8 @@ def remarks_of_entrants(results: Results, suites: Iterable[str]) -> list[str]:
 
 
 def _entrants(results: Results) -> list[EntrantRecords]:
-    entrants: dict[tuple[str, str], list[Record]] = {}
-    for record in [*results.all("ik", entrant=True), *results.all("cloth", entrant=True)]:
-        entrants.setdefault((record.suite, record.solver), []).append(record)
-    return list(entrants.values())
+    records = [*results.all("ik", entrant=True), *results.all("cloth", entrant=True)]
+    return list(grouped(records, lambda record: (record.suite, record.solver)).values())
 
 
 def _version(records: EntrantRecords) -> str:

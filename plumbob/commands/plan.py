@@ -17,7 +17,7 @@ from plumbob.bench.harness.executors import THIS_PROCESS
 from plumbob.bench.harness.measure import block_key, not_asked, not_installed
 from plumbob.bench.harness.record import Key, Record, RecordFile
 from plumbob.bench.peers import registry
-from plumbob.bench.tables.results import counted
+from plumbob.bench.tables.results import counted, grouped
 
 from ..terminal import width
 
@@ -133,9 +133,7 @@ def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
         if reason is not None
     ]
     lines = [f"{len(steps)} to measure, {len(selection) - len(steps)} already on record"]
-    by_solver: dict[tuple[str, str], list[PlannedBlock]] = {}
-    for step in steps:
-        by_solver.setdefault((step.block.suite, step.block.solver), []).append(step)
+    by_solver = grouped(steps, lambda step: (step.block.suite, step.block.solver))
     for (suite, solver), group in by_solver.items():
         repeats = Counter(step.reason for step in group if step.reason)
         whys = "".join(f"; again {count}, for {reason}" for reason, count in repeats.items())

@@ -147,12 +147,10 @@ def _machines(records: "Iterable[Record]") -> set[str]:
 def _table(folder: Path, records: "list[Record]") -> "Table":
     """Return a table with a row for each suite and solver."""
     from plumbob.bench.tables.columns import text
-    from plumbob.bench.tables.results import counted
+    from plumbob.bench.tables.results import counted, grouped
     from plumbob.bench.tables.table import Column, Summary, Table, cells
 
-    groups: dict[tuple[str, str], list[Record]] = {}
-    for record in records:
-        groups.setdefault((record.suite, record.solver), []).append(record)
+    groups = grouped(records, lambda record: (record.suite, record.solver))
     columns = (
         text("suite", lambda group: group[0].suite),
         text("solver", lambda group: group[0].solver),
