@@ -1,16 +1,16 @@
 """Titles, captions and columns of tables and figures, from the file `tables.toml` of a folder."""
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from string import Formatter
 from typing import Any
 
 from ..harness.record import Record
 from .columns import lengths_of_steps
-from .layout import records_of
-from .results import settings
-from .table import Column
+from .layout import Layout, records_of
+from .results import Results, settings
+from .table import NO_SUMMARY, Column, Summary
 
 
 class Captions:
@@ -29,13 +29,19 @@ class Captions:
         self.shared = {key: _on_one_line(text, constants) for key, text in shared.items()}
         self._constants = {**constants, **self.shared}
 
-    def of(
-        self, name: str, measured: Callable[[Any], Mapping[str, str]] | None = None
-    ) -> dict[str, Any]:
-        """Return the name, question, title, shows, measured and declared columns of a `Layout`.
+    def layout(
+        self,
+        name: str,
+        subjects: Callable[[Results], Iterable[Any]],
+        summary: Callable[[Any], Summary] = lambda subjects: NO_SUMMARY,
+        measured: Callable[[Any], Mapping[str, str]] | None = None,
+        **fields: Any,
+    ) -> Layout:
+        """Return the layout of a table, its texts and declared columns from the file.
 
         `measured` returns, from the subjects of the table, what stands in the braces of the
-        sentence on how they were measured; other braces hold the settings of their records.
+        sentence on how they were measured; other braces hold the settings of their records. The
+        fields are those of `Layout` beside the texts.
         """
         texts = {**self._tables[name]}
         template = texts.pop("measured")
@@ -45,16 +51,16 @@ class Captions:
         if name in self._columns[0]:
             captions["columns"] = self.columns(name)
         names = {field for _, field, _, _ in Formatter().parse(template) if field}
-        if measured is None and names <= self._constants.keys():
-            return {"name": name, **captions, "measured": _on_one_line(template, self._constants)}
 
-        def sentence(subjects: Any) -> str:
-            numbers = measured(subjects) if measured else {}
+        def sentence(rows: Any) -> str:
+            numbers = measured(rows) if measured else {}
             missing = names - {*self._constants, *numbers}
-            settings = {field: _setting(list(records_of(subjects)), field) for field in missing}
+            settings = {field: _setting(list(records_of(rows)), field) for field in missing}
             return _on_one_line(template, {**self._constants, **settings, **numbers})
 
-        return {"name": name, **captions, "measured": sentence}
+        is_constant = measured is None and names <= self._constants.keys()
+        captions |= {"measured": sentence([]) if is_constant else sentence, **fields}
+        return Layout(name=name, subjects=subjects, summary=summary, **captions)
 
     def figure(self, name: str) -> dict[str, Any]:
         """Return the name, title, caption and axes of a chart, a sketch or a scene."""

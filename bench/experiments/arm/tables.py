@@ -10,7 +10,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import quantile_cells, spread_of
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import Results, by_problem, grouped, leaders
 from ...tables.table import Summary, words
 from ..chain import BEYOND, CHAIN
@@ -83,12 +83,6 @@ def _residuals(record: Record) -> Series:
     return series(record.solver, np.arange(1, len(median)), median[1:], (low[1:], high[1:]))
 
 
-accuracy = Layout(
-    **_CAPTIONS.of("accuracy"),
-    subjects=_rows,
-    summary=_summary,
-    figures=(residuals_chart,),
-    compared=2,
-)
+accuracy = _CAPTIONS.layout("accuracy", _rows, _summary, figures=(residuals_chart,), compared=2)
 
 LAYOUTS = (accuracy,)

@@ -8,7 +8,7 @@ from ...harness.record import Record
 from ...peers.registry import PLUMBOB
 from ...tables.captions import Captions
 from ...tables.columns import words_in
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import Results, grouped, listed
 from ...tables.table import Summary, listing, words
 from . import BRANCHES, EXACT, LARGEST_COUNT, SAME, STARTS, TOLERANCE
@@ -59,6 +59,6 @@ _CAPTIONS = Captions(
     largest=words(LARGEST_COUNT),
 )
 
-branches = Layout(**_CAPTIONS.of("branches"), subjects=_rows, summary=_summary)
+branches = _CAPTIONS.layout("branches", _rows, _summary)
 
 LAYOUTS = (branches,)

@@ -16,7 +16,7 @@ from ...tables.columns import (
     spread_of_iterations,
     words_in,
 )
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import Results, by_problem, counted, grouped, label
 from ...tables.table import Summary, words
 from .. import arm
@@ -87,10 +87,8 @@ def _beyond_measured(rows: Sequence[Row]) -> dict[str, str]:
     return {"distances": " to ".join(map(words, metrics.extent(distances)))}
 
 
-beyond_reach = Layout(
-    **_CAPTIONS.of("q1_beyond_reach", _beyond_measured),
-    subjects=_beyond_rows,
-    summary=_beyond_summary,
+beyond_reach = _CAPTIONS.layout(
+    "q1_beyond_reach", _beyond_rows, _beyond_summary, measured=_beyond_measured
 )
 
 
@@ -159,11 +157,6 @@ def _reached(record: Record) -> Series:
     return series(record.solver, COUNTED, 100 * rates, (100 * low, 100 * high))
 
 
-rivals = Layout(
-    **_CAPTIONS.of("q2_iterations"),
-    subjects=_rival_rows,
-    summary=_rival_summary,
-    figures=(iterations_chart,),
-)
+rivals = _CAPTIONS.layout("q2_iterations", _rival_rows, _rival_summary, figures=(iterations_chart,))
 
 LAYOUTS = (beyond_reach, rivals)

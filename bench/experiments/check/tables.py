@@ -8,7 +8,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers.registry import MUJOCO, PINOCCHIO
 from ...tables.captions import Captions
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import listed
 from ...tables.table import Summary, in_unit, words
 
@@ -47,10 +47,8 @@ def _summary(rows: Sequence[Row]) -> Summary:
     )
 
 
-verdicts = Layout(
-    **Captions(__file__).of("check"),
-    subjects=lambda results: map(_row, results.all("check")),
-    summary=_summary,
+verdicts = Captions(__file__).layout(
+    "check", lambda results: map(_row, results.all("check")), _summary
 )
 
 LAYOUTS = (verdicts,)

@@ -10,7 +10,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import spread_of, words_in
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import Results, by_problem, grouped, label
 from ...tables.table import Summary, in_unit, words
 from .. import arm
@@ -102,11 +102,6 @@ def jitter_chart(results: Results) -> Sketch | None:
     return declared_chart(_CAPTIONS.figure("jitter"), panels, results.entrants, rows=rows)
 
 
-jitter = Layout(
-    **_CAPTIONS.of("q3_jitter"),
-    subjects=_rows,
-    summary=_summary,
-    figures=(jitter_chart,),
-)
+jitter = _CAPTIONS.layout("q3_jitter", _rows, _summary, figures=(jitter_chart,))
 
 LAYOUTS = (jitter,)

@@ -10,7 +10,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...tables.captions import Captions
 from ...tables.columns import words_in
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import (
     Results,
     by_problem,
@@ -125,10 +125,10 @@ def _single_iterations(rows: Sequence[Row]) -> Iterator[str]:
             )
 
 
-convergence = Layout(
-    **CAPTIONS.of("cloth_convergence"),
-    subjects=_convergence_rows,
-    summary=_convergence_summary,
+convergence = CAPTIONS.layout(
+    "cloth_convergence",
+    _convergence_rows,
+    _convergence_summary,
     figures=(convergence_chart, falling_cloth),
 )
 
@@ -159,6 +159,6 @@ def _at(step: Row) -> str:
     return f"{words(step['difference'])} at {words_in(step['h'], 'ms')}"
 
 
-dampers = Layout(**CAPTIONS.of("cloth_dampers"), subjects=_damped_steps, summary=_damper_summary)
+dampers = CAPTIONS.layout("cloth_dampers", _damped_steps, _damper_summary)
 
 LAYOUTS = (convergence, dampers)

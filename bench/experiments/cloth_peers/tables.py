@@ -18,7 +18,7 @@ from ...peers.registry import LINEARISED
 from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import Results, counted, grouped, label, listed, most_often
 from ...tables.table import NO_SUMMARY, Summary, words
 from ..published import problem as published
@@ -188,10 +188,11 @@ def _fastest(rows: Sequence[Row], target: str) -> str:
     return " (then ".join(names) + ")" * (len(names) > 1) or "none"
 
 
-one_step = Layout(
-    **CAPTIONS.of("cloth_peers_step", _rounding),
-    subjects=lambda results: _rows(results, ONE_STEP, TARGETS, {}),
-    summary=partial(_summary, "an error of one implicit step", TARGETS),
+one_step = CAPTIONS.layout(
+    "cloth_peers_step",
+    lambda results: _rows(results, ONE_STEP, TARGETS, {}),
+    partial(_summary, "an error of one implicit step", TARGETS),
+    measured=_rounding,
     figures=(step_chart,),
 )
 
@@ -227,10 +228,11 @@ def _certainty(rows: Sequence[Row]) -> dict[str, str]:
     return {**numbers, **_agreement(rows)}
 
 
-motion = Layout(
-    **CAPTIONS.of("cloth_peers_motion", _certainty),
-    subjects=_motion_rows,
-    summary=partial(_summary, "a distance from the true motion", MOTION_TARGETS),
+motion = CAPTIONS.layout(
+    "cloth_peers_motion",
+    _motion_rows,
+    partial(_summary, "a distance from the true motion", MOTION_TARGETS),
+    measured=_certainty,
     figures=(truth_chart,),
 )
 
@@ -259,16 +261,15 @@ def _liu_summary(rows: Sequence[Row]) -> Summary:
     return Summary(sentence, tuple(sentences))
 
 
-liu_2013 = Layout(
-    **CAPTIONS.of(
-        "cloth_liu_2013", lambda rows: {"vertices": words(rows[0]["record"].values.vertices)}
-    ),
-    subjects=lambda results: [
+liu_2013 = CAPTIONS.layout(
+    "cloth_liu_2013",
+    lambda results: [
         _liu_row(record)
         for record in results.all("cloth", task=LIU)
         if record.solver in published.LIU_2013
     ],
-    summary=_liu_summary,
+    _liu_summary,
+    measured=lambda rows: {"vertices": words(rows[0]["record"].values.vertices)},
     compared=0,
 )
 

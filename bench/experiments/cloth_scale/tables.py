@@ -6,7 +6,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.table import NO_SUMMARY, Summary, words
 
 CAPTIONS = Captions(__file__)
@@ -58,10 +58,8 @@ def _summary(rows: Sequence[Row]) -> Summary:
     )
 
 
-scale = Layout(
-    **CAPTIONS.of("cloth_scale"),
-    subjects=lambda results: list(map(_row, results.all("cloth_scale"))),
-    summary=_summary,
+scale = CAPTIONS.layout(
+    "cloth_scale", lambda results: map(_row, results.all("cloth_scale")), _summary
 )
 
 LAYOUTS = (scale,)

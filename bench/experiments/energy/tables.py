@@ -6,7 +6,7 @@ from ...figures.chart import Panel, declared_chart, series
 from ...figures.sketch import Sketch
 from ...tables.captions import Captions
 from ...tables.columns import words_in
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import Results, by_problem, label, settings
 from ...tables.table import Summary, words
 from . import DAMPINGS, SIZE
@@ -52,11 +52,6 @@ def _summary(rows: Sequence[Row]) -> Summary:
     )
 
 
-energy = Layout(
-    **CAPTIONS.of("energy"),
-    subjects=_rows,
-    summary=_summary,
-    figures=(energy_chart,),
-)
+energy = CAPTIONS.layout("energy", _rows, _summary, figures=(energy_chart,))
 
 LAYOUTS = (energy,)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import counted
 from ...tables.table import Summary, words
 from . import CAUSES, COVERED, IMPOSSIBLE
@@ -57,10 +57,8 @@ def _summary(rows: Sequence[Row]) -> Summary:
     )
 
 
-pose_proofs = Layout(
-    **CAPTIONS.of("pose_proofs"),
-    subjects=lambda results: list(map(_row, results.all("ik_proofs"))),
-    summary=_summary,
+pose_proofs = CAPTIONS.layout(
+    "pose_proofs", lambda results: map(_row, results.all("ik_proofs")), _summary
 )
 
 LAYOUTS = (pose_proofs,)

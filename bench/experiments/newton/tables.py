@@ -6,7 +6,7 @@ import numpy as np
 
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import counted, label, listed
 from ...tables.table import Summary, words
 from . import FRAME, FRAMES, GRAVITY
@@ -59,10 +59,8 @@ def _sizes(rows: Sequence[Row]) -> dict[str, str]:
     return {"sizes": listed([f"{size} × {size}" for size in sizes], "or")}
 
 
-proofs = Layout(
-    **CAPTIONS.of("cloth_proofs", _sizes),
-    subjects=lambda results: list(map(_row, results.all("newton"))),
-    summary=_summary,
+proofs = CAPTIONS.layout(
+    "cloth_proofs", lambda results: map(_row, results.all("newton")), _summary, measured=_sizes
 )
 
 LAYOUTS = (proofs,)

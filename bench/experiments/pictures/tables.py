@@ -6,7 +6,7 @@ import numpy as np
 
 from ...harness.record import Record
 from ...tables.columns import words_in
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import label, listed, solvers
 from ...tables.table import Summary, words
 from . import ARM
@@ -48,10 +48,11 @@ def _solvers(rows: Sequence[Row]) -> dict[str, str]:
     return {"solvers": listed([label(name) for name in solvers(row["record"] for row in rows)])}
 
 
-resampling = Layout(
-    **CAPTIONS.of("resampling", _solvers),
-    subjects=lambda results: list(map(_row, results.all("pictures", task=ARM))),
-    summary=_summary,
+resampling = CAPTIONS.layout(
+    "resampling",
+    lambda results: map(_row, results.all("pictures", task=ARM)),
+    _summary,
+    measured=_solvers,
     figures=(arm_draws,),
 )
 

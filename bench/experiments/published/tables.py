@@ -8,7 +8,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import Results, counted, grouped, label
 from ...tables.table import Summary, listing, words
 from ..robots.readings import Score
@@ -135,6 +135,6 @@ _CAPTIONS = Captions(
     fabrik_tolerance=words(published.FABRIK.tolerance),
 )
 
-published_ik = Layout(**_CAPTIONS.of("published_ik"), subjects=_rows, summary=_summary)
+published_ik = _CAPTIONS.layout("published_ik", _rows, _summary)
 
 LAYOUTS = (published_ik,)

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from ...harness.record import Record
 from ...peers import registry
 from ...tables.captions import Captions
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import Results, by_problem, counted, grouped, listed, settings
 from ...tables.table import Summary, words
 from . import PEERS
@@ -114,6 +114,6 @@ def _points(files: Sequence[Record], robots: Sequence[Record]) -> Iterator[str]:
         )
 
 
-readers = Layout(**Captions(__file__).of("readers", _measured), subjects=_rows, summary=_summary)
+readers = Captions(__file__).layout("readers", _rows, _summary, measured=_measured)
 
 LAYOUTS = (readers,)

@@ -102,9 +102,7 @@ def _robot(record: Record) -> str:
     return f"{record.title}: {robot.joints} joints{freedoms}, {robot.target} of {effectors}"
 
 
-participants = Layout(
-    **CAPTIONS.of("participants"), subjects=_participants, summary=_participant_summary
-)
+participants = CAPTIONS.layout("participants", _participants, _participant_summary)
 
 
 # Scores.
@@ -204,12 +202,14 @@ def _layout(
     **fields: Any,
 ) -> Layout:
     """Return a table of scores; solvers with the same robots and starts are compared."""
-    return Layout(
-        **{**CAPTIONS.of(name, _measured), **fields},
-        subjects=lambda results: map(row, scores(results)),
+    return CAPTIONS.layout(
+        name,
+        lambda results: map(row, scores(results)),
+        measured=_measured,
         compared=2,
         ranked=lambda row: row["score"].is_ranked,
         leads=_leads,
+        **fields,
     )
 
 

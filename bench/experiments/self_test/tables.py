@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ...harness.record import Record
 from ...tables.captions import Captions
-from ...tables.layout import Layout, Row
+from ...tables.layout import Row
 from ...tables.results import grouped, listed
 from ...tables.table import Summary
 
@@ -45,10 +45,8 @@ def _counts(rows: Sequence[Row]) -> str:
     return "; ".join([planted] * bool(faults) + [honest] * (len(faults) < len(rows)))
 
 
-self_test = Layout(
-    **Captions(__file__).of("self_test"),
-    subjects=lambda results: map(_row, results.all("self_test")),
-    summary=_summary,
+self_test = Captions(__file__).layout(
+    "self_test", lambda results: map(_row, results.all("self_test")), _summary
 )
 
 LAYOUTS = (self_test,)

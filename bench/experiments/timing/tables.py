@@ -167,14 +167,12 @@ def _time(row: Row, unit: str) -> str:
 
 
 def _layout(subject: str, unit: str) -> Layout:
-    captions = CAPTIONS.of(
-        f"timing_{subject}", lambda rows: {"steadiness": steadiness(_noise(rows))}
-    )
-    return Layout(
-        **captions,
-        subjects=partial(_rows, subject),
+    return CAPTIONS.layout(
+        f"timing_{subject}",
+        partial(_rows, subject),
+        partial(_summary, unit),
+        measured=lambda rows: {"steadiness": steadiness(_noise(rows))},
         columns=partial(_columns, unit),
-        summary=partial(_summary, unit),
         figures=(partial(timing_chart, subject, unit),),
     )
 
