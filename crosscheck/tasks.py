@@ -75,7 +75,8 @@ def centre_of_mass(engine: str, case: int) -> Comparison:
 
 def equalities(case: int) -> Comparison:
     """Compare the residuals of loop closures and couplings: lengths of vectors, signed numbers."""
-    text = _text(case, _filled_equalities(case))
+    numbers = samples.generator("equalities", case).normal(size=EQUALITIES.count("{}"))
+    text = _text(case, EQUALITIES.format(*numbers))
     robot, model = mjcf.parse(text), mujoco.MjModel.from_xml_string(text)
     data, rows = mujoco.MjData(model), _rows(robot, case)
 
@@ -141,11 +142,6 @@ def _sample(engine: str, case: int) -> tuple[Robot, RobotEngine, FloatArray]:
         adapter = ROBOT_ENGINES[engine](path)
     robot = mjcf.parse(text)
     return robot, adapter, _rows(robot, case)
-
-
-def _filled_equalities(case: int) -> str:
-    rng = samples.generator("equalities", case)
-    return EQUALITIES.format(*rng.normal(size=EQUALITIES.count("{}")))
 
 
 def _text(case: int, equality: str = "") -> str:

@@ -90,7 +90,8 @@ class ChainJob(NamedTuple):
 def solve_together(jobs: Sequence[ChainJob]) -> list[Measured]:
     """Solve the targets of every solver; then time the first targets, the solvers in turns."""
     results = [_answer_of(job) for job in jobs]
-    places = [i for i, result in enumerate(results) if _has_answer(result)]
+    values = [result.values for result in results]
+    places = [i for i, v in enumerate(values) if v and np.isfinite(v.residual).any()]
     count = min(MAX_TIMED, -(-jobs[0].job.targets.shape[0] // PER_TIMED))
     turns = times_in_turns([jobs[i].job for i in places], count, ROUNDS)
     for i, times in zip(places, turns, strict=True):
@@ -98,10 +99,6 @@ def solve_together(jobs: Sequence[ChainJob]) -> list[Measured]:
             values = structs.replace(results[i].values, **times._asdict())
             results[i] = results[i]._replace(values=values)
     return results
-
-
-def _has_answer(measured: Measured) -> bool:
-    return measured.values is not None and bool(np.isfinite(measured.values.residual).any())
 
 
 def _answer_of(job: ChainJob) -> Measured:

@@ -53,7 +53,7 @@ def work_precision(name: str, task: str, results: Results) -> Sketch | None:
 
     Each stiffness has a column, each size a row.
     """
-    visible = [point for point in points(results, task) if _is_visible(point)]
+    visible = [p for p in points(results, task) if p.seconds > 0 and 0 < p.error < MAX_ERROR]
     cloths = [point for point in visible if not point.own]
     stiffnesses = sorted({point.stiffness for point in cloths})
     panels = [
@@ -75,11 +75,6 @@ def _curves(visible: Sequence[Point]) -> tuple[Series, ...]:
         series(solver, [1e3 * p.seconds for p in group], [p.error for p in group])
         for solver, group in grouped(visible, lambda point: point.solver).items()
     )
-
-
-def _is_visible(point: Point) -> bool:
-    """Return whether a point has a time, and an error that can be drawn."""
-    return point.seconds > 0 and 0 < point.error < MAX_ERROR
 
 
 step_chart = partial(work_precision, "work_precision_step", ONE_STEP)

@@ -71,7 +71,9 @@ class Score(NamedTuple):
 
     def all(self, name: str, default: float) -> np.ndarray:
         """Return an array of all targets, with a default for the others, (target,)."""
-        return np.concatenate([_padded(record, name, default) for record in self.records])
+        arrays = [(record.arrays[name], total(record)) for record in self.records]
+        padded = [np.pad(a, (0, n - a.size), constant_values=default) for a, n in arrays]
+        return np.concatenate(padded)
 
     @property
     def solved(self) -> np.ndarray:
@@ -203,11 +205,6 @@ def drift(scores: Iterable[Score]) -> str:
         f"A fixed loop, timed before every turn of a solver, took {words(1e3 * low)} to "
         f"{words(1e3 * high)} ms: times of this run drifted by up to a factor of {high / low:.2f}."
     )
-
-
-def _padded(record: Record, name: str, number: float) -> np.ndarray:
-    array = record.arrays[name]
-    return np.pad(array, (0, total(record) - array.size), constant_values=number)
 
 
 def _strata(record: Record) -> np.ndarray:
