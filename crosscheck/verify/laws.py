@@ -18,6 +18,8 @@ from .timing import time_call
 
 # Numbers that differ by less than this share are alike, in single precision too.
 ROUNDED = 1e-5
+# Numbers of fewer decimals than these are rounded; in single precision they have as many [m].
+MAX_DECIMALS = 6
 HOLDS = sentence("It holds.")
 LAWS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
@@ -138,19 +140,78 @@ def proportion_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
             for values, expected in answers
             if name in values and name in expected
         ]
-        factor = _common_factor(pairs)
-        if factor is not None and abs(factor - 1.0) > ROUNDED and not name.endswith("rotations"):
-            sentences.append(sentence(
-                "All numbers of {name} in its answers are {factor:.6g} times the right ones: look "
-                "for a unit or a factor.", name=name, factor=factor,
-            ))  # fmt: skip
+        if pairs and all(a.shape == b.shape and np.isfinite(a).all() for a, b in pairs):
+            sentences += _relations(name, pairs)
     return tuple(sentences)
 
 
-def _common_factor(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float | None:
+Pairs = Sequence[tuple[FloatArray, FloatArray]]
+
+
+def _relations(name: str, pairs: Pairs) -> Iterable[Sentence]:
+    """Yield how an output's answers, first in each pair, come from the right ones."""
+    if _has_one_row(pairs):
+        yield sentence(
+            "In each answer all {name} but the first are the same: do they share one array?",
+            name=name,
+        )
+    if name.endswith("rotations"):
+        return
+    factor, axes, decimals = _common_factor(pairs), _axes(pairs), _decimals(pairs)
+    if factor is not None and abs(factor - 1.0) > ROUNDED:
+        yield sentence(
+            "All numbers of {name} in its answers are {factor:.6g} times the right ones: look "
+            "for a unit or a factor.", name=name, factor=factor,
+        )  # fmt: skip
+    elif axes not in ("", "x, y, z"):
+        yield sentence(
+            "In its answers {name} are the right ones written as ({axes}): look for axes that are "
+            "exchanged, or negative.", name=name, axes=axes,
+        )  # fmt: skip
+    elif decimals is not None:
+        yield sentence(
+            "All numbers of {name} in its answers have at most {decimals} decimals: return them as "
+            "they are, not rounded.", name=name, decimals=decimals,
+        )  # fmt: skip
+
+
+def _has_one_row(pairs: Pairs) -> bool:
+    """Return whether all rows but the first are alike in each first array, and seldom should."""
+    long = [pair for pair in pairs if pair[0].ndim == 2 and len(pair[0]) > 2]
+    spreads = [[np.ptp(rows[1:], axis=0).max() for rows in pair] for pair in long]
+    return all(a == 0.0 for a, _ in spreads) and sum(b > 0.0 for _, b in spreads) > 2
+
+
+def _axes(pairs: Pairs) -> str:
+    """Return of which axes the first arrays' columns are in the second, "" if of none."""
+    if any(a.shape[-1:] != (3,) for a, _ in pairs):
+        return ""
+    a, b = (np.concatenate([pair[i].reshape(-1, 3) for pair in pairs]).T for i in range(2))
+    bound = ROUNDED * np.abs(b).max(initial=0.0)
+    axes = list[str]()
+    for i, column in enumerate(a):
+        near = [
+            f"{sign}{'xyz'[j]}"
+            for j in (i, *range(3))
+            for sign, right in (("", b[j]), ("-", -b[j]))
+            if np.abs(column - right).max(initial=0.0) <= bound
+        ]
+        axes += near[:1]
+    return ", ".join(axes) if len(axes) == 3 else ""
+
+
+def _decimals(pairs: Pairs) -> int | None:
+    """Return the number of decimals of the first arrays if they are the second ones rounded."""
+    a, b = (np.concatenate([pair[i].ravel() for pair in pairs]) for i in range(2))
+    for decimals in range(MAX_DECIMALS):
+        is_round = np.abs(a - np.round(a, decimals)).max() <= 1e-3 * 0.1**decimals
+        if is_round and np.abs(a - b).max() <= 0.1**decimals:
+            return decimals
+    return None
+
+
+def _common_factor(pairs: Pairs) -> float | None:
     """Return the number that makes the first arrays of the second, None if there is none."""
-    if not pairs or any(a.shape != b.shape or not np.isfinite(a).all() for a, b in pairs):
-        return None
     a, b = (np.concatenate([pair[i].ravel() for pair in pairs]) for i in range(2))
     square = float(b @ b)
     factor = float(a @ b) / square if square > 0.0 else 0.0

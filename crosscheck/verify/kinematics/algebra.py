@@ -34,8 +34,9 @@ FIRST_ELEMENT = 4
 # Up to this number `angle` changes the angle of the right arc.
 OF_THE_ARC = 3
 DEGREE = math.pi / 180.0
-# Of `angle`, the number of an angle that is 90 degrees throughout.
-QUARTER_TURN = 19
+# Of `angle`, the number of an angle that is 90 degrees throughout, the first with the sign of a
+# component of the axis, and the first of a rotation in a plane.
+QUARTER_TURN, SIGNED, IN_PLANE = 19, 21, 24
 
 
 def product(a: Any, b: Any, faults: Switches) -> Any:
@@ -172,11 +173,28 @@ def wrong_arc(a: Any, b: Any, axis: Any, sine: float, cosine: float, k: int) -> 
         (1.0 + raw * cosine, raw * sine), (raw * raw + raw * cosine, raw * sine),
         (math.cos(0.5 * root), math.sin(0.5 * root) * sine * raw),
     )  # fmt: skip
-    if k == QUARTER_TURN:
-        return rotation_about(axis, 0.5 * math.pi)
+    if k >= QUARTER_TURN:
+        return other_arc(a, b, axis, angle, k)
     w, length = numbers[k - OF_THE_ARC - 1 - len(angles)]
     x, y, z = scale(length, axis)
     return (w, x, y, z) if k < 16 or k == 18 else made_unit((w, x, y, z))
+
+
+def other_arc(a: Any, b: Any, axis: Any, angle: float, k: int) -> Any:
+    """Return a quarter turn (19), an arc of whole degrees (20), or one with another sign or axis.
+
+    The sign is that of the axis' x, y or z (21 to 23); about z, x or y alone (24 to 26) the angle
+    is the difference of two polar angles.
+    """
+    if k >= IN_PLANE:
+        i = k - IN_PLANE
+        j, m = (i + 1) % 3, (i + 2) % 3
+        angle = math.atan2(b[j], b[i]) - math.atan2(a[j], a[i])
+        return rotation_about((1.0 * (m == 0), 1.0 * (m == 1), 1.0 * (m == 2)), angle)
+    if k >= SIGNED:
+        return rotation_about(axis, math.copysign(angle, axis[k - SIGNED]))
+    degrees = math.floor(angle / DEGREE)
+    return rotation_about(axis, 0.5 * math.pi if k == QUARTER_TURN else degrees * DEGREE)
 
 
 def damped(d: Any, faults: Switches) -> Any:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ..explain import either
 from ..judgement import Diagnosis
 from ..sentence import Sentence, sentence, with_code
-from .algebra import FIRST_CROSS_TERM, FIRST_ELEMENT, FIRST_TERM
+from .algebra import FIRST_CROSS_TERM, FIRST_ELEMENT, FIRST_TERM, SIGNED
 from .switches import Switches
 from .textbook import DROPPED, FIXED, FIXED_TEST, SMALL
 
@@ -47,6 +47,7 @@ class SwitchFault(NamedTuple):
     sentence: Sentence  # the code, the mistake, and its correction
     honest: bool  # whether it may be on purpose: the answers still obey every law
     is_rare: bool = False  # whether it is not tried together with others
+    covers: tuple[str, ...] = ()  # keys of faults in its sentence, if no answer tells them apart
 
 
 def _load() -> dict[str, tuple[SwitchFault, ...]]:
@@ -81,14 +82,30 @@ def _faults(part: str, key: str, entry: Mapping[str, Any]) -> Iterator[SwitchFau
             words = with_code(entry["code"], Sentence(entry["sentence"], values))
             is_honest = entry.get("honest", False)
             is_rare = is_range or entry.get("alone", False)
+            covers = tuple(entry.get("covers", ()))
             yield SwitchFault(
-                part, key.format_map(values), switch, number, words, is_honest, is_rare
+                part, key.format_map(values), switch, number, words, is_honest, is_rare, covers
             )
 
 
 PASSES = (
     sentence("both passes"), sentence("the backward pass"), sentence("the forward pass"),
 )  # fmt: skip
+# What is taken for the length of a link, by the kind of `link_length` from `OTHER_LENGTHS` on.
+OTHER_LENGTHS = 9
+LENGTHS = (
+    sentence("the length before it in the list, and the last for the first link,"),
+    sentence("the length after it in the list, and the first for the last link,"),
+    sentence("the length in a reversed list"),
+    sentence("|x| of the offset"), sentence("|y| of the offset"), sentence("|z| of the offset"),
+    sentence("|x| + |y| + |z| of the offset"), sentence("the square of the length"),
+    sentence("the length of x and y alone"), sentence("the whole metres of the length"),
+    sentence("the length rounded to 1 m"), sentence("the length rounded to 0.1 m"),
+    sentence("the length rounded to 0.01 m"),
+)  # fmt: skip
+# What CCD makes of a local rotation, by the number of `applied` from `OTHER_PRODUCTS` on.
+OTHER_PRODUCTS = 22
+PRODUCTS = ("Q P d conj(P)", "Q R d conj(R)", "Q Q d conj(Q)", "conj(Q) d Q Q")
 
 
 def _term(number: int) -> tuple[str, str]:
@@ -128,7 +145,12 @@ VALUES: Mapping[str, Callable[[int], Mapping[str, Any]]] = {
     "cross": lambda number: dict(zip(("term", "number"), _cross_term(number), strict=True)),
     "inverse": lambda number: {"number": "xyz"[number - 4]},
     "pull": lambda number: {"passes": PASSES[number % 3]},
-    "lengths": lambda number: {"passes": PASSES[number % 3]},
+    "lengths": lambda number: {
+        "passes": PASSES[number % 3],
+        "length": LENGTHS[max(0, number // 3 - OTHER_LENGTHS)],
+    },
+    "angle": lambda number: {"axis": "xyzzxy"[number - SIGNED]},
+    "applied": lambda number: {"product": PRODUCTS[number - OTHER_PRODUCTS]},
 }
 FAULTS = _load()
 
@@ -187,6 +209,8 @@ def describe(method: str, keys: Sequence[str]) -> Sentence:
     faults = by_key(method)
     sentences = {key: fault.sentence for key, fault in faults.items()} | {"": AS_THE_TEXTBOOK}
     names = [key.split(" + ") for key in keys]
+    covered = {key for group in names for name in group if name for key in faults[name].covers}
+    names = [group for group in names if not covered.intersection(group)]
     mistakes = either([[sentences[name] for name in group] for group in names])
     parts = {faults[name].part for group in names for name in group if name}
     if method == "forward" or parts != {"forward"}:

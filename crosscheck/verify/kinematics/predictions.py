@@ -97,6 +97,8 @@ def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:
         return np.roll(rotations, 1, axis=-1)
     if switched.numbers == 10:
         return np.abs(rotations)
+    if switched.numbers == 11:
+        return np.column_stack([np.abs(rotations[:, 0]), rotations[:, 1:]])
     return np.roll(rotations, -1, axis=-1) if switched.numbers in (2, 3) else rotations
 
 
@@ -137,29 +139,30 @@ def programs(
     They show beside a single fault, or a single one besides those of the `base`.
     """
     parts, names = {fault.part for fault in faults}, {fault.switch for fault in faults}
-    numbers: dict[str, Sequence[int]] = {}
     known = {fault.key for fault in base}
     if not faults or sum(fault.key not in known for fault in faults) > 1:
         return [{}]
-    if "quaternion" in parts:
-        # a reversed product shows in the program's rotations of vectors too, by q v q*
-        is_reversed = any(fault.key == REVERSED for fault in faults)
-        numbers["rotating"] = range(int(is_reversed), 3)
-        numbers["unit"] = (0, 2) if method == "forward" else range(3)
-    if "arc" in parts:
-        numbers["unit"] = range(2)
-    if method != "forward" and parts & {"quaternion", "forward"}:
-        numbers["grouping"] = range(4 if method == "ccd" else 2)
-    if method == "fabrik" and (
+    is_forward, is_fabrik = method == "forward", method == "fabrik"
+    # a reversed product shows in the program's rotations of vectors too, by q v q*
+    is_reversed = any(fault.key == REVERSED for fault in faults)
+    of_globals = any(f.switch == "rotations" and f.number >= OF_GLOBAL_LINKS for f in faults)
+    rules = is_fabrik and (
         parts & {"quaternion", "forward", "arc"} or names & {"rotations", "angle", "link"}
-    ):
-        numbers["rule"] = range(6 if "forward" in parts else 4)
-    if method == "fabrik" and "forward" in parts:
-        numbers["returned"] = range(2)
-    if method != "forward" and (names & {"rotations", "applied"} or parts & {"forward", "arc"}):
-        numbers["global_rotations"] = range(2)
-    if any(f.switch == "rotations" and f.number >= OF_GLOBAL_LINKS for f in faults):
-        numbers["rule"] = (0, 3)
+    )
+    globals_ = not is_forward and (names & {"rotations", "applied"} or parts & {"forward", "arc"})
+    table: Sequence[tuple[Any, str, Sequence[int]]] = (
+        ("quaternion" in parts, "rotating", range(int(is_reversed), 3)),
+        ("quaternion" in parts, "unit", (0, 2) if is_forward else range(3)),
+        ("arc" in parts, "unit", range(2)),
+        (not is_forward and parts & {"quaternion", "forward"}, "grouping",
+         range(2 if is_fabrik else 4)),
+        (rules, "rule", range(6 if "forward" in parts else 4)),
+        (of_globals, "rule", (0, 3)),
+        (is_fabrik and "forward" in parts, "returned", range(2)),
+        (globals_, "global_rotations", range(3 if is_fabrik else 2)),
+        ("lengths" in names, "stretch", (0, 9)),
+    )  # fmt: skip
+    numbers = {name: values for is_shown, name, values in table if is_shown}
     choices = [
         dict(zip(numbers, values, strict=True)) for values in itertools.product(*numbers.values())
     ]
@@ -171,8 +174,12 @@ def programs(
 def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
     """Return the outputs of forward kinematics."""
     positions, rotations = forward(case.inputs, switched)
+    local, parents = case.inputs["local_rotations"], case.inputs["parents"]
     if switched.numbers == 7:
-        rotations = case.inputs["local_rotations"]
+        rotations = local
+    elif switched.numbers == 12:
+        above = np.where((parents >= 0)[:, None], local[parents], rotation.identity(len(parents)))
+        rotations = rotation.multiply(above, local)
     return {"positions": positions, "rotations": _reordered(rotations, switched)}
 
 

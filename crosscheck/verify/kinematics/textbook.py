@@ -38,9 +38,12 @@ ORIGIN = (0.0, 0.0, 0.0)
 GIVEN_TO_CHILD = (10, 13)
 # Of `rotations`, those from this number on rotate a link from its present or its first direction.
 OF_GLOBAL_LINKS = 13
-# CCD drops rotations smaller than these, by the number of `dropped` [rad]; among them are a degree,
-# and the angles with the cosines 0.99999, 0.9999 and 0.999.
-DROPPED = (0.0, 1e-4, 1e-3, 4.4721e-3, 1e-2, 1.41421e-2, 1.745329e-2, 4.47214e-2, 0.1)
+# CCD drops rotations smaller than these, by the number of `dropped` [rad]; among them are 1 and 5
+# degrees, and the angles with the cosines 0.99999, 0.9999, 0.999 and 0.99.
+DROPPED = (
+    0.0, 1e-4, 1e-3, 4.4721e-3, 1e-2, 1.41421e-2, 1.745329e-2, 4.47214e-2, 0.1, 5e-2, 8.726646e-2,
+    0.141539,
+)  # fmt: skip
 # Angles smaller than these end a sweep, end the solve or are raised to them, by `small` [rad].
 SMALL = (1e-4, 1e-3, 1e-2, 1.745329e-2, 5e-2)
 # The distances at which a solve ends whatever the tolerance, by `test` from `FIXED_TEST` on [m].
@@ -116,7 +119,7 @@ def root_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: int
     rotations = (Q, Q, IDENTITY, Q)
     R = rotations[faults.root]
     places = (offset, ORIGIN, offset, rotated(R, offset, faults))
-    return places[faults.root], R
+    return places[3 if faults.frame == 9 else faults.root], R
 
 
 def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: int, p: int) -> Any:
@@ -134,13 +137,18 @@ def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: in
         R = made_unit(R)
     above = chain.parents[p]
     R_above = load_quaternion(pose.rotations, above) if above >= 0 else IDENTITY
+    Q_parent = load_quaternion(pose.local, p)
     frames = (
-        R_parent, IDENTITY, R, conjugate(R_parent), R_above, load_quaternion(pose.local, p), Q,
-        R_parent, R_above if above >= 0 else R_parent,
+        R_parent, IDENTITY, R, conjugate(R_parent), R_above, Q_parent, Q, R_parent,
+        R_above if above >= 0 else R_parent, R, product(R_parent, Q_parent, faults), R_parent,
     )  # fmt: skip
     offset = load_vector(chain.offsets, j)
     if faults.frame == 7:
         offset = subtract(offset, load_vector(chain.offsets, p))
+    elif faults.frame == 11:
+        offset = scale(-1.0, offset)
+    if faults.base == 6:
+        offset = add(offset, load_vector(pose.positions, p))
     if faults.base == 3:
         return offset, R
     offset = rotated(frames[faults.frame], offset, faults)
@@ -150,9 +158,9 @@ def joint_pose(chain: TextbookChain, faults: Switches, pose: TextbookPose, j: in
 def base_of(chain: TextbookChain, pose: TextbookPose, p: int, fault: int) -> Any:
     """Return what a rotated offset is added to: the parent's position, at rest (1), the root's.
 
-    Or nothing (5).
+    Or nothing (5, 6).
     """
-    if fault == 5:
+    if fault >= 5:
         return ORIGIN
     if fault == 1:
         x = load_vector(chain.offsets, p)
@@ -414,6 +422,10 @@ def wrong_rotation(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
         (unit, R, d, P_inverse),
         (unit, P, d, Q),
         (unit, unit, inverse(product(d, R, faults), faults), P),
+        (Q, P, d, P_inverse),
+        (Q, R, d, R_inverse),
+        (Q, Q, d, inverse(Q, faults)),
+        (inverse(Q, faults), d, Q, Q),
     )
     a, b, c, e = products[faults.applied]
     return product(product(product(a, b, faults), c, faults), e, faults)
@@ -466,7 +478,9 @@ def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookP
     Aristidou & Lasenby 2011, Algorithm 1, has this step, which the sweeps approach without it. By
     the number of `stretch` it is always made (1), where the distance is squared (2) or from the
     effector (3), where the reach lacks the last (4) or the first link (5); or its direction is that
-    from the effector (6), or each link begins at the root (7) or has the next one's length (8).
+    from the effector (6), or each link begins at the root (7) or has the next one's length (8). A
+    right program has it (9) with the lengths of `lengths`; or it stretches away from the target
+    (10), or leaves the chain as it is (11).
     """
     k = faults.stretch
     if k == 0:
@@ -474,7 +488,8 @@ def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookP
     last, reach = len(chain.path) - 1, 0.0
     for m in range(last):
         if not (k == 4 and m == last - 1) and not (k == 5 and m == 0):
-            reach += link_length(chain, m, 0, pose.positions)
+            kind = in_pass(faults.lengths, 0) if k == 9 else 0
+            reach += link_length(chain, m, kind, pose.positions)
     root = load_vector(pose.positions, chain.path[0])
     effector = load_vector(pose.positions, chain.path[last])
     to_target = subtract(target, root)
@@ -482,9 +497,9 @@ def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookP
     if k != 1 and (distance * distance if k == 2 else distance) < reach:
         return False
     direction = subtract(target, effector) if k == 6 else to_target
-    length = norm(direction)
-    if length == 0.0:
-        return False
+    length = -norm(direction) if k == 10 else norm(direction)
+    if length == 0.0 or k == 11:
+        return k == 11
     x = root
     for m in range(last):
         stretched = link_length(chain, m, 8 if k == 8 else 0, pose.positions)
@@ -501,7 +516,7 @@ def pull_to_target(
     ends = (target, add(target, root), subtract(target, root))
     store_vector(positions, chain.path[last], ends[faults.end])
     kind = in_pass(faults.pull, 1)
-    for k in range(last - (2 if faults.loop == 1 else 1), 1 if faults.loop == 4 else -1, -1):
+    for k in range(last - 1, 1 if faults.loop == 4 else -1, -1):
         length = link_length(chain, k, in_pass(faults.lengths, 1), positions)
         j, fixed = chain.path[k], load_vector(positions, chain.path[k + 1])
         moved = load_vector(positions, j)
@@ -509,6 +524,8 @@ def pull_to_target(
             moved = add(fixed, subtract(moved, load_vector(before, chain.path[k + 1])))
         elif faults.stale == 2 and k < last - 1:
             fixed = load_vector(before, chain.path[k + 1])
+        elif faults.stale == 3:
+            fixed = target
         store_vector(positions, j, pulled(fixed, moved, length, kind))
 
 
@@ -520,8 +537,8 @@ def pull_to_root(chain: TextbookChain, faults: Switches, positions: FloatArray) 
     kind = in_pass(faults.pull, 2)
     for k in range(1 if faults.loop == 3 else 0, last - (1 if faults.loop == 2 else 0)):
         length = link_length(chain, k, in_pass(faults.lengths, 2), positions)
-        child = chain.path[k + 1]
-        moved, fixed = load_vector(positions, child), load_vector(positions, chain.path[k])
+        child, start = chain.path[k + 1], chain.path[0 if faults.stale == 4 else k]
+        moved, fixed = load_vector(positions, child), load_vector(positions, start)
         store_vector(positions, child, pulled(fixed, moved, length, kind))
 
 
@@ -538,10 +555,15 @@ def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) 
 
     It is the next link's (1), the previous link's (2), that of now (3), the first link's (4), the
     mean (5), 1 (6), that of the offset of the link's first joint (7), or the next one's, 0 if there
-    is none (8).
+    is none (8); in a list that is rolled by one either way (9, 10) or reversed (11), or another
+    length of an offset (from 12 on).
     """
     last = len(chain.path) - 2
-    links = (k, min(k + 1, last), max(k - 1, 0), k, 0, k, k, k - 1, min(k + 1, last))
+    before, after = max(k - 1, 0), min(k + 1, last)
+    rolled = (k - 1 if k > 0 else last, k + 1 if k < last else 0)
+    links = (k, after, before, k, 0, k, k, k - 1, after, rolled[0], rolled[1], last - k)
+    if kind > 11:
+        return other_length(load_vector(chain.offsets, chain.path[k + 1]), kind)
     if kind == 8 and k == last:
         return 0.0
     if kind == 3:
@@ -553,6 +575,22 @@ def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) 
             total += norm(load_vector(chain.offsets, j))
         return total / (last + 1)
     return 1.0 if kind == 6 else norm(load_vector(chain.offsets, chain.path[links[kind] + 1]))
+
+
+def other_length(offset: Any, kind: int) -> float:
+    """Return what programs take for the length of an offset, by the kind of `link_length`.
+
+    It is |x|, |y| or |z| (12 to 14), their sum (15), the square (16), the length without z (17), or
+    the length in whole metres, cut (18) or rounded (19), or to one or two decimals (20, 21).
+    """
+    x, y, z = abs(offset[0]), abs(offset[1]), abs(offset[2])
+    length = norm(offset)
+    lengths = (
+        x, y, z, x + y + z, length * length, math.sqrt(x * x + y * y), float(math.floor(length)),
+        float(math.floor(length + 0.5)), math.floor(10.0 * length + 0.5) / 10.0,
+        math.floor(100.0 * length + 0.5) / 100.0,
+    )  # fmt: skip
+    return lengths[kind - 12]
 
 
 class SolvedPath(NamedTuple):
@@ -568,7 +606,9 @@ def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPo
     points = pose.positions.copy()
     place(chain, faults, pose)
     solved = SolvedPath(points, pose.positions.copy(), pose.rotations.copy())
-    for k in range(len(chain.path) - 1 if sweeps > 0 else 0):
+    links = len(chain.path) - 1
+    first, end = int(faults.link == 5), links - int(faults.link == 6)  # links that are left out
+    for k in range(first, end if sweeps > 0 else 0):
         if faults.global_rotations == 0:
             place(chain, faults, pose)
         point_link(chain, k, solved, faults, pose)
@@ -584,9 +624,11 @@ def point_link(
     j, child = chain.path[k], chain.path[k + 1]
     p = chain.parents[j]
     Q, R, P = load_quaternion(pose.local, j), load_quaternion(pose.rotations, j), IDENTITY
-    if p >= 0:
+    if p >= 0 and faults.rotations != 20:
         P = load_quaternion(solved.rotations if faults.rotations == 4 else pose.rotations, p)
-    rest = rest_of(chain, k, solved, faults, pose)
+    if faults.rotations == 20 or faults.global_rotations == 2:
+        R = product(P, Q, faults)
+    rest = rest_of(chain, k, R, solved, faults, pose)
     link = link_of(chain, k, solved.points, faults.link)
     if faults.rotations == 18:  # of the link before
         rest = link_of(chain, k, solved.positions, 3)
@@ -598,13 +640,13 @@ def point_link(
         R = load_quaternion(solved.rotations, j)
     elif faults.rule in (1, 2):
         R = IDENTITY
-    if faults.rotations in (0, 3, 4, 9, 18, 19):
+    if faults.rotations in (0, 3, 4, 9, 18, 19, 20, 21):
         Q = local_of(P, d, Q, R, faults)
     else:
         Q = wrong_local(chain, k, P, d, R, faults, pose)
     Q = Q if faults.unit == 1 else made_unit(Q)
     store_quaternion(pose.local, child if faults.rotations == 3 else j, Q)
-    if faults.global_rotations == 1:
+    if faults.global_rotations > 0:
         store_quaternion(pose.rotations, j, global_of(P, d, R, faults))
 
 
@@ -618,7 +660,7 @@ def global_of(P: Any, d: Any, R: Any, faults: Switches) -> Any:
 
 
 def rest_of(
-    chain: TextbookChain, k: int, solved: SolvedPath, faults: Switches, pose: TextbookPose
+    chain: TextbookChain, k: int, R: Any, solved: SolvedPath, faults: Switches, pose: TextbookPose
 ) -> Any:
     """Return the direction of link k that its new one is compared with.
 
@@ -629,19 +671,26 @@ def rest_of(
     offset = load_vector(chain.offsets, child)
     if faults.rule in (1, 2) or faults.rotations in (1, 19):
         return offset
-    if faults.rule == 0:
-        return rotated(load_quaternion(pose.rotations, j), offset, faults)
-    if faults.rule == 3:
-        return rotated(load_quaternion(solved.rotations, j), offset, faults)
+    if faults.rule == 3 or faults.rotations == 21:
+        R = load_quaternion(solved.rotations, j)
+    if faults.rule in (0, 3):
+        return rotated(R, offset, faults)
     x = solved.positions if faults.rule == 4 else pose.positions
     return subtract(load_vector(x, child), load_vector(x, j))
 
 
 def link_of(chain: TextbookChain, k: int, points: FloatArray, fault: int) -> Any:
-    """Return the direction of link k; or the opposite (1), the next (2) or previous link's (3)."""
+    """Return the direction of link k; or the opposite (1), the next (2) or previous link's (3).
+
+    Or that from the root to the link's end (4).
+    """
     last = len(chain.path) - 2
+    if fault == 4:
+        root = load_vector(points, chain.path[0])
+        return subtract(load_vector(points, chain.path[k + 1]), root)
     links = (k, k, min(k + 1, last), max(k - 1, 0))
-    start, end = chain.path[links[fault]], chain.path[links[fault] + 1]
+    link = links[fault if fault <= 3 else 0]
+    start, end = chain.path[link], chain.path[link + 1]
     if fault == 1:
         start, end = end, start
     return subtract(load_vector(points, end), load_vector(points, start))

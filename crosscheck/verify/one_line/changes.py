@@ -5,6 +5,7 @@ The kinds of changes are the keys of `faults.toml`; operators of mutation testin
 """
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -13,13 +14,15 @@ FUNCTIONS = (
     ("sin", "cos"), ("arcsin", "arccos"), ("asin", "acos"), ("min", "max"), ("ceil", "floor"),
     ("degrees", "radians"), ("zeros", "ones"), ("sum", "mean"),
 )  # fmt: skip
+# Functions whose second argument is the type of an array's numbers.
+ALLOCATIONS = ("zeros", "empty", "ones")
 COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 # What is made of a number or of each number of an array, by the kind of change.
 OF_NUMBERS = {
     "unit": ("np.degrees({})", "np.radians({})"), "factor": ("2.0 * {}", "0.5 * {}"),
     "power": ("{} ** 2", "np.sqrt({})"), "sign": ("-{}", "abs({})"),
 }  # fmt: skip
-NUMBER = "()"
+NUMBER, WORD = "()", re.compile(r"\w+(\.\d+)?")
 
 Change = tuple[str, ast.expr]  # the kind, and what an expression becomes
 # The kind, the line in the place of a statement, and the statements of its block.
@@ -53,6 +56,7 @@ def of_expression(node: Any, parent: ast.AST, scope: Scope) -> Iterator[Change]:
     text = ast.unparse(node)
     if text in scope.shapes:
         yield from _names(text, scope)
+        yield from (("name", parsed(other)) for other in _of_one_form(text, scope))
         yield from _conversions(text, scope)
         yield from _lost_factors(node, scope)
 
@@ -84,6 +88,7 @@ def _other_operators(node: Any) -> Iterator[Change]:
         yield from (("condition", ast.Constant(value)) for value in (True, False))
     elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
         yield "function", parsed(f"np.linalg.norm({ast.unparse(node.left)})")
+        yield "function", ast.BinOp(node.left, ast.Mult(), node.right)
     elif isinstance(node, ast.BinOp) and type(node.op) in opposite:
         kind = "sign" if isinstance(node.op, ast.Add | ast.Sub) else "factor"
         yield kind, ast.BinOp(node.left, opposite[type(node.op)], node.right)
@@ -108,6 +113,11 @@ def _calls(node: ast.Call) -> Iterator[Change]:
     yield from (("call", arg) for arg in node.args)
     if isinstance(node.func, ast.Attribute):
         yield "call", node.func.value
+        if node.func.attr == "arctan2":
+            y, x = map(ast.unparse, node.args)
+            yield "function", parsed(f"np.arctan({y} / {x})")
+        if node.func.attr in ALLOCATIONS:
+            yield "whole numbers", ast.Call(node.func, [*node.args, parsed("int")], node.keywords)
         for names in (names for names in FUNCTIONS if node.func.attr in names):
             other = names[names[0] == node.func.attr]
             func = ast.Attribute(node.func.value, other, ast.Load())
@@ -133,6 +143,15 @@ def _names(text: str, scope: Scope) -> Iterator[Change]:
     kind = "index" if scope.shapes[text] == "int" else "name"
     near = ("0", "-1", f"{text} + 1", f"{text} - 1") if kind == "index" else ()
     yield from ((kind, parsed(other)) for other in (*scope.alike(text), *near))
+
+
+def _of_one_form(text: str, scope: Scope) -> Iterator[str]:
+    """Yield the sums and products that differ from one in names or numbers alone."""
+    form = WORD.sub("", text)
+    for other, shape in scope.shapes.items():
+        is_alike = shape == scope.shapes[text] and WORD.sub("", other) == form
+        if is_alike and other != text and isinstance(parsed(other), ast.BinOp):
+            yield other
 
 
 def _conversions(text: str, scope: Scope) -> Iterator[Change]:
@@ -175,8 +194,25 @@ def of_statement(statements: list[ast.stmt], i: int) -> Iterator[Rearrangement]:
         for k in range(1, len(after) + 1):
             line = f"{header(statement)}  # after {header(after[k - 1])}"
             yield "moved line", line, [*before, *after[:k], statement, *after[k:]]
+    if isinstance(statement, ast.Assign):
+        for lines in _in_place(statement):
+            text = "; ".join(map(ast.unparse, lines))
+            yield "shared array", text, [*before, *lines, *after]
     if isinstance(statement, ast.For | ast.While):
         yield from _around_loop(statement, before, after)
+
+
+def _in_place(statement: ast.Assign) -> Iterator[list[ast.stmt]]:
+    """Yield x[j] = f(x[p]) as lines that write the result over x[p], and let x[j] share it."""
+    target = statement.targets[0]
+    if not isinstance(target, ast.Subscript):
+        return
+    for node in ast.walk(statement.value):
+        if isinstance(node, ast.Subscript) and ast.unparse(node.value) == ast.unparse(target.value):
+            text = ast.unparse(node)
+            value, name = ast.unparse(statement.value), ast.unparse(target)
+            if text != name:
+                yield ast.parse(f"{text}[...] = {value}\n{name} = {text}").body
 
 
 def _around_loop(

@@ -331,9 +331,19 @@ def changed_forward(change):
     )
 
 
-@pytest.mark.parametrize(("factor", "words"), [(0.0, "are zero"), (0.01, "0.01 times the right")])
-def test_a_common_factor_of_positions_is_reported(factor, words):
-    report = judged(FORWARD, changed_forward(lambda x, R: (factor * x, R)))
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda x, R: (0.0 * x, R), "are zero"),
+        (lambda x, R: (0.01 * x, R), "0.01 times the right"),
+        (lambda x, R: (x[:, [0, 2, 1]] * [1.0, -1.0, 1.0], R), "written as (x, -z, y)"),
+        (lambda x, R: (np.round(x, 2), R), "at most 2 decimals"),
+        (lambda x, R: (x, np.vstack([R[:1], 0.0 * R[1:] + R[-1]])), "do they share one array"),
+    ],
+    ids=["zero", "factor", "axes", "decimals", "shared"],
+)
+def test_a_relation_to_the_right_answers_is_reported(change, words):
+    report = judged(FORWARD, changed_forward(change))
     assert [words in str(hint) for hint in report.diagnosis.hints] == [True]
 
 
