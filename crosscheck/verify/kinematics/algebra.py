@@ -181,7 +181,7 @@ def wrong_arc(a: Any, b: Any, axis: Any, sine: float, cosine: float, k: int) -> 
 
 
 def other_arc(a: Any, b: Any, axis: Any, angle: float, k: int) -> Any:
-    """Return a quarter turn (19), an arc of whole degrees (20), or one with another sign or axis.
+    """Return a quarter turn (19), an arc of whole degrees (20), or of another sign or axis.
 
     The sign is that of the axis' x, y or z (21 to 23); about z, x or y alone (24 to 26) the angle
     is the difference of two polar angles.

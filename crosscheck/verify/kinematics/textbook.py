@@ -555,7 +555,7 @@ def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) 
 
     It is the next link's (1), the previous link's (2), that of now (3), the first link's (4), the
     mean (5), 1 (6), that of the offset of the link's first joint (7), or the next one's, 0 if there
-    is none (8); in a list that is rolled by one either way (9, 10) or reversed (11), or another
+    is none (8); in a list that is rolled either way (9, 10) or reversed (11), or another
     length of an offset (from 12 on).
     """
     last = len(chain.path) - 2
@@ -578,10 +578,10 @@ def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) 
 
 
 def other_length(offset: Any, kind: int) -> float:
-    """Return what programs take for the length of an offset, by the kind of `link_length`.
+    """Return a wrong length of an offset as of programs, by the kind of `link_length`.
 
     It is |x|, |y| or |z| (12 to 14), their sum (15), the square (16), the length without z (17), or
-    the length in whole metres, cut (18) or rounded (19), or to one or two decimals (20, 21).
+    the length in whole metres, cut (18) or rounded (19), or to decimetres or centimetres (20, 21).
     """
     x, y, z = abs(offset[0]), abs(offset[1]), abs(offset[2])
     length = norm(offset)

@@ -146,7 +146,7 @@ def _names(text: str, scope: Scope) -> Iterator[Change]:
 
 
 def _of_one_form(text: str, scope: Scope) -> Iterator[str]:
-    """Yield the sums and products that differ from one in names or numbers alone."""
+    """Yield the sums and products that differ from a text in names or numbers alone."""
     form = WORD.sub("", text)
     for other, shape in scope.shapes.items():
         is_alike = shape == scope.shapes[text] and WORD.sub("", other) == form
