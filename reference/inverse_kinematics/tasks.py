@@ -16,10 +16,12 @@ from .. import arguments, rotation
 from ..arguments import FloatArray, frozen
 from ..articulation import Articulation
 from ..jacobians import difference, jacobians
+from ..quaternion import IDENTITY, conjugate, logarithm, multiply, rotate
 
 # What a task takes as an ArrayLike, and holds as a read-only array.
 Values: TypeAlias = Any
 ORIGIN = (0.0, 0.0, 0.0)
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Below this angle [rad] the series of the right Jacobian's last factor is exact to rounding.
 SMALL_ANGLE = 1e-4
 
@@ -29,6 +31,7 @@ class FramePoint(NamedTuple):
 
     position: FloatArray  # in the world [m], (3,)
     matrix: FloatArray  # the frame's rotation in the world, (3, 3)
+    quaternion: tuple[float, float, float, float]  # the same, w first
     linear: FloatArray  # the derivative of the position, (3, freedom)
     angular: FloatArray  # the angular velocity in the world, (3, freedom)
 
@@ -46,12 +49,14 @@ class Configuration(NamedTuple):
         """Return a point of a joint's frame, or of the world."""
         if joint is None:
             still = np.zeros((3, self.model.freedom_count))
-            return FramePoint(np.asarray(point, dtype=float), np.eye(3), still, still)
+            x = np.asarray(point, dtype=float)
+            return FramePoint(x, np.eye(3), IDENTITY, still, still)
         j = self.model.index(joint, "frame")
-        R, J = rotation.to_matrix(self.rotations[j]), self.jacobians[j]
+        Q, J = tuple(self.rotations[j].tolist()), self.jacobians[j]
+        R = matrix_of(Q)
         arm = R @ np.asarray(point, dtype=float)
         linear = J[:3] - cross_matrix(arm) @ J[3:]
-        return FramePoint(self.positions[j] + arm, R, linear, J[3:])
+        return FramePoint(self.positions[j] + arm, R, Q, linear, J[3:])
 
 
 def configuration(model: Articulation, q: FloatArray) -> Configuration:
@@ -117,7 +122,8 @@ class FrameTask:
         """Return the errors of position [m] and rotation [rad], and their derivative."""
         frame = configuration.frame(self.frame, self.point)
         base = configuration.frame(self.relative_to)
-        turn = None if self.rotation is None else rotation.to_matrix(self.rotation)
+        target = None if self.rotation is None else tuple(self.rotation.tolist())
+        turn = None if target is None else matrix_of(target)
         residuals, derivatives = [], []
         if self.position is not None:
             into = base.matrix.T if turn is None else turn.T @ base.matrix.T
@@ -127,7 +133,8 @@ class FrameTask:
             residuals.append(self.axes[:3] * (into @ offset - shift))
             derivatives.append(self.axes[:3, None] * (into @ J))
         if turn is not None:
-            error = rotation.logarithm(rotation.from_matrix(turn.T @ base.matrix.T @ frame.matrix))
+            relative = multiply(conjugate(base.quaternion), frame.quaternion)
+            error = np.array(logarithm(multiply(conjugate(target), relative)))
             J = inverse_right_jacobian(error) @ frame.matrix.T @ (frame.angular - base.angular)
             residuals.append(self.axes[3:] * error)
             derivatives.append(self.axes[3:, None] * J)
@@ -312,6 +319,11 @@ class Coupling:
         J[record["freedom"]] = record["multiplier"]
         q = record["multiplier"] * configuration.q[record["coordinate"]] + record["shift"]
         return float(q), J
+
+
+def matrix_of(q: tuple[float, float, float, float]) -> FloatArray:
+    """Return the matrix of one rotation, (3, 3), sooner than `rotation.to_matrix`."""
+    return np.array([rotate(q, axis) for axis in AXES]).T
 
 
 def cross_matrix(v: FloatArray) -> FloatArray:
