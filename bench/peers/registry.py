@@ -203,6 +203,8 @@ class Peer(Adapter):
     precision: str = field(default="", kw_only=True)
     # whether its adapter lists all solutions of a pose
     lists_all: bool = field(default=False, kw_only=True)
+    # whether its adapter takes tasks beyond poses
+    takes_tasks: bool = field(default=False, kw_only=True)
     built_on: str = field(default="", kw_only=True)  # the engine whose kinematics it works with
     # whether it is a Python loop of ours on the package's kinematics
     loop: bool = field(default=False, kw_only=True)
@@ -266,6 +268,7 @@ PLUMBOB_LM, TOOLBOX = _PEERS["Plumbob LM"], _PEERS["Robotics Toolbox ik_LM"]
 TRAC_IK, DRAKE, PLACO = _PEERS["TRAC-IK"], _PEERS["Drake"], _PEERS["PlaCo"]
 KINEMATICS = tuple(peer for peer in PEERS if peer.kinematics)
 BRANCH_SOLVERS = tuple(peer for peer in PEERS if peer.lists_all)
+TASK_SOLVERS = tuple(peer for peer in PEERS if peer.takes_tasks)
 SINGLE_PRECISION = {peer.title: peer.precision for peer in PEERS if peer.precision}
 
 

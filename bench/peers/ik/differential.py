@@ -1,11 +1,18 @@
 """Differential inverse kinematics by quadratic programs, as mink and pink have it alike."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import hypot
 from typing import Any
 
+import numpy as np
+
+from ...problems.robot_tasks import POSTURE, RobotTask, TaskRequest, middle
 from .overhead import library
-from .protocol import BenchRobot, FloatArray, Tolerance
+from .protocol import BenchRobot, FloatArray, Solve, Tolerance
+
+# Where a posture counts, iterations go on until a step is smaller than this [rad].
+SETTLED_STEP = 1e-3
 
 
 def reaching(
@@ -44,3 +51,50 @@ def reaching(
         )
 
     return reach
+
+
+def meeting(
+    solve_ik: Callable[..., Any],
+    configuration: Any,
+    parts: Sequence[Any],
+    robot: BenchRobot,
+    task: RobotTask,
+    tolerance: float,
+    iterations: int,
+    **options: Any,
+) -> Callable[[TaskRequest], Solve]:
+    """Return the solver of a task, whose parts are tasks of the library in the same order.
+
+    It steps to what the goal's configuration has; a posture is approached only.
+    """
+    exact = [
+        (part.compute_error, np.asarray(part.cost) > 0.0)
+        for part, row in zip(parts, task.parts, strict=True)
+        if row.kind != POSTURE
+    ]
+    has_posture = len(exact) < len(parts)
+
+    def meet(start: FloatArray) -> bool:
+        configuration.update(start)
+        largest = np.inf if has_posture else 0.0
+        for _ in range(iterations):
+            if largest <= SETTLED_STEP and is_met():
+                return True
+            velocity = solve_ik(configuration, parts, 1.0, solver="daqp", **options)
+            configuration.integrate_inplace(velocity, 1.0)
+            largest = np.abs(velocity).max() if has_posture else 0.0
+        return is_met()
+
+    def is_met() -> bool:
+        errors = (counts * compute_error(configuration) for compute_error, counts in exact)
+        return all(hypot(*e[:3]) <= tolerance and hypot(*e[3:]) <= tolerance for e in errors)
+
+    def ask(request: TaskRequest) -> Solve:
+        configuration.update(request.goal)
+        for part in parts:
+            part.set_target_from_configuration(configuration)
+        if has_posture:
+            parts[-1].set_target(middle(robot))
+        return Solve(partial(meet, request.start), lambda claim: (configuration.q.copy(), claim))
+
+    return ask

@@ -5,13 +5,15 @@ the part `limit_gain` of the way to a limit. With full steps, the damping of the
 zero: they then jump about.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import mink
 
-from ...problems.evaluate import mujoco_model
-from .differential import reaching
+from ...problems.evaluate import evaluator_of, mujoco_model
+from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
+from .differential import meeting, reaching
 from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 METERED = True
@@ -46,3 +48,35 @@ def prepare(
         return Solve(solve, lambda claim: (configuration.q.copy(), claim))
 
     return ask
+
+
+def prepare_task(
+    robot: BenchRobot,
+    task: RobotTask,
+    tolerance: float,
+    iterations: int,
+    damping: float,
+    limit_gain: float,
+    **gains: float,
+) -> Callable[[TaskRequest], Solve]:
+    """Return the solver of a task, set up for an arm."""
+    configuration = mink.Configuration(mujoco_model(robot))
+    limits = [mink.ConfigurationLimit(configuration.model, limit_gain)]
+    parts = [_task(robot, part, configuration.model, gains) for part in task.parts]
+    goal = (robot, task, tolerance, iterations)
+    options: dict[str, Any] = {"damping": damping, "limits": limits}
+    return meeting(mink.solve_ik, configuration, parts, *goal, **options)
+
+
+def _task(robot: BenchRobot, part: TaskPart, model: Any, gains: dict[str, float]) -> Any:
+    frame = (robot.effectors[0], "body")
+    match part.kind:
+        case "look_at":
+            return mink.LookAtTask(*frame, **gains)
+        case "centre_of_mass":
+            return mink.ComTask(1.0, **gains)
+        case "posture":
+            return mink.PostureTask(model, POSTURE_COST, **gains)
+    base = (first_link(evaluator_of(robot.name)), "body")
+    kind = mink.RelativeFrameTask if part.is_relative else mink.FrameTask
+    return kind(*frame, *base * part.is_relative, part.axes[:3], part.axes[3:], **gains)

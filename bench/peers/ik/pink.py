@@ -8,14 +8,16 @@ beyond its limit; with 1e-6 it never is here.
 """
 
 import logging
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import pink
 
-from ...problems.evaluate import from_pinocchio, pinocchio_model, to_pinocchio
-from .differential import reaching
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+from ...problems.evaluate import evaluator_of, from_pinocchio, pinocchio_model, to_pinocchio
+from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
+from .differential import meeting, reaching
+from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance, UnableError
 
 METERED = True
 
@@ -30,11 +32,8 @@ def prepare(
     limit_gain: float = 0.5,
 ) -> Ask:
     """Return the solver, set up for a robot."""
-    logging.getLogger().setLevel(logging.ERROR)  # it warns of each step beyond a limit
-    model, cost = pinocchio_model(robot), float(robot.oriented)
-    start = pink.configuration.pin.neutral(model)
-    configuration = pink.Configuration(model, model.createData(), start, copy_data=False)
-    limits = [pink.limits.ConfigurationLimit(model, limit_gain)]
+    configuration, cost = _configuration(robot), float(robot.oriented)
+    limits = [pink.limits.ConfigurationLimit(configuration.model, limit_gain)]
     tasks = [pink.FrameTask(effector, 1.0, cost, lm_damping, gain) for effector in robot.effectors]
     goal = (robot, tolerance, iterations)
     options: dict[str, Any] = {"damping": damping, "limits": limits, "safety_break": False}
@@ -46,3 +45,45 @@ def prepare(
         return Solve(solve, lambda claim: (from_pinocchio(robot, configuration.q), claim))
 
     return ask
+
+
+def prepare_task(
+    robot: BenchRobot,
+    task: RobotTask,
+    tolerance: float,
+    iterations: int,
+    damping: float,
+    limit_gain: float,
+    **gains: float,
+) -> Callable[[TaskRequest], Solve]:
+    """Return the solver of a task, set up for an arm.
+
+    Raises:
+        UnableError: if pink has no such task.
+    """
+    configuration = _configuration(robot)
+    limits = [pink.limits.ConfigurationLimit(configuration.model, limit_gain)]
+    parts = [_task(robot, part, gains) for part in task.parts]
+    goal = (robot, task, tolerance, iterations)
+    options: dict[str, Any] = {"damping": damping, "limits": limits, "safety_break": False}
+    return meeting(pink.solve_ik, configuration, parts, *goal, **options)
+
+
+def _configuration(robot: BenchRobot) -> Any:
+    logging.getLogger().setLevel(logging.ERROR)  # it warns of each step beyond a limit
+    model = pinocchio_model(robot)
+    start = pink.configuration.pin.neutral(model)
+    return pink.Configuration(model, model.createData(), start, copy_data=False)
+
+
+def _task(robot: BenchRobot, part: TaskPart, gains: dict[str, float]) -> Any:
+    match part.kind:
+        case "look_at":
+            raise UnableError("has no task to look at a point")
+        case "centre_of_mass":
+            return pink.tasks.ComTask(1.0, **gains)
+        case "posture":
+            return pink.PostureTask(POSTURE_COST, **gains)
+    frames = (robot.effectors[0], first_link(evaluator_of(robot.name)))
+    kind = pink.tasks.RelativeFrameTask if part.is_relative else pink.FrameTask
+    return kind(*frames[: 1 + part.is_relative], part.axes[:3], part.axes[3:], **gains)

@@ -1,11 +1,35 @@
 """Plumbob's own solvers, through their public interface, on the model that its readers make."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from plumbob.reference import IKSolution, Outcome, Target, all_solutions, rotation, solve_ik
-from plumbob.reference.formats import mjcf, urdf
+import numpy as np
 
+from plumbob.reference import (
+    IKSolution,
+    Outcome,
+    Target,
+    all_solutions,
+    rotation,
+    solve_ik,
+    solve_tasks,
+    tasks,
+)
+from plumbob.reference.formats import mjcf, urdf
+from plumbob.reference.formats.robot import Robot
+from plumbob.reference.inverse_kinematics.solve_tasks import TaskSolution
+
+from ...problems.evaluate import evaluator_of
+from ...problems.robot_tasks import (
+    POSTURE_COST,
+    RobotTask,
+    TaskPart,
+    TaskRequest,
+    first_link,
+    middle,
+)
 from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 
@@ -44,5 +68,43 @@ def prepare_all(robot: BenchRobot) -> Ask:
     return ask
 
 
-def _read(solution: IKSolution) -> tuple[FloatArray | None, bool]:
+def _read(solution: IKSolution | TaskSolution) -> tuple[FloatArray | None, bool]:
     return solution.coordinates, solution.outcome == Outcome.CONVERGED
+
+
+def prepare_task(
+    robot: BenchRobot, task: RobotTask, tolerance: float, restarts: int = 0
+) -> Callable[[TaskRequest], Solve]:
+    """Return the solver of a task, set up for an arm."""
+    arm, base = urdf.parse(robot.text), first_link(evaluator_of(robot.name))
+    # of an entry of a residual, so that its three keep it together
+    settings: dict[str, Any] = {"tolerance": tolerance / 3.0**0.5, "restarts": restarts}
+
+    def ask(request: TaskRequest) -> Solve:
+        goal = tasks.configuration(arm.articulation, request.goal)
+        parts = [_task(robot, part, arm, goal, base) for part in task.parts]
+        solve = partial(solve_tasks, arm.articulation, request.start, parts, **settings)
+        return Solve(solve, _read)
+
+    return ask
+
+
+def _task(
+    robot: BenchRobot, part: TaskPart, arm: Robot, goal: tasks.Configuration, base: str
+) -> tasks.IKTask:
+    """Return a part of a task as a configuration of the goal meets it."""
+    effector = robot.effectors[0]
+    frame, reference = goal.frame(effector), goal.frame(base if part.is_relative else None)
+    match part.kind:
+        case "posture":
+            return tasks.Posture(middle(robot), weight=POSTURE_COST**2)
+        case "look_at":
+            return tasks.LookAt(effector, frame.position + frame.matrix[:, 2])
+        case "centre_of_mass":  # of what moves, as the peers have it
+            moving = np.logical_or.accumulate(np.array(arm.articulation.kinds) != "fixed")
+            balance = tasks.CentreOfMass(arm.masses * moving, arm.centres, (0.0, 0.0, 0.0))
+            return replace(balance, position=balance.evaluate(goal)[0])
+    into = reference.matrix.T
+    x, R = into @ (frame.position - reference.position), rotation.from_matrix(into @ frame.matrix)
+    relative = base if part.is_relative else None
+    return tasks.FrameTask(effector, x, R, relative_to=relative, axes=part.axes)

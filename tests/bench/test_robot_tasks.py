@@ -1,0 +1,78 @@
+"""Tasks of arms: what is met is confirmed, in every part, and counted."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from table_cells import column
+
+from plumbob.bench.experiments.robot_tasks import TOLERANCE
+from plumbob.bench.experiments.robot_tasks.measurement import TaskJob, meet
+from plumbob.bench.experiments.robot_tasks.tables import robot_tasks
+from plumbob.bench.peers.registry import ONE_START, PLUMBOB_LM, RESTARTS
+from plumbob.bench.problems.evaluate import evaluator_of
+from plumbob.bench.problems.robot_tasks import POSTURE, ROBOT_TASKS, TaskRequest, is_met
+from plumbob.bench.tables.results import Results
+
+# Published dimensions, which need no package.
+ARM = "iiwa14"
+FAULTY = """
+import numpy as np
+from plumbob.bench.problems.robots import UnableError
+
+def prepare_task(robot, task, tolerance, **settings):
+    from plumbob.bench.peers.ik.protocol import Solve
+    if len(task.parts) > 1:
+        raise UnableError("takes one part")
+    return lambda request: Solve(lambda: request.goal + 0.01, lambda q: (q, True))
+"""
+
+
+@pytest.mark.parametrize("name", ROBOT_TASKS)
+def test_a_task_is_met_by_its_goal_only(name, rng):
+    task, evaluator = ROBOT_TASKS[name], evaluator_of(ARM)
+    goal, start = 0.9 * evaluator.robot.draw(rng, 2)
+    request = TaskRequest(goal, start)
+    assert is_met(evaluator, task, request, goal, TOLERANCE)
+    assert not is_met(evaluator, task, request, goal + 0.01, TOLERANCE)
+    assert not is_met(evaluator, task, request, goal + 2.0 * np.pi, TOLERANCE)
+    for i, part in enumerate(task.parts):  # each part counts
+        rest = dataclasses.replace(task, parts=task.parts[:i] + task.parts[i + 1 :])
+        q = meet_part(rest, request) if rest.parts and part.kind != POSTURE else None
+        assert q is None or not is_met(evaluator, task, request, q, TOLERANCE)
+
+
+def meet_part(task, request):
+    """Return coordinates that Plumbob finds for the remaining parts."""
+    from plumbob.bench.peers.ik import plumbob
+
+    robot = evaluator_of(ARM).robot
+    solve = plumbob.prepare_task(robot, task, TOLERANCE, restarts=20)(request)
+    q = solve().q
+    assert is_met(evaluator_of(ARM), task, request, q, TOLERANCE)
+    return q
+
+
+@pytest.mark.parametrize("name", ROBOT_TASKS)
+def test_plumbob_meets_tasks_with_restarts(name):
+    values = meet(TaskJob(ARM, name, PLUMBOB_LM, RESTARTS, 2, 1986)).values
+    assert values.solved.all()
+    assert (values.seconds > 0.0).all()
+    assert (values.distance < 3.0).all()
+
+
+def test_a_false_claim_is_not_counted_and_an_unable_solver_says_why(importable):
+    importable("faulty_tasks", FAULTY)
+    peer = dataclasses.replace(PLUMBOB_LM, module="faulty_tasks", title="faulty")
+    assert not meet(TaskJob(ARM, "axis", peer, ONE_START, 2, 1986)).values.solved.any()
+    assert meet(TaskJob(ARM, "loop", peer, ONE_START, 2, 1986)).notes["remark"] == "takes one part"
+
+
+def test_the_table_adds_up_the_robots(make):
+    records = [make.sample("met"), make.sample("met", problem="axis/z1")]
+    lacking = make.sample("met", solver="pink", arrays=None, notes={"remark": "has no task"})
+    table = robot_tasks(Results([*records, lacking]))
+    assert column(table, "remark") == ["", "has no task"]
+    share, none = column(table, "solved (95 % interval)")
+    assert (share.hits, share.total, none) == (2, 4, None)
+    assert "Plumbob 2/4" in table.summary.points[0]
