@@ -193,9 +193,9 @@ def predict_inverse(method: str, switched: Switches, case: Case) -> Mapping[str,
 
 def _outputs(
     method: str, switched: Switches, inputs: Mapping[str, Any]
-) -> tuple[dict[str, Any], FloatArray]:
-    """Return the outputs of a solver, and its local rotations."""
-    local, positions, _ = solve(method, inputs, switched)
+) -> tuple[dict[str, Any], FloatArray, int]:
+    """Return the outputs of a solver, its local rotations and the number of its sweeps."""
+    local, positions, sweeps = solve(method, inputs, switched)
     local = with_effector_of(local, inputs)
     with np.errstate(all="ignore"):  # as the answers are read
         local = local / np.linalg.norm(local, axis=-1, keepdims=True)
@@ -204,9 +204,9 @@ def _outputs(
         positions = _older_positions(method, switched, inputs)
     outputs = {"path_positions": positions[path], "all_positions": positions}
     if method == "ccd":
-        return outputs | {"positions": positions, "local_rotations": local}, local
+        return outputs | {"positions": positions, "local_rotations": local}, local, sweeps
     placed, _ = forward({**inputs, "local_rotations": local})
-    return outputs | {"path_placed": placed[path]}, local
+    return outputs | {"path_placed": placed[path]}, local, sweeps
 
 
 def _older_positions(method: str, switched: Switches, inputs: Mapping[str, Any]) -> FloatArray:
@@ -223,24 +223,66 @@ def _older_positions(method: str, switched: Switches, inputs: Mapping[str, Any])
 
 def predict_track(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:
     """Return the outputs of a solver that follows a curve frame by frame."""
-    first, curve = case.inputs["local_rotations"], case.inputs["curve"]
-    start, shift, frames = first, (0, -1, 1)[switched.frame_target], []
-    for i in range(len(curve)):
-        target = curve[np.clip(i + shift, 0, len(curve) - 1)]
+    first, budget = case.inputs["local_rotations"], case.inputs["max_iterations"]
+    start, frames = first, list[dict[str, Any]]()
+    curve = _targets(case.inputs, switched.frame_target)
+    for i, target in enumerate(curve):
+        is_left_out = (False, i % 2 == 1, i == 0, False)[switched.frame_solved]
         inputs = {**case.inputs, "target": target, "local_rotations": start}
-        frame, local = _outputs(method, switched, inputs)
+        inputs["max_iterations"] = 0 if is_left_out else budget
+        frame, local, sweeps = _outputs(method, switched, inputs)
+        budget -= sweeps * (switched.frame_solved == 3)
+        if switched.frame_saved == 4:
+            frame |= _with_global_rotations(inputs, local, frame)
         frames.append(frame)
-        start = (local, first, rotation.identity(len(first)))[switched.frame_start]
-    if switched.frame_saved == 1:  # before it is solved
+        start = (local, first, rotation.identity(len(first)))[min(switched.frame_start, 2)]
+        if switched.frame_start == 3:
+            start = forward({**inputs, "local_rotations": local})[1]
+    if switched.frame_saved in (1, 5):  # before it is solved
         first_case = {**case.inputs, "target": curve[0], "max_iterations": 0}
-        frames = [_outputs(method, switched, first_case)[0], *frames[:-1]]
+        earlier = [_outputs(method, switched, first_case)[0], *frames[:-1]]
+        names = [name for name in frames[0] if switched.frame_saved == 1 or "positions" in name]
+        frames = [
+            {**frame, **{name: before[name] for name in names}}
+            for frame, before in zip(frames, earlier, strict=True)
+        ]
     outputs = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
     for name in {2: ("local_rotations", "path_placed"), 3: outputs}.get(switched.frame_saved, ()):
         if name in outputs:
             outputs[name][:] = outputs[name][-1]
+    if switched.frame_saved == 6:
+        outputs["path_positions"][:, -1] = case.inputs["curve"]
+        for name in {"positions", "all_positions"} & outputs.keys():
+            outputs[name][:, case.inputs["effector"]] = case.inputs["curve"]
     for local in outputs.get("local_rotations", ()):
         with_effector_of(local, case.inputs)
     return outputs
+
+
+def _targets(inputs: Mapping[str, Any], fault: int) -> FloatArray:
+    """Return the target of each frame, as a solver with a fault has them, (frame, 3)."""
+    curve, frame = inputs["curve"], np.arange(len(inputs["curve"]))
+    effector = forward(inputs)[0][inputs["effector"]]
+    shift = {1: -1, 2: 1}.get(fault, 0)
+    targets = np.array(curve[np.clip(frame + shift, 0, len(curve) - 1)])
+    if fault == 3:
+        targets[1:-1] = (curve[:-2] + curve[1:-1] + curve[2:]) / 3.0
+    elif fault == 4:
+        targets += effector - curve[0]
+    for i in frame if fault == 5 else ():
+        targets[i] = 0.5 * (targets[i] + (targets[i - 1] if i else effector))
+    return targets
+
+
+def _with_global_rotations(
+    inputs: Mapping[str, Any], local: FloatArray, frame: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the outputs in which global rotations stand for local ones."""
+    rotations = forward({**inputs, "local_rotations": local})[1]
+    if "local_rotations" in frame:
+        return {"local_rotations": rotations}
+    path = path_to(inputs["parents"], inputs["effector"])
+    return {"path_placed": forward({**inputs, "local_rotations": rotations})[0][path]}
 
 
 def with_effector_of(local: FloatArray, inputs: Mapping[str, Any]) -> FloatArray:

@@ -5,6 +5,7 @@ along the line, or the point at such a place.
 """
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import Any
@@ -34,15 +35,17 @@ def points_by(
     pieces: Callable[[float], float] = np.ceil,
     interpolate: Callable[..., FloatArray] | None = None,
     places: Callable[..., FloatArray] | None = None,
+    arcs: Callable[[FloatArray], FloatArray] = lambda lengths: np.append(0.0, np.cumsum(lengths)),
     kept_axes: Any = 1.0,
 ) -> FloatArray:
     """Return points at even places along a line, or those of other steps.
 
     `norm` measures segments, `pieces` makes whole pieces of length / spacing, `places` returns the
-    places along the line, `interpolate` the points there, and `kept_axes` is 0 for a lost axis.
+    places along the line, `interpolate` the points there, `arcs` the arc length of each point from
+    the lengths of segments, and `kept_axes` is 0 for a lost axis.
     """
     points, is_closed = kept_axes * case.facts["line"].points, bool(case.inputs["closed"])
-    arc = np.append(0.0, np.cumsum(norm(np.diff(points, axis=0), axis=1)))
+    arc = arcs(norm(np.diff(points, axis=0), axis=1))
     count = case.inputs.get("count")
     if count is None:
         count = max(1, int(pieces(arc[-1] / case.inputs["spacing"] - ROUNDING))) + (not is_closed)
@@ -57,18 +60,58 @@ def _linear(s: FloatArray, arc: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def _at_fraction(
-    s: FloatArray, arc: FloatArray, points: FloatArray, fraction: Callable[..., Any], side: Any
+    s: FloatArray,
+    arc: FloatArray,
+    points: FloatArray,
+    fraction: Callable[..., Any],
+    side: Any,
+    first: int = 0,
 ) -> FloatArray:
-    """Return points on segments, from the distance along a segment and its length."""
+    """Return points on segments, from the distance along a segment and its length.
+
+    The length is that of the segment, or the arc length of its end if `side` is "end"; `first` is
+    the first segment that is ever taken.
+    """
     lengths = np.diff(arc)
-    k = np.clip(np.searchsorted(arc, s, side=side) - (side == "right"), 0, len(lengths) - 1)
-    t = fraction(s - arc[k], np.maximum(lengths[k], 1e-12))
+    order: Any = "left" if side == "end" else side
+    k = np.clip(np.searchsorted(arc, s, side=order) - (side != "left"), first, len(lengths) - 1)
+    t = fraction(s - arc[k], np.maximum((arc[1:] if side == "end" else lengths)[k], 1e-12))
     return points[k] + np.asarray(t)[:, None] * (points[k + 1] - points[k])
 
 
 def _smoothstep(along: FloatArray, length: FloatArray) -> FloatArray:
     t = along / length
     return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+def _segment_for_each(s: FloatArray, arc: FloatArray, points: FloatArray) -> FloatArray:
+    """Go on by a segment at most for each point."""
+    k, last = 0, len(arc) - 2
+    segments = [k := min(k + (arc[k + 1] < place), last) for place in s]
+    t = (s - arc[segments]) / np.maximum(np.diff(arc)[segments], 1e-12)
+    return np.asarray(points[segments] + t[:, None] * np.diff(points, axis=0)[segments])
+
+
+def _of_other_line(case: Case, points: FloatArray) -> FloatArray:
+    """Return even points of another polyline."""
+    line = Polyline(points, (0,), bool(case.inputs["closed"]))
+    return even_points(replace(case, facts={**case.facts, "line": line}))
+
+
+def _with_axes(case: Case, axes: tuple[int, ...]) -> FloatArray:
+    return even_points(case)[:, list(axes)]
+
+
+def _steps_added_up(s: FloatArray, length: float, case: Case) -> FloatArray:
+    """Return the places below the length of an open line, each a step after the one before."""
+    if case.inputs["closed"] or len(s) < 2:
+        return s
+    places = np.cumsum(np.append(0.0, np.full(len(s), s[1])))
+    return np.asarray(places[places < length])
+
+
+def _first_stroke(case: Case) -> FloatArray:
+    return case.inputs["curve"][: (*case.inputs["strokes"][1:], None)[0]]
 
 
 def _catmull_rom(s: FloatArray, arc: FloatArray, points: FloatArray) -> FloatArray:
@@ -151,8 +194,9 @@ def _left_open(case: Case, keeps_count: bool) -> FloatArray:
     return line.even_points(int(count), False)
 
 
-def _fraction(fraction: Callable[..., Any], side: str = "right") -> PointsOf:
-    return partial(points_by, interpolate=partial(_at_fraction, fraction=fraction, side=side))
+def _fraction(fraction: Callable[..., Any], side: str = "right", first: int = 0) -> PointsOf:
+    rule = partial(_at_fraction, fraction=fraction, side=side, first=first)
+    return partial(points_by, interpolate=rule)
 
 
 def _places(places: Callable[..., FloatArray]) -> PointsOf:
@@ -189,7 +233,19 @@ FAULTS: Mapping[str, tuple[PointsOf, ...]] = {
     ),
     "lengths of coordinates": (partial(points_by, norm=lambda d, axis: np.abs(d).sum(axis)),),
     "distance for the fraction": (_fraction(lambda along, length: along),),
-    "segment after the place": (_fraction(np.divide, "left"),),
+    "segment after the place": (_fraction(np.divide, "left"), _fraction(np.divide, "left", 1)),
+    "fraction of the arc length": (_fraction(np.divide, "end"),),
+    "segment for each point": (partial(points_by, interpolate=_segment_for_each),),
+    "arc length without its zero": (
+        partial(points_by, arcs=lambda d: np.cumsum(np.append(d, d[-1]))),
+        partial(points_by, arcs=lambda d: np.cumsum(np.append(d[0], d))),
+    ),
+    "first stroke only": (lambda case: _of_other_line(case, _first_stroke(case)),),
+    "points sorted": (lambda case: _of_other_line(case, np.unique(case.inputs["curve"], axis=0)),),
+    "coordinates exchanged": tuple(
+        partial(_with_axes, axes=axes) for axes in product(range(3), repeat=3) if axes != (0, 1, 2)
+    ),
+    "steps added up": (_places(_steps_added_up),),
     "fraction smoothed": (_fraction(_smoothstep),),
     "spline for the polyline": (partial(points_by, interpolate=_catmull_rom),),
     "segment by segment": tuple(

@@ -46,6 +46,7 @@ class Switches(NamedTuple):
     budget: int = 0  # how many sweeps are allowed
     frame_start: int = 0  # following a curve: where a frame starts
     frame_target: int = 0  # which target a frame has
+    frame_solved: int = 0  # which frames are solved, and whether they share the iterations
     frame_saved: int = 0  # which pose a frame gets
     # Choices of right programs, which only show beside a fault.
     rotating: int = 0  # a vector is rotated by cross products, by (q v) q* (1) or by q (v q*) (2)

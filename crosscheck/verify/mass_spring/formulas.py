@@ -33,6 +33,8 @@ NAMES: Mapping[str, Callable[[SpringProblem], Any]] = {
     "external": lambda p: p.external,
     "x": lambda p: p.positions,
     "v": lambda p: p.velocities,
+    "x_before": lambda p: p.before[0] if p.before else p.positions,
+    "v_before": lambda p: p.before[1] if p.before else p.velocities,
     "h": lambda p: p.h,
     "pins": lambda p: p.pinned,
     "r": lambda p: p.rest_lengths,

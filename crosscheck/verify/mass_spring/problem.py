@@ -48,6 +48,8 @@ class SpringProblem:
     # the spring ("own"); "one end": along the spring, but the first end alone feels the damper
     damping: str = "along"
     normalised: bool = True  # whether a spring's direction is of length one
+    # positions and velocities at the end of the last request of as many particles, if there is any
+    before: tuple[FloatArray, FloatArray] | None = None
     linear: "SpringProblem | None" = None  # whose springs the matrix of a step has, if others
 
     @property

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from plumbob.reference.arguments import FloatArray
 from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.mass_spring import State
@@ -28,7 +29,15 @@ from .honest import compatible, domains, honest
 from .laws import SOLVED, StepContext, rounding
 from .model import EXPLICIT, StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
-from .search import ModelMatch, ModelSearch, Probe, gaps_of, probes_of, with_factorisation
+from .search import (
+    ModelMatch,
+    ModelSearch,
+    Probe,
+    fields_of,
+    gaps_of,
+    probes_of,
+    with_factorisation,
+)  # fmt: skip
 
 MAX_EXPLANATIONS = 3
 LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
@@ -83,6 +92,9 @@ def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, 
     """Return the problem of each case; a solver that goes on starts from its own answer."""
     by_name = {exchange.case.name: exchange for exchange in exchanges}
     problems: dict[str, SpringProblem] = {}
+    ends: dict[
+        int, tuple[FloatArray, FloatArray]
+    ] = {}  # the last states, by the number of particles
     for name, exchange in by_name.items():
         before = by_name.get(exchange.case.follows)
         h_before = before.case.inputs["h"] if before is not None else None
@@ -92,7 +104,14 @@ def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, 
             for state in {"positions", "velocities"} & answers.keys():
                 frames = answers[state]
                 inputs[state] = frames.reshape(-1, *frames.shape[-2:])[-1]
-        problems[name] = problem_of(inputs, h_before)
+        p = problems[name] = problem_of(inputs, h_before)
+        problems[name] = p.changed(before=ends.get(p.count))
+        outputs = exchange.answer.values if isinstance(exchange.answer, Answer) else {}
+        if {"positions", "velocities"} <= outputs.keys():
+            x, v = (
+                outputs[state].reshape(-1, p.count, 3)[-1] for state in ("positions", "velocities")
+            )
+            ends[p.count] = x, v
     return problems
 
 
@@ -221,9 +240,12 @@ def _diagnose(
     behaviour, step = None, search.step
     if matches and matches[0].faults:
         explanations = (_explanation(matches, probes, search.epsilon),)
-    elif matches and _leaves_open(step, options := honest_options(matches, step)):
+    elif matches and (
+        (is_open := _leaves_open(step, options := honest_options(matches, step)))
+        or fields_of({option.aspect: option for option in options})["integrator"].hessian != "exact"
+    ):
         is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
-        declaration = "" if is_wrong else declaration_of(options)
+        declaration = declaration_of(options) if is_open and not is_wrong else ""
         behaviour = sentence(
             "In small cases it behaves like {model}, with which it is compared."
             if is_wrong
