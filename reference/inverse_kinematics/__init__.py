@@ -74,8 +74,8 @@ def solve_ik(
     joints that others share every other time. Otherwise an attempt that was given up early is
     finished if no other reaches the target. All make up to (1 + 2 restarts) `max_iterations`, for
     one position on a Skeleton (2 + 3 restarts). Attempts at a target proven out of reach end at the
-    least distance that geometry allows, or where no small motion comes nearer: two or three restarts
-    mostly find the nearest pose.
+    least distance that geometry allows, or where no small motion comes nearer: there two or three
+    restarts mostly find the nearest pose.
 
     Args:
         skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot
