@@ -118,7 +118,7 @@ def _reached(fault: RobotFault, motion: Trajectory, laws: set[str]) -> Evidence:
 
     Of robots with few joints, which reach no target in other kinematics, only frames that do count.
     """
-    explained = motion.errors(_errors(fault, motion, motion.q, sine_error)) <= LENIENT
+    explained = motion.errors(_errors(fault, motion, motion.q, _sine_if_near)) <= LENIENT
     is_pose = explained | (motion.q.shape[1] >= POSE_FREEDOMS)
     return Evidence(_ends_off_target(motion) & is_pose, explained)
 
@@ -138,11 +138,14 @@ def _errors(
     frames, targets = fault.frames(motion.inputs, q), fault.targets(motion.inputs, motion.targets())
     turned = np.zeros_like(targets.positions)
     if targets.rotations is not None:
-        goals = rotation.to_matrix(targets.rotations)
-        turned = angular(frames.rotation, goals)
-        is_near = np.einsum("fij,fij->f", frames.rotation, goals) > 1.0
-        turned = np.where(is_near[:, None] | (angular is not sine_error), turned, np.pi)
+        turned = angular(frames.rotation, rotation.to_matrix(targets.rotations))
     return np.concatenate([targets.positions - frames.position, turned], axis=-1)
+
+
+def _sine_if_near(R: FloatArray, goals: FloatArray) -> FloatArray:
+    """Return the sine error, which vanishes at half a turn too, or pi beyond a right angle."""
+    is_near = np.einsum("fij,fij->f", R, goals) > 1.0
+    return np.where(is_near[:, None], sine_error(R, goals), np.pi)
 
 
 def is_falling_at(motion: Trajectory) -> bool:
@@ -293,7 +296,8 @@ def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
     e, R = motion.twists(motion.q), RIGHT.frames(motion.inputs, motion.q).rotation
     (J,) = RIGHT.jacobians(motion.inputs, motion.q)
     J = J * ~motion.at_limits[:, None]
-    right, wrong = (np.einsum("fij,fi->fj", J, twist) for twist in (e, _twists(motion, e, R)[key]))
+    twists = e, TWISTS[key](e, R, motion.targets().rotations)
+    right, wrong = (np.einsum("fij,fi->fj", J, twist) for twist in twists)
     scale = np.linalg.norm(right, axis=-1) * np.linalg.norm(wrong, axis=-1)
     cosine = (right * wrong).sum(axis=-1) / np.maximum(scale, 1e-300)
     is_at_start = np.abs(motion.changes).max(axis=-1) <= AT_LIMIT
@@ -304,7 +308,8 @@ def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
 def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
     """Return the gaps to a right step and to those of faults, by key."""
     J, q, e = motion.jacobians, motion.previous, motion.twists(motion.previous)
-    twists = _twists(motion, e, RIGHT.frames(motion.inputs, q).rotation)
+    R, goals = RIGHT.frames(motion.inputs, q).rotation, motion.targets().rotations
+    twists = {key: rule(e, R, goals) for key, rule in TWISTS.items()}
     if len(q) > 1:
         twists["no feedback"] = motion.displacements
     gaps = {key: _step_gap(motion, J, q, twist) for key, twist in twists.items()}
@@ -317,28 +322,9 @@ def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
     return gaps
 
 
-def _twists(motion: Trajectory, e: FloatArray, R: FloatArray) -> dict[str, FloatArray]:
-    """Return the right twists e of tools with rotation matrices R, and those of faults, by key."""
-    return {
-        "": e,
-        "Jacobian in the tool's frame": _both(R, e),
-        "error in the tool's frame": _both(np.swapaxes(R, 1, 2), e),
-        "rotation error reversed": e * np.repeat([1.0, -1.0], 3),
-        "linear and angular swapped": np.roll(e, 3, axis=-1),
-        "step reversed": -e,
-        "position error reversed": e * np.repeat([-1.0, 1.0], 3),
-        "rotation error in the tool's frame": np.concatenate(
-            [e[:, :3], np.einsum("fji,fj->fi", R, e[:, 3:])], axis=-1
-        ),
-        "rotation error doubled": e * np.repeat([1.0, 2.0], 3),
-        "difference of Euler angles": np.concatenate([e[:, :3], _angles_between(motion, R)], -1),
-    }
-
-
-def _angles_between(motion: Trajectory, R: FloatArray) -> FloatArray:
-    """Return the differences of roll, pitch and yaw from matrices to targets, (frame, 3)."""
-    goals = rotation.to_matrix(motion.targets().rotations)
-    pairs = zip(R, goals, strict=True)
+def _angles_between(R: FloatArray, goals: FloatArray) -> FloatArray:
+    """Return the differences of roll, pitch and yaw from matrices to quaternions, (frame, 3)."""
+    pairs = zip(R, rotation.to_matrix(goals), strict=True)
     return np.array([np.subtract(roll_pitch_yaw(b), roll_pitch_yaw(a)) for a, b in pairs])
 
 
@@ -347,7 +333,7 @@ def _fault_gaps(fault: RobotFault, motion: Trajectory) -> Iterator[FloatArray]:
     q = motion.previous
     errors = [_errors(fault, motion, q)]
     if len(q) == 1:  # the errors of frames are small
-        errors.append(_errors(fault, motion, q, lambda R, target: sine_error(R, target)))
+        errors.append(_errors(fault, motion, q, sine_error))
     for J in fault.jacobians(motion.inputs, q):
         yield from (_step_gap(motion, J, q, error) for error in errors)
 
@@ -418,14 +404,12 @@ def _overshoot(motion: Trajectory, laws: set[str]) -> Evidence:
 
 def _wrapped(motion: Trajectory, laws: set[str]) -> Evidence:
     turns = np.abs(np.abs(motion.changes) - 2.0 * np.pi) < WHOLE_TURN
-    return _jumping(motion, np.any(turns, axis=-1), least=1)
+    return _jumping(motion, np.any(turns, axis=-1), repeats=MIN_FRAMES)
 
 
-def _jumping(motion: Trajectory, explained: BoolArray, least: int = MIN_FRAMES) -> Evidence:
-    """Return which jumps are explained; a motion has few: each counts several times."""
-    is_jump = motion.jumps > 1.0
-    repeats = -(-MIN_FRAMES // least)
-    return Evidence(np.repeat(is_jump, repeats), np.repeat(explained, repeats))
+def _jumping(motion: Trajectory, explained: BoolArray, repeats: int = 1) -> Evidence:
+    """Return which jumps are explained; where a single one is enough, each counts several times."""
+    return Evidence(np.repeat(motion.jumps > 1.0, repeats), np.repeat(explained, repeats))
 
 
 def _is_singular(motion: Trajectory) -> BoolArray:
@@ -436,7 +420,7 @@ def _is_singular(motion: Trajectory) -> BoolArray:
 def _undamped(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the jumps from near a singularity, or towards a target beyond reach."""
     explained = _is_singular(motion) | ~motion.case.facts["reachable"]
-    return _jumping(motion, explained, least=1)
+    return _jumping(motion, explained, repeats=MIN_FRAMES)
 
 
 def _branch(motion: Trajectory, laws: set[str]) -> Evidence:
@@ -477,12 +461,24 @@ STEP_FAULTS = {
     for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()
     if not (fault.relative or fault.order or key in NOT_STEPS)
 }
-STEP_KEYS = (
-    "Jacobian in the tool's frame", "error in the tool's frame", "rotation error reversed",
-    "linear and angular swapped", "no feedback", "frames start anew", "step reversed",
-    "position error reversed", "rotation error in the tool's frame", "rotation error doubled",
-    "difference of Euler angles", *STEP_FAULTS,
-)  # fmt: skip
+# The right twists e of tools with rotation matrices R to goals, and those of faults.
+TWISTS: Mapping[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] = {
+    "": lambda e, R, goals: e,
+    "Jacobian in the tool's frame": lambda e, R, goals: _both(R, e),
+    "error in the tool's frame": lambda e, R, goals: _both(np.swapaxes(R, 1, 2), e),
+    "rotation error reversed": lambda e, R, goals: e * np.repeat([1.0, -1.0], 3),
+    "linear and angular swapped": lambda e, R, goals: np.roll(e, 3, axis=-1),
+    "step reversed": lambda e, R, goals: -e,
+    "position error reversed": lambda e, R, goals: e * np.repeat([-1.0, 1.0], 3),
+    "rotation error in the tool's frame": lambda e, R, goals: np.concatenate(
+        [e[:, :3], np.einsum("fji,fj->fi", R, e[:, 3:])], axis=-1
+    ),
+    "rotation error doubled": lambda e, R, goals: e * np.repeat([1.0, 2.0], 3),
+    "difference of Euler angles": lambda e, R, goals: np.concatenate(
+        [e[:, :3], _angles_between(R, goals)], axis=-1
+    ),
+}
+STEP_KEYS = (*(key for key in TWISTS if key), "no feedback", "frames start anew", *STEP_FAULTS)
 STEPS: Mapping[str, Signature] = {
     "damping too large": partial(_scaled, OVERDAMPED, (0.9, 1.1)),
     "steps too short": partial(_scaled, DAMPINGS[DAMPINGS < 0.1][:, None], SHORT),
