@@ -50,6 +50,14 @@ class SwitchFault(NamedTuple):
     covers: tuple[str, ...] = ()  # keys of faults in its sentence, if no answer tells them apart
 
 
+def sentences_of(part: str) -> dict[str, Sentence]:
+    """Return the sentences of a table's faults with their codes, by their short names."""
+    return {
+        key: with_code(entry["code"], Sentence(entry["sentence"], {}))
+        for key, entry in TABLE[part].items()
+    }
+
+
 def _load() -> dict[str, tuple[SwitchFault, ...]]:
     """Return the faults that each method may have, the most frequent first."""
     parts = {

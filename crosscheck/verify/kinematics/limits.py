@@ -19,9 +19,8 @@ from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, Verdict
 from ..laws import finding, judge_case
-from ..sentence import Sentence, with_code
 from . import pose_laws, problems, rounding, skeletons
-from .faults import TABLE
+from .faults import sentences_of
 from .predictions import forward
 from .problems import TargetProblem
 from .skeletons import CaseFamily
@@ -333,10 +332,7 @@ READINGS: Mapping[str, Reading] = {
     "twists ignored": _of_limits(partial(_without, FIELDS[2:])),
 }
 IGNORED, CLAMPED = "limits ignored", "clamped after the solve"
-SENTENCES = {
-    key: with_code(entry["code"], Sentence(entry["sentence"], {}))
-    for key, entry in TABLE["limits"].items()
-}
+SENTENCES = sentences_of("limits")
 
 
 def _ends(reading: Reading, case: Case, local: FloatArray, bound: float) -> int:

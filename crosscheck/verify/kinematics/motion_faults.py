@@ -10,8 +10,7 @@ from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray
 
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
-from ..sentence import Sentence, with_code
-from .faults import TABLE
+from .faults import sentences_of
 from .robot_faults import FAULTS as POSE_FAULTS
 from .robot_faults import JACOBIAN_FAULTS, POSITION_ONLY, RIGHT, RobotFault
 from .robot_textbook import roll_pitch_yaw, rotation_error, sine_error
@@ -43,6 +42,8 @@ WELL_BEYOND = 0.01
 EXACT, SAME_SPEED = 1e-9, 1e-3
 # A test that is looser than the tolerance lets pass up to so many tolerances.
 LOOSER = 60.0
+SENTENCES = sentences_of("robot_track")
+SENTENCES |= {key: fault.sentence for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()}
 
 
 class Evidence(NamedTuple):
@@ -77,17 +78,9 @@ def diagnosis_of(
         shares = {key: _share(rule, wrong, by_family) for key, rule in signatures.items()}
         key = max(shares, key=shares.__getitem__)
         if shares[key] >= least:
-            explanation = Explanation((key,), sentence_of(key), shares[key], 0.0)
+            explanation = Explanation((key,), SENTENCES[key], shares[key], 0.0)
             return Diagnosis((explanation,), variant_count=len(FAULTS))
     return Diagnosis(variant_count=len(FAULTS))
-
-
-def sentence_of(key: str) -> Sentence:
-    """Return the mistake, and its correction."""
-    if fault := (POSE_FAULTS | JACOBIAN_FAULTS).get(key):
-        return fault.sentence
-    entry = TABLE["robot_track"][key]
-    return with_code(entry["code"], Sentence(entry["sentence"], {}))
 
 
 def _broken(judgement: CaseJudgement) -> set[str]:

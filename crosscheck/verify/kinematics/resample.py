@@ -15,9 +15,9 @@ from ..explain import Variant, explain
 from ..greeting import Greeting
 from ..judgement import Diagnosis, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case
-from ..sentence import Sentence, sentence, with_code
+from ..sentence import Sentence, sentence
 from . import rounding
-from .faults import AS_THE_TEXTBOOK, TABLE
+from .faults import AS_THE_TEXTBOOK, sentences_of
 from .polylines import Polyline
 from .report import report
 from .resample_faults import FAULTS, even_points
@@ -219,11 +219,7 @@ def _diagnosis(
     wrong_first: Sequence[Exchange], greeting: Greeting, behaviour: Sentence | None
 ) -> Diagnosis:
     """Return the faults that reproduce the answers."""
-    sentences = {
-        key: with_code(entry["code"], Sentence(entry["sentence"], {}))
-        for key, entry in TABLE[TASK].items()
-    }
-    sentences[""] = AS_THE_TEXTBOOK
+    sentences = {"": AS_THE_TEXTBOOK, **sentences_of(TASK)}
 
     def variant(key: str, points: Callable[[Case], FloatArray]) -> Variant:
         return Variant((key,) if key else (), lambda case: {"points": points(case)})

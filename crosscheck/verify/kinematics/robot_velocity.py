@@ -18,9 +18,9 @@ from ..explain import Variant, either, explain
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from ..sentence import Sentence, sentence, with_code
+from ..sentence import Sentence, sentence
 from . import robot_jacobian, robot_models, rounding
-from .faults import TABLE
+from .faults import sentences_of
 from .report import report
 from .robot_jacobian import CONVENTIONS, right_jacobian
 from .robot_models import mechanism
@@ -39,10 +39,7 @@ LARGEST_LOSS = 0.25
 FACTOR = 1e3
 SINGULAR = "a singular pose"
 # Mistakes in reading the velocity or solving for the speeds, by their keys.
-READING_FAULTS: Mapping[str, Sentence] = {
-    key: with_code(entry["code"], Sentence(entry["sentence"], {}))
-    for key, entry in TABLE["robot_velocity"].items()
-}
+READING_FAULTS = sentences_of("robot_velocity")
 # Those that invert a singular matrix, which is so for robots with too few joints or too many.
 TOO_FEW, TO_SPARE = "too few joints", "joints to spare"
 # Those whose speeds may be short by any share: with a factor of the transposed matrix, or damping.
