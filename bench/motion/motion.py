@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
+
+from plumbob.crosscheck.verify.output.html import environment
 
 from ..figures.style import COLOURS
 from ..text import visible
@@ -92,17 +93,6 @@ class Scene(NamedTuple):
         points = np.concatenate(arrays if self.curve is None else [*arrays, self.curve])
         is_near = np.abs(points - (low + high) / 2) <= (high - low).max()
         return np.asarray(points[is_near.all(axis=-1)])
-
-
-def environment(folder: Path) -> Environment:
-    """Return the environment of the templates in a folder, which escapes texts."""
-    return Environment(
-        loader=FileSystemLoader(folder),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
 
 
 def fragment(scene: Scene) -> Markup:

@@ -6,8 +6,9 @@ import re
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader
 from markupsafe import Markup, escape
+
+from plumbob.crosscheck.verify.output import html
 
 from ..harness.metrics import Share
 from .table import Cell, Table, best_cells, words
@@ -83,14 +84,9 @@ def html_fragment(table: Table) -> str:
         for i, row in enumerate(table.rows)
     ]
     about = " ".join(filter(None, (table.shows, table.measured, table.provenance)))
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["powers"] = _powers
-    template = environment.get_template("fragment.html")
+    templates = html.environment(Path(__file__).parent)
+    templates.filters["powers"] = _powers
+    template = templates.get_template("fragment.html")
     return template.render(table=table, rows=rows, about=about) + "\n"
 
 

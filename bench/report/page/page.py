@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from plumbob.crosscheck.verify.output import BASE_STYLE
+from plumbob.crosscheck.verify.output import html
 
 from ...experiments.robots.figures import RobotMap
 from ...figures import svg
@@ -62,11 +62,11 @@ class Chapter(NamedTuple):
 def render(contents: Contents, newest: Record, missing: Sequence[str]) -> str:
     """Return the page, with machine and versions of the newest record."""
     scripts = [SCRIPT, *([motion.SCRIPT] if contents.scenes else [])]
-    environment = motion.environment(_FOLDER)
+    environment = html.environment(_FOLDER)
     environment.filters |= {"rich": rich, "coded": coded, "inline": svg.inline}
     environment.filters |= {"percent": partial(words_in, unit="%"), "player": motion.fragment}
     return environment.get_template("page.html").render(
-        style=Markup(BASE_STYLE + (_FOLDER / "page.css").read_text(encoding="utf-8")),
+        style=Markup(html.BASE_STYLE + (_FOLDER / "page.css").read_text(encoding="utf-8")),
         motion_style=Markup(motion.STYLE if contents.scenes else ""),
         scripts=list(map(Markup, scripts)),
         policy=policy(scripts),

@@ -4,14 +4,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from jinja2 import Template
 from markupsafe import Markup
 from rich.cells import cell_len
 
 from ..judgement import Report, TaskReport
 from ..sentence import Sentence, sentence
 from ..task import TASKS
-from . import BASE_STYLE, comparison, drawing, words
+from . import comparison, drawing, html, words
 from .words import Presentation
 
 _FOLDER = Path(__file__).parent
@@ -36,16 +36,13 @@ WORDS = {
 
 def _template(name: str, context: Presentation) -> Template:
     """Return a template, which escapes all texts of the solver."""
-    environment = Environment(
-        loader=FileSystemLoader(_FOLDER), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    environment.globals |= {"words": WORDS, "verdicts": words.VERDICTS}
-    environment.filters |= {
+    templates = html.environment(_FOLDER)
+    templates.globals |= {"words": WORDS, "verdicts": words.VERDICTS}
+    templates.filters |= {
         "say": context.say, "numbers": comparison.texts, "digits": words.digits,
         "title": words.title, "passed": words.passed,
     }  # fmt: skip
-    return environment.get_template(name)
+    return templates.get_template(name)
 
 
 def card(report: Report, context: Presentation) -> str:
@@ -62,7 +59,7 @@ def card(report: Report, context: Presentation) -> str:
 def render(report: Report, context: Presentation) -> str:
     """Return the page."""
     return _template("page.html", context).render(
-        style=Markup(BASE_STYLE + (_FOLDER / "page.css").read_text(encoding="utf-8")),
+        style=Markup(html.BASE_STYLE + (_FOLDER / "page.css").read_text(encoding="utf-8")),
         language={"zh": "zh-CN"}.get(context.language, context.language),
         introduction=words.introduction(report),
         advice=words.advice(report.tasks),
