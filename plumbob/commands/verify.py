@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..help_text import Command
-from .options import File, Text, Texts, argument, flag, option
+from .options import FAILED, SUCCESS, File, Text, Texts, argument, flag, option
 
 if TYPE_CHECKING:
     from plumbob.crosscheck.verify.output.files import Files
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from plumbob.crosscheck.verify.output.words import Say
     from plumbob.crosscheck.verify.solvers import ProcessLimits
 
-RIGHT, WRONG = 0, 1
 PROGRAM = "plumbob.program"
 
 
@@ -145,7 +144,7 @@ def _judge(
 
 def _print(lines: Iterable[str]) -> int:
     print("\n".join(lines))
-    return RIGHT
+    return SUCCESS
 
 
 def _self_test(words: list[str], say: "Say") -> int:
@@ -164,4 +163,4 @@ def _self_test(words: list[str], say: "Say") -> int:
     )
     trials = [attempt(solver) for solver in solvers]
     _print(self_test(trials, say))
-    return RIGHT if all(trial.passed for trial in trials) else WRONG
+    return SUCCESS if all(trial.passed for trial in trials) else FAILED

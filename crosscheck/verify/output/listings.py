@@ -80,7 +80,7 @@ def starter(language: str, folder: Path, say: Say) -> list[str]:
 
 def exported(folder: Path, tasks: Sequence[str], seed: int, thorough: bool, say: Say) -> list[str]:
     """Write cases into a folder and return what to do next."""
-    count = export_cases(folder, None, tasks or None, seed, thorough)
+    count = export_cases(folder, tasks or None, seed, thorough)
     place = shlex.quote(str(folder))
     steps = (
         sentence("{count} cases are in {folder}; README.txt there says how to answer them.",

@@ -18,22 +18,17 @@ README = Path(__file__).with_name("export_readme.txt").read_text(encoding="utf-8
 
 
 def export_cases(
-    folder: Path,
-    greeting: Greeting | None = None,
-    tasks: Sequence[str] | None = None,
-    seed: int = 0,
-    thorough: bool = False,
+    folder: Path, tasks: Sequence[str] | None = None, seed: int = 0, thorough: bool = False
 ) -> int:
     """Write all cases that suit a solver, with instructions for the answers; return their number.
 
-    The folder is new or empty, or that of an earlier export, whose answers stay. Without a
-    greeting, that of its greeting.json counts, or else all tasks. Raise ValueError if it holds
+    The folder is new or empty, or that of an earlier export, whose answers stay. Its greeting.json
+    says what suits the solver; without that, all tasks do. Raise ValueError if the folder holds
     something else, or greeting.json is not understood.
     """
     _check_is_export(folder)
-    if greeting is None and (folder / GREETING).is_file():
-        greeting = read_greeting(folder)
-    greeting = greeting or Greeting(1, tuple(DISCIPLINES))
+    is_greeted = (folder / GREETING).is_file()
+    greeting = read_greeting(folder) if is_greeted else Greeting(1, tuple(DISCIPLINES))
     cases = [
         case
         for task, method in trials(greeting, tasks)
