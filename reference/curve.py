@@ -186,10 +186,10 @@ def _stroke(corners: ArrayLike) -> Callable[[FloatArray], FloatArray]:
     return points
 
 
-def _uneven(count: int, halts: int = 3) -> FloatArray:
-    """Return fractions from 0 to 1, dense at `halts` points and sparse in between."""
+def _uneven(count: int) -> FloatArray:
+    """Return fractions from 0 to 1, dense at three points and sparse in between."""
     u = np.linspace(0.0, 1.0, count)
-    return u + np.sin(2.0 * np.pi * halts * u) / (2.0 * np.pi * halts)
+    return u + np.sin(6.0 * np.pi * u) / (6.0 * np.pi)
 
 
 def _body(u: FloatArray) -> FloatArray:

@@ -31,7 +31,6 @@ from .arguments import (
     IndexArray,
     KeepsReadOnly,
     array,
-    boolean,
     check_shape,
     coordinates,
     flags,
@@ -345,7 +344,7 @@ def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     It is the sum of (A_i A_i') x (k u u' + k (1 - r/l) (I - u u')) over springs that are not slack;
     the second, geometric term is zero for a spring with a rest length whose ends coincide.
     """
-    stiffness = spring_blocks(system, positions)
+    stiffness = blocks(_positions(system, positions), system.arrays, True)
     return BlockSum(incidence(system)).matrix(stiffness)
 
 
@@ -357,14 +356,6 @@ def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     x, never_slack = _positions(system, positions), np.zeros(len(system.springs), dtype=bool)
     dampers = system.arrays._replace(stiffnesses=system.arrays.dampings, tension_only=never_slack)
     return BlockSum(incidence(system)).matrix(blocks(x, dampers, False))
-
-
-def spring_blocks(
-    system: MassSpring, positions: ArrayLike, *, geometric: bool = True
-) -> FloatArray:
-    """Return each spring's 3 x 3 stiffness [N/m], the geometric term included or left out."""
-    x, geometric = _positions(system, positions), boolean("geometric", geometric)
-    return blocks(x, system.arrays, geometric)
 
 
 def checked_state(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
@@ -399,7 +390,7 @@ def spring_pulls(x, v, system):
 
 
 def stiffness_blocks(x, system, geometric):
-    """Return the 3 x 3 stiffness of each spring, zero if slack; see `mass_spring.spring_blocks`."""
+    """Return the 3 x 3 stiffness of each spring, zero if slack; see `stiffness_matrix`."""
     blocks = np.zeros((len(system.springs), 3, 3))
     for s in range(len(system.springs)):
         i, j = system.springs[s, 0], system.springs[s, 1]

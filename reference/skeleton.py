@@ -108,11 +108,11 @@ class Skeleton(KeepsReadOnly):
         return f"Skeleton({self.joint_count} joints, reach {self.reach():g} m)"
 
 
-def checked_skeleton(skeleton: Skeleton, name: str = "skeleton") -> Skeleton:
-    """Return the argument of that name if it is a Skeleton."""
+def checked_skeleton(skeleton: Skeleton) -> Skeleton:
+    """Return the argument `skeleton` if it is a Skeleton."""
     if type(skeleton) is Skeleton:
         return skeleton
-    return arguments.instance(name, skeleton, Skeleton)
+    return arguments.instance("skeleton", skeleton, Skeleton)
 
 
 class Pose(NamedTuple):

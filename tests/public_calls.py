@@ -403,7 +403,6 @@ def _systems():
     }  # fmt: skip
     yield entry(MassSpring, built, single=" ".join(per_spring), free="masses pinned")
     yield entry(State, {"positions": state.positions, "velocities": outer})
-    yield entry(m.spring_blocks, {**at, "geometric": False})
     yield entry(m.derivation, {"system": model})
     yield entry(m.incidence, {"system": model})
     yield entry(m.kinetic_energy, moving)

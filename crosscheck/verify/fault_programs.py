@@ -91,9 +91,9 @@ def _faults_of(part: Any) -> Iterator[CodedFault]:
         yield CodedFault(entry["code"], name.format(**values), words, program, lines)
 
 
-def contestant_of(program: str, name: str = "program") -> FunctionContestant:
+def contestant_of(program: str) -> FunctionContestant:
     """Return the functions of a program's source as a contestant of this process."""
     names: dict[str, Any] = {}
-    exec(compile(program, name, "exec"), names)
-    solver = PythonSolver(names, name, names.get("PLUMBOB", {}))
-    return FunctionContestant(solver.functions, decode_greeting(solver.greeting, name))
+    exec(compile(program, "program", "exec"), names)
+    solver = PythonSolver(names, "program", names.get("PLUMBOB", {}))
+    return FunctionContestant(solver.functions, decode_greeting(solver.greeting, "program"))

@@ -47,7 +47,7 @@ SENTENCES |= {key: fault.sentence for key, fault in (POSE_FAULTS | JACOBIAN_FAUL
 
 
 class Evidence(NamedTuple):
-    """Frames that a fault concerns, and those of them that it explains, (frame) each."""
+    """Which frames a fault concerns, and which it explains, (frame) each."""
 
     concerned: BoolArray
     explained: BoolArray
@@ -272,7 +272,7 @@ def _least_gap(changes: FloatArray, steps: FloatArray, factors: tuple[float, flo
 def _scaled(
     dampings: FloatArray, factors: tuple[float, float], motion: Trajectory, laws: set[str]
 ) -> Evidence:
-    """Return the frames that are right steps with one of these dampings, times such a factor."""
+    """Return the frames that are right steps with some of these dampings, times a factor."""
     J, changes = motion.jacobians * ~motion.at_limits[:, None], motion.changes * ~motion.at_limits
     steps = _damped_steps(J, motion.twists(motion.previous), dampings)
     lengths = np.linalg.norm(changes, axis=-1)
@@ -282,7 +282,7 @@ def _scaled(
 
 
 def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames that end off the minimum, and those where a fault's step goes nowhere.
+    """Return the frames that end off the minimum, and where a fault's step goes nowhere.
 
     A solver that accepts only steps that reduce the error ends where its own do not.
     """
@@ -299,7 +299,7 @@ def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
 
 
 def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
-    """Return the gaps to a right step and to those of faults, by key."""
+    """Return the gaps to a right step and to steps of faults, by key."""
     J, q, e = motion.jacobians, motion.previous, motion.twists(motion.previous)
     R, goals = RIGHT.frames(motion.inputs, q).rotation, motion.targets().rotations
     twists = {key: rule(e, R, goals) for key, rule in TWISTS.items()}
@@ -348,7 +348,7 @@ def _nearest_steps(motion: Trajectory) -> tuple[BoolArray, list[str]]:
 
 
 def _is_step(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames that move, and those whose step is nearest to that of a fault."""
+    """Return the frames that move, and where the step is nearest to that of a fault."""
     is_telling, keys = _nearest_steps(motion)
     return Evidence(is_telling, np.array([name == key for name in keys]))
 

@@ -1,4 +1,4 @@
-"""What the pages of `verify` and of the bench share: the style and the escaping of texts."""
+"""The style of the pages of `verify` and of the bench, and the escaping of their texts."""
 
 from pathlib import Path
 
