@@ -137,10 +137,9 @@ def difference(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
 def _difference(name: str, first: Any, second: Any) -> float:
     a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     if name.endswith("rotations") and a.shape == b.shape:
-        b = b * np.where(np.nansum(a * b, -1, keepdims=True) < 0.0, -1.0, 1.0)
-    size = float(np.abs(a).max(initial=0.0))
-    if not math.isfinite(size):
-        size = float(np.abs(np.nan_to_num(a)).max())
+        with np.errstate(invalid="ignore"):
+            b = b * np.where(np.nansum(a * b, -1, keepdims=True) < 0.0, -1.0, 1.0)
+    size = float(np.abs(np.where(np.isfinite(a), a, 0.0)).max(initial=0.0))
     return largest_gap(a, b) / max(size, 1e-300)
 
 

@@ -17,7 +17,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case
 from ..sentence import sentence
-from . import degenerate, limits, pose_laws, problems, rounding, sweeps
+from . import degenerate, early_ends, limits, pose_laws, problems, rounding, sweeps
 from .faults import SwitchFault
 from .pose_laws import AnsweredPose
 from .predictions import solve
@@ -250,20 +250,24 @@ def _diagnosis(
     sweep_trials = [trial for trial in posed_trials if trial.is_sweep]
     names = comparison.wrong
     wrong = [trial for trial in sweep_trials if trial.is_wrong or trial.case.name in names]
+    must = [t for t in posed_trials if t.case.requirement == "must" and t.pose.finite]
+    diagnosis = Diagnosis(behaviour=comparison.behaviour)
     if wrong:
-        return sweeps.explained(comparison, sweep_trials, wrong, greeting, max_faults, base)
-    whole = [
-        trial
-        for trial in posed_trials
-        if not trial.is_sweep and trial.case.requirement == "must" and trial.pose.finite
-    ]
-    solves = [trial.comparable for trial in whole if trial.is_wrong or _ends_elsewhere(trial)]
-    # of another tolerance, where tests that agree elsewhere differ
-    loose = [t.comparable for t in whole if t.case.inputs["tolerance"] == problems.LOOSE]
-    if solves and comparison.method:
+        diagnosis = sweeps.explained(comparison, sweep_trials, wrong, greeting, max_faults, base)
+    elif comparison.method:
+        whole = [trial for trial in must if not trial.is_sweep]
+        wrong = [trial for trial in whole if trial.is_wrong or _ends_elsewhere(trial)]
+        # of another tolerance, where tests that agree elsewhere differ
+        loose = [trial for trial in whole if trial.case.inputs["tolerance"] == problems.LOOSE]
+        compared = [*wrong, *(trial for trial in loose if trial not in wrong)]
         bound = partial(sweeps.prediction_bound, greeting)
-        compared = [*solves, *(exchange for exchange in loose if exchange not in solves)]
-        return diagnosis_of(
-            comparison.method, compared, solves, bound, comparison.behaviour, base=base
-        )
-    return Diagnosis(behaviour=comparison.behaviour)
+        diagnosis = diagnosis_of(
+            comparison.method, [t.comparable for t in compared], [t.comparable for t in wrong],
+            bound, comparison.behaviour, base=base,
+        )  # fmt: skip
+    is_certain = any(explanation.share == 1.0 for explanation in diagnosis.explanations)
+    if wrong and comparison.method and not is_certain:
+        solves = [trial for trial in must if trial in wrong or not trial.is_sweep]
+        early = early_ends.explanation(solves, wrong, comparison.method, greeting)
+        return replace(diagnosis, explanations=(early,)) if early else diagnosis
+    return diagnosis

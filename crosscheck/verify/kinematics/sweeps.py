@@ -333,6 +333,10 @@ def is_grave(method: str, diagnosis: Diagnosis) -> bool:
     faults = by_key(method)
     return any(
         explanation.share == 1.0
-        and not any(faults[key].honest for keys in explanation.faults for key in keys.split(" + "))
+        and not any(
+            key not in faults or faults[key].honest
+            for keys in explanation.faults
+            for key in keys.split(" + ")
+        )
         for explanation in diagnosis.explanations
     )

@@ -1,0 +1,136 @@
+"""The test by which solves end too early: a quantity that is small at their ends, not before.
+
+The textbook's sweeps are followed up to the pose of each answer, which shows after how many it has
+ended.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from ..greeting import Greeting
+from ..judgement import Explanation
+from ..sentence import Sentence, sentence, with_code
+from .faults import TABLE
+from .predictions import solve
+from .sweeps import PoseTrial
+
+KEY = "early by another test"
+# A pose is that after a sweep up to this share of the skeleton's size, by precision.
+SAME_POSE = {"double": 1e-7, "single": 1e-5}
+# So many solves end after the same sweep before their number is taken for the reason.
+MIN_SOLVES = 2
+
+
+class Solve(NamedTuple):
+    """The textbook's sweeps up to the end of a solve."""
+
+    gaps: FloatArray  # from the target to the effector, before the first sweep and after each [m]
+    tolerance: float  # [m]
+    is_early: bool  # whether the textbook goes on
+
+
+def _distances(solve: Solve) -> FloatArray:
+    return np.asarray(np.linalg.norm(solve.gaps, axis=1))
+
+
+def _gains(solve: Solve) -> FloatArray:
+    return np.append(np.inf, -np.diff(_distances(solve)))
+
+
+# What programs compare with a constant or with the tolerance, and the words of the test.
+Quantity = Callable[[Solve], FloatArray]
+TESTS: Sequence[tuple[Quantity, Sentence]] = (
+    (
+        lambda s: -np.arange(len(s.gaps), dtype=float),
+        sentence("{sweeps} sweeps are made, whatever max_iterations is"),
+    ),
+    (_distances, sentence("the distance to the target is below about {bound:.3g} m")),
+    (
+        lambda s: _distances(s) / s.tolerance,
+        sentence("the distance to the target is below about {bound:.3g} times the tolerance"),
+    ),
+    (_gains, sentence("a sweep lowers the distance by less than about {bound:.3g} m")),
+    (
+        lambda s: _gains(s) / s.tolerance,
+        sentence("a sweep lowers the distance by less than about {bound:.3g} times the tolerance"),
+    ),
+    (
+        lambda s: np.append(np.inf, np.linalg.norm(np.diff(s.gaps, axis=0), axis=1)),
+        sentence("a sweep moves the effector by less than about {bound:.3g} m"),
+    ),
+    (
+        lambda s: np.append(np.inf, _gains(s)[1:] / _distances(s)[:-1]),
+        sentence("a sweep lowers the distance by less than about {bound:.3g} of it"),
+    ),
+    (
+        lambda s: s.gaps.max(axis=1) / s.tolerance,
+        sentence("each component of effector - target is below the tolerance, even negative"),
+    ),
+    (
+        lambda s: (-s.gaps).max(axis=1) / s.tolerance,
+        sentence("each component of target - effector is below the tolerance, even negative"),
+    ),
+    *(
+        (
+            lambda s, k=k: np.abs(s.gaps[:, k]) / s.tolerance,
+            sentence("{axis} of effector - target is below the tolerance", axis=axis),
+        )
+        for k, axis in enumerate("xyz")
+    ),
+)
+
+
+def explanation(
+    trials: Sequence[PoseTrial], wrong: Sequence[PoseTrial], method: str, greeting: Greeting
+) -> Explanation | None:
+    """Return the test that ends all wrong solves of a method too early, None if no test does."""
+    solves = {trial.case.name: _solve(trial, method, greeting) for trial in trials}
+    ended = [solve for solve in solves.values() if solve is not None]
+    if not all((s := solves[trial.case.name]) is not None and s.is_early for trial in wrong):
+        return None
+    for quantity, words in TESTS:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = [quantity(solve) for solve in ended]
+        last = [v[-1] for v, solve in zip(values, ended, strict=True) if solve.is_early]
+        before = np.concatenate([v[:-1] for v in values])
+        largest, bound = float(max(last)), float(min(before, default=np.inf))
+        if largest < bound < np.inf and (len(last) >= MIN_SOLVES or quantity is not TESTS[0][0]):
+            fields = {"sweeps": -round(largest), "bound": round_number(largest, bound)}
+            test = Sentence(words.template, {**words.values, **fields})
+            entry = TABLE["stop"][KEY]
+            count = {"count": len(last), "total": len(ended), "test": test}
+            return Explanation(
+                (KEY,), with_code(entry["code"], Sentence(entry["sentence"], count)), 1.0, 0.0
+            )
+    return None
+
+
+def round_number(low: float, high: float) -> float:
+    """Return 1, 2 or 5 times a power of ten in (low, high], or their mean if none is in it."""
+    if low <= 0.0:
+        return high
+    power = 10.0 ** math.floor(math.log10(low))
+    numbers = (power * factor for factor in (1.0, 10.0, 5.0, 2.0))
+    return next((n for n in numbers if low < n <= high), math.sqrt(low * high))
+
+
+def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> Solve | None:
+    """Return the sweeps of a solve, None if its pose is that after no sweep, or after several."""
+    inputs, size = trial.case.inputs, trial.case.facts["size"]
+    needed = solve(method, inputs)[2]
+    poses = [
+        solve(method, {**inputs, "tolerance": 0.0, "max_iterations": count})[1]
+        for count in range(needed + 1)
+    ]
+    bound = SAME_POSE[greeting.precision] * size
+    counts = [i for i, x in enumerate(poses) if trial.pose.distance_to(x) <= bound]
+    if len(counts) != 1:
+        return None
+    (count,) = counts
+    gaps = np.array([x[inputs["effector"]] - inputs["target"] for x in poses[: count + 1]])
+    return Solve(gaps, float(inputs["tolerance"]), count < needed)
