@@ -26,7 +26,7 @@ SAME_POSE = {"double": 1e-7, "single": 1e-5}
 MIN_SOLVES = 2
 
 
-class Solve(NamedTuple):
+class FollowedSolve(NamedTuple):
     """The textbook's sweeps up to the end of a solve."""
 
     gaps: FloatArray  # from the target to the effector, before the first sweep and after each [m]
@@ -34,16 +34,16 @@ class Solve(NamedTuple):
     is_early: bool  # whether the textbook goes on
 
 
-def _distances(solve: Solve) -> FloatArray:
+def _distances(solve: FollowedSolve) -> FloatArray:
     return np.asarray(np.linalg.norm(solve.gaps, axis=1))
 
 
-def _gains(solve: Solve) -> FloatArray:
+def _gains(solve: FollowedSolve) -> FloatArray:
     return np.append(np.inf, -np.diff(_distances(solve)))
 
 
 # What programs compare with a constant or with the tolerance, and the words of the test.
-Quantity = Callable[[Solve], FloatArray]
+Quantity = Callable[[FollowedSolve], FloatArray]
 TESTS: Sequence[tuple[Quantity, Sentence]] = (
     (
         lambda s: -np.arange(len(s.gaps), dtype=float),
@@ -119,7 +119,7 @@ def round_number(low: float, high: float) -> float:
     return next((n for n in numbers if low < n <= high), math.sqrt(low * high))
 
 
-def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> Solve | None:
+def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> FollowedSolve | None:
     """Return the sweeps of a solve, None if its pose is that after no sweep, or after several."""
     inputs, size = trial.case.inputs, trial.case.facts["size"]
     needed = solve(method, inputs)[2]
@@ -133,4 +133,4 @@ def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> Solve | None:
         return None
     (count,) = counts
     gaps = np.array([x[inputs["effector"]] - inputs["target"] for x in poses[: count + 1]])
-    return Solve(gaps, float(inputs["tolerance"]), count < needed)
+    return FollowedSolve(gaps, float(inputs["tolerance"]), count < needed)
