@@ -20,6 +20,8 @@ JOINTS = {"slide": mujoco.mjtJoint.mjJNT_SLIDE, "hinge": mujoco.mjtJoint.mjJNT_H
 # use, measured for up to 10,000 particles, is two bytes for each pair.
 LARGE_SYSTEM = 1000
 BASE_MEMORY, PAIR_MEMORY = 2**27, 8
+# MuJoCo's default of 100 iterations of "discrete" does not suffice for larger systems.
+ITERATIONS = 5000
 # Radius of the edges of a flex [m], required although collisions are disabled.
 FLEX_RADIUS = 1e-4
 
@@ -42,24 +44,16 @@ class MujocoMassSpring:
     coupling of different bodies.
     """
 
-    def __init__(
-        self,
-        system: MassSpring,
-        *,
-        h: float = 1e-3,
-        integrator: str = "Euler",
-        iterations: int = 5000,
-    ) -> None:
+    def __init__(self, system: MassSpring, *, h: float = 1e-3, integrator: str = "Euler") -> None:
         """Build the model, with h [s], an integrator of `INTEGRATORS`, and conjugate gradients.
 
-        MuJoCo's default of 100 iterations of "discrete" does not suffice for larger systems. Raise
-        a ValueError if the integrator is unknown.
+        Raise a ValueError if the integrator is unknown.
         """
         self.model = self._build(system)
         self.model.opt.timestep = h
         self.set_integrator(integrator)
         self.model.opt.tolerance = 1e-15
-        self.model.opt.iterations = iterations
+        self.model.opt.iterations = ITERATIONS
         self.data = mujoco.MjData(self.model)
         self.free = system.free
         self.bodies = np.array(
@@ -243,7 +237,7 @@ def _nested_joints(system: MassSpring, kind: mujoco.mjtJoint) -> mujoco.MjModel:
     spec.option.gravity = np.zeros(3)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.tolerance = 1e-15
-    spec.option.iterations = 5000
+    spec.option.iterations = ITERATIONS
     body = spec.worldbody
     for i, mass in enumerate(system.masses[1:], 1):
         body = add_point_mass(body, f"particle{i}", np.zeros(3), mass)
