@@ -343,6 +343,7 @@ def records():
         sample("missing_engine", solver="pybullet"),
         bounded("MuJoCo Euler", 0.02),
         sample("listed"),
+        sample("met"),
         sample("as_liu", solver="local_global", arrays={"seconds": [0.03]}),
         *pictured(),
         *moved(),

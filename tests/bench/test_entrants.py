@@ -333,7 +333,7 @@ def test_a_solver_is_closed_after_its_greeting(folder, monkeypatch):
         (["--solver", "levenberg"], "did you mean 'levenberg_marquardt'?"),
         (["--problem", "chain/naer"], "did you mean 'chain/near'?"),
         (["--robot", "ur6"], "did you mean 'ur5'?"),
-        (["--solver", "qqq"], "expected one of 'DART', 'DART, "),
+        (["--solver", "qqq"], "expected one of 'Anderson CCD', 'DART', "),
         (["--problem", "qqq"], "'Fetch', 'Franka Panda', 'KUKA iiwa14'"),
         (["--robot", "qqq"], "expected one of baxter, character, fetch"),
         (["--targets", "0"], "targets: expected 1 or more, got 0"),
