@@ -33,6 +33,7 @@ class Variant(NamedTuple):
     # exception of NumPy or a ValueError means that the variant has no answer
     predict: Callable[[Case], Mapping[str, Any]]
     is_special: bool = False  # compared only if no plain one with as few faults explains all
+    amplification: float = 1.0  # by which its faults enlarge rounding
 
 
 class Match(NamedTuple):
@@ -111,7 +112,7 @@ def _match(
         prediction = _predict(variant, exchange.case)
         predictions.append({k: v for k, v in prediction.items() if k in outputs})
         distance = difference(predictions[-1], outputs)
-        if distance <= tolerance(exchange.case):
+        if distance <= variant.amplification * tolerance(exchange.case):
             hits, largest = hits + 1, max(largest, distance)
     return Match(variant, hits / len(answers), largest, predictions) if hits else None
 

@@ -13,11 +13,13 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 
 from ..case import Case
 from ..explain import Variant
+from .algebra import DEGREE
 from .faults import ANGLES, EULER_ORDERS, SwitchFault, combinations, switches
 from .switches import Switches
 from .textbook import OF_GLOBAL_LINKS, SOLVERS, Ending, TextbookChain, TextbookPose, place_all
 
 RIGHT = Switches()
+IN_DEGREES = "degrees for radians"
 REVERSED, CONJUGATED = "product of quaternions reversed", "local rotation conjugated"
 
 
@@ -124,6 +126,8 @@ def variants(
             keys, switched = tuple(fault.key for fault in faults), switches(faults)
             for choices in programs(solver, faults, base):
                 variant = Variant(keys, partial(predict, switched._replace(**choices)))
+                if IN_DEGREES in keys:
+                    variant = variant._replace(amplification=1.0 / DEGREE)
                 if any(choices.values()):
                     special.append(variant._replace(is_special=True))
                 else:
