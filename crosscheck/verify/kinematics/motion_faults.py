@@ -109,10 +109,11 @@ def _share(
 def _reached(fault: RobotFault, motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames in which a fault's kinematics reach the target.
 
-    Of robots with few joints, which reach no target in other kinematics, only frames that do count.
+    Of robots with few joints, which reach no target in other kinematics, and of solves that report
+    failure, only frames that do count.
     """
     explained = motion.errors(_errors(fault, motion, motion.q, _sine_if_near)) <= LENIENT
-    is_pose = explained | (motion.q.shape[1] >= POSE_FREEDOMS)
+    is_pose = explained | (motion.q.shape[1] >= POSE_FREEDOMS and motion.is_claimed is not False)
     return Evidence(_ends_off_target(motion) & is_pose, explained)
 
 
@@ -208,10 +209,13 @@ def _one_sided(motion: Trajectory, laws: set[str]) -> Evidence:
 
 
 def _within(
-    limits: Callable[[Trajectory], FloatArray], motion: Trajectory, laws: set[str]
+    limits: Callable[[Trajectory], tuple[FloatArray, FloatArray]],
+    motion: Trajectory,
+    laws: set[str],
 ) -> Evidence:
     """Return the frames well beyond limits, and those in which joints keep other limits."""
-    is_within = np.abs(motion.q) <= limits(motion) + EXACT
+    lower, upper = limits(motion)
+    is_within = (motion.q >= lower - EXACT) & (motion.q <= upper + EXACT)
     is_beyond = motion.excess.max(axis=-1) > WELL_BEYOND
     return Evidence(is_beyond & motion.is_pose, np.asarray(is_within.all(axis=-1)))
 
@@ -424,6 +428,10 @@ def _branch(motion: Trajectory, laws: set[str]) -> Evidence:
     return _jumping(motion, is_on_target & before & ~whole & ~_is_singular(motion))
 
 
+def _clamped_start(motion: Trajectory) -> FloatArray:
+    return np.clip(motion.inputs["start"], motion.inputs["lower"], motion.inputs["upper"])
+
+
 # The speeds that faults report, given those that lead to the coordinates.
 SPEEDS: Mapping[str, Callable[[FloatArray, Trajectory], FloatArray]] = {
     "velocities zero": lambda v, motion: 0.0 * v,
@@ -432,6 +440,10 @@ SPEEDS: Mapping[str, Callable[[FloatArray, Trajectory], FloatArray]] = {
     "velocities times the step": lambda v, motion: motion.inputs["h"] ** 2 * v,
     "velocities of the frame before": lambda v, motion: np.concatenate([0.0 * v[:1], v[:-1]]),
     "central differences": lambda v, motion: np.gradient(motion.q, motion.inputs["h"], axis=0),
+    "first velocity zero": lambda v, motion: np.concatenate([0.0 * v[:1], v[1:]]),
+    "first velocity from the clamped start": lambda v, motion: np.concatenate(
+        [(motion.q[:1] - _clamped_start(motion)) / motion.inputs["h"], v[1:]]
+    ),
 }
 # What explains whole poses comes before what explains steps, jumps and misses.
 POSES: Mapping[str, Signature] = {
@@ -488,8 +500,11 @@ VAGUE: Mapping[str, Signature] = {
     "stopped early": _stopped,
 }
 OTHER_LIMITS: Mapping[str, Signature] = {
-    "limits mirrored": partial(_within, lambda motion: motion.inputs["upper"]),
-    "limits of half a turn": partial(_within, lambda motion: np.full(motion.q.shape[1], np.pi)),
+    "limits in degrees": partial(
+        _within, lambda m: (np.radians(m.inputs["lower"]), np.radians(m.inputs["upper"]))
+    ),
+    "limits mirrored": partial(_within, lambda m: (-m.inputs["upper"], m.inputs["upper"])),
+    "limits of half a turn": partial(_within, lambda m: (0.0 * m.q - np.pi, 0.0 * m.q + np.pi)),
 }
 STUCK: Mapping[str, Signature] = {
     key: partial(_is_stuck, key)

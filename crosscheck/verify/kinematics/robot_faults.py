@@ -83,11 +83,15 @@ def _converted(
     return {name: convert(inputs[name]) for name in names if name in inputs}
 
 
-def _other_angles(quaternions: FloatArray) -> FloatArray:
-    """Return rotations whose roll, pitch and yaw are applied in the reverse order."""
+def _other_angles(
+    quaternions: FloatArray,
+    order: str = "xyz",
+    change: Callable[[FloatArray], FloatArray] = np.asarray,
+) -> FloatArray:
+    """Return rotations whose roll, pitch and yaw are changed, or applied in another order."""
     matrices = rotation.to_matrix(quaternions).reshape(-1, 3, 3)
     angles = np.array([roll_pitch_yaw(R) for R in matrices])
-    others = Rotation.from_euler("XYZ", angles).as_quat(scalar_first=True)
+    others = Rotation.from_euler(order, change(angles)).as_quat(scalar_first=True)
     return np.array(others).reshape(quaternions.shape)
 
 
@@ -110,7 +114,13 @@ MISREAD: Mapping[str, Callable[[Inputs], Inputs]] = {
     "every scalar last": partial(_converted, _scalar_last, _QUATERNIONS),
     "inverse rotations": partial(_converted, rotation.conjugate, _QUATERNIONS),
     "inverse frames": partial(_converted, rotation.conjugate, _QUATERNIONS[:2]),
-    "yaw first": partial(_converted, _other_angles, _QUATERNIONS[:2]),
+    "yaw first": partial(_converted, partial(_other_angles, order="XYZ"), _QUATERNIONS[:2]),
+    "roll for yaw": partial(
+        _converted, partial(_other_angles, change=lambda angles: angles[:, ::-1]), _QUATERNIONS[:2]
+    ),
+    "angles taken for degrees": partial(
+        _converted, partial(_other_angles, change=np.radians), _QUATERNIONS[:2]
+    ),
     "axes along z": lambda inputs: {"axes": np.tile(UPRIGHT, (len(inputs["parents"]), 1))},
     "signs of axes lost": lambda inputs: {"axes": np.abs(inputs["axes"])},
     "origins rotated by their frames": lambda inputs: {

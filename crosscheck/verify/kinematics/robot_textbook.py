@@ -17,7 +17,8 @@ Inputs = Mapping[str, Any]
 SIGNS = ((0, 0), (0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
 DIFFERENCE = 1e-6  # of coordinates, for numerical derivatives [rad, m]
 # Differences before and after a configuration that are too long, by the number of `difference`.
-COARSE = [(0.0, h) for h in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)] + [(h, h) for h in (1e-1, 1e-2, 1e-3)]
+COARSE = [(0.0, h) for h in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 5e-2, 5e-3)]
+COARSE += [(h, h) for h in (1e-1, 1e-2, 1e-3, 5e-2)]
 # Products of small rotations by larger angles overflow [rad].
 MAX_SMALL = 1e3
 UPRIGHT = np.array([0.0, 0.0, 1.0])
@@ -157,10 +158,14 @@ def geometric_jacobian(inputs: Inputs, q: FloatArray, faults: RobotSwitches) -> 
     frames = frames_at(inputs, q, faults)
     tool = frames.position[..., None, :]
     origins = frames.starts if faults.arm else frames.origins
+    if faults.column == 12:
+        joints, parents = np.arange(len(inputs["parents"])), inputs["parents"]
+        origins = origins[..., np.where(parents >= 0, parents, joints), :]
     last = origins[..., inputs["effector"], None, :]
-    arms = (tool - origins, 0.0 * origins, tool + 0.0 * origins, origins - tool, last - origins)[
-        {1: 1, 2: 2, 6: 3, 8: 4}.get(faults.column, 0)
-    ]
+    arms = (
+        tool - origins, 0.0 * origins, tool + 0.0 * origins, origins - tool, last - origins,
+        tool + origins,
+    )[{1: 1, 2: 2, 6: 3, 8: 4, 13: 5}.get(faults.column, 0)]  # fmt: skip
     slides = inputs["slides"][:, None] & (faults.column != 3)
     linear = np.where(slides, frames.axes, np.cross(frames.axes, arms))
     angular = np.where(slides & (faults.column != 7), 0.0, frames.axes)
@@ -170,10 +175,21 @@ def geometric_jacobian(inputs: Inputs, q: FloatArray, faults: RobotSwitches) -> 
         linear = linear @ frames.rotation
     if faults.column == 10:
         angular = 0.0 * angular
+    if faults.column == 14:
+        angular = angular @ np.swapaxes(np.linalg.inv(_axes_of_angles(frames.rotation)), -1, -2)
     if faults.column == 11:
         linear[..., -1, :] = angular[..., -1, :] = 0.0
     J = np.swapaxes(np.concatenate([linear, angular], axis=-1), -1, -2)
-    return np.asarray(J * ancestors(inputs) * (-1.0 if faults.column == 4 else 1.0))
+    J = J * ancestors(inputs) * (-1.0 if faults.column == 4 else 1.0)
+    return np.asarray(J[..., ::-1] if faults.column == 15 else J)
+
+
+def _axes_of_angles(R: FloatArray) -> FloatArray:
+    """Return the axes about which roll, pitch and yaw rotate, in the columns of (..., 3, 3)."""
+    roll = R[..., 0]
+    pitch = np.cross(UPRIGHT, roll)
+    pitch = pitch / np.linalg.norm(pitch, axis=-1, keepdims=True)
+    return np.stack([roll, pitch, np.broadcast_to(UPRIGHT, roll.shape)], axis=-1)
 
 
 def ancestors(inputs: Inputs) -> FloatArray:
