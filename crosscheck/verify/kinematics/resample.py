@@ -139,7 +139,19 @@ def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> lis
 
 
 def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Finding]:
-    """Return whether points are on the line, ordered, evenly spaced and of the requested count."""
+    """Return whether points are on the line, ordered, evenly spaced and of the requested count.
+
+    A closed line may be walked either way round.
+    """
+    findings = _point_laws(points, case, greeting)
+    if case.inputs["closed"] and any(found.verdict >= Verdict.WRONG for found in findings):
+        backwards = _point_laws(np.roll(points[::-1], 1, axis=0), case, greeting)
+        if all(found.verdict < Verdict.WRONG for found in backwards):
+            return backwards
+    return findings
+
+
+def _point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Finding]:
     line, bound, inputs = case.facts["line"], _bound(case, greeting), case.inputs
     distances = _distances(points, line, True)
     findings = [_on_line(points, distances, line, bound), _ends(points, case, bound)]

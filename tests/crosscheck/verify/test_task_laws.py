@@ -157,6 +157,9 @@ def test_the_last_side_of_a_closed_curve_counts():
         assert found["closing side"].verdict is verdict
     found = by_law(resample.point_laws(np.concatenate([points, points[:1]]), case, GREETING))
     assert found["closing side"].verdict is RIGHT
+    for other, verdict in ((np.roll(points[::-1], 1, axis=0), RIGHT), (points[::-1], WRONG)):
+        findings = resample.point_laws(other, case, GREETING)  # either way round, from the start
+        assert max(found.verdict for found in findings) is verdict
 
 
 # ---- motions
