@@ -79,6 +79,18 @@ def test_no_sweep_raises_the_error(model, backend, rng):
         assert rises.min() < 0.0
 
 
+@pytest.mark.parametrize("distance", [0.3, 0.9, 0.97, 1.05])
+def test_no_sweep_raises_the_error_of_a_long_chain(distance, rng):
+    n = 12
+    chain = Skeleton(range(-1, n), [[0.0, 0.0, 0.0], *[[0.0, 0.0, 1.0 / n]] * n])
+    with set_backend("python"):
+        solution = solve_ik(
+            chain, rotation.random(rng, n + 1), (distance, 0.0, 0.0), "anderson_ccd",
+            tolerance=1e-12, record=True, max_iterations=40,
+        )  # fmt: skip
+    assert np.diff(solution.history).max() <= 1e-14
+
+
 def test_a_batch_remembers_nothing_of_the_target_before(rng):
     chain = Skeleton(range(-1, 5), [[0.0, 0.0, 0.0], *rng.standard_normal((5, 3))])
     target, start = 3.0 * rng.standard_normal(3), rotation.random(rng, 6)
