@@ -32,6 +32,7 @@ def results(numbers, faults):
     parts = (
         algebra.product(a, b, faults), algebra.inverse(a, faults), algebra.rotated(a, u, faults),
         algebra.arc(u, v, faults), algebra.arc(u, scale(-1.0, v), faults),
+        algebra.arc(u, v[::-1], faults),
     )  # fmt: skip
     return np.concatenate(parts)
 
@@ -39,7 +40,7 @@ def results(numbers, faults):
 @pytest.mark.parametrize("rotating", ROTATING)
 def test_without_faults_the_algebra_is_the_reference(numbers, rotating):
     a, b, u, v = numbers
-    arcs = between(u, v), between(u, scale(-1.0, v))
+    arcs = between(u, v), between(u, scale(-1.0, v)), between(u, v[::-1])
     expected = np.concatenate((multiply(a, b), conjugate(a), rotate(a, u), *arcs))
     right = RIGHT._replace(rotating=rotating)
     assert results(numbers, right) == pytest.approx(expected, abs=4e-15)
