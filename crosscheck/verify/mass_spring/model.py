@@ -17,6 +17,8 @@ from .problem import SpringProblem, accelerations, damper_forces, frames, spring
 
 # Newton's method ends in rounding long before this on systems of this size.
 MAX_ITERATIONS = 200
+# A first step longer than this share of the displacement shows that positions are not the solution.
+ESTIMATED = 1e-2
 
 
 class Integrator(NamedTuple):
@@ -127,6 +129,8 @@ class Substep(NamedTuple):
     x: FloatArray
     v: FloatArray
     h: float
+    # positions that may be the solution, from which an equation is solved; None if unknown
+    near: FloatArray | None = None
 
     @property
     def free(self) -> BoolArray:
@@ -154,16 +158,31 @@ FRAMES: Mapping[str, Callable[[SpringProblem, list[State]], list[State]]] = {
 }
 
 
-def simulate(p: SpringProblem, model: StepModel) -> dict[str, FloatArray]:
-    """Return positions and velocities after the step, or after each of several."""
+def simulate(
+    p: SpringProblem, model: StepModel, near: FloatArray | None = None
+) -> dict[str, FloatArray]:
+    """Return positions and velocities after the step, or after each of several.
+
+    Where `near` holds positions that may be those of each frame, equations are solved from them.
+    If they are not, the result is an estimate, and the last of several frames repeat the first
+    that is far from them.
+    """
     p = _with_pins(p, model)
     if model.integrator.explicit and model.damper == "none":
         p = p.changed(dampings=np.zeros_like(p.dampings))
-    x, v, states = p.positions, p.velocities, []
-    for _ in range(p.steps or 1):
-        x, v = _step(p, model, x, v)
+    if near is not None and np.isfinite(near).all() and model.frames not in FRAMES:
+        frames: list[FloatArray | None] = [*near.reshape(-1, p.count, 3)]
+    else:
+        frames = [None] * (p.steps or 1)
+    x, v, states = p.positions, p.velocities, list[State]()
+    for frame in frames:
+        start = x
+        x, v = _step(p, model, x, v, frame if _ends_solved(model) else None)
         states.append((x, v))
+        if frame is not None and _norm(x - frame) > ESTIMATED * _norm(frame - start):
+            break
         x, v = BETWEEN[model.frames](p, x, v) if model.frames in BETWEEN else (x, v)
+    states += states[-1:] * (len(frames) - len(states))
     if p.steps is None:
         return {"positions": x, "velocities": v}
     if model.frames in FRAMES:
@@ -172,11 +191,19 @@ def simulate(p: SpringProblem, model: StepModel) -> dict[str, FloatArray]:
     return {"positions": positions, "velocities": velocities}
 
 
-def predicted(p: SpringProblem, model: StepModel) -> dict[str, FloatArray]:
-    """Return the model's result, {} if its matrix is singular."""
+def _ends_solved(model: StepModel) -> bool:
+    """Return whether the positions at the end of a step are the solution of its equation."""
+    is_changed = model.update != "solved" or model.pins in ("overwritten", "at_the_end")
+    return model.substeps == 1 and not is_changed
+
+
+def predicted(
+    p: SpringProblem, model: StepModel, near: FloatArray | None = None
+) -> dict[str, FloatArray]:
+    """Return the result of `simulate`, {} if the model's matrix is singular."""
     with np.errstate(all="ignore"):
         try:
-            return simulate(p, model)
+            return simulate(p, model, near)
         except np.linalg.LinAlgError:
             return {}
 
@@ -199,7 +226,7 @@ def _with_pins(p: SpringProblem, model: StepModel) -> SpringProblem:
 
 
 def _step(
-    p: SpringProblem, model: StepModel, x: FloatArray, v: FloatArray
+    p: SpringProblem, model: StepModel, x: FloatArray, v: FloatArray, near: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     h = p.h if isinstance(model.time, str) else model.time
     if model.time != "undivided":
@@ -208,7 +235,7 @@ def _step(
     if model.substeps > 1 and _falls_freely(p, model):
         return _free_fall(Substep(p, model, x, v, h))
     for _ in range(model.substeps - (model.time == "one substep less")):
-        x, v = substep(Substep(p, model, x, v, h))
+        x, v = substep(Substep(p, model, x, v, h, near))
     if model.pins == "at_the_end":
         x, v = x.copy(), v.copy()
         x[p.pinned], v[p.pinned] = pins, 0.0
@@ -225,7 +252,7 @@ def _falls_freely(p: SpringProblem, model: StepModel) -> bool:
 
 def _free_fall(start: Substep) -> tuple[FloatArray, FloatArray]:
     """Return the state after all substeps at once."""
-    p, model, x, v, h = start
+    p, model, x, v, h, _ = start
     n, a = model.substeps, accelerations(p, x, v)
     parts = n * (n - 1) / 2 + n * SHARES[model.integrator.method]
     return x + n * h * v + parts * h * h * a, v + n * h * a
@@ -233,7 +260,7 @@ def _free_fall(start: Substep) -> tuple[FloatArray, FloatArray]:
 
 def substep(start: Substep) -> tuple[FloatArray, FloatArray]:
     """Return positions and velocities a time h later."""
-    p, model, x_n, separate, h = start
+    p, model, x_n, separate, h, _ = start
     if model.integrator.explicit:
         x, separate = EXPLICIT[model.integrator.method](start)
     else:
@@ -289,20 +316,20 @@ SHARES = {"explicit": 0.0, "taylor": 0.5, "symplectic": 1.0, "beyond": 1.5}
 
 def _by_one_rate(start: Substep) -> tuple[FloatArray, FloatArray]:
     """Step by the acceleration at the start: explicit or symplectic Euler, or x + h v + h²/2 a."""
-    _, model, x, v, h = start
+    _, model, x, v, h, _ = start
     a = _explicit_rates(start, x, v)
     return x + h * (v + SHARES[model.integrator.method] * h * a), v + h * a
 
 
 def _half_a(start: Substep) -> tuple[FloatArray, FloatArray]:
     """Step by x + h v + h/2 a, where h²/2 a is meant."""
-    _, _, x, v, h = start
+    _, _, x, v, h, _ = start
     a = _explicit_rates(start, x, v)
     return x + h * v + 0.5 * h * a, v + h * a
 
 
 def _runge_kutta(start: Substep) -> tuple[FloatArray, FloatArray]:
-    _, _, x, v, h = start
+    _, _, x, v, h, _ = start
     dx, dv = v, _explicit_rates(start, x, v)
     sum_x, sum_v = dx, dv
     for share, weight in ((0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
@@ -314,7 +341,7 @@ def _runge_kutta(start: Substep) -> tuple[FloatArray, FloatArray]:
 
 def _in_place(start: Substep) -> tuple[FloatArray, FloatArray]:
     """Move particles in turn, each by forces of the new positions of its predecessors."""
-    _, _, x, v, h = start
+    _, _, x, v, h, _ = start
     x, v = x.copy(), v.copy()
     for i in range(len(x)):
         v[i] += h * _explicit_rates(start, x, v)[i]
@@ -386,7 +413,7 @@ class StepEquation:
 
     def __init__(self, start: Substep) -> None:
         """Set up y and the forces that stay through the step."""
-        p, model, x, v, h = start
+        p, model, x, v, h, _ = start
         self.start, self.free = start, start.free
         self.linear = p.linear or p  # whose springs the matrix is put together from
         self.y = x + SHIFTS[model.inertia](h) * v
@@ -737,11 +764,15 @@ def _descent(equation: StepEquation, x: FloatArray, integrator: Integrator) -> F
 
 
 def _converged(equation: StepEquation, x: FloatArray, integrator: Integrator) -> FloatArray:
-    """Minimise g by Newton's method with a shift and a line search, else solve by residuals."""
-    best, stalled = np.inf, 0
-    for _ in range(MAX_ITERATIONS):
+    """Minimise g by Newton's method with a shift and a line search, else solve by residuals.
+
+    From positions near the solution a long first step shows that they are not: it is the estimate.
+    """
+    best, stalled, near = np.inf, 0, equation.start.near
+    x = x if near is None else np.where(equation.free[:, None], near, x)
+    for iteration in range(MAX_ITERATIONS):
         gradient = equation.free_gradient(x)
-        norm = float(np.linalg.norm(gradient))
+        norm = _norm(gradient)
         stalled = 0 if norm < 0.5 * best else stalled + 1
         best = min(best, norm)
         if norm == 0.0 or not np.isfinite(norm) or stalled > 3:
@@ -749,8 +780,16 @@ def _converged(equation: StepEquation, x: FloatArray, integrator: Integrator) ->
         A = equation.matrix(x, "exact")
         if equation.conservative:
             A = _shifted(equation, A)
-        x = _line_search(equation, x, gradient, -equation.solve(A, gradient))
+        step = -equation.solve(A, gradient)
+        moved = x - equation.start.x
+        if near is not None and not iteration and _norm(step) > ESTIMATED * _norm(moved):
+            return x + step
+        x = _line_search(equation, x, gradient, step)
     return x
+
+
+def _norm(x: FloatArray) -> float:
+    return float(np.sqrt((x * x).sum()))
 
 
 def _shifted(equation: StepEquation, A: FloatArray) -> FloatArray:
@@ -769,11 +808,11 @@ def _line_search(
     equation: StepEquation, x: FloatArray, gradient: FloatArray, step: FloatArray
 ) -> FloatArray:
     """Return x + t step with the largest t = 1, 1/2, ... that lowers g, or the residual."""
-    norm, slope = float(np.linalg.norm(gradient)), float((gradient * step).sum())
+    norm, slope = _norm(gradient), float((gradient * step).sum())
     start_value = equation.value(x) if equation.conservative else 0.0
     for t in 0.5 ** np.arange(20.0):
         trial = x + t * step
-        residual = float(np.linalg.norm(equation.free_gradient(trial)))
+        residual = _norm(equation.free_gradient(trial))
         if not equation.conservative:
             is_lower = residual < (1.0 - 1e-4 * t) * norm
         elif norm < 1e-6 and residual < 0.5 * norm:  # rounding of g hides that it falls

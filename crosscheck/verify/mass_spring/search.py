@@ -30,6 +30,8 @@ WORK, WORK_OF_PAIRS = 40_000, 10_000
 HYPOTHESES, NEAREST = 32, 40
 # The share of the evidence that may stay unexplained beside a fault.
 UNEXPLAINED = 0.25
+# The iterations that a converged substep takes, about, unless the answer tells its solution.
+ITERATIONS_TO_CONVERGE = 10
 # Integrators with more iterations are not combined with faults.
 MAX_ITERATIONS = 10
 # A relative difference below this is not from single precision.
@@ -356,7 +358,7 @@ class ModelSearch:
         plain = probe.problem
         if problem.stiff > plain.stiff or problem.damped > plain.damped:
             return None  # aspects matter of which nothing is assumed yet
-        prediction = predicted(problem, model)
+        prediction = predicted(problem, model, probe.answers.get("positions"))
         if _is_singular(prediction):
             return None if _is_singular(probe.answers) else np.inf
         allowed = self._rounding(probe, model)
@@ -443,7 +445,10 @@ def _effort(choices: Choices) -> float:
     """Return how many iterations, or a few substeps of explicit methods, a prediction takes."""
     fields = fields_of(choices)
     integrator, substeps = fields["integrator"], fields["substeps"]
-    return float(1.0 + substeps * (0.3 if integrator.explicit else integrator.iterations))
+    iterations = 0.3 if integrator.explicit else integrator.iterations
+    if integrator.method == "converged" and substeps > 1:
+        iterations = ITERATIONS_TO_CONVERGE
+    return float(1.0 + substeps * iterations)
 
 
 def _takes_long(option: Option) -> bool:

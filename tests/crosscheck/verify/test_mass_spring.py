@@ -125,6 +125,27 @@ def test_the_dense_step_is_the_reference_s(name):
         )
 
 
+@pytest.mark.parametrize("task", ["mass_spring_step", "mass_spring_motion"])
+def test_a_solution_is_reproduced_from_itself_and_others_are_told_apart(task):
+    compared = 0
+    for case in task_cases(task, Greeting(1, (task,)), 0, False):
+        if case.family == "compression" or case.name == "stiff cloth":
+            continue  # several minima
+        p = problem_of(case.inputs)
+        solution = simulate(p, CONVERGED)["positions"]
+        moved = np.abs(solution - p.positions).max()
+        near = simulate(p, CONVERGED, solution)["positions"]
+        np.testing.assert_allclose(near, solution, rtol=0, atol=1e-13 + 1e-9 * moved)
+        free = np.setdiff1d(np.arange(p.count), p.pinned)
+        if moved > 1e-3 and free.size:
+            other = solution.copy()
+            other[..., free, 1] += 0.1 * moved
+            away = np.abs(simulate(p, CONVERGED, other)["positions"] - other).max()
+            assert away > 1e-3 * moved, case.name
+            compared += 1
+    assert compared > 10
+
+
 PAIRS = [
     (first, second)
     for i, first in enumerate(BY_KEY)
