@@ -46,6 +46,11 @@ class EntrantSolver:
         round_trip = perf_counter() - begin
         if isinstance(answer, Failure):
             raise NoAnswerError(str(answer.sentence))
+        count, limit = answer.values.get("iterations", 0), inputs.get("max_iterations", 0)
+        if count > limit:
+            raise NoAnswerError(
+                f"iterations: expected 0 to {limit}, the max_iterations sent, got {count}"
+            )
         doubt = "" if answer.untimed in (None, NO_SECONDS) else str(answer.untimed)
         if not doubt and (answer.untimed or not answer.seconds):
             self.remark = ROUND_TRIPS

@@ -187,14 +187,14 @@ def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> str:
     nearest, reach, before = (case.facts[name] for name in ("least", "reach", "before"))
     is_degenerate, is_beyond = case.requirement != "must", nearest > 0.0
     is_nearer = excess < 0.5 * (before - nearest)
-    if is_degenerate and excess + nearest <= before + 1e-6 * reach:
-        return "target reached, undetermined"
     if excess <= rounding.STALL[greeting.precision] * reach:
         return "target reached, stalled"
     if is_beyond and is_nearer:
         return "nearest point, approached"
     if is_nearer and (not method or is_degenerate):
         return SLOW
+    if is_degenerate and excess + nearest <= before + 1e-6 * reach:
+        return "target reached, undetermined"
     return "nearest point" if is_beyond else "target reached"
 
 

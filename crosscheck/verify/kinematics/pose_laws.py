@@ -223,8 +223,10 @@ def _agreement(pose: AnsweredPose, case: Case, bound: float, greeting: Greeting)
 def claims(
     distance: float, slack: float, outputs: Mapping[str, Any], case: Case
 ) -> Iterator[Finding]:
-    """Yield whether `converged` and `residual` are true."""
-    tolerance = case.inputs["tolerance"]
+    """Yield whether `converged`, `residual` and `iterations` are true."""
+    tolerance, limit = case.inputs["tolerance"], case.inputs["max_iterations"]
+    if (count := outputs.get("iterations", 0)) > limit:
+        yield finding("claims, iterations", count - limit, count=count, limit=limit)
     if outputs.get("converged"):
         yield finding("claims, success", distance, tolerance + slack)
     elif "converged" in outputs and distance <= tolerance - slack:

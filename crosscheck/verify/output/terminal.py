@@ -107,8 +107,10 @@ def _reservations(task: TaskReport) -> list[Sentence]:
 def _summary(task: TaskReport, say: Say, indent: str = "") -> list[str]:
     """Return the name of a task and the sentences about its answers as one paragraph."""
     failure = task.smallest_failure
-    words = [*explanations(task), *failure.complaints] if failure else _reservations(task)
-    return wrapped(f"{title(task)}: " + " ".join(dict.fromkeys(map(say, words))), indent)
+    sentences = [*explanations(task), *failure.complaints] if failure else _reservations(task)
+    words = list(dict.fromkeys(map(say, sentences)))
+    new = [text for text in words if not any(text != other and text in other for other in words)]
+    return wrapped(f"{title(task)}: " + " ".join(new), indent)
 
 
 def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:

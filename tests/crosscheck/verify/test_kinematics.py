@@ -172,6 +172,19 @@ def test_fault_breaks_a_law_of_its_own(key, law):
     assert law in broken(faulty("ccd", key))
 
 
+def test_one_iteration_too_many_that_is_reported_is_wrong_and_named():
+    solve = textbook(INVERSE, [by_key("ccd")["one sweep more"]])
+
+    def ccd(max_iterations, **inputs):
+        answer = solve(max_iterations=max_iterations, **inputs)
+        return {**answer, "iterations": max_iterations + 1}
+
+    report = judged(INVERSE, ccd, "ccd")
+    assert report.verdict is WRONG
+    assert "claims" in broken(report)
+    assert "one sweep more" in named(report)[0]
+
+
 def test_sixty_faults_and_their_likely_triples_are_known():
     assert len({(f.part, f.key) for method in METHODS for f in FAULTS[method]}) >= 60
     report = faulty("ccd", "xyzw read", "gap as direction", "one sweep more")
