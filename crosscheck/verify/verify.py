@@ -13,6 +13,7 @@ from .contestant import Contestant, Exchange, Failure, is_hung
 from .greeting import Greeting
 from .inference import inferred, methods_of
 from .judgement import Diagnosis, Report, TaskReport, Verdict
+from .kept_state import with_kept_state
 from .kinematics import (
     faults,
     forward_kinematics,
@@ -91,6 +92,7 @@ def verify(
             return judge_cases(contestant, task, method, cases, notify, greeting, known)
 
         report = inferred(contestant, judge(contestant.greeting), judge)
+        report = with_kept_state(contestant, report)
         reports.append(with_changed_line(report, contestant.greeting, partial(notify, task)))
         if task == forward_kinematics.TASK:
             forward_faults = faults.explaining(reports[-1].diagnosis)

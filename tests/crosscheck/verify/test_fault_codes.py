@@ -40,6 +40,7 @@ FAMILIES = (
     "STEP",
     "FORCE",
     "ENERGY",
+    "STATE",
     "LINE",
 )
 CODE = re.compile(rf"PB-({'|'.join(FAMILIES)})-(\d{{3}})")

@@ -1,0 +1,57 @@
+"""Ask wrong answers again in a new process and in reverse: what is kept between requests shows."""
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from .contestant import Answer, Contestant, is_hung
+from .explain import difference
+from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
+from .sentence import Sentence, with_code
+
+NAME = "state kept between requests"
+FAULT = tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8"))["state"][NAME]
+# The number of wrong answers that are asked again, the last first.
+ASKED = 4
+# Relative differences of answers above this do not come from threads that add up in another order.
+SAME = 1e-6
+STEPS = ("mass_spring_step", "mass_spring_motion")
+
+
+def with_kept_state(contestant: Contestant, report: TaskReport) -> TaskReport:
+    """Return the report with the fault that answers depend on earlier requests, if they do.
+
+    Other mistakes that explain such answers do so by chance, except of steps, where what is kept is
+    a matrix or a state.
+    """
+    is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
+    if report.verdict < Verdict.WRONG or contestant.greeting.system.continues or is_stuck:
+        return report
+    wrong = [judgement for judgement in report.judgements if _is_steady(judgement)]
+    share = _changed_share(contestant, wrong[-ASKED:])
+    if not share:
+        return report
+    words = with_code(FAULT["code"], Sentence(FAULT["sentence"], {}))
+    explanations = [Explanation((NAME,), words, share, 0.0)]
+    if report.task in STEPS:
+        explanations += report.diagnosis.explanations
+    diagnosis = replace(report.diagnosis, explanations=tuple(explanations), first_broken=None)
+    return replace(report, diagnosis=diagnosis)
+
+
+def _is_steady(judgement: CaseJudgement) -> bool:
+    """Return whether an answer is wrong, and the same if the request is repeated."""
+    laws = {finding.law for finding in judgement.findings if finding.verdict >= Verdict.WRONG}
+    return isinstance(judgement.answer, Answer) and bool(laws) and "equal answers" not in laws
+
+
+def _changed_share(contestant: Contestant, judgements: Sequence[CaseJudgement]) -> float:
+    """Return the share of answers that differ when they are asked again, the last one first."""
+    contestant.close()
+    changed = 0
+    for judgement in reversed(judgements):
+        before, answer = judgement.answer, contestant.answer(judgement.case)
+        assert isinstance(before, Answer)
+        changed += not isinstance(answer, Answer) or difference(before.values, answer.values) > SAME
+    return changed / max(len(judgements), 1)
