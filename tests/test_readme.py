@@ -20,6 +20,7 @@ from plumbob.crosscheck.verify.judgement import (
     Verdict,
 )
 from plumbob.crosscheck.verify.language import translator
+from plumbob.crosscheck.verify.message import decode_greeting
 from plumbob.crosscheck.verify.output import json_file
 from plumbob.crosscheck.verify.sentence import sentence
 
@@ -152,6 +153,18 @@ def test_every_option_of_verify_that_a_page_shows_exists():
         shown = {option for line in lines for option in re.findall(r" (--[a-z-]+)", line)}
         assert shown - {"--flag"} <= known, page
         assert shown, page
+
+
+def test_every_greeting_that_a_page_shows_is_understood():
+    greetings = [
+        (page.stem, json.loads(block))
+        for page in PAGES
+        for block in snippets("json", page)
+        if page.stem != "protocol" and '"tasks"' in block
+    ]
+    assert "engine_developer" in dict(greetings)
+    for _, fields in greetings:
+        assert decode_greeting(fields).tasks == tuple(fields["tasks"])
 
 
 def keys(value):
