@@ -224,7 +224,7 @@ def claims(
     distance: float, slack: float, outputs: Mapping[str, Any], case: Case
 ) -> Iterator[Finding]:
     """Yield whether `converged`, `residual` and `iterations` are true."""
-    tolerance, limit = case.inputs["tolerance"], case.inputs["max_iterations"]
+    tolerance, limit = case.inputs["tolerance"], case.inputs.get("max_iterations", np.inf)
     if (count := outputs.get("iterations", 0)) > limit:
         yield finding("claims, iterations", count - limit, count=count, limit=limit)
     if outputs.get("converged"):
