@@ -39,6 +39,9 @@ ACCEPTED = 1e-3
 # After an update of the multipliers that leaves more than PROGRESS of the error exact tasks count
 # PENALTY times as much, at most PENALTIES times.
 PROGRESS, PENALTY, PENALTIES = 0.1, 10.0, 6
+# Factors of exact residuals with which the others are approached: without one these may lead away
+# for good, with a large one to dearer minima. The second is tried if the first lowers no cost.
+STRENGTHS = 1.0, 30.0
 
 
 class TaskSolution(NamedTuple):
@@ -172,6 +175,10 @@ class TaskProblem:
         """Return whether every exact task is met."""
         return bool((state.errors[self.is_exact] <= tolerance).all())
 
+    def cost(self, state: _Evaluation) -> float:
+        """Return the weighted sum of squares of the tasks that are not exact."""
+        return float(np.sum(state.r[~self.exact] ** 2))
+
     def misses(self, solution: TaskSolution) -> float:
         """Return the largest error of an exact task."""
         return float(solution.errors[self.is_exact].max(initial=0.0))
@@ -180,21 +187,26 @@ class TaskProblem:
 def _attempt(problem: TaskProblem, q: FloatArray, tolerance: float, limit: int) -> TaskSolution:
     """Return the solution from a start: the exact tasks first, then the others along with them.
 
-    The others are given up where they would end away from the exact tasks.
+    Where these end away from the exact tasks, those are met again from there.
     """
     exact = problem.exact.astype(float)
     state, count, stalled = _descend(problem, q, exact, tolerance, limit)
-    if problem.is_met(state, tolerance) and not problem.exact.all():
-        ones = np.ones(len(exact))
-        end, more, stalled = _descend(problem, state.q, ones, tolerance, limit)
+    others_follow = problem.is_met(state, tolerance) and not problem.exact.all()
+    for strength in STRENGTHS if others_follow else ():
+        scale = np.where(problem.exact, strength, 1.0)
+        end, more, stalled = _descend(problem, state.q, scale, tolerance, limit - count)
         count += more
-        if problem.is_met(end, tolerance):
+        if not problem.is_met(end, tolerance):
+            end, more, stalled = _descend(problem, end.q, exact, tolerance, limit - count)
+            count += more
+        if problem.is_met(end, tolerance) and problem.cost(end) < problem.cost(state):
             state = end
+            break
     outcome = Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT
     if problem.is_met(state, tolerance):
         outcome = Outcome.CONVERGED
-    cost = float(np.sum(state.r[~problem.exact] ** 2))
-    return TaskSolution(frozen(state.q), frozen(state.errors), cost, count, outcome)
+    q, errors = frozen(state.q), frozen(state.errors)
+    return TaskSolution(q, errors, problem.cost(state), count, outcome)
 
 
 def _descend(
