@@ -95,7 +95,8 @@ def _checked_grid(model: Articulation, grid: Mapping[Any, ArrayLike]) -> dict[in
         j = model.index(name, "grid")
         if j in model.mimics or model.kinds[j] not in ("hinge", "slide"):
             raise ValueError(f"grid: expected hinges or slides, no mimics, got {model.names[j]!r}")
-        values[j] = arguments.array("grid", np.atleast_1d(numbers), "value")
+        values[j] = np.atleast_1d(arguments.array("grid", numbers, "..."))
+        arguments.check_shape("grid", values[j], "value")
         if not len(values[j]):
             raise ValueError(f"grid: expected values of {model.names[j]!r}, got none")
         outside = (values[j] < model.lower[j]) | (values[j] > model.upper[j])

@@ -301,6 +301,8 @@ MISUSES = {
     "an unknown joint": ({"grid": {"nose": 0.0}}, "grid: expected"),
     "beyond limits": ({"grid": {0: 7.0}}, "grid: expected values from -3.14159 to 3.14159, got 7"),
     "no values": ({"grid": {0: []}}, "grid: expected values of 'joint0', got none"),
+    "a ragged list": ({"grid": {0: [[1.0], [1.0, [2.0]]]}}, "grid: expected an array of numbers"),
+    "a table": ({"grid": {0: [[1.0], [2.0]]}}, "grid: expected shape"),
     "a fixed joint": ({"grid": {7: 0.0}}, "grid: expected hinges or slides"),
     "too few locked": ({"grid": {}}, "grid: expected joints to lock, so that 6 of 7 remain, got 0"),
     "no restarts": ({"restarts": 0}, "restarts: expected"),
