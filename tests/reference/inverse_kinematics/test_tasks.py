@@ -300,6 +300,21 @@ def test_the_nearest_solution_is_no_further_than_any_other(prefer, order):
         assert distance <= norms.min() + 1e-6
 
 
+@pytest.mark.parametrize("seed", [0, 129, 248])
+@pytest.mark.parametrize(("prefer", "order"), [("nearest", 2.0), ("nearest_linf", np.inf)])
+def test_a_preference_leads_no_further_than_none(prefer, order, seed):
+    model, rng = arm(2.0), np.random.default_rng(seed)
+    start, (x, _) = model.random(rng), pose_of(model, seed + 1000)
+    distances = [
+        np.linalg.norm(solution.coordinates - start, order)
+        for solution in (
+            solve_ik(model, start, x, restarts=3, prefer=preference)
+            for preference in (prefer, None)
+        )
+    ]
+    assert distances[0] <= distances[1]
+
+
 def test_nothing_is_nearest_where_no_solution_is():
     model = six_hinges()
     far = solve_ik(model, model.neutral(), (9.0, 0.0, 0.0), prefer="nearest")
