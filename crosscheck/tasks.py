@@ -2,8 +2,9 @@
 
 import functools
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,6 +21,7 @@ from .robots.models import moving_joints
 from .verdict import Comparison
 
 BODIES, CONFIGURATIONS = 8, 3
+BALLS = (1, 4, 5)  # bodies on balls or slides, others are on hinges or slides
 # Equalities of the sort of bodies that MuJoCo reads, with places for six random numbers.
 EQUALITIES = """
 <connect body1="b2" body2="b7" anchor="{} {} {}"/>
@@ -28,25 +30,39 @@ EQUALITIES = """
 <weld body1="b4"/>
 <joint joint1="j3" joint2="j6" polycoef="{} {} {} 0.1"/>
 <joint joint1="j2" polycoef="{}"/>"""
+CLOSURES = '<connect body1="b2" body2="b7" anchor="{}"/><weld body1="b3" body2="b6" anchor="{}"/>'
+
+
+class EngineFrame(NamedTuple):
+    """A link as an engine has it."""
+
+    position: FloatArray  # [m], (3,)
+    matrix: FloatArray  # (3, 3)
+    linear: FloatArray  # the derivative of the position, (3, freedom)
+    angular: FloatArray  # the angular velocity, (3, freedom)
+
+    def place(self, point: FloatArray) -> FloatArray:
+        """Return where a point of the link is [m], (3,)."""
+        return self.position + self.matrix @ point
+
+    def velocity(self, point: FloatArray) -> FloatArray:
+        """Return the derivative of where it is, (3, freedom)."""
+        return self.linear + np.cross(self.angular.T, self.matrix @ point).T
 
 
 def relative_frames(engine: str, case: int) -> Comparison:
     """Compare the place of a point in another link's frame, its rotation, and both derivatives."""
     robot, adapter, rows = _sample(engine, case)
     point = samples.generator("point", case).normal(size=3)
-    freedoms = {j.name: j.freedoms.stop - j.freedoms.start for j in moving_joints(robot)}
     task = tasks.FrameTask("b7", (0, 0, 0), (1, 0, 0, 0), relative_to="b3", point=point)
 
     def expected(q: FloatArray) -> FloatArray:
-        _set(robot, adapter, q)
-        (x, x_base), (R, R_base) = adapter.link_poses(["b7", "b3"])
-        J, J_base = adapter.jacobians(["b7", "b3"], freedoms)
-        offset = x + R @ point - x_base
-        velocity = J[:3] + np.cross(J[3:].T, R @ point).T - J_base[:3]
-        velocity -= np.cross(J_base[3:].T, offset).T
-        matrix, angular = R_base.T @ R, R_base.T @ (J[3:] - J_base[3:])
-        parts = R_base.T @ offset, matrix, R_base.T @ velocity, angular
-        return np.concatenate([part.ravel() for part in parts])
+        frame, base = _frames(robot, adapter, q)
+        offset = frame.place(point) - base.position
+        velocity = frame.velocity(point) - base.linear - np.cross(base.angular.T, offset).T
+        into = base.matrix.T
+        parts = into @ offset, into @ frame.matrix, into @ velocity
+        return _joined(*parts, into @ (frame.angular - base.angular))
 
     def actual(q: FloatArray) -> FloatArray:
         residual, J = _evaluate(robot, q, task)
@@ -55,22 +71,82 @@ def relative_frames(engine: str, case: int) -> Comparison:
         angular = rotation.to_matrix(Q) @ np.linalg.solve(
             tasks.inverse_right_jacobian(residual[3:]), J[3:]
         )
-        parts = residual[:3], rotation.to_matrix(Q), J[:3], angular
-        return np.concatenate([part.ravel() for part in parts])
+        return _joined(residual[:3], rotation.to_matrix(Q), J[:3], angular)
 
     return _compared(robot, rows, actual, expected)
 
 
+def look_at(engine: str, case: int) -> Comparison:
+    """Compare an axis less the direction to a point of another link, and the derivative."""
+    robot, adapter, rows = _sample(engine, case)
+    target, axis, origin = samples.generator("look-at", case).normal(size=(3, 3))
+    axis /= np.linalg.norm(axis)
+    task = tasks.LookAt("b7", target, axis, origin, "b3")
+
+    def expected(q: FloatArray) -> FloatArray:
+        eye, base = _frames(robot, adapter, q)
+        offset = base.place(target) - eye.place(origin)
+        velocity, distance = base.velocity(target) - eye.velocity(origin), np.linalg.norm(offset)
+        direction = offset / distance
+        across = velocity - np.outer(direction, direction @ velocity)
+        rate = np.cross(eye.angular.T, eye.matrix @ axis).T - across / distance
+        return _joined(eye.matrix @ axis - direction, rate)
+
+    return _compared(robot, rows, lambda q: _joined(*_evaluate(robot, q, task)), expected)
+
+
 def centre_of_mass(engine: str, case: int) -> Comparison:
-    """Compare the centre of mass."""
+    """Compare the centre of mass and its derivative."""
     robot, adapter, rows = _sample(engine, case)
     task = tasks.CentreOfMass(robot.masses, robot.centres, (0.0, 0.0, 0.0))
 
     def expected(q: FloatArray) -> FloatArray:
-        _set(robot, adapter, q)
-        return adapter.centre_of_mass()
+        adapter.update_kinematics(_coordinates(robot, q))
+        return _joined(adapter.centre_of_mass(), adapter.centre_of_mass_jacobian(_freedoms(robot)))
 
+    return _compared(robot, rows, lambda q: _joined(*_evaluate(robot, q, task)), expected)
+
+
+def postures(engine: str, case: int) -> Comparison:
+    """Compare the velocity from a posture."""
+    robot, adapter, rows = _sample(engine, case)
+    posture = robot.articulation.random(samples.generator("posture", case))
+
+    def expected(q: FloatArray) -> FloatArray:
+        adapter.update_kinematics(_coordinates(robot, q))
+        return adapter.displacement(_coordinates(robot, posture), _freedoms(robot))
+
+    task = tasks.Posture(posture)
     return _compared(robot, rows, lambda q: _evaluate(robot, q, task)[0], expected)
+
+
+def closures(engine: str, case: int) -> Comparison:
+    """Compare by how much links leave the places that connect and weld keep them at."""
+    anchor, anchor_weld = samples.generator("closures", case).normal(size=(2, 3))
+    links = ["b2", "b7", "b3", "b6"]
+    numbers = [" ".join(map(repr, point.tolist())) for point in (anchor, anchor_weld)]
+    robot = mjcf.parse(_text(case, CLOSURES.format(*numbers)))
+    _, adapter, rows = _sample(engine, case)
+
+    def places(q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the anchors in frames of the other links, and the rotation of the weld."""
+        adapter.update_kinematics(_coordinates(robot, q))
+        x, R = adapter.link_poses(links)
+        connected = R[1].T @ (x[0] + R[0] @ anchor - x[1])
+        return connected, R[2].T @ (x[3] + R[3] @ anchor_weld - x[2]), R[2].T @ R[3]
+
+    closed = places(robot.home)
+
+    def expected(q: FloatArray) -> FloatArray:
+        connected, welded, turn = places(q)
+        gaps = [np.linalg.norm(connected - closed[0]), np.linalg.norm(welded - closed[1])]
+        return np.array([*gaps, np.linalg.norm(turn - closed[2]) / 8.0**0.5])
+
+    def actual(q: FloatArray) -> FloatArray:
+        connect, weld = (_evaluate(robot, q, task)[0] for task in robot.equalities)
+        return np.concatenate([[np.linalg.norm(connect)], _measures(weld, True)])
+
+    return _compared(robot, rows, actual, expected)
 
 
 def equalities(case: int) -> Comparison:
@@ -124,8 +200,24 @@ def _evaluate(robot: Robot, q: FloatArray, task: tasks.IKTask) -> tuple[FloatArr
     return task.evaluate(tasks.configuration(robot.articulation, q))
 
 
-def _set(robot: Robot, adapter: RobotEngine, q: FloatArray) -> None:
-    adapter.update_kinematics({j.name: q[j.coordinates] for j in moving_joints(robot)})
+def _joined(*parts: FloatArray) -> FloatArray:
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def _coordinates(robot: Robot, q: FloatArray) -> dict[str, FloatArray]:
+    return {j.name: q[j.coordinates] for j in moving_joints(robot)}
+
+
+def _freedoms(robot: Robot) -> dict[str, int]:
+    return {j.name: j.freedoms.stop - j.freedoms.start for j in moving_joints(robot)}
+
+
+def _frames(robot: Robot, adapter: RobotEngine, q: FloatArray) -> Iterator[EngineFrame]:
+    """Yield links b7 and b3 as an engine has them at q."""
+    adapter.update_kinematics(_coordinates(robot, q))
+    x, R = adapter.link_poses(["b7", "b3"])
+    J = adapter.jacobians(["b7", "b3"], _freedoms(robot))
+    return map(EngineFrame, x, R, J[:, :3], J[:, 3:])
 
 
 def _rows(robot: Robot, case: int) -> FloatArray:
@@ -145,7 +237,7 @@ def _sample(engine: str, case: int) -> tuple[Robot, RobotEngine, FloatArray]:
 
 
 def _text(case: int, equality: str = "") -> str:
-    """Return a random tree of hinges and slides with masses, as MJCF."""
+    """Return a random tree of hinges, slides and balls with masses, as MJCF."""
     rng = samples.generator("tree", case)
     children: list[list[int]] = [[] for _ in range(BODIES)]
     for body in range(1, BODIES):
@@ -154,7 +246,7 @@ def _text(case: int, equality: str = "") -> str:
     def element(body: int) -> str:
         numbers = [" ".join(map(repr, rng.normal(size=n).tolist())) for n in (3, 4, 3, 3)]
         position, quaternion, axis, centre = numbers
-        kind = "slide" if rng.random() < 0.25 else "hinge"
+        kind = "slide" if rng.random() < 0.25 else "ball" if body in BALLS else "hinge"
         inside = "".join(map(element, children[body]))
         return (
             f'<body name="b{body}" pos="{position}" quat="{quaternion}">'

@@ -24,6 +24,7 @@ from .arguments import (
     KeepsReadOnly,
     RecordArray,
     frozen,
+    is_plain,
 )
 from .backend.compiled import Kernel
 from .quaternion import (
@@ -265,14 +266,22 @@ class Articulation(KeepsReadOnly):
 
     def forward(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4)."""
+        if is_plain(q, (self.coordinate_count,)):  # most often one of many calls: overhead counts
+            count = len(self.joints)
+            positions, rotations = np.empty((count, 3)), np.empty((count, 4))
+            if forward_one(self.joints, q, positions, rotations):
+                return positions, rotations
         return self._transforms(_forward, q)
 
     def _transforms(self, kernel: Kernel, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        q = self.checked("q", q)
+        q = arguments.floats("q", q, "...", self.coordinate_count)
         shape = (*q.shape[:-1], self.joint_count)
         positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        kernel(self.joints, one_batch(q), one_batch(positions, 2), one_batch(rotations, 2))
-        return positions, rotations
+        rows = one_batch(q), one_batch(positions, 2), one_batch(rotations, 2)
+        if kernel(self.joints, *rows):
+            return positions, rotations
+        # raise, or the lengths were within rounding of the tolerance
+        return self._transforms(kernel, self.checked("q", q))
 
     def checked(self, name: str, q: ArrayLike) -> FloatArray:
         """Return coordinates (..., coordinate), their quaternions made unit."""
@@ -438,22 +447,41 @@ def _excess_batch(joints, q, excess):
 
 
 def _locals_batch(joints, q, offsets, rotations):
+    unit = np.empty(q.shape[1])
     for i in range(len(q)):
+        unit[:] = q[i]
+        if not normalise_start(joints, unit):
+            return False
         for j in range(len(joints)):
-            x, R = joint_transform(joints, j, q[i])
+            x, R = joint_transform(joints, j, unit)
             store_vector(offsets[i], j, x)
             store_quaternion(rotations[i], j, R)
+    return True
+
+
+def _forward_one(joints, q, positions, rotations):
+    unit = q.copy()
+    if not normalise_start(joints, unit):
+        return False
+    articulated_pose(joints, unit, positions, rotations)
+    return True
 
 
 def _forward_batch(joints, q, positions, rotations):
+    unit = np.empty(q.shape[1])
     for i in range(len(q)):
-        articulated_pose(joints, q[i], positions[i], rotations[i])
+        unit[:] = q[i]
+        if not normalise_start(joints, unit):
+            return False
+        articulated_pose(joints, unit, positions[i], rotations[i])
+    return True
 
 
 _clamp = Kernel(_clamp_batch)
 _excess = Kernel(_excess_batch)
 _locals = Kernel(_locals_batch)
-_forward = Kernel(_forward_batch, label="forward_kinematics of articulations")
+_forward = Kernel(_forward_batch, label="forward_kinematics of a batch of articulations")
+forward_one = Kernel(_forward_one, label="forward_kinematics of articulations")
 
 
 def _per_joint(name: str, values: FloatArray, count: int, *axes: int) -> FloatArray:

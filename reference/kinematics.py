@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments, rotation
 from .arguments import FloatArray, frozen, is_plain
-from .articulation import Articulation
+from .articulation import Articulation, forward_one
 from .backend.compiled import Kernel
 from .backend.simd.vectors import (
     LANES,
@@ -22,7 +22,7 @@ from .backend.simd.vectors import (
     store_unit,
 )
 from .backend.threads import in_slices
-from .model import Model, checked_model
+from .model import Model, checked_model, coordinates_name
 from .quaternion import add, conjugate, load_vector, made_unit, multiply, rotate
 from .skeleton import Pose, Skeleton, SkeletonArrays, checked_skeleton
 
@@ -47,15 +47,17 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
         ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
             from unit length.
     """
+    positions: Any
+    rotations: Any
     if isinstance(skeleton, Articulation):
-        x, R = skeleton.forward(local_rotations)
-        return Pose(frozen(x), frozen(R))
+        positions, rotations = skeleton.forward(local_rotations)
+        positions.setflags(False)  # by its name it takes twice as long
+        rotations.setflags(False)
+        return Pose(positions, rotations)
     if not isinstance(skeleton, Skeleton):
         return forward_kinematics(checked_model(skeleton), local_rotations)
     tree = skeleton.arrays
     count = len(tree.parents)
-    positions: Any
-    rotations: Any
     if is_plain(local_rotations, (count, 4)):  # most often one of many calls: overhead counts
         local: Any = local_rotations
         positions, rotations = np.empty((count, 3)), np.empty((count, 4))
@@ -66,13 +68,13 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
         valid = _in_slices(_forward_batch, tree, local, positions, rotations)
     if not valid:  # raise, or the lengths were within rounding of the tolerance
         return forward_kinematics(skeleton, rotation.unit("local_rotations", local))
-    positions.setflags(False)  # by its name it takes twice as long
+    positions.setflags(False)
     rotations.setflags(False)
     return Pose(positions, rotations)
 
 
 class PreparedKinematics:
-    """Forward kinematics of a skeleton, one pose a call, into the same arrays every time.
+    """Forward kinematics of a model, one pose a call, into the same arrays every time.
 
     A call takes less than half the time of `forward_kinematics`, which allocates its result and
     makes it read-only: for ten balls that is most of its time.
@@ -82,19 +84,29 @@ class PreparedKinematics:
             positions (joint, 3) [m] and rotations (joint, 4), NaN before the first call.
     """
 
-    __slots__ = ("_arrays", "_forward", "_shape", "_skeleton", "pose")
+    __slots__ = ("_arrays", "_forward", "_model", "_shape", "pose")
 
-    def __init__(self, skeleton: Skeleton):
+    def __init__(self, model: Skeleton | Articulation):
         """Allocate the arrays; `prepare` checks the argument."""
-        count = skeleton.joint_count
+        count = model.joint_count
         positions, rotations = np.full((count, 3), np.nan), np.full((count, 4), np.nan)
-        self._skeleton, self._shape = skeleton, (count, 4)
-        self._arrays = positions, rotations
-        self._forward = functools.partial(_forward.in_force, *skeleton.arrays)
+        self._model, self._arrays = model, (positions, rotations)
+        self._shape: tuple[int, ...] = (count, 4)
+        if isinstance(model, Skeleton):
+            self._forward = functools.partial(_forward.in_force, *model.arrays)
+        else:
+            self._shape = (model.coordinate_count,)
+            self._forward = functools.partial(forward_one.in_force, model.joints)
         self.pose = Pose(frozen(positions), frozen(rotations))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes a copy, which has arrays of its own."""
+        return type(self), (self._model,)
 
     def __call__(self, local_rotations: ArrayLike) -> Pose:
         """Return the pose of local rotations, (joint, 4); the next call overwrites it.
+
+        For an Articulation, of its coordinates, (coordinate,).
 
         Raises:
             ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
@@ -103,23 +115,23 @@ class PreparedKinematics:
         if not is_plain(local_rotations, self._shape) or not self._forward(
             local_rotations, *self._arrays
         ):
-            local = arguments.floats("local_rotations", local_rotations, *self._shape)
-            for values, new in zip(
-                self._arrays, forward_kinematics(self._skeleton, local), strict=True
-            ):
+            name = coordinates_name(self._model)
+            local = arguments.floats(name, local_rotations, *self._shape)
+            pose = forward_kinematics(self._model, local)
+            for values, new in zip(self._arrays, pose, strict=True):
                 values[:] = new
         return self.pose
 
 
-def prepare(skeleton: Skeleton) -> PreparedKinematics:
-    """Return forward kinematics for many single poses of a skeleton: `prepare(skeleton)(local)`.
+def prepare(skeleton: Model) -> PreparedKinematics:
+    """Return forward kinematics for many single poses of a model: `prepare(skeleton)(local)`.
 
     It runs on the backend that is in force now.
 
     Raises:
-        ValueError: if it is no Skeleton.
+        ValueError: if it is no Skeleton, Articulation or Robot.
     """
-    return PreparedKinematics(checked_skeleton(skeleton))
+    return PreparedKinematics(checked_model(skeleton))
 
 
 def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:

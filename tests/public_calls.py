@@ -219,7 +219,7 @@ def _lists(position, rotation):
     pose, all_solutions = {"position": position, "rotation": rotation}, reference.all_solutions
     options = {"effector": 6, "grid": np.array([0.2, 0.4]), "restarts": 8, "seed": 3}
     laws = {"free": "position rotation grid", "names": "target"}
-    yield entry(listed, pose | options, of=all_solutions, **laws)
+    yield entry(listed, pose | options, of=all_solutions, single="grid", **laws)
     yield entry(listed_by_form, pose, "closed form", all_solutions, **laws)
 
 
@@ -267,6 +267,10 @@ def _skeletons():
     yield entry(
         lambda local_rotations: reference.prepare(model)(local_rotations),
         {"local_rotations": local[0]}, of=kinematics.PreparedKinematics,
+    )  # fmt: skip
+    yield entry(
+        lambda q: reference.prepare(robot())(q), {"q": q[0]}, "robot",
+        of=kinematics.PreparedKinematics,
     )  # fmt: skip
     yield entry(
         reference.local_from_global, {"skeleton": model, "rotations": turned}, free="rotations"

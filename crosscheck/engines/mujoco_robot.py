@@ -85,6 +85,17 @@ class MujocoRobot(RobotEngine):
         """Return the current centre of mass of all bodies [m], (3,)."""
         return self.data.subtree_com[0].copy()
 
+    def _centre_of_mass_jacobian(self) -> FloatArray:
+        J = np.empty((3, self.model.nv))
+        mujoco.mj_jacSubtreeCom(self.model, self.data, J, 0)
+        return J
+
+    def _displacement(self, start: Mapping[str, FloatArray]) -> FloatArray:
+        end, v = self.data.qpos.copy(), np.empty(self.model.nv)
+        self.update_kinematics(start)
+        mujoco.mj_differentiatePos(self.model, v, 1.0, self.data.qpos, end)
+        return v
+
     def _jacobians(self, links: list[str]) -> FloatArray:
         J = np.empty((len(links), 6, self.model.nv))
         for part, link in zip(J, links, strict=True):

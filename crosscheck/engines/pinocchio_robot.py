@@ -91,6 +91,14 @@ class PinocchioRobot(RobotEngine):
         """Return the current centre of mass of all that moves [m], (3,)."""
         return np.array(pinocchio.centerOfMass(self.model, self.data, self._q))
 
+    def _centre_of_mass_jacobian(self) -> FloatArray:
+        return np.array(pinocchio.jacobianCenterOfMass(self.model, self.data, self._q))
+
+    def _displacement(self, start: Mapping[str, FloatArray]) -> FloatArray:
+        end = self._q
+        self.update_kinematics(start)
+        return np.array(pinocchio.difference(self.model, self._q, end))
+
     def _jacobians(self, links: list[str]) -> FloatArray:
         """Return the Jacobians of links with respect to all joints, (link, 6, column).
 

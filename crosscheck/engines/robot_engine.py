@@ -68,17 +68,38 @@ class RobotEngine(ABC):
     def _jacobians(self, links: list[str]) -> FloatArray:
         """Return the Jacobians of links with respect to all joints, (link, 6, column)."""
 
+    @abstractmethod
+    def _centre_of_mass_jacobian(self) -> FloatArray:
+        """Return the Jacobian of the centre of mass, (3, column)."""
+
+    @abstractmethod
+    def _displacement(self, start: Mapping[str, FloatArray]) -> FloatArray:
+        """Set coordinates; return the velocity from them to those before, (column,)."""
+
     def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
         """Return the Jacobians of links with respect to joints, given with their freedoms.
 
         They are the linear [m], then the angular velocity of the links' origins in the frame of the
         world, (link, 6, freedom); columns of unknown joints are zero.
         """
-        J = self._jacobians(links)
-        matched, first = np.zeros((*J.shape[:-1], sum(freedoms.values()))), 0
+        return self._matched(self._jacobians(links), freedoms)
+
+    def centre_of_mass_jacobian(self, freedoms: Mapping[str, int]) -> FloatArray:
+        """Return the Jacobian of the centre of mass with respect to joints, (3, freedom)."""
+        return self._matched(self._centre_of_mass_jacobian(), freedoms)
+
+    def displacement(
+        self, start: Mapping[str, FloatArray], freedoms: Mapping[str, int]
+    ) -> FloatArray:
+        """Set coordinates; return the velocity of joints to those before, (freedom,)."""
+        return self._matched(self._displacement(start), freedoms)
+
+    def _matched(self, values: FloatArray, freedoms: Mapping[str, int]) -> FloatArray:
+        """Return the columns of joints, given with their freedoms; zero of unknown joints."""
+        matched, first = np.zeros((*values.shape[:-1], sum(freedoms.values()))), 0
         for name, width in freedoms.items():
             if name in self.columns:
                 start = self.columns[name]
-                matched[..., first : first + width] = J[..., start : start + width]
+                matched[..., first : first + width] = values[..., start : start + width]
             first += width
         return matched

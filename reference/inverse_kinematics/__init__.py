@@ -107,6 +107,8 @@ def solve_ik(
             1e-6 from unit length, a number is out of range, a name unknown, or an Articulation has
             several tips and no effector is named.
     """
+    if type(target) is list and len(target) == 1 and type(target[0]) is Target:
+        target = target[0]  # it takes the shorter route
     if solver is None:
         solver, default_restarts = default_solver(skeleton, target)
         restarts = default_restarts if restarts is None else restarts

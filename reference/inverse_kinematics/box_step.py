@@ -20,8 +20,10 @@ from ..quaternion import load_vector, logarithm, normalised, scale, subtract
 from .linear_algebra import ROUNDING_DAMPING, clear, inner, solve, store
 from .mechanism import (
     LEVER,
+    cost,
     effector_position,
     load_ball,
+    move_by,
     position_error,
     rotation_error,
     store_ball,
@@ -31,6 +33,8 @@ from .mechanism import (
 FULL_CIRCLE = 2.0 * math.pi
 # A rotation by less [rad] has no axis to be made the long way round.
 LEAST_TURN = 1e-3
+# The step of a joint with followers is halved at most so often.
+HALVINGS = 20
 
 
 class TaskSystem(NamedTuple):
@@ -301,3 +305,22 @@ def wrap(joints, j, q):
         q[at] -= FULL_CIRCLE * math.ceil((q[at] - upper) / FULL_CIRCLE)
     elif q[at] < lower:
         q[at] += FULL_CIRCLE * math.ceil((lower - q[at]) / FULL_CIRCLE)
+
+
+def descend(mechanism, target, data, work, j):
+    """Move a joint with followers down the gradient, half as far until the cost does not rise."""
+    q, at, k = data.q, mechanism.joints["coordinate"][j], mechanism.joints["freedom"][j]
+    update_forward_kinematics(mechanism, data)
+    linearise_task(mechanism, target, data, work.system)
+    row = work.system.J[k]
+    slope, square = inner(row, work.system.e), inner(row, row)
+    before, start = cost(mechanism, target, data), q[at]
+    step = freedom_unit(mechanism, j) * slope / square if square > 0.0 else 0.0
+    for _ in range(HALVINGS):
+        move_by(mechanism.joints, q, j, step)
+        update_forward_kinematics(mechanism, data)
+        if cost(mechanism, target, data) <= before:
+            return
+        q[at] = start
+        step *= 0.5
+    update_forward_kinematics(mechanism, data)

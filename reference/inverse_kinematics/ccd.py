@@ -32,10 +32,9 @@ from ..quaternion import (
     subtract,
 )
 from .anderson import forget, mix
-from .box_step import freedom_unit, linearise_task
+from .box_step import descend
 from .chain import effector_error, rotate_links, update_positions
 from .fabrik import reach_forward
-from .linear_algebra import inner
 from .mechanism import (
     cost,
     effector_position,
@@ -53,9 +52,6 @@ from .mechanism import (
 )
 from .restarts import copy_row
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, best_rotation
-
-# The step of a joint with followers is halved at most so often.
-HALVINGS = 20
 
 
 def ccd_sweep(chain, target):
@@ -230,22 +226,3 @@ def translate_effectors(mechanism, data, j, v):
         if mechanism.moves[j, e]:
             moved = add(effector_position(mechanism, data, e), v)
             store_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
-
-
-def descend(mechanism, target, data, work, j):
-    """Move a joint with followers down the gradient, half as far until the cost does not rise."""
-    q, at, k = data.q, mechanism.joints["coordinate"][j], mechanism.joints["freedom"][j]
-    update_forward_kinematics(mechanism, data)
-    linearise_task(mechanism, target, data, work.system)
-    row = work.system.J[k]
-    slope, square = inner(row, work.system.e), inner(row, row)
-    before, start = cost(mechanism, target, data), q[at]
-    step = freedom_unit(mechanism, j) * slope / square if square > 0.0 else 0.0
-    for _ in range(HALVINGS):
-        move_by(mechanism.joints, q, j, step)
-        update_forward_kinematics(mechanism, data)
-        if cost(mechanism, target, data) <= before:
-            return
-        q[at] = start
-        step *= 0.5
-    update_forward_kinematics(mechanism, data)

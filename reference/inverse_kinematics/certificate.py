@@ -61,6 +61,8 @@ QUATERNION_ROUNDINGS, OFFSET_ROUNDINGS = 48, 130
 SLACK = 1.0 + 1e-8
 # The answer is polished to this distance [m] and angle [rad], and then by a few Newton steps.
 POLISHED, NEWTON_STEPS = 1e-11, 3
+# A Newton step by more leads to no solution [rad or m].
+LARGEST_STEP = 1e9
 # A joint nearer to its limit than this stays where it is [rad or m].
 MARGIN = 1e-7
 # Displacements [rad or m] for which lengths of slides and angles of mimic joints are bounded.
@@ -317,6 +319,8 @@ def exact_solution(equations: Equations, q: FloatArray) -> tuple[IKCoverage, flo
             break
         step = np.zeros(model.freedom_count)
         step[free] = -B @ F
+        if not np.abs(step).max() <= LARGEST_STEP:
+            return IKCoverage.TOO_FAR, math.inf
         p = integrate(model, p, step)
         F, J = equations.evaluate(p)
     J = J[:, free]

@@ -3,7 +3,8 @@
 The backward pass gives each joint a backward position. On mechanisms the forward pass rotates and
 translates joints instead of moving points, each to bring its children nearest to their backward
 positions: a hinge about its axis, a ball within its limits, a single rotation for all children of
-a branch, a free joint as a body. The remaining distances are the residual.
+a branch, a free joint as a body. A joint with followers goes down the gradient. The remaining
+distances are the residual.
 """
 
 import numpy as np
@@ -28,6 +29,7 @@ from ..quaternion import (
     store_vector,
     subtract,
 )
+from .box_step import descend
 from .chain import is_beyond_reach, root_distance, rounding
 from .mechanism import (
     move_by,
@@ -174,6 +176,9 @@ def forward_joint(mechanism, target, data, work, j):
     R, x = load_quaternion(data.rotations, j), load_vector(data.positions, j)
     if kind == FREE and work.backward["weight"][j] > 0.0:
         forward_free(mechanism, target, data, work, j)
+        return
+    if joints["followed"][j]:  # the backward positions know nothing of its followers
+        descend(mechanism, target, data, work, j)
         return
     leads = joints["leader"][j] == j
     if kind == SLIDE and leads:

@@ -32,10 +32,10 @@ def nearest_solution(
 ) -> IKSolution:
     """Return the solution whose displacement from the start has the least norm.
 
-    Solutions come from the start, from random restarts, all of which are made, and for a single
-    pose from `all_solutions`, where that takes the model. Angles are those within the limits that
-    are nearest to the start's. Where nothing reaches the targets, the solution is as without a
-    preference.
+    Solutions come from the start, from random restarts, all of which are made, for a single pose
+    from `all_solutions`, where that takes the model, and from the solve without a preference, whose
+    solution it is where nothing reaches the targets. Angles are those within the limits that are
+    nearest to the start's.
     """
     order = PREFERENCES[arguments.choice("prefer", prefer, PREFERENCES)]
     if not isinstance(model, Articulation):
@@ -48,15 +48,20 @@ def nearest_solution(
     starts = np.vstack([q[None], model.random(rng, settings.limits.restarts)])
     ends = solve_checked(model, starts, targets, single_start)
     solved = ends.coordinates[ends.outcome == Outcome.CONVERGED]
-    candidates = _unwound(model, np.vstack([solved, *_branches(model, targets, q)]), q)
+    plain = solve_checked(model, q, targets, settings)
+    rows = [
+        *_branches(model, targets, q),
+        *[plain.coordinates] * (plain.outcome == Outcome.CONVERGED),
+    ]
+    candidates = _unwound(model, np.vstack([solved, *rows]), q)
     if not len(candidates):
-        return solve_checked(model, q, targets, settings)
+        return plain
     norms = np.linalg.norm(difference(model, candidates, q), order, axis=-1)
     unmoved = replace(
         single_start, limits=single_start.limits._replace(max_iterations=0, far_iterations=0)
     )
     solution = solve_checked(model, candidates[norms.argmin()], targets, unmoved)
-    return solution._replace(iterations=int(np.sum(ends.iterations)))
+    return solution._replace(iterations=int(np.sum(ends.iterations)) + plain.iterations)
 
 
 def _branches(model: Articulation, targets: list[CheckedTarget], q: FloatArray) -> list[FloatArray]:

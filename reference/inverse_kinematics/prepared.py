@@ -59,11 +59,15 @@ class PreparedIK:
             results = local, positions, figures, UNRECORDED, q
         starts, self._arrays = np.empty((1, *self._shape)), (q, positions, figures)
         self._start, self._target_shape = starts[0], self._target.shape
-        self._problem = model, joint, settings
+        self._problem = model, joint, oriented, settings
         call = kernel.in_force
         self._call = partial(call, *arrays, settings.numbers, starts, targets, *results)
         self.coordinates, self.positions = frozen(q[0]), frozen(positions[0])
         self.figures = frozen(figures[0])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes a copy, which has arrays of its own."""
+        return type(self), self._problem
 
     def __call__(self, start: ArrayLike, target: ArrayLike) -> Outcome:
         """Solve for a target from a start; return the outcome.
@@ -85,7 +89,7 @@ class PreparedIK:
 
     def _solve_checked(self, start: ArrayLike, target: ArrayLike) -> None:
         """Solve by the route of `solve_ik`, which names what is wrong."""
-        model, joint, settings = self._problem
+        model, joint, _, settings = self._problem
         q = floats(coordinates_name(model), start, *self._shape)
         values = floats("target", target, *self._target_shape)
         pose = Target(values[:3], values[3:] if len(values) > 3 else None, joint)

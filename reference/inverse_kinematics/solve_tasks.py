@@ -25,10 +25,10 @@ from .mechanism import (
     new_data,
 )
 from .problem import RESTARTS, Target
-from .tasks import FrameTask, IKTask, configuration
+from .tasks import Configuration, FrameTask, IKTask, configuration
 
 MAX_ITERATIONS = 200
-# The first damping, over the largest diagonal entry of J J', and the largest.
+# The first damping and the largest, over the largest diagonal entry of J J' at first.
 FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
 # An attempt settles where a step promises to lower the cost by less than this share, and between
 # two updates of the multipliers by less than the second: with it costs are half a per cent higher
@@ -39,6 +39,9 @@ ACCEPTED = 1e-3
 # After an update of the multipliers that leaves more than PROGRESS of the error exact tasks count
 # PENALTY times as much, at most PENALTIES times.
 PROGRESS, PENALTY, PENALTIES = 0.1, 10.0, 6
+# Factors of exact residuals with which the others are approached: without one these may lead away
+# for good, with a large one to dearer minima. The second is tried if the first lowers no cost.
+STRENGTHS = 1.0, 30.0
 
 
 class TaskSolution(NamedTuple):
@@ -139,16 +142,20 @@ class TaskProblem:
             np.zeros((n, 0), dtype=bool), np.zeros((n, n), dtype=bool), 1.0, freedoms, 0,
         )  # fmt: skip
         self.data: ConfigurationData = new_data(self.mechanism)
-        sizes = [len(task.evaluate(configuration(model, q))[0]) for task in self.tasks]
+        start = configuration(model, q)
+        sizes = [len(_evaluated(task, start, "row")[0]) for task in self.tasks]
         self.system: TaskSystem = new_system(sum(sizes), freedoms)
         self.exact = np.repeat([task.exact for task in self.tasks], sizes)
         self.root = np.sqrt(np.repeat([task.weight for task in self.tasks], sizes))
         self.is_exact = np.array([task.exact for task in self.tasks])
+        self.sizes = sizes
 
     def at(self, q: FloatArray) -> _Evaluation:
         """Return the weighted residuals at q."""
         current = configuration(self.model, q)
-        residuals, derivatives = zip(*(t.evaluate(current) for t in self.tasks), strict=True)
+        pairs = zip(self.tasks, self.sizes, strict=True)
+        parts = [_evaluated(task, current, size) for task, size in pairs]
+        residuals, derivatives = zip(*parts, strict=True)
         errors = np.array([np.abs(residual).max(initial=0.0) for residual in residuals])
         r, J = np.concatenate(residuals), np.concatenate(derivatives)
         return _Evaluation(q, self.root * r, self.root[:, None] * J, errors)
@@ -168,6 +175,10 @@ class TaskProblem:
         """Return whether every exact task is met."""
         return bool((state.errors[self.is_exact] <= tolerance).all())
 
+    def cost(self, state: _Evaluation) -> float:
+        """Return the weighted sum of squares of the tasks that are not exact."""
+        return float(np.sum(state.r[~self.exact] ** 2))
+
     def misses(self, solution: TaskSolution) -> float:
         """Return the largest error of an exact task."""
         return float(solution.errors[self.is_exact].max(initial=0.0))
@@ -176,21 +187,26 @@ class TaskProblem:
 def _attempt(problem: TaskProblem, q: FloatArray, tolerance: float, limit: int) -> TaskSolution:
     """Return the solution from a start: the exact tasks first, then the others along with them.
 
-    The others are given up where they would end away from the exact tasks.
+    Where these end away from the exact tasks, those are met again from there.
     """
     exact = problem.exact.astype(float)
     state, count, stalled = _descend(problem, q, exact, tolerance, limit)
-    if problem.is_met(state, tolerance) and not problem.exact.all():
-        ones = np.ones(len(exact))
-        end, more, stalled = _descend(problem, state.q, ones, tolerance, limit)
+    others_follow = problem.is_met(state, tolerance) and not problem.exact.all()
+    for strength in STRENGTHS if others_follow else ():
+        scale = np.where(problem.exact, strength, 1.0)
+        end, more, stalled = _descend(problem, state.q, scale, tolerance, limit - count)
         count += more
-        if problem.is_met(end, tolerance):
+        if not problem.is_met(end, tolerance):
+            end, more, stalled = _descend(problem, end.q, exact, tolerance, limit - count)
+            count += more
+        if problem.is_met(end, tolerance) and problem.cost(end) < problem.cost(state):
             state = end
+            break
     outcome = Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT
     if problem.is_met(state, tolerance):
         outcome = Outcome.CONVERGED
-    cost = float(np.sum(state.r[~problem.exact] ** 2))
-    return TaskSolution(frozen(state.q), frozen(state.errors), cost, count, outcome)
+    q, errors = frozen(state.q), frozen(state.errors)
+    return TaskSolution(q, errors, problem.cost(state), count, outcome)
 
 
 def _descend(
@@ -205,7 +221,8 @@ def _descend(
     exact, missed, penalties = problem.exact, np.inf, 0
     is_single = not scale[~exact].any()
     settled = SETTLED if is_single or not exact.any() else SETTLED_BETWEEN
-    damping, growth = FIRST_DAMPING * float(np.sum(state.J**2, axis=1).max(initial=0.0)), 2.0
+    unit = float(np.sum(state.J**2, axis=1).max(initial=0.0)) or 1.0  # if nothing moves them
+    damping, growth = FIRST_DAMPING * unit, 2.0
     for count in range(limit):
         if is_single and problem.is_met(state, tolerance):
             return state, count, True
@@ -219,7 +236,7 @@ def _descend(
             growth, state = 2.0, new
         else:
             damping, growth = damping * growth, 2.0 * growth
-        if promised > settled * square and damping < LARGEST_DAMPING:
+        if promised > settled * square and damping < LARGEST_DAMPING * unit:
             continue
         if is_single or problem.is_met(state, tolerance) or penalties == PENALTIES:
             return state, count + 1, True
@@ -237,9 +254,22 @@ def _as_task(model: Articulation, task: IKTask | Target) -> IKTask:
     if isinstance(task, Target):
         frame = effector_of(model, task.effector)
         return FrameTask(frame, task.position, task.rotation, weight=task.weight)
-    if not callable(getattr(task, "evaluate", None)):
+    if isinstance(task, type) or not callable(getattr(task, "evaluate", None)):
         raise ValueError(f"tasks: expected tasks and Targets, got {task!r:.80}")
+    arguments.number("weight", getattr(task, "weight", None), above=0.0)
+    arguments.boolean("exact", getattr(task, "exact", None))
     return task
+
+
+def _evaluated(
+    task: IKTask, current: Configuration, size: int | str
+) -> tuple[FloatArray, FloatArray]:
+    """Return the residual of a task, of a size, and its derivative; both are checked."""
+    parts = task.evaluate(current)
+    if not isinstance(parts, tuple) or len(parts) != 2:
+        raise ValueError(f"evaluate: expected a residual and its derivative, got {parts!r:.80}")
+    r = arguments.array("residual", parts[0], size)
+    return r, arguments.array("derivative", parts[1], len(r), current.model.freedom_count)
 
 
 _step = Kernel(damped_step, label="solve_tasks, step")

@@ -6,6 +6,7 @@ tasks are to be met; the others, such as a posture, are approached as far as tho
 radians. Frames are joints of the model, by index or name; None is the world.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
-from ..arguments import FloatArray, frozen
+from ..arguments import FloatArray, KeepsReadOnly, frozen
 from ..articulation import Articulation
 from ..jacobians import difference, jacobians
 from ..quaternion import IDENTITY, conjugate, logarithm, multiply, rotate
@@ -81,7 +82,7 @@ class IKTask(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class FrameTask:
+class FrameTask(KeepsReadOnly):
     """A position, a rotation, or both, of a frame in the world or relative to another frame.
 
     The position is that of `point`. Its error is along the axes of the target rotation, if there is
@@ -113,10 +114,14 @@ class FrameTask:
         """Check and copy; a ValueError names the argument."""
         if self.position is None and self.rotation is None:
             raise ValueError("position: expected a position or a rotation, got neither")
-        _check(self, vectors=("point",) if self.position is None else ("point", "position"))
-        factors = frozen(arguments.sizes("axes", self.axes, 6))
-        Q = None if self.rotation is None else rotation.unit("rotation", self.rotation)
-        self.__dict__.update(axes=factors, rotation=Q)
+        _check(self)
+        _keep(self, arguments.coordinates, point=3)
+        _keep(self, arguments.sizes, axes=6)
+        if self.position is not None:
+            _keep(self, arguments.coordinates, position=3)
+        if self.rotation is not None:
+            Q = rotation.unit("rotation", arguments.array("rotation", self.rotation, 4))
+            self.__dict__["rotation"] = frozen(Q)
 
     def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
         """Return the errors of position [m] and rotation [rad], and their derivative."""
@@ -142,7 +147,7 @@ class FrameTask:
 
 
 @dataclass(frozen=True, eq=False)
-class LookAt:
+class LookAt(KeepsReadOnly):
     """An axis of a frame points at a point of another frame, or of the world.
 
     The residual is the difference of the two unit directions: its length is the chord of the angle.
@@ -167,7 +172,8 @@ class LookAt:
 
     def __post_init__(self) -> None:
         """Check and copy; a ValueError names the argument."""
-        _check(self, vectors=("target", "axis", "origin"))
+        _check(self)
+        _keep(self, arguments.coordinates, target=3, axis=3, origin=3)
         length = np.linalg.norm(self.axis)
         if length == 0.0:
             raise ValueError("axis: expected a direction, got (0, 0, 0)")
@@ -186,7 +192,7 @@ class LookAt:
 
 
 @dataclass(frozen=True, eq=False)
-class CentreOfMass:
+class CentreOfMass(KeepsReadOnly):
     """The centre of mass at a position.
 
     Attributes:
@@ -208,16 +214,14 @@ class CentreOfMass:
 
     def __post_init__(self) -> None:
         """Check and copy; a ValueError names the argument."""
-        _check(self, vectors=("position",))
+        _check(self)
         unknown = np.flatnonzero(np.isnan(arguments.floats("masses", self.masses, "joint")))
         if len(unknown):
             raise ValueError(f"masses: expected that of joint {unknown[0]}, got NaN, as of a mesh")
-        masses = frozen(arguments.sizes("masses", self.masses, "joint"))
-        if not masses.sum() > 0.0:
+        _keep(self, arguments.sizes, masses="joint", axes=3)
+        if not self.masses.sum() > 0.0:
             raise ValueError("masses: expected a positive sum, got 0")
-        centres = frozen(arguments.coordinates("centres", self.centres, len(masses), 3))
-        axes = frozen(arguments.sizes("axes", self.axes, 3))
-        self.__dict__.update(masses=masses, centres=centres, axes=axes)
+        _keep(self, arguments.coordinates, centres=(len(self.masses), 3), position=3)
 
     def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
         """Return the error of the position [m], and its derivative."""
@@ -231,7 +235,7 @@ class CentreOfMass:
 
 
 @dataclass(frozen=True, eq=False)
-class Posture:
+class Posture(KeepsReadOnly):
     """Coordinates to stay near, by default not exact.
 
     Attributes:
@@ -248,26 +252,28 @@ class Posture:
 
     def __post_init__(self) -> None:
         """Check and copy; a ValueError names the argument."""
-        q = arguments.coordinates("coordinates", self.coordinates, "coordinate")
-        axes = arguments.sizes("axes", self.axes, "...")
         _check(self)
-        self.__dict__.update(coordinates=frozen(q.copy()), axes=frozen(axes))
+        _keep(self, arguments.coordinates, coordinates="coordinate")
+        _keep(self, arguments.sizes, axes="...")
 
     def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
         """Return the velocity from the posture to the configuration, and its derivative."""
         model = configuration.model
-        residual = difference(model, configuration.q, self.coordinates)
+        rest = model.checked("coordinates", self.coordinates)
+        residual = difference(model, configuration.q, rest)
         J = np.eye(model.freedom_count)
         for joint in np.flatnonzero([kind in ("ball", "free") for kind in model.kinds]):
             end = model.freedoms_of(int(joint)).stop
             block = slice(end - 3, end)
             J[block, block] = inverse_right_jacobian(residual[block])
+        if self.axes.ndim > 0:
+            arguments.check_shape("axes", self.axes, model.freedom_count)
         axes = np.broadcast_to(self.axes, residual.shape)
         return axes * residual, axes[:, None] * J
 
 
 @dataclass(frozen=True, eq=False)
-class Coupling:
+class Coupling(KeepsReadOnly):
     """A hinge or slide follows a polynomial of another: q - q0 = sum of c_k (leader - leader0)^k.
 
     Attributes:
@@ -291,8 +297,9 @@ class Coupling:
     def __post_init__(self) -> None:
         """Check and copy; a ValueError names the argument."""
         _check(self)
-        coefficients = arguments.coordinates("coefficients", self.coefficients, "coefficient")
-        self.__dict__["coefficients"] = frozen(coefficients.copy())
+        _keep(self, arguments.coordinates, coefficients="coefficient")
+        if not len(self.coefficients):
+            raise ValueError("coefficients: expected at least one, got none")
         for name in ("zero", "leader_zero"):
             arguments.number(name, getattr(self, name))
 
@@ -342,10 +349,14 @@ def inverse_right_jacobian(v: FloatArray) -> FloatArray:
     return np.eye(3) + 0.5 * K + factor * (K @ K)
 
 
-def _check(task: object, vectors: tuple[str, ...] = ()) -> None:
-    """Check the weight and the flag of a task, and copy its vectors (3,)."""
-    fields = task.__dict__
-    arguments.number("weight", fields["weight"], above=0.0)
-    arguments.boolean("exact", fields["exact"])
-    for name in vectors:
-        fields[name] = frozen(arguments.coordinates(name, fields[name], 3).copy())
+def _check(task: object) -> None:
+    """Check the weight and the flag of a task."""
+    arguments.number("weight", task.__dict__["weight"], above=0.0)
+    arguments.boolean("exact", task.__dict__["exact"])
+
+
+def _keep(task: object, checked: Callable[..., FloatArray], **shapes: Any) -> None:
+    """Replace arrays of a task by read-only copies, checked to have these shapes."""
+    for name, shape in shapes.items():
+        lengths = shape if isinstance(shape, tuple) else (shape,)
+        task.__dict__[name] = frozen(checked(name, task.__dict__[name], *lengths).copy())

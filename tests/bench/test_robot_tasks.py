@@ -9,7 +9,7 @@ from table_cells import column
 from plumbob.bench.experiments.robot_tasks import TOLERANCE
 from plumbob.bench.experiments.robot_tasks.measurement import TaskJob, meet
 from plumbob.bench.experiments.robot_tasks.tables import robot_tasks
-from plumbob.bench.peers.registry import ONE_START, PLUMBOB_LM, RESTARTS
+from plumbob.bench.peers.registry import ONE_START, PLUMBOB_LM, RESTARTS, TASK_SOLVERS
 from plumbob.bench.problems.evaluate import evaluator_of
 from plumbob.bench.problems.robot_tasks import POSTURE, ROBOT_TASKS, TaskRequest, is_met
 from plumbob.bench.tables.results import Results
@@ -54,8 +54,17 @@ def meet_part(task, request):
 
 
 @pytest.mark.parametrize("name", ROBOT_TASKS)
-def test_plumbob_meets_tasks_with_restarts(name):
-    values = meet(TaskJob(ARM, name, PLUMBOB_LM, RESTARTS, 2, 1986)).values
+@pytest.mark.parametrize("peer", TASK_SOLVERS, ids=lambda peer: peer.title)
+def test_every_installed_solver_meets_tasks_with_restarts_or_says_why_not(name, peer):
+    if not peer.is_installed:
+        pytest.skip(f"{peer.package} is not installed")
+    measured = meet(TaskJob(ARM, name, peer, RESTARTS, 2, 1986))
+    values = measured.values
+    if values is None:
+        assert measured.notes["remark"] == "has no task to look at a point"
+        assert name == "look_at"
+        assert peer is not PLUMBOB_LM
+        return
     assert values.solved.all()
     assert (values.seconds > 0.0).all()
     assert (values.distance < 3.0).all()

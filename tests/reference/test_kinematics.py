@@ -1,3 +1,6 @@
+import copy
+from pickle import dumps, loads
+
 import numpy as np
 import pytest
 
@@ -107,3 +110,28 @@ def test_prepared_kinematics_fill_the_same_arrays_with_the_same_bits(skeleton, r
             forward(wrong)
     with pytest.raises(ValueError, match=r"^skeleton: "):
         prepare(local)
+
+
+def test_prepared_kinematics_of_an_articulation_have_the_same_bits(articulated, rng, backend):
+    model = articulated(["free", "hinge", "slide", "ball", "fixed", "hinge"], 1)
+    forward, rows = prepare(model), model.random(rng, 3)
+    batch = forward_kinematics(model, rows)
+    for i, q in enumerate(rows):
+        pose = forward(q)
+        for values, row, single in zip(pose, batch, forward_kinematics(model, q), strict=True):
+            np.testing.assert_array_equal(values, row[i])
+            np.testing.assert_array_equal(values, single)
+            assert not values.flags.writeable
+    infinite = np.full_like(rows[0], np.inf)
+    for wrong, words in ((rows[0] * 1.01, "length 1.01"), (rows, "shape"), (infinite, "inf")):
+        with pytest.raises(ValueError, match=f"^q: expected .*{words}"):
+            forward(wrong)
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda f: loads(dumps(f))])
+def test_a_copy_of_prepared_kinematics_computes_into_arrays_of_its_own(skeleton, rng, duplicate):
+    forward, (first, second) = prepare(skeleton), rotation.random(rng, 2, skeleton.joint_count)
+    pose = forward(first)
+    other = duplicate(forward)(second)
+    np.testing.assert_array_equal(other.positions, forward_kinematics(skeleton, second).positions)
+    np.testing.assert_array_equal(pose.positions, forward_kinematics(skeleton, first).positions)

@@ -4,6 +4,7 @@ Its wheels pin a Pinocchio older than ours, so it works in a process of an envir
 `placo_program`, which measures its own time: the connection is not timed.
 """
 
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -13,11 +14,21 @@ import numpy as np
 
 from plumbob.crosscheck.child_process import ChildProcess, LostError
 
+from ...problems.evaluate import evaluator_of
+from ...problems.robot_tasks import (
+    LOOK_AT,
+    POSTURE,
+    POSTURE_COST,
+    RobotTask,
+    TaskRequest,
+    first_link,
+    middle,
+)
 from ...problems.robots import UnableError
 from ..protocol import OwnTime
 from ..registry import environment_python
 from .overhead import is_metered, report_library
-from .protocol import Ask, BenchRobot, PoseRequest, SolverOutput, Tolerance
+from .protocol import Ask, BenchRobot, SolverOutput, Tolerance
 
 METERED = True
 PROGRAM = Path(__file__).with_name("placo_program.py")
@@ -35,27 +46,46 @@ def prepare(
     Raises:
         UnableError: if the robot is no chain, or the program does not take it.
     """
+    settings = {"iterations": iterations, "regularization": regularization, "weight": weight}
+    answer = _program(robot, {"limits": tolerance, "parts": [{"kind": "pose"}]} | settings)
+    return lambda request: answer(target=request.matrix.tolist(), start=request.start.tolist())
+
+
+def prepare_task(
+    robot: BenchRobot, task: RobotTask, tolerance: float, **settings: float
+) -> Callable[[TaskRequest], Callable[[], SolverOutput]]:
+    """Return the solver of a task, set up for an arm.
+
+    Raises:
+        UnableError: if PlaCo has no such task, or the program does not take the robot.
+    """
+    if any(part.kind == LOOK_AT for part in task.parts):
+        raise UnableError("has no task to look at a point")
+    bases = (robot.root, first_link(evaluator_of(robot.name)))
+    posture = {"weight": POSTURE_COST**2, "middle": middle(robot).tolist()}
+    parts = [
+        dataclasses.asdict(part) | posture | {"base": bases[part.is_relative]}
+        for part in task.parts
+    ]
+    goal = {"limits": [tolerance], "parts": parts}
+    if any(part.kind == POSTURE for part in task.parts):  # which it would outweigh
+        settings["regularization"] = POSTURE_COST**2
+    answer = _program(robot, goal | settings)
+    return lambda request: answer(goal=request.goal.tolist(), start=request.start.tolist())
+
+
+def _program(robot: BenchRobot, goal: dict[str, Any]) -> Callable[..., Callable[[], SolverOutput]]:
+    """Return a function that asks a program for a goal of a robot."""
     robot.require_chain()
     program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
-    task = {
-        "text": robot.text,
-        "effector": robot.effectors[0],
-        "joints": robot.joints,
-        "regularization": regularization,
-        "weight": weight,
-        "is_metered": is_metered(),
-        "iterations": iterations,
-        "limits": tolerance,
-    }
+    chain = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
     try:
-        _answer(program, task)
+        _answer(program, chain | goal | {"is_metered": is_metered()})
     except ConnectionError:
         why = "PlaCo does not read the robot, or orders its joints otherwise"
         raise UnableError(why) from None
 
-    def ask(request: PoseRequest) -> Callable[[], SolverOutput]:
-        question = {"target": request.matrix.tolist(), "start": request.start.tolist()}
-
+    def ask(**question: Any) -> Callable[[], SolverOutput]:
         def solve() -> SolverOutput:
             claim, seconds, q, library_seconds = _answer(program, question)
             report_library(library_seconds)

@@ -96,8 +96,8 @@ def all_solutions(
         robot: an Articulation or a Robot; hinges and slides move the effector.
         target: the pose, with a rotation.
         effector: the joint that is to reach it, as for `solve_ik`.
-        grid: joints to lock, each with its values, which are combined. By default, of seven joints
-            the most redundant whose arm has a closed form, at 16 values between its limits.
+        grid: joints to lock, each with a value or several, which are combined. By default, of seven
+            joints the most redundant whose arm has a closed form, at 16 values between its limits.
         restarts: the number of starts of a search, at each value of the grid.
         seed: of the starts.
 

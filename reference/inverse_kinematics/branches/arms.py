@@ -15,7 +15,7 @@ from ...skeleton import Skeleton
 from ..box_step import FULL_CIRCLE
 from ..mechanism import Mechanism
 from ..reduce import prepare
-from .closed_forms import EXACT, FORMS, HINGES, closed_form
+from .closed_forms import EXACT, FORMS, HINGES, NEAR, closed_form
 from .settle import middle
 
 # The method of an arm without a closed form.
@@ -95,7 +95,8 @@ def _checked_grid(model: Articulation, grid: Mapping[Any, ArrayLike]) -> dict[in
         j = model.index(name, "grid")
         if j in model.mimics or model.kinds[j] not in ("hinge", "slide"):
             raise ValueError(f"grid: expected hinges or slides, no mimics, got {model.names[j]!r}")
-        values[j] = arguments.array("grid", np.atleast_1d(numbers), "value")
+        values[j] = np.atleast_1d(arguments.array("grid", numbers, "..."))
+        arguments.check_shape("grid", values[j], "value")
         if not len(values[j]):
             raise ValueError(f"grid: expected values of {model.names[j]!r}, got none")
         outside = (values[j] < model.lower[j]) | (values[j] > model.upper[j])
@@ -139,12 +140,22 @@ def arm_of(model: Articulation, effector: int, values: Mapping[int, float]) -> A
     mechanism = prepare(articulation, (effector,), (True,)).mechanism
     form = closed_form(mechanism) if mechanism.freedoms == HINGES else None
     columns = remaining[mechanism.columns]
-    if form is None:
+    if form is None or _is_singular(articulation, mechanism, effector):
         return Arm(articulation, mechanism, SEARCH, False, (), columns, rest, False)
     is_plain = np.array_equal(columns, np.arange(len(rest)))
     method, is_exact = FORMS[form.form], form.deviation <= EXACT
     flat = tuple(mechanism), tuple(form)
     return Arm(articulation, mechanism, method, is_exact, flat, columns, rest, is_plain)
+
+
+def _is_singular(model: Articulation, mechanism: Mechanism, effector: int) -> bool:
+    """Return whether an arm of hinges is singular in every pose, so that solutions are continua."""
+    rng = np.random.default_rng(0)
+    q = model.random(rng, SAMPLES)
+    q[:, mechanism.columns] = rng.uniform(-np.pi, np.pi, (SAMPLES, HINGES))
+    J = jacobian(model, q, effector)
+    J[:, :3] /= mechanism.reach
+    return bool((np.linalg.svd(J, compute_uv=False)[:, HINGES - 1] < NEAR).all())
 
 
 def _locked(model: Articulation, q: FloatArray, joints: Mapping[int, float]) -> Articulation:

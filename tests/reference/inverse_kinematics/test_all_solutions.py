@@ -113,6 +113,29 @@ def test_no_search_finds_more_than_a_closed_form(named, targets, starts, rng):
         assert differences(ends, solutions).min(axis=1).max() < 1e-5
 
 
+# Arms whose solutions are continua in every pose: a joint moves nothing that others do not.
+ALWAYS_SINGULAR = {
+    "third axis through the wrist": ([Z, Y, Y, X, Y, Z], [[0, 0, 0.2], [0.1, 0, 0.3],
+                                     *[[0.4, 0, 0.6]] * 4]),
+    "two wrists": ([Z, Y, X, Z, Y, X], [*[[0, 0, 0.2]] * 3, *[[0.5, 0.1, 0.3]] * 3]),
+    "three parallel axes and a wrist": ([Z, Z, Z, X, Y, Z], [[0, 0, 0.2], [0.3, 0, 0.2],
+                                        [0.5, 0.1, 0.2], *[[0.7, 0, 0.3]] * 3]),
+    "four parallel axes": ([Y, Y, Y, Y, Z, X], [[0, 0, 0.1], [0.1, 0, 0.3], [0.5, 0, 0.3],
+                           [0.7, 0, 0.4], [0.8, 0, 0.4], [0.8, 0, 0.4]]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("backwards", [False, True], ids=["forwards", "backwards"])
+@pytest.mark.parametrize("name", ALWAYS_SINGULAR)
+def test_an_arm_that_is_singular_in_every_pose_has_no_complete_list(name, backwards, rng):
+    arm = arm_of(*ALWAYS_SINGULAR[name], backwards=backwards)
+    for q in arm.random(rng, 3):
+        target = target_of(arm, q)
+        solutions = all_solutions(arm, target, restarts=8)
+        assert_lists(solutions, arm, target)
+        assert not solutions.complete
+
+
 def test_bases_and_tools_change_nothing(named, rng):
     geometry = ARMS[named][:2]
     base, arm = rotation.random(rng), arm_of(*geometry)
@@ -301,6 +324,8 @@ MISUSES = {
     "an unknown joint": ({"grid": {"nose": 0.0}}, "grid: expected"),
     "beyond limits": ({"grid": {0: 7.0}}, "grid: expected values from -3.14159 to 3.14159, got 7"),
     "no values": ({"grid": {0: []}}, "grid: expected values of 'joint0', got none"),
+    "a ragged list": ({"grid": {0: [[1.0], [1.0, [2.0]]]}}, "grid: expected an array of numbers"),
+    "a table": ({"grid": {0: [[1.0], [2.0]]}}, "grid: expected shape"),
     "a fixed joint": ({"grid": {7: 0.0}}, "grid: expected hinges or slides"),
     "too few locked": ({"grid": {}}, "grid: expected joints to lock, so that 6 of 7 remain, got 0"),
     "no restarts": ({"restarts": 0}, "restarts: expected"),

@@ -292,6 +292,13 @@ class TestImpossible:
         assert result.least_distance == pytest.approx(exact, abs=1e-11)
         assert result.least_distance <= exact
 
+    def test_a_target_any_distance_away_is_impossible(self, rng):
+        """Newton's step was beyond all numbers, and an error named it."""
+        chain = Skeleton([-1, 0, 1], 1e-30 * rng.standard_normal((3, 3)))
+        result = certify_ik(chain, rotation.random(rng, 3), [1e60, 0.0, 0.0])
+        assert result.impossible
+        assert result.least_distance == pytest.approx(1e60)
+
     def test_a_pose_may_be_out_of_reach_where_its_position_is_not(self):
         """The wrist would be 0.1 m further away than the straight arm's 0.6 m."""
         model = seven()

@@ -75,6 +75,13 @@ def test_the_default_elsewhere_is_levenberg_marquardt_with_restarts(skeleton, lo
         same(solve_ik(tree, q, target, "levenberg_marquardt"), one)
 
 
+def test_a_list_of_a_single_target_is_that_target_and_of_a_point_a_batch(rng):
+    model = Articulation(LINKS, "hinge", AXES, lower=-2.5, upper=2.5)
+    q, x = model.random(rng), forward_kinematics(model, model.random(rng)).positions[-1]
+    same(solve_ik(model, q, [Target(x)]), solve_ik(model, q, Target(x)))
+    assert solve_ik(model, q, [x]).coordinates.shape == (1, 4)
+
+
 def test_by_default_a_robot_reaches_what_fabrik_misses(rng):
     model = Articulation(LINKS, "hinge", AXES, lower=-2.5, upper=2.5)
     points = forward_kinematics(model, model.random(rng, 80)).positions[:, -1]

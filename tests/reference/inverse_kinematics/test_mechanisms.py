@@ -484,3 +484,15 @@ def test_lengths_on_the_edge_of_the_unit_tolerance_are_unit(
         there = solve_ik(skeleton, start, wanted, solver, max_iterations=2)
         assert there.coordinates.shape == (6, 4)
         np.testing.assert_allclose(there.positions, exact.positions, rtol=0, atol=1e-12)
+
+
+def test_no_solver_runs_away_where_a_slide_moves_others_along(solver):
+    """FABRIK moved the leader as if it were alone, too far by half, again and again."""
+    links = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0.1], [0.3, 0, 0]])
+    axes = [[1, 0, 0], [1, 0.1, 0], [0, 1, 0], [0, 0, 1]]
+    kinds = ["slide", "slide", "hinge", "fixed"]
+    lift = Articulation(links, kinds, axes, mimics={1: Mimic(0, 1.5)})
+    q = np.array([0.4, 0.7])
+    target = forward_kinematics(lift, q).positions[-1]
+    solution = solve_ik(lift, lift.neutral(), target, solver, max_iterations=2000)
+    assert solution.residual < 1e-3

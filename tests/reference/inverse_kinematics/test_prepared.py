@@ -1,5 +1,8 @@
 """Prepared solves: the bits of `solve_ik`, into the same arrays every time."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -31,6 +34,23 @@ def test_prepared_solves_are_those_of_solve_ik(model, oriented, target_type):
         assert solve.figures.tolist() == [getattr(expected, name) for name in FIGURES]
         assert outcome is expected.outcome
     assert not solve.coordinates.flags.writeable
+
+
+@pytest.mark.parametrize(
+    "duplicate", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))]
+)
+@pytest.mark.parametrize("model", [SKELETON, ARM], ids=["skeleton", "arm"])
+def test_a_copy_of_prepared_solves_has_arrays_of_its_own(model, duplicate):
+    rng, solve = np.random.default_rng(1), prepare_ik(model)
+    start = rotation.random(rng, 7) if model is SKELETON else model.random(rng)
+    targets = rng.normal(size=(2, 3)) * 0.6
+    solve(start, targets[0])
+    other = duplicate(solve)
+    other(start, targets[1])
+    for prepared, target in zip((solve, other), targets, strict=True):
+        expected = solve_ik(model, start, target)
+        np.testing.assert_array_equal(prepared.coordinates, expected.coordinates)
+        assert prepared.figures[0] == expected.residual
 
 
 @pytest.mark.parametrize(
