@@ -19,6 +19,8 @@ MIN_NUMBERS, MIN_SHARE = 6, 0.25
 MIN_DIGITS, MAX_DIGITS = 4, 14
 # The digits that single precision is printed with, and those that it leaves correct in most cases.
 SINGLE, CORRECT = (8, 9), (5.0, 9.0)
+# Single precision keeps lengths to about 1e-7, double precision to much less.
+EXACT = 1e-11
 AS_SINGLE = sentence(
     "Judged in single precision: all its numbers are single-precision values. Declare it with "
     '"precision": "single" in the greeting (of a Python file, in PLUMBOB).'
@@ -111,6 +113,17 @@ def _long_numbers(arrays: Iterable[Any]) -> np.ndarray:
     numbers = np.concatenate([np.ravel(array) for array in arrays if not isinstance(array, str)])
     numbers = numbers[np.isfinite(numbers)].astype(float)
     return numbers[2.0**12 * np.frexp(numbers)[0] % 1.0 != 0.0]
+
+
+def is_exact(report: TaskReport) -> bool:
+    """Return whether lengths are kept as only double precision keeps them, in most answers."""
+    errors = [
+        finding.error
+        for judgement in report.judgements
+        for finding in judgement.findings
+        if finding.law in ("unit quaternions", "link lengths")
+    ]
+    return bool(errors) and float(np.median(errors)) < EXACT
 
 
 def is_off_by_single(report: TaskReport) -> bool:

@@ -36,6 +36,11 @@ from .timing import with_lesser_time
 MAX_HANGS = 2
 # Tasks that are tried once for every method that the greeting names.
 WITH_METHODS = ("inverse_kinematics", "track")
+# The tasks that a task builds upon, the last step of the computation first.
+BUILDS_ON = {
+    "inverse_kinematics": ("forward_kinematics",),
+    "track": ("inverse_kinematics", "forward_kinematics"),
+}
 Notify = Callable[[str, int, int], None]
 
 
@@ -79,24 +84,45 @@ def verify(
     of faults. Raise ValueError if a task is not offered.
     """
     greeting, remarks = _with_methods(contestant, tasks, seed)
-    reports, forward_faults = list[TaskReport](), tuple[SwitchFault, ...]()
+    reports = list[TaskReport]()
     for task, method in trials(greeting, tasks):
+        causes = [r for r in reports if _builds_on(task, method, r)]
+        causes.sort(key=lambda cause: BUILDS_ON[task].index(cause.task))
+        known_faults = next(filter(None, map(faults.explaining, causes)), ())
 
         def judge(
             greeting: Greeting,
             task: str = task,
             method: str = method,
-            known: Sequence[SwitchFault] = forward_faults,
+            known: Sequence[SwitchFault] = known_faults,
         ) -> TaskReport:
             cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
             return judge_cases(contestant, task, method, cases, notify, greeting, known)
 
         report = inferred(contestant, judge(contestant.greeting), judge)
         report = with_kept_state(contestant, report)
-        reports.append(with_changed_line(report, contestant.greeting, partial(notify, task)))
-        if task == forward_kinematics.TASK:
-            forward_faults = faults.explaining(reports[-1].diagnosis)
+        report = with_changed_line(report, contestant.greeting, partial(notify, task))
+        reports.append(_with_cause(report, causes))
     return Report(contestant.greeting, reports, seed, remarks)
+
+
+def _builds_on(task: str, method: str, report: TaskReport) -> bool:
+    """Return whether a task builds upon that of a report whose mistake is known."""
+    is_earlier = report.task in BUILDS_ON.get(task, ()) and report.method in ("", method)
+    return is_earlier and report.verdict >= Verdict.WRONG and report.diagnosis.explained
+
+
+def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
+    """Return a report on unexplained answers that names the mistakes of the task it builds upon."""
+    if report.verdict < Verdict.WRONG or report.diagnosis.explained or not causes:
+        return report
+    hint = sentence(
+        "Its {task} is wrong as well ({codes}): correct that first, since this builds upon it.",
+        task=causes[0].task,
+        codes=", ".join(causes[0].diagnosis.explanations[0].codes),
+    )
+    diagnosis = replace(report.diagnosis, hints=(hint, *report.diagnosis.hints))
+    return replace(report, diagnosis=diagnosis)
 
 
 def _with_methods(
@@ -124,17 +150,17 @@ def judge_cases(
     cases: Sequence[Case],
     notify: Notify = lambda task, count, total: None,
     declared: Greeting | None = None,
-    forward_faults: Sequence[SwitchFault] = (),
+    known_faults: Sequence[SwitchFault] = (),
 ) -> TaskReport:
     """Ask a solver some cases of a task and judge its answers; arguments as of `verify`.
 
-    They are judged by what its greeting declares, or by another greeting. Its forward kinematics is
-    known to have the `forward_faults`.
+    They are judged by what its greeting declares, or by another greeting. What the task builds upon
+    is known to have some faults.
     """
     exchanges = _ask(contestant, cases, partial(notify, task))
     judge = DISCIPLINES[task].judge
-    if forward_faults and task == inverse_kinematics.TASK:
-        judge = partial(inverse_kinematics.judge, base=forward_faults)
+    if known_faults:
+        judge = partial(judge, base=known_faults)
     if isinstance(discipline := DISCIPLINES[task], Stepping):
         judge = partial(discipline.judge, notify=partial(notify, task))
     greeting, reason = precision.judging_greeting(exchanges, declared or contestant.greeting)
@@ -148,7 +174,8 @@ def judge_cases(
         report = replace(report, diagnosis=Diagnosis(first_broken=words))
     diagnosis = report.diagnosis
     unexplained = report.verdict is Verdict.WRONG and not diagnosis.explained and places is None
-    if unexplained and greeting.precision == "double" and not diagnosis.is_double:
+    is_double = diagnosis.is_double or precision.is_exact(report)
+    if unexplained and greeting.precision == "double" and not is_double:
         single = judge(exchanges, msgspec.structs.replace(greeting, precision="single"), method)
         is_right = single.verdict <= Verdict.RIGHT_EXCEPT and precision.is_off_by_single(report)
         if is_right or single.diagnosis.explained:

@@ -35,8 +35,9 @@ FIRST_ELEMENT = 4
 OF_THE_ARC = 3
 DEGREE = math.pi / 180.0
 # Of `angle`, the number of an angle that is 90 degrees throughout, the first with the sign of a
-# component of the axis, and the first of a rotation in a plane.
-QUARTER_TURN, SIGNED, IN_PLANE = 19, 21, 24
+# component of the axis, the first of a rotation in a plane, and the first with a sine or a cosine of
+# directions that are not unit.
+QUARTER_TURN, SIGNED, IN_PLANE, UNEQUAL = 19, 21, 24, 27
 
 
 def product(a: Any, b: Any, faults: Switches) -> Any:
@@ -184,8 +185,15 @@ def other_arc(a: Any, b: Any, axis: Any, angle: float, k: int) -> Any:
     """Return a quarter turn (19), an arc of whole degrees (20), or of another sign or axis.
 
     The sign is that of the axis' x, y or z (21 to 23); about z, x or y alone (24 to 26) the angle
-    is the difference of two polar angles.
+    is the difference of two polar angles. The sine (27 to 29) or the cosine (30 to 32) has in it the
+    length of the first vector, of the second or of both.
     """
+    if k >= UNEQUAL:
+        lengths = (norm(a), norm(b), norm(a) * norm(b))
+        length, is_sine = lengths[(k - UNEQUAL) % 3], k < UNEQUAL + 3
+        sine, cosine = math.sin(angle), math.cos(angle)
+        ratio = length if is_sine else 1.0 / length
+        return rotation_about(axis, math.atan2(ratio * sine, cosine))
     if k >= IN_PLANE:
         i = k - IN_PLANE
         j, m = (i + 1) % 3, (i + 2) % 3

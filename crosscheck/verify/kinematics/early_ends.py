@@ -32,6 +32,8 @@ class FollowedSolve(NamedTuple):
     gaps: FloatArray  # from the target to the effector, before the first sweep and after each [m]
     tolerance: float  # [m]
     is_early: bool  # whether the textbook goes on
+    lengths: FloatArray  # of the links [m]
+    root_distance: float  # of the target [m]
 
 
 def _distances(solve: FollowedSolve) -> FloatArray:
@@ -42,45 +44,83 @@ def _gains(solve: FollowedSolve) -> FloatArray:
     return np.append(np.inf, -np.diff(_distances(solve)))
 
 
-# What programs compare with a constant or with the tolerance, and the words of the test.
+def _beyond(solve: FollowedSolve, links: slice) -> FloatArray:
+    """Return after each sweep the distance from the nearest point of some links [m]."""
+    lengths, d = solve.lengths[links], solve.root_distance
+    reach, longest = float(lengths.sum()), float(lengths.max(initial=0.0))
+    least = max(0.0, d - reach, 2.0 * longest - reach - d)
+    return np.append(np.inf, _distances(solve)[1:] - least)
+
+
+# What programs compare with a constant or with the tolerance, the constant if the words of the test
+# do not tell it, and these words. Near the reach rounding decides.
 Quantity = Callable[[FollowedSolve], FloatArray]
-TESTS: Sequence[tuple[Quantity, Sentence]] = (
+AT_REACH = 1e-9
+TESTS: Sequence[tuple[Quantity, float | None, Sentence]] = (
     (
         lambda s: -np.arange(len(s.gaps), dtype=float),
+        None,
         sentence("{sweeps} sweeps are made, whatever max_iterations is"),
     ),
-    (_distances, sentence("the distance to the target is below about {bound:.3g} m")),
-    (
-        lambda s: _distances(s) / s.tolerance,
-        sentence("the distance to the target is below about {bound:.3g} times the tolerance"),
+    *(
+        (
+            lambda s, links=links: _beyond(s, links),
+            AT_REACH,
+            sentence(
+                "the effector is as near as it could come without the {link} link, which is left "
+                "out of the reach",
+                link=link,
+            ),
+        )
+        for link, links in (("first", slice(1, None)), ("last", slice(-1)))
     ),
-    (_gains, sentence("a sweep lowers the distance by less than about {bound:.3g} m")),
-    (
-        lambda s: _gains(s) / s.tolerance,
-        sentence("a sweep lowers the distance by less than about {bound:.3g} times the tolerance"),
-    ),
-    (
-        lambda s: np.append(np.inf, np.linalg.norm(np.diff(s.gaps, axis=0), axis=1)),
-        sentence("a sweep moves the effector by less than about {bound:.3g} m"),
-    ),
-    (
-        lambda s: np.append(np.inf, _gains(s)[1:] / _distances(s)[:-1]),
-        sentence("a sweep lowers the distance by less than about {bound:.3g} of it"),
-    ),
-    (
-        lambda s: s.gaps.max(axis=1) / s.tolerance,
-        sentence("each component of effector - target is below the tolerance, even negative"),
-    ),
-    (
-        lambda s: (-s.gaps).max(axis=1) / s.tolerance,
-        sentence("each component of target - effector is below the tolerance, even negative"),
+    *(
+        (
+            lambda s, k=k: np.linalg.norm(np.delete(s.gaps, k, axis=1), axis=1) / s.tolerance,
+            1.0,
+            sentence("the distance to the target without {axis} is below the tolerance", axis=axis),
+        )
+        for k, axis in enumerate("xyz")
     ),
     *(
         (
             lambda s, k=k: np.abs(s.gaps[:, k]) / s.tolerance,
+            1.0,
             sentence("{axis} of effector - target is below the tolerance", axis=axis),
         )
         for k, axis in enumerate("xyz")
+    ),
+    (
+        lambda s: s.gaps.max(axis=1) / s.tolerance,
+        1.0,
+        sentence("each component of effector - target is below the tolerance, even negative"),
+    ),
+    (
+        lambda s: (-s.gaps).max(axis=1) / s.tolerance,
+        1.0,
+        sentence("each component of target - effector is below the tolerance, even negative"),
+    ),
+    (_distances, None, sentence("the distance to the target is below about {bound:.3g} m")),
+    (
+        lambda s: _distances(s) / s.tolerance,
+        None,
+        sentence("the distance to the target is below about {bound:.3g} times the tolerance"),
+    ),
+    (_gains, None, sentence("a sweep lowers the distance by less than about {bound:.3g} m")),
+    (
+        lambda s: _gains(s) / s.tolerance,
+        None,
+        sentence("a sweep lowers the distance by less than about {bound:.3g} times the tolerance"),
+    ),
+    (
+        lambda s: np.append(np.inf, np.linalg.norm(np.diff(s.gaps, axis=0), axis=1)),
+        None,
+        sentence("a sweep moves the effector by less than about {bound:.3g} m"),
+    ),
+    (
+        lambda s: np.append(np.inf, _gains(s)[1:] / _distances(s)[:-1]),
+        None,
+        sentence("a sweep lowers the distance by less than about {bound:.3g} of it"),
     ),
 )
 
@@ -89,16 +129,22 @@ def explanation(
     trials: Sequence[PoseTrial], wrong: Sequence[PoseTrial], method: str, greeting: Greeting
 ) -> Explanation | None:
     """Return the test that ends all wrong solves of a method too early, None if no test does."""
-    solves = {trial.case.name: _solve(trial, method, greeting) for trial in trials}
+    solves = {
+        trial.case.name: _solve(trial, method, greeting)
+        for trial in trials
+        if trial in wrong or trial.case.facts["least"] == 0.0  # beyond reach solvers may give up
+    }
     ended = [solve for solve in solves.values() if solve is not None]
     if not all((s := solves[trial.case.name]) is not None and s.is_early for trial in wrong):
         return None
-    for quantity, words in TESTS:
+    for quantity, constant, words in TESTS:
         with np.errstate(divide="ignore", invalid="ignore"):
             values = [quantity(solve) for solve in ended]
         last = [v[-1] for v, solve in zip(values, ended, strict=True) if solve.is_early]
         before = np.concatenate([v[:-1] for v in values])
         largest, bound = float(max(last)), float(min(before, default=np.inf))
+        if constant is not None and not largest < constant <= bound:
+            continue
         if largest < bound < np.inf and (len(last) >= MIN_SOLVES or quantity is not TESTS[0][0]):
             fields = {"sweeps": -round(largest), "bound": round_number(largest, bound)}
             test = Sentence(words.template, {**words.values, **fields})
@@ -133,4 +179,7 @@ def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> FollowedSolve |
         return None
     (count,) = counts
     gaps = np.array([x[inputs["effector"]] - inputs["target"] for x in poses[: count + 1]])
-    return FollowedSolve(gaps, float(inputs["tolerance"]), count < needed)
+    path = trial.pose.path
+    lengths = np.linalg.norm(inputs["offsets"][path[1:]], axis=1)
+    root_distance = float(np.linalg.norm(inputs["target"] - poses[0][path[0]]))
+    return FollowedSolve(gaps, float(inputs["tolerance"]), count < needed, lengths, root_distance)

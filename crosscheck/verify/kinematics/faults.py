@@ -8,11 +8,21 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..explain import either
-from ..judgement import Diagnosis
+from ..judgement import LEAST_SHARE, TaskReport
 from ..sentence import Sentence, sentence, with_code
-from .algebra import FIRST_CROSS_TERM, FIRST_ELEMENT, FIRST_TERM, SIGNED
+from .algebra import FIRST_CROSS_TERM, FIRST_ELEMENT, FIRST_TERM, SIGNED, UNEQUAL
 from .switches import Switches
-from .textbook import DROPPED, FIXED, FIXED_TEST, SMALL
+from .textbook import (
+    DROPPED,
+    FIXED,
+    FIXED_TEST,
+    FRAMES,
+    LINK_FRAMES,
+    LINK_OF_CHILD,
+    MIXED_FRAMES,
+    MIXED_LINKS,
+    SMALL,
+)
 
 TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 # The orders in which a rotation is split into Euler angles, and put together: X, Y and Z in another
@@ -32,7 +42,26 @@ AT_SMALL = (
     sentence("the sweep ends"), sentence("the solve ends"),
     sentence("the angle is raised to that"),
 )  # fmt: skip
+ORDERS = (sentence("breadth first"), sentence("by their depth"))
 SAVED = (sentence("rotations"), sentence("rotations and positions"))
+# The frames of `FRAMES`, and what becomes of a local rotation by an arc, in words.
+INTO = (
+    sentence("as it is in the world"), sentence("into the joint's frame, conj(R) v"),
+    sentence("into the parent's frame, conj(R_parent) v"),
+    sentence("by R, which is not inverted, R v"),
+    sentence("by R_parent, which is not inverted, R_parent v"),
+    sentence("as conj(R) target - joint, although the joint is not in that frame"),
+    sentence("as conj(R_parent) target - joint, although the joint is not in that frame"),
+)  # fmt: skip
+SIDES = ("conj(R_parent) d R_parent Q", "Q d", "d Q")
+# What rotates with a joint that is rotated by hand, by the number of `spin`.
+SPINS = (
+    sentence("only that joint and its children rotate, and not what hangs on these"),
+    sentence("that joint alone rotates, and nothing that hangs on it"),
+    sentence("all rotates about the root, x := x_root + d (x - x_root)"),
+    sentence("all rotates about the origin, x := d x"),
+    sentence("the pivot is not rotated, x := d x + x_joint"),
+)
 AS_THE_TEXTBOOK = sentence("It does what the textbook does.")
 
 
@@ -110,10 +139,17 @@ LENGTHS = (
     sentence("the length of x and y alone"), sentence("the whole metres of the length"),
     sentence("the length rounded to 1 m"), sentence("the length rounded to 0.1 m"),
     sentence("the length rounded to 0.01 m"),
+    sentence("the length of the link before, and nothing for the first link,"),
 )  # fmt: skip
 # What CCD makes of a local rotation, by the number of `applied` from `OTHER_PRODUCTS` on.
 OTHER_PRODUCTS = 22
 PRODUCTS = ("Q P d conj(P)", "Q R d conj(R)", "Q Q d conj(Q)", "conj(Q) d Q Q")
+# What FABRIK makes of the local rotation of a link's lower joint.
+OF_CHILD = ("d Q_child", "conj(R) d R Q_child", "conj(R_parent) d R_parent Q_child", "Q_child d")
+FUNCTIONS = (sentence("the sine"), sentence("the cosine"))
+DIRECTIONS = (
+    sentence("the first direction"), sentence("the second direction"), sentence("both directions"),
+)  # fmt: skip
 
 
 def _term(number: int) -> tuple[str, str]:
@@ -131,6 +167,12 @@ def _cross_term(number: int) -> tuple[str, str]:
     return f"a.{'xyz'[i]} b.{'xyz'[j]}", "xyz"[c]
 
 
+def _frames(frames: tuple[int, int, int]) -> dict[str, Any]:
+    """Return the frames of two directions in words, and what their arc d makes of Q."""
+    first, second, side = frames
+    return {"first": INTO[first], "second": INTO[second], "product": SIDES[side]}
+
+
 def _element(number: int) -> str:
     """Return the element of a matrix that has the wrong sign."""
     row, is_second = divmod(number - FIRST_ELEMENT, 2)
@@ -145,6 +187,7 @@ VALUES: Mapping[str, Callable[[int], Mapping[str, Any]]] = {
         "angle": SMALL[(number - 1) % len(SMALL)],
         "what": AT_SMALL[(number - 1) // len(SMALL)],
     },
+    "parent": lambda number: {"order": ORDERS[number % 2]},
     "test": lambda number: {"distance": FIXED[number - FIXED_TEST]},
     "rotate": lambda number: {"element": _element(number)},
     "frame_saved": lambda number: {"what": SAVED[number - 2]},
@@ -157,7 +200,18 @@ VALUES: Mapping[str, Callable[[int], Mapping[str, Any]]] = {
         "passes": PASSES[number % 3],
         "length": LENGTHS[max(0, number // 3 - OTHER_LENGTHS)],
     },
-    "angle": lambda number: {"axis": "xyzzxy"[number - SIGNED]},
+    "angle": lambda number: {
+        "axis": "xyzzxy"[min(number - SIGNED, 5)],
+        "function": FUNCTIONS[max(0, number - UNEQUAL) // 3],
+        "direction": DIRECTIONS[(number - UNEQUAL) % 3],
+    },
+    "aim": lambda number: _frames(FRAMES[number - MIXED_FRAMES]),
+    "spin": lambda number: {"number": number, "what": SPINS[number - 1]},
+    "rotations": lambda number: (
+        _frames(LINK_FRAMES[number - MIXED_LINKS])
+        if number >= MIXED_LINKS
+        else {"product": OF_CHILD[number - LINK_OF_CHILD[0]]}
+    ),
     "applied": lambda number: {"product": PRODUCTS[number - OTHER_PRODUCTS]},
 }
 FAULTS = _load()
@@ -166,7 +220,8 @@ FAULTS = _load()
 @cache
 def by_key(method: str) -> dict[str, SwitchFault]:
     """Return the faults of a method by their keys."""
-    return {fault.key: fault for fault in (*FAULTS["forward"], *FAULTS[method])}
+    own = (*FAULTS[method.removeprefix("track ")], *FAULTS[method])
+    return {fault.key: fault for fault in (*FAULTS["forward"], *own)}
 
 
 def switches(faults: Sequence[SwitchFault]) -> Switches:
@@ -179,11 +234,14 @@ def combinations(
 ) -> Iterator[tuple[SwitchFault, ...]]:
     """Yield no fault, single faults, pairs and likely triples, no two of the same switch.
 
-    With a `base`, yield it alone, and with each of the method's own faults.
+    With a `base`, yield it alone, and with each of the method's own faults; of those that follow a
+    curve only the faults of that.
     """
     faults = FAULTS[method]
     if base:
-        own = ((fault,) for fault in faults if fault.part not in ("forward", "quaternion"))
+        is_track = method.startswith("track ")
+        own = [(fault,) for fault in faults if fault.part not in ("forward", "quaternion")]
+        own = [(fault,) for (fault,) in own if fault.part == "follow" or not is_track]
         yield from ((*base, *extra) for extra in ((), *own))
         return
     yield ()
@@ -228,10 +286,11 @@ def describe(method: str, keys: Sequence[str]) -> Sentence:
     )
 
 
-def explaining(diagnosis: Diagnosis) -> tuple[SwitchFault, ...]:
-    """Return the faults of forward kinematics that explain all answers, () if none do."""
-    for explanation in diagnosis.explanations[:1]:
-        if explanation.share == 1.0:
-            faults = by_key("forward")
-            return tuple(faults[k] for k in explanation.faults[0].split(" + ") if k in faults)
+def explaining(report: TaskReport) -> tuple[SwitchFault, ...]:
+    """Return the faults that explain most answers of a report, () if none do."""
+    known = by_key("ccd") | by_key("fabrik")
+    for explanation in report.diagnosis.explanations[:1]:
+        keys = explanation.faults[0].split(" + ")
+        if explanation.share >= LEAST_SHARE and all(key in known for key in keys):
+            return tuple(known[key] for key in keys)
     return ()

@@ -17,7 +17,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case
 from ..sentence import sentence
-from . import degenerate, early_ends, limits, pose_laws, problems, rounding, sweeps
+from . import claims, degenerate, early_ends, limits, pose_laws, problems, rounding, sweeps
 from .faults import SwitchFault
 from .pose_laws import AnsweredPose
 from .predictions import solve
@@ -103,7 +103,13 @@ def _judge_unlimited(
     if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
             trial.correct(_aggravate)
-    return [trial.judgement for trial in trials], diagnosis
+    judgements = [trial.judgement for trial in trials]
+    answers = [
+        claims.values_of(trial.case, [trial.pose], trial.outputs, comparison.method, greeting)
+        for trial in trials
+        if trial.pose.finite
+    ]
+    return judgements, claims.with_claims(diagnosis, judgements, answers, not base)
 
 
 def _forgive(case: Case, broken: Finding) -> Finding:
@@ -252,17 +258,14 @@ def _diagnosis(
     wrong = [trial for trial in sweep_trials if trial.is_wrong or trial.case.name in names]
     must = [t for t in posed_trials if t.case.requirement == "must" and t.pose.finite]
     diagnosis = Diagnosis(behaviour=comparison.behaviour)
-    if wrong:
+    if any(trial.case.facts["sweeps"] == 1 for trial in wrong) or (wrong and comparison.damped):
         diagnosis = sweeps.explained(comparison, sweep_trials, wrong, greeting, max_faults, base)
     elif comparison.method:
-        whole = [trial for trial in must if not trial.is_sweep]
-        wrong = [trial for trial in whole if trial.is_wrong or _ends_elsewhere(trial)]
-        # of another tolerance, where tests that agree elsewhere differ
-        loose = [trial for trial in whole if trial.case.inputs["tolerance"] == problems.LOOSE]
-        compared = [*wrong, *(trial for trial in loose if trial not in wrong)]
+        wrong += [t for t in must if not t.is_sweep and (t.is_wrong or _ends_elsewhere(t))]
         bound = partial(sweeps.prediction_bound, greeting)
+        exchanges = {trial.case.name: trial.comparable for trial in must}
         diagnosis = diagnosis_of(
-            comparison.method, [t.comparable for t in compared], [t.comparable for t in wrong],
+            comparison.method, list(exchanges.values()), [exchanges[t.case.name] for t in wrong],
             bound, comparison.behaviour, base=base,
         )  # fmt: skip
     is_certain = any(explanation.share == 1.0 for explanation in diagnosis.explanations)

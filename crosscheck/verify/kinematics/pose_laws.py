@@ -63,27 +63,28 @@ class AnsweredPose:
     def outputs(self) -> Mapping[str, Any]:
         """The outputs that are compared with variants, all joints' and those of the path alone.
 
-        Points of the path that are those of the rotations say nothing of their own: they need not
-        be a solver's last points.
+        Positions that are those of the rotations say nothing of their own: they need not be a
+        solver's last points.
         """
         outputs: dict[str, Any] = {}
-        if self.answered_positions is not None:
-            outputs["positions"] = self.answered_positions
-            if not self._agrees:
-                outputs["path_positions"] = self.answered_positions[self.path]
+        x = self.answered_positions
+        if x is not None:
+            if not self._agrees(slice(None)):
+                outputs["positions"] = x
+            if not self._agrees(self.path):
+                outputs["path_positions"] = x[self.path]
         if self.local is not None:
             outputs |= {
                 "local_rotations": self.local, "path_placed": self.positions[self.path]
             }  # fmt: skip
         return outputs
 
-    @property
-    def _agrees(self) -> bool:
-        """Whether answered positions of the path are those of the rotations, nearly."""
+    def _agrees(self, joints: Any) -> bool:
+        """Return whether answered positions of some joints are those of the rotations, nearly."""
         if self.local is None or self.answered_positions is None:
             return False
-        gap = np.abs(self.positions - self.answered_positions)[self.path]
-        return bool(gap.max() <= AGREEMENT * np.abs(self.positions[self.path]).max())
+        gap = np.abs(self.positions - self.answered_positions)[joints]
+        return bool(gap.max() <= AGREEMENT * np.abs(self.positions[joints]).max())
 
     @property
     def distance(self) -> float:

@@ -16,7 +16,7 @@ from ..explain import Variant
 from .algebra import DEGREE
 from .faults import ANGLES, EULER_ORDERS, SwitchFault, combinations, switches
 from .switches import Switches
-from .textbook import OF_GLOBAL_LINKS, SOLVERS, Ending, TextbookChain, TextbookPose, place_all
+from .textbook import IN_FRAMES, OF_GLOBAL_LINKS, SOLVERS, Ending, TextbookChain, TextbookPose, place_all
 
 RIGHT = Switches()
 IN_DEGREES = "degrees for radians"
@@ -46,7 +46,8 @@ def solve(
     parents = inputs["parents"]
     pose = _read(inputs, switched)
     effector = len(parents) - 1 if switched.effector == 1 else inputs["effector"]
-    chain = TextbookChain(parents, np.array(inputs["offsets"]), path_to(parents, effector))
+    path = path_to(parents, effector)[int(switched.effector == 2) :]
+    chain = TextbookChain(parents, np.array(inputs["offsets"]), path)
     target = tuple(inputs["target"].tolist())
     ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]))
     sweeps = SOLVERS[method](chain, target, ending, switched, pose)
@@ -60,7 +61,7 @@ def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
         local = np.roll(local, 1, axis=-1)
     elif switched.numbers == 4:  # w is computed as a square root
         local[:, 0] = np.abs(local[:, 0])
-    elif switched.numbers == 5:
+    elif switched.numbers in (5, 13):
         local[:, 1:] *= -1.0
     elif switched.numbers in (8, 9):
         local = np.roll(local, -1, axis=-1)
@@ -68,7 +69,7 @@ def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
         local = _as_euler_angles(local, *ANGLES[switched.angles - 1])
     if switched.euler:
         local = _through_euler_angles(local, *EULER_ORDERS[switched.euler - 1])
-    return TextbookPose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
+    return TextbookPose(local, np.zeros((len(local), 3)), rotation.identity(len(local)))
 
 
 def _through_euler_angles(local: FloatArray, order: str, other_order: str) -> FloatArray:
@@ -93,10 +94,12 @@ def _as_euler_angles(local: FloatArray, order: str, is_degrees: bool) -> FloatAr
 
 def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:
     """Return quaternions in the order in which the solver writes them."""
-    if switched.numbers == 6:  # the conjugates
+    if switched.numbers in (6, 13):  # the conjugates
         return rotations * [1.0, -1.0, -1.0, -1.0]
     if switched.numbers == 9:
         return np.roll(rotations, 1, axis=-1)
+    if switched.numbers == 14:  # all rows as one
+        return np.roll(np.roll(rotations, -1, axis=-1), 1)
     if switched.numbers == 10:
         return np.abs(rotations)
     if switched.numbers == 11:
@@ -147,6 +150,8 @@ def programs(
     if not faults or sum(fault.key not in known for fault in faults) > 1:
         return [{}]
     is_forward, is_fabrik = method == "forward", method == "fabrik"
+    if "spin" in names:
+        return [{"global_rotations": 2, "rule": 5, "grouping": grouping} for grouping in range(2)]
     # a reversed product shows in the program's rotations of vectors too, by q v q*
     is_reversed = any(fault.key == REVERSED for fault in faults)
     of_globals = any(f.switch == "rotations" and f.number >= OF_GLOBAL_LINKS for f in faults)
@@ -154,16 +159,19 @@ def programs(
         parts & {"quaternion", "forward", "arc"} or names & {"rotations", "angle", "link"}
     )
     globals_ = not is_forward and (names & {"rotations", "applied"} or parts & {"forward", "arc"})
+    tips = 4 if "forward" in parts else 2 if names & {"applied", "aim", "angle"} else 1
     table: Sequence[tuple[Any, str, Sequence[int]]] = (
         ("quaternion" in parts, "rotating", range(int(is_reversed), 3)),
         ("quaternion" in parts, "unit", (0, 2) if is_forward else range(3)),
         ("arc" in parts, "unit", range(2)),
         (not is_forward and parts & {"quaternion", "forward"}, "grouping",
-         range(2 if is_fabrik else 4)),
-        (rules, "rule", range(6 if "forward" in parts else 4)),
-        (of_globals, "rule", (0, 3)),
+         range(2 if is_fabrik else 5)),
+        (rules, "rule", range(6 if parts & {"forward", "fabrik"} else 4)),
+        (of_globals, "rule", (0, 3, 5)),
         (is_fabrik and "forward" in parts, "returned", range(2)),
-        (globals_, "global_rotations", range(3 if is_fabrik else 2)),
+        (globals_, "global_rotations", range(3)),
+        (is_fabrik and parts & {"fabrik", "forward", "arc"}, "converted", range(2)),
+        (method == "ccd" and tips > 1, "tip", range(tips)),
         ("lengths" in names, "stretch", (0, 9)),
     )  # fmt: skip
     numbers = {name: values for is_shown, name, values in table if is_shown}
@@ -171,8 +179,17 @@ def programs(
         dict(zip(numbers, values, strict=True)) for values in itertools.product(*numbers.values())
     ]
     if any(fault.key == CONJUGATED for fault in faults) and method != "forward":
-        choices.append({"product": 0, "numbers": 5})  # where rotations are read
-    return choices
+        # where rotations are read, or written too; a helper may give arcs that are inverse as well
+        choices += [{"product": 0, "numbers": 5}]
+        choices += [{"product": 0, "numbers": 13, "angle": angle} for angle in range(2)]
+    return [choice for choice in choices if _is_program(choice, is_fabrik)]
+
+
+def _is_program(choice: Mapping[str, int], is_fabrik: bool) -> bool:
+    """Return whether choices go together."""
+    if choice.get("tip", 0) >= IN_FRAMES:
+        return not any(choice.get(name) for name in ("global_rotations", "grouping"))
+    return not is_fabrik or choice.get("global_rotations") != 2 or choice.get("rule") == 5
 
 
 def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
@@ -184,6 +201,10 @@ def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
     elif switched.numbers == 12:
         above = np.where((parents >= 0)[:, None], local[parents], rotation.identity(len(parents)))
         rotations = rotation.multiply(above, local)
+    elif switched.numbers == 15:
+        rotations = rotations[np.maximum(parents, 0)]
+    elif switched.numbers == 16:
+        rotations = forward(case.inputs, Switches(product=1))[1]
     return {"positions": positions, "rotations": _reordered(rotations, switched)}
 
 
@@ -231,9 +252,9 @@ def predict_track(method: str, switched: Switches, case: Case) -> Mapping[str, A
     start, frames = first, list[dict[str, Any]]()
     curve = _targets(case.inputs, switched.frame_target)
     for i, target in enumerate(curve):
-        is_left_out = (False, i % 2 == 1, i == 0, False)[switched.frame_solved]
+        left_out = (False, i % 2 == 1, i == 0, False, i == len(curve) - 1)
         inputs = {**case.inputs, "target": target, "local_rotations": start}
-        inputs["max_iterations"] = 0 if is_left_out else budget
+        inputs["max_iterations"] = 0 if left_out[switched.frame_solved] else budget
         frame, local, sweeps = _outputs(method, switched, inputs)
         budget -= sweeps * (switched.frame_solved == 3)
         if switched.frame_saved == 4:
@@ -271,8 +292,8 @@ def _targets(inputs: Mapping[str, Any], fault: int) -> FloatArray:
     targets = np.array(curve[np.clip(frame + shift, 0, len(curve) - 1)])
     if fault == 3:
         targets[1:-1] = (curve[:-2] + curve[1:-1] + curve[2:]) / 3.0
-    elif fault == 4:
-        targets += effector - curve[0]
+    elif fault in (4, 6):
+        targets += effector - curve[0] if fault == 4 else forward(inputs)[0][0]
     for i in frame if fault == 5 else ():
         targets[i] = 0.5 * (targets[i] + (targets[i - 1] if i else effector))
     return targets

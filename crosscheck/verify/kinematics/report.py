@@ -7,14 +7,21 @@ from functools import partial
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import explain, first_broken
-from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict, smallest_failures
+from ..judgement import (
+    LEAST_SHARE,
+    CaseJudgement,
+    Diagnosis,
+    TaskReport,
+    Verdict,
+    smallest_failures,
+)
 from ..laws import hints_of, laws_that_hold, proportion_of
 from ..sentence import Sentence
 from .faults import SwitchFault, describe
 from .predictions import variants
 
 # The most cases that are compared with every variant, small and wrong ones first.
-COMPARED = 12
+COMPARED = 20
 
 
 def diagnosis_of(
@@ -34,13 +41,17 @@ def diagnosis_of(
         if not with_answers and group is wrong:
             return Diagnosis(behaviour=behaviour)
         compared += sorted(with_answers, key=lambda exchange: exchange.case.size)
+    compared = compared[:COMPARED]
     explanations, count = explain(
         variants(method, max_faults, base),
-        compared[:COMPARED],
+        compared,
         tolerance,
         partial(describe, method),
     )
-    faulty = tuple(explanation for explanation in explanations if explanation.faults != ("",))
+    # of the answers that are wrong, as many as of all answers to an unknown solver
+    right_share = sum(exchange not in wrong for exchange in compared) / len(compared)
+    least_share = right_share + LEAST_SHARE * (1.0 - right_share)
+    faulty = tuple(e for e in explanations if e.faults != ("",) and e.share >= least_share)
     return Diagnosis(faulty, behaviour, variant_count=count)
 
 

@@ -45,16 +45,18 @@ class PoseTrial:
     """A case, its answered pose, and the judgement, to which laws add findings."""
 
     def __init__(self, exchange: Exchange) -> None:
-        outputs = exchange.answer.values if isinstance(exchange.answer, Answer) else {}
+        self.outputs = exchange.answer.values if isinstance(exchange.answer, Answer) else {}
         self.exchange, self.case = exchange, exchange.case
-        self.pose = pose_laws.read_pose(outputs, self.case.inputs, self.case.facts)
+        self.pose = pose_laws.read_pose(self.outputs, self.case.inputs, self.case.facts)
         self.judgement = CaseJudgement(exchange.case, exchange.answer, (), {})
         self.is_sweep = "sweeps" in self.case.facts  # whether one or two sweeps were requested
 
     @property
     def is_wrong(self) -> bool:
-        """Whether a law is broken."""
-        return self.judgement.verdict >= Verdict.WRONG
+        """Whether there is no pose, or one that breaks a law."""
+        findings = self.judgement.findings
+        is_law = any(f.verdict >= Verdict.WRONG and f.law != "claims" for f in findings)
+        return is_law or self.judgement.verdict is Verdict.BROKEN
 
     @property
     def comparable(self) -> Exchange:

@@ -26,6 +26,8 @@ class Switches(NamedTuple):
     joints: int = 0  # which joints a sweep leaves out
     update: int = 0  # when joints are placed anew
     aim: int = 0  # the two directions that d joins
+    tip: int = 0  # how the effector follows: it is placed anew (0), rotated (1), or in frames
+    spin: int = 0  # what rotates with a joint, and about which point
     offsets: int = 0  # what becomes of a child's offset
     dropped: int = 0  # which angle is too small to rotate by
     small: int = 0  # what a small angle ends, or is raised to
@@ -50,10 +52,12 @@ class Switches(NamedTuple):
     frame_saved: int = 0  # which pose a frame gets
     # Choices of right programs, which only show beside a fault.
     rotating: int = 0  # a vector is rotated by cross products, by (q v) q* (1) or by q (v q*) (2)
-    grouping: int = 0  # ((P* d) P) Q, P* (d R), (P* d) R or (P* (d P)) Q
+    grouping: int = 0  # ((P* d) P) Q, P* (d R), (P* d) R, (P* (d P)) Q or Q ((R* d) R)
+    converted: int = 0  # FABRIK: points become rotations at the end (0), or after each sweep (1)
     unit: int = 0  # local rotations are made unit (0), none (1), or global ones too (2)
     rule: int = 0  # FABRIK: the direction of a link from which its joint is rotated
-    global_rotations: int = 0  # they come from new local ones, or are kept as they are made (1)
+    # from new local ones (0), kept as they are made (1), or all below a joint rotate with it (2)
+    global_rotations: int = 0
     # What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad].
     gain: float = 1.0
     cap: float = UNCAPPED

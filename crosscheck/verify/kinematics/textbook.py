@@ -12,6 +12,8 @@ the world rotation of a joint, R its global and Q its local rotation.
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from plumbob.reference.arguments import FloatArray, IndexArray
 from plumbob.reference.backend.compiled import Kernel, bind
 from plumbob.reference.quaternion import (
@@ -48,10 +50,26 @@ DROPPED = (
 SMALL = (1e-4, 1e-3, 1e-2, 1.745329e-2, 5e-2)
 # The distances at which a solve ends whatever the tolerance, by `test` from `FIXED_TEST` on [m].
 FIXED, FIXED_TEST = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2), 5
-# Of `aim`, directions of which one is in the frame of the joint (two numbers) or of its parent.
-MIXED_FRAMES = 13
-# Of `aim`, directions that are rotated by the joint's rotation and not by its inverse.
-NOT_INVERTED = 18
+# Of `aim` and of FABRIK's `rotations` from these numbers on, the frames of two directions, and what
+# becomes of Q by the arc d between them: P* d P Q (0), Q d (1) or d Q (2). The frames are the world's
+# (0), the joint's (1) or its parent's (2), with R or P not inverted (3, 4), or the target in either
+# frame minus the joint in the world's (5, 6).
+MIXED_FRAMES, MIXED_LINKS = 13, 28
+FRAMES = (
+    (0, 1, 1), (1, 0, 1), (0, 2, 2), (2, 0, 2), (0, 0, 0), (3, 3, 1), (1, 2, 1), (1, 2, 2),
+    (2, 1, 1), (2, 1, 2), (0, 1, 2), (1, 0, 2), (0, 2, 1), (2, 0, 1), (0, 1, 0), (1, 0, 0),
+    (0, 2, 0), (2, 0, 0), (1, 2, 0), (2, 1, 0), (4, 4, 2), (1, 3, 1), (3, 1, 1), (2, 4, 2),
+    (4, 2, 2), (1, 5, 1), (2, 6, 2),
+)  # fmt: skip
+LINK_FRAMES = (
+    (1, 0, 1), (1, 0, 2), (0, 1, 0), (0, 1, 1), (0, 1, 2), (2, 0, 0), (2, 0, 1), (2, 0, 2),
+    (0, 2, 0), (0, 2, 1), (0, 2, 2), (1, 2, 0), (1, 2, 1), (1, 2, 2), (2, 1, 0), (2, 1, 1),
+    (2, 1, 2),
+)  # fmt: skip
+# Of `tip`, those from this number on carry the effector from frame to frame.
+IN_FRAMES = 2
+# Of `rotations`, the first and the last that rotate a link's lower joint.
+LINK_OF_CHILD = (22, 25)
 
 
 class TextbookChain(NamedTuple):
@@ -80,17 +98,37 @@ class Ending(NamedTuple):
 def place(chain: TextbookChain, faults: Switches, pose: TextbookPose) -> None:
     """Fill positions and global rotations of all joints."""
     joints = len(chain.parents)
+    order = np.arange(joints)
+    if faults.parent >= 4:
+        order = by_depth(chain.parents, faults.parent % 2 == 0)
     # a joint placed before j may have a higher number: then each pass places at least one more
     for i in range(joints * joints if faults.parent == 3 else joints):
-        j = i % joints
-        parents = (chain.parents[j], j - 1, -1, before_in_depth(chain, j))
-        p = parents[faults.parent]
+        j = order[i % joints]
+        visited = order[i - 1] if i > 0 else -1
+        number = j - 1 if i > 0 else -1
+        before = before_in_depth(chain, j) if faults.parent == 3 else -1
+        p = (chain.parents[j], j - 1, -1, before, visited, visited, number, number)[faults.parent]
         if p < 0:
             x, R = root_pose(chain, faults, pose, j)
         else:
             x, R = joint_pose(chain, faults, pose, j, p)
         store_vector(pose.positions, j, x)
         store_quaternion(pose.rotations, j, R)
+        if faults.base == 7 and p >= 0:  # in place of a copy
+            store_vector(pose.positions, p, x)
+
+
+def by_depth(parents: IndexArray, is_queue: bool) -> IndexArray:
+    """Return the joints by their depth, those of one depth in the order of a queue or of numbers."""
+    order, depths, count = np.zeros_like(parents), np.zeros_like(parents), 1
+    for j in range(1, len(parents)):
+        depths[j] = depths[parents[j]] + 1
+    for i in range(len(parents)):
+        for j in range(1, len(parents)):
+            if (parents[j] == order[i]) if is_queue else (depths[j] == i):
+                order[count] = j
+                count += 1
+    return order
 
 
 def before_in_depth(chain: TextbookChain, j: int) -> int:
@@ -160,7 +198,7 @@ def base_of(chain: TextbookChain, pose: TextbookPose, p: int, fault: int) -> Any
 
     Or nothing (5, 6).
     """
-    if fault >= 5:
+    if fault in (5, 6):
         return ORIGIN
     if fault == 1:
         x = load_vector(chain.offsets, p)
@@ -180,7 +218,7 @@ def solve(
             store_quaternion(pose.local, j, IDENTITY)
     place(chain, faults, pose)
     if method.stretch(chain, target, faults, pose):
-        method.finish(chain, 1, faults, pose)
+        method.finish(chain, -1, faults, pose)
         return 1
     n = ending.sweeps
     allowed = (n, n + 1, n - 1, n, min(n, 1), 0)
@@ -222,6 +260,9 @@ def sweep_ccd(
     links = len(chain.path) - 1
     if faults.budget == 3:
         return rotate_joint(chain, links - 1 - i % links, target, faults, pose)
+    if faults.tip >= IN_FRAMES:
+        sweep_in_frames(chain, target, faults, pose)
+        return False
     is_over = False
     for link in range(links):
         k = link if faults.order == 1 else links - 1 - link
@@ -233,6 +274,32 @@ def sweep_ccd(
     if faults.update < 2 and faults.global_rotations == 0:
         place(chain, faults, pose)
     return is_over and faults.small > len(SMALL)
+
+
+def sweep_in_frames(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookPose) -> None:
+    """Rotate each joint in its parent's or its own frame (3), up which the effector is carried.
+
+    Faulty: joints' offsets are left out on the way (4), or it begins at its parent's offset (5).
+    """
+    last = len(chain.path) - 1
+    tip = load_vector(chain.offsets, chain.path[last - 1 if faults.tip == 5 else last])
+    for k in range(last - 1, -1, -1):
+        j = chain.path[k]
+        p, Q = chain.parents[j], load_quaternion(pose.local, j)
+        to_target = subtract(target, load_vector(pose.positions, j))
+        if faults.tip == 3:
+            R = load_quaternion(pose.rotations, j)
+            Q = product(Q, arc(tip, rotated(inverse(R, faults), to_target, faults), faults), faults)
+        else:
+            P = load_quaternion(pose.rotations, p) if p >= 0 else IDENTITY
+            to_target = rotated(inverse(P, faults), to_target, faults)
+            Q = product(arc(rotated(Q, tip, faults), to_target, faults), Q, faults)
+        Q = Q if faults.unit == 1 else made_unit(Q)
+        store_quaternion(pose.local, j, Q)
+        tip = rotated(Q, tip, faults)
+        if faults.tip != 4:
+            tip = add(tip, load_vector(chain.offsets, j))
+    place(chain, faults, pose)
 
 
 def rotate_joint(
@@ -256,9 +323,11 @@ def rotate_joint(
     rotate_offset(chain, k, d, faults, pose)
     if faults.update < 3:
         apply_rotation(chain, k, d, faults, pose)
-    if faults.update == 0:
+    if faults.global_rotations == 2:
+        rotate_below(chain, chain.path[k], d, faults, pose)
+    elif faults.update == 0 and faults.tip == 0:
         place(chain, faults, pose)
-    elif faults.update >= 2:
+    elif faults.update >= 2 or faults.tip == 1:
         follow_by_hand(chain, k, d, faults, pose)
     return False
 
@@ -286,32 +355,26 @@ def directions_of(
         (arm, subtract(target, root)),
         (subtract(effector, root), direction),
         (subtract(effector, root), subtract(target, root)),
-        (arm, direction),
-        (arm, direction),
-        (arm, direction),
-        (arm, direction),
         (arm, subtract(direction, root)),
-        (arm, direction),
     )
-    a, b = directions[faults.aim]
-    if MIXED_FRAMES <= faults.aim < MIXED_FRAMES + 4:
-        a, b = in_mixed_frames(chain, k, a, b, faults, pose)
-    elif faults.aim == NOT_INVERTED:
-        R = load_quaternion(pose.rotations, chain.path[k])
-        a, b = rotated(R, a, faults), rotated(R, b, faults)
-    return a, b
+    if faults.aim < MIXED_FRAMES or faults.aim == 17:
+        return directions[min(faults.aim, MIXED_FRAMES)]
+    first, second, _ = FRAMES[faults.aim - MIXED_FRAMES]
+    j = chain.path[k]
+    p, R = chain.parents[j], load_quaternion(pose.rotations, j)
+    P = load_quaternion(pose.rotations, p) if p >= 0 else IDENTITY
+    if second >= 5:
+        frame = rotated(inverse(R if second == 5 else P, faults), target, faults)
+        return in_frame(first, arm, R, P, faults), subtract(frame, joint)
+    return in_frame(first, arm, R, P, faults), in_frame(second, direction, R, P, faults)
 
 
-def in_mixed_frames(
-    chain: TextbookChain, k: int, a: Any, b: Any, faults: Switches, pose: TextbookPose
-) -> Any:
-    """Return two directions, one of them in the frame of joint k of the path, or of its parent."""
-    j, number = chain.path[k], faults.aim - MIXED_FRAMES
-    p = chain.parents[j] if number >= 2 else j
-    R = load_quaternion(pose.rotations, p) if p >= 0 else IDENTITY
-    if number % 2 == 0:
-        return a, rotated(inverse(R, faults), b, faults)
-    return rotated(inverse(R, faults), a, faults), b
+def in_frame(frame: int, v: Any, R: Any, P: Any, faults: Switches) -> Any:
+    """Return a vector in one of the first five frames of `FRAMES`."""
+    if frame == 0:
+        return v
+    rotations = (R, inverse(R, faults), inverse(P, faults), R, P)
+    return rotated(rotations[frame], v, faults)
 
 
 def raised(a: Any, b: Any, angle: float) -> Any:
@@ -324,15 +387,21 @@ def raised(a: Any, b: Any, angle: float) -> Any:
 def rotate_below(
     chain: TextbookChain, j: int, d: Any, faults: Switches, pose: TextbookPose
 ) -> None:
-    """Rotate joint j and all below it about its position, in global rotations and positions."""
-    x = load_vector(pose.positions, j)
+    """Rotate joint j and all below it about its position, in global rotations and positions.
+
+    By the number of `spin` only it and its children (1) or it alone (2) rotate, or all about the root
+    (3), or about the origin (4) and then by the joint's position (5).
+    """
+    x = load_vector(pose.positions, 0 if faults.spin == 3 else j)
+    start = x if faults.spin < 4 else ORIGIN
     for m in range(j, len(chain.parents)):
         above = m
-        while above > j:
+        while above > j and not (faults.spin == 1 and above < m):
             above = chain.parents[above]
-        if above == j:
-            arm = subtract(load_vector(pose.positions, m), x)
-            store_vector(pose.positions, m, add(x, rotated(d, arm, faults)))
+        if above == j and (faults.spin != 2 or m == j):
+            arm = subtract(load_vector(pose.positions, m), start)
+            end = ORIGIN if faults.spin == 4 else x
+            store_vector(pose.positions, m, add(end, rotated(d, arm, faults)))
             R = load_quaternion(pose.rotations, m)
             store_quaternion(pose.rotations, m, product(d, R, faults))
 
@@ -373,15 +442,20 @@ def apply_rotation(
     if GIVEN_TO_CHILD[0] <= faults.applied <= GIVEN_TO_CHILD[1]:
         j = chain.path[k + 1]
     Q = load_quaternion(pose.local, j)
-    if faults.aim == NOT_INVERTED or MIXED_FRAMES <= faults.aim < MIXED_FRAMES + 2:
-        Q = product(Q, d, faults)
-    elif MIXED_FRAMES + 2 <= faults.aim < MIXED_FRAMES + 4:
-        Q = product(d, Q, faults)
+    if faults.aim >= MIXED_FRAMES:
+        Q = beside(FRAMES[faults.aim - MIXED_FRAMES][2], P, d, Q, R, faults)
     elif faults.applied == 0:
         Q = from_world(P, d, Q, R, faults)
     else:
         Q = wrong_rotation(P, d, Q, R, faults)
     store_quaternion(pose.local, j, Q if faults.unit == 1 else made_unit(Q))
+
+
+def beside(side: int, P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
+    """Return P* d P Q, Q d (1) or d Q (2)."""
+    if side == 0:
+        return from_world(P, d, Q, R, faults)
+    return product(Q, d, faults) if side == 1 else product(d, Q, faults)
 
 
 def from_world(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
@@ -393,6 +467,9 @@ def from_world(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
         return product(product(inverse_P, d, faults), R, faults)
     if faults.grouping == 3:
         return product(product(inverse_P, product(d, P, faults), faults), Q, faults)
+    if faults.grouping == 4:
+        inner = product(product(inverse(R, faults), d, faults), R, faults)
+        return product(Q, inner, faults)
     return product(product(product(inverse_P, d, faults), P, faults), Q, faults)
 
 
@@ -433,7 +510,7 @@ def wrong_rotation(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
 
 def keep(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
     """Leave a pose of CCD, unless its effector was followed by hand, or all global rotations."""
-    if faults.update == 2:
+    if faults.update == 2 or faults.global_rotations == 2:
         place(chain, faults, pose)
     if faults.global_rotations == 1:
         for j in range(1, len(chain.parents)):
@@ -463,7 +540,10 @@ def sweep_fabrik(
     positions, before = pose.positions, pose.positions.copy()
     if faults.passes == 0:
         pull_to_target(chain, target, faults, positions, before)
-    pull_to_root(chain, faults, positions)
+    pull_to_root(chain, faults, positions, before)
+    if faults.converted == 1:
+        follow(chain, 1, faults, pose)
+        place(chain, faults, pose)
     return False
 
 
@@ -480,7 +560,8 @@ def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookP
     effector (3), where the reach lacks the last (4) or the first link (5); or its direction is that
     from the effector (6), or each link begins at the root (7) or has the next one's length (8). A
     right program has it (9) with the lengths of `lengths`; or it stretches away from the target
-    (10), or leaves the chain as it is (11).
+    (10), or leaves the chain as it is (11), or measures from the origin (12), or keeps each length
+    from the target (13).
     """
     k = faults.stretch
     if k == 0:
@@ -493,7 +574,7 @@ def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookP
     root = load_vector(pose.positions, chain.path[0])
     effector = load_vector(pose.positions, chain.path[last])
     to_target = subtract(target, root)
-    distance = norm(subtract(target, effector) if k == 3 else to_target)
+    distance = norm(subtract(target, effector if k == 3 else ORIGIN if k == 12 else root))
     if k != 1 and (distance * distance if k == 2 else distance) < reach:
         return False
     direction = subtract(target, effector) if k == 6 else to_target
@@ -503,7 +584,10 @@ def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookP
     x = root
     for m in range(last):
         stretched = link_length(chain, m, 8 if k == 8 else 0, pose.positions)
-        x = add(root if k == 7 else x, scale(stretched / length, direction))
+        if k == 13:
+            x = pulled(target, x, stretched, 0)
+        else:
+            x = add(root if k == 7 else x, scale(stretched / length, direction))
         store_vector(pose.positions, chain.path[m + 1], x)
     return True
 
@@ -512,11 +596,12 @@ def pull_to_target(
     chain: TextbookChain, target: Any, faults: Switches, positions: FloatArray, before: FloatArray
 ) -> None:
     """Put the effector on the target, and pull each joint to the one after it."""
-    last, root = len(chain.path) - 1, load_vector(chain.offsets, chain.path[0])
+    last, root = len(chain.path) - 1, load_vector(before, chain.path[0])
     ends = (target, add(target, root), subtract(target, root))
     store_vector(positions, chain.path[last], ends[faults.end])
     kind = in_pass(faults.pull, 1)
-    for k in range(last - 1, 1 if faults.loop == 4 else -1, -1):
+    for i in range(last - 1, 1 if faults.loop == 4 else -1, -1):
+        k = last - 1 - i if faults.loop == 6 else i
         length = link_length(chain, k, in_pass(faults.lengths, 1), positions)
         j, fixed = chain.path[k], load_vector(positions, chain.path[k + 1])
         moved = load_vector(positions, j)
@@ -526,19 +611,26 @@ def pull_to_target(
             fixed = load_vector(before, chain.path[k + 1])
         elif faults.stale == 3:
             fixed = target
+        elif faults.stale == 5:
+            moved = add(fixed, subtract(moved, target))
         store_vector(positions, j, pulled(fixed, moved, length, kind))
 
 
-def pull_to_root(chain: TextbookChain, faults: Switches, positions: FloatArray) -> None:
+def pull_to_root(
+    chain: TextbookChain, faults: Switches, positions: FloatArray, before: FloatArray
+) -> None:
     """Put the root back, and pull each joint to the one before it."""
     last, root = len(chain.path) - 1, chain.path[0]
-    places = (load_vector(chain.offsets, root), load_vector(positions, root), ORIGIN)
+    places = (load_vector(before, root), load_vector(positions, root), ORIGIN)
     store_vector(positions, root, places[faults.base_joint])
     kind = in_pass(faults.pull, 2)
-    for k in range(1 if faults.loop == 3 else 0, last - (1 if faults.loop == 2 else 0)):
+    for i in range(1 if faults.loop == 3 else 0, last - (1 if faults.loop == 2 else 0)):
+        k = last - 1 - i if faults.loop == 5 else i
         length = link_length(chain, k, in_pass(faults.lengths, 2), positions)
         child, start = chain.path[k + 1], chain.path[0 if faults.stale == 4 else k]
         moved, fixed = load_vector(positions, child), load_vector(positions, start)
+        if faults.stale == 6:
+            moved = add(fixed, subtract(moved, load_vector(positions, root)))
         store_vector(positions, child, pulled(fixed, moved, length, kind))
 
 
@@ -555,16 +647,16 @@ def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) 
 
     It is the next link's (1), the previous link's (2), that of now (3), the first link's (4), the
     mean (5), 1 (6), that of the offset of the link's first joint (7), or the next one's, 0 if there
-    is none (8); in a list that is rolled either way (9, 10) or reversed (11), or another
-    length of an offset (from 12 on).
+    is none (8); in a list that is rolled either way (9, 10) or reversed (11), another length of an
+    offset (from 12 on), or the previous link's, 0 if there is none (22).
     """
     last = len(chain.path) - 2
     before, after = max(k - 1, 0), min(k + 1, last)
     rolled = (k - 1 if k > 0 else last, k + 1 if k < last else 0)
     links = (k, after, before, k, 0, k, k, k - 1, after, rolled[0], rolled[1], last - k)
-    if kind > 11:
+    if 11 < kind < 22:
         return other_length(load_vector(chain.offsets, chain.path[k + 1]), kind)
-    if kind == 8 and k == last:
+    if (kind == 8 and k == last) or (kind == 22 and k == 0):
         return 0.0
     if kind == 3:
         start = load_vector(positions, chain.path[k])
@@ -574,7 +666,8 @@ def link_length(chain: TextbookChain, k: int, kind: int, positions: FloatArray) 
         for j in chain.path[1:]:
             total += norm(load_vector(chain.offsets, j))
         return total / (last + 1)
-    return 1.0 if kind == 6 else norm(load_vector(chain.offsets, chain.path[links[kind] + 1]))
+    link = links[2 if kind == 22 else kind]
+    return 1.0 if kind == 6 else norm(load_vector(chain.offsets, chain.path[link + 1]))
 
 
 def other_length(offset: Any, kind: int) -> float:
@@ -601,6 +694,12 @@ class SolvedPath(NamedTuple):
     rotations: FloatArray
 
 
+def finish_fabrik(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
+    """Rotate the joints, unless each sweep has done so; after a stretch `sweeps` is -1."""
+    if faults.converted == 0 or sweeps < 0:
+        follow(chain, abs(sweeps), faults, pose)
+
+
 def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPose) -> None:
     """Rotate each joint of the path to its link's new direction; the path keeps its positions."""
     points = pose.positions.copy()
@@ -609,7 +708,7 @@ def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPo
     links = len(chain.path) - 1
     first, end = int(faults.link == 5), links - int(faults.link == 6)  # links that are left out
     for k in range(first, end if sweeps > 0 else 0):
-        if faults.global_rotations == 0:
+        if faults.global_rotations == 0 or (faults.global_rotations == 1 and faults.rule == 5):
             place(chain, faults, pose)
         point_link(chain, k, solved, faults, pose)
     place(chain, faults, pose)
@@ -626,7 +725,7 @@ def point_link(
     Q, R, P = load_quaternion(pose.local, j), load_quaternion(pose.rotations, j), IDENTITY
     if p >= 0 and faults.rotations != 20:
         P = load_quaternion(solved.rotations if faults.rotations == 4 else pose.rotations, p)
-    if faults.rotations == 20 or faults.global_rotations == 2:
+    if faults.rotations == 20 or faults.global_rotations == 1:
         R = product(P, Q, faults)
     rest = rest_of(chain, k, R, solved, faults, pose)
     link = link_of(chain, k, solved.points, faults.link)
@@ -636,17 +735,30 @@ def point_link(
     if faults.rule == 1:  # in the parent's frame
         link = rotated(P if faults.rotations == 9 else inverse(P, faults), link, faults)
     d = arc(rest, link, faults)
-    if faults.rule in (3, 4):
+    if faults.rule in (3, 4) or faults.rotations == 26:
         R = load_quaternion(solved.rotations, j)
     elif faults.rule in (1, 2):
         R = IDENTITY
-    if faults.rotations in (0, 3, 4, 9, 18, 19, 20, 21):
+    if faults.rotations == 26:  # the pose of the start, of the joint's position too
+        P = load_quaternion(solved.rotations, p) if p >= 0 else IDENTITY
+        start = load_vector(solved.positions, j)
+        d = arc(rest, subtract(load_vector(solved.points, child), start), faults)
+    if faults.rotations >= MIXED_LINKS:
+        first, second, side = LINK_FRAMES[faults.rotations - MIXED_LINKS]
+        rest = in_frame(first, rotated(R, load_vector(chain.offsets, child), faults), R, P, faults)
+        d = arc(rest, in_frame(second, link, R, P, faults), faults)
+        Q = beside(side, P, d, Q, R, faults)
+    elif faults.rotations in (0, 3, 4, 9, 18, 19, 20, 21, 26):
         Q = local_of(P, d, Q, R, faults)
     else:
         Q = wrong_local(chain, k, P, d, R, faults, pose)
     Q = Q if faults.unit == 1 else made_unit(Q)
-    store_quaternion(pose.local, child if faults.rotations == 3 else j, Q)
-    if faults.global_rotations > 0:
+    is_lower = faults.rotations == 3 or LINK_OF_CHILD[0] <= faults.rotations <= LINK_OF_CHILD[1]
+    rotated_joint = child if is_lower else j
+    store_quaternion(pose.local, rotated_joint, Q)
+    if faults.global_rotations == 2:
+        rotate_below(chain, rotated_joint, d, faults, pose)
+    elif faults.global_rotations == 1:
         store_quaternion(pose.rotations, j, global_of(P, d, R, faults))
 
 
@@ -671,7 +783,7 @@ def rest_of(
     offset = load_vector(chain.offsets, child)
     if faults.rule in (1, 2) or faults.rotations in (1, 19):
         return offset
-    if faults.rule == 3 or faults.rotations == 21:
+    if faults.rule == 3 or faults.rotations in (21, 26):
         R = load_quaternion(solved.rotations, j)
     if faults.rule in (0, 3):
         return rotated(R, offset, faults)
@@ -722,6 +834,7 @@ def wrong_local(
     """Return a wrong local rotation after the arc d, by the number of `rotations`."""
     j, unit, P_inverse = chain.path[k], IDENTITY, inverse(P, faults)
     Q, Q_parent = load_quaternion(pose.local, j), IDENTITY
+    Q_child = load_quaternion(pose.local, chain.path[k + 1])
     if chain.parents[j] >= 0:
         Q_parent = load_quaternion(pose.local, chain.parents[j])
     products = (
@@ -743,6 +856,16 @@ def wrong_local(
         (unit, P_inverse, d),
         (P_inverse, R, d),
         (unit, inverse(product(d, R, faults), faults), P),
+        (unit, unit, d),
+        (unit, unit, d),
+        (unit, unit, d),
+        (unit, unit, d),
+        (unit, d, Q_child),
+        (product(inverse(R, faults), d, faults), R, Q_child),
+        (product(P_inverse, d, faults), P, Q_child),
+        (unit, Q_child, d),
+        (unit, unit, d),
+        (product(Q, P_inverse, faults), d, P),
     )
     if faults.rotations == 17 and chain.parents[j] < 0:
         return product(d, R, faults)
@@ -759,11 +882,12 @@ class Method(NamedTuple):
 
 
 method = Method(sweep_ccd, keep, never)
-FABRIK = Method(sweep_fabrik, follow, stretch)
+FABRIK = Method(sweep_fabrik, finish_fabrik, stretch)
 place_all = Kernel(place, label="forward kinematics with faults")
 SOLVERS = {
     "ccd": Kernel(solve, label="CCD with faults"),
     "fabrik": Kernel(
-        bind(solve, method=Method(sweep_fabrik, follow, stretch)), label="FABRIK with faults"
+        bind(solve, method=Method(sweep_fabrik, finish_fabrik, stretch)),
+        label="FABRIK with faults",
     ),
 }

@@ -16,10 +16,11 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..laws import HOLDS, finding, judge_case
 from ..sentence import sentence
-from . import pose_laws, problems, rounding, skeletons, sweeps
+from . import claims, pose_laws, problems, rounding, skeletons, sweeps
+from .faults import SwitchFault
 from .inverse_kinematics import METHODS
 from .pose_laws import AnsweredPose
 from .predictions import forward, predict_track
@@ -118,8 +119,16 @@ class Frame(NamedTuple):
     pose: AnsweredPose
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-    """Judge each frame by the laws of poses, and compare it with its neighbours."""
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    base: Sequence[SwitchFault] = (),
+) -> TaskReport:
+    """Judge each frame by the laws of poses, and compare it with its neighbours.
+
+    `base` are the faults that the solver's inverse kinematics is known to have.
+    """
     method = method.lower()
     judgements = [_judge(exchange, method, greeting) for exchange in exchanges]
     comparable = {e.case.name: _comparable(e) for e in exchanges if frames_of(e)}
@@ -130,11 +139,27 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     ]
     bound = partial(_prediction_bound, greeting)
     diagnoses = [
-        diagnosis_of(f"track {textbook}", list(comparable.values()), wrong, bound)
+        diagnosis_of(f"track {textbook}", list(comparable.values()), wrong, bound, base=base)
         for textbook in ((method,) if method in METHODS else METHODS)
     ]
     best = max(diagnoses, key=lambda d: max((e.share for e in d.explanations), default=0.0))
-    return report(TASK, method, judgements, best)
+    explanations = (_of_solves(explanation, base) for explanation in best.explanations)
+    best = replace(best, explanations=tuple(explanations))
+    answers = [
+        claims.values_of(e.case, [frame.pose for frame in frames_of(e)], {}, method, greeting)
+        for e in exchanges
+        if e.case.name in comparable
+    ]
+    return report(TASK, method, judgements, claims.with_claims(best, judgements, answers, not base))
+
+
+def _of_solves(explanation: Explanation, base: Sequence[SwitchFault]) -> Explanation:
+    """Return an explanation that says if its faults are those of the single solves."""
+    keys = {fault.key for fault in base}
+    if not keys.issuperset(explanation.faults[0].split(" + ")):
+        return explanation
+    words = sentence("Its inverse_kinematics has the same mistake: {what}", what=explanation.sentence)
+    return replace(explanation, sentence=words)
 
 
 def _is_wrong(judgement: CaseJudgement) -> bool:

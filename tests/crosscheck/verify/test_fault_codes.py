@@ -32,6 +32,7 @@ FAMILIES = (
     "CCD",
     "FABRIK",
     "STOP",
+    "CLAIM",
     "TRACK",
     "LIMIT",
     "VELOCITY",

@@ -1,0 +1,202 @@
+"""What an answer says of itself: formulas that give its residual, its success or its positions.
+
+The entries of the table `claim` in `faults.toml` name an output, and the formula that gives it in a
+program with the fault, whatever its method is. The names in formulas are those of `values_of`.
+"""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import CodeType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.reference import Skeleton, forward_kinematics, local_from_global, rotation
+
+from ..case import Case
+from ..greeting import Greeting
+from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
+from ..sentence import Sentence, with_code
+from .faults import TABLE
+from .pose_laws import AnsweredPose
+from .predictions import path_to, solve
+
+# What an output is in a right program. The rotations of an answer are compared as the positions
+# that they give, those that are `placed`.
+RIGHT = {
+    "residual": "distance",
+    "converged": "distance <= tolerance",
+    "iterations": "sweeps",
+    "positions": "placed",
+    "placed": "positions",
+}
+# The claim that follows from a false residual.
+FOLLOWS = "success by the reported residual"
+# The laws that false outputs break, beside any that a pose breaks.
+LAWS = {"claims", "root in place", "link lengths", "branches", "rotations agree with positions"}
+# The least number of answers that a formula is compared with, and the share that it has to give.
+MIN_ANSWERS, MIN_SHARE = 4, 0.9
+# Positions that differ by less than this share of the skeleton's size are the same, by precision;
+# those after sweeps by so many times as much.
+SAME, AFTER_SWEEPS = {"double": 1e-9, "single": 1e-4}, 1e3
+NAMES = {
+    "abs": np.abs, "norm": np.linalg.norm, "np": np, "rotate": rotation.rotate, "where": np.where,
+    "without": lambda v, axis: np.delete(v, "xyz".index(axis)),
+}  # fmt: skip
+
+
+class ClaimFault(NamedTuple):
+    """A formula that gives an output of programs with a fault."""
+
+    key: str
+    output: str
+    formula: CodeType
+    sentence: Sentence
+
+
+def _load() -> Iterator[ClaimFault]:
+    for key, entry in TABLE["claim"].items():
+        choices = entry.get("each", {})
+        for choice in itertools.product(*choices.values()):
+            fields = dict(zip(choices, choice, strict=True))
+            formula = compile(entry["formula"].format(**fields), key, "eval")
+            words = with_code(entry["code"], Sentence(entry["sentence"], fields))
+            yield ClaimFault(key.format(**fields), entry["output"], formula, words)
+
+
+FAULTS = tuple(_load())
+OF_POSES = {fault.key for fault in FAULTS if fault.output in ("positions", "placed")}
+TRUTHS = {output: compile(formula, output, "eval") for output, formula in RIGHT.items()}
+
+
+def values_of(
+    case: Case,
+    poses: Sequence[AnsweredPose],
+    outputs: Mapping[str, Any],
+    method: str,
+    greeting: Greeting,
+) -> dict[str, Any]:
+    """Return the values of the names in formulas, for the pose of a solve or those of all frames.
+
+    Positions are (frame, joint, 3). `method` is one of the textbook's or "".
+    """
+    inputs, effector, parents = case.inputs, case.inputs["effector"], case.inputs["parents"]
+    skeleton, path = Skeleton(parents, inputs["offsets"]), case.facts["path"]
+    same = SAME[greeting.precision] * case.facts["size"]
+    values = {
+        **{name: outputs[name] for name in RIGHT if name in outputs}, "same": same,
+        "tolerance": inputs["tolerance"], "limit": inputs["max_iterations"],
+    }  # fmt: skip
+    values.pop("positions", None)
+    if "target" in inputs:
+        gaps = poses[0].positions - inputs["target"]
+        neighbours = {"parent": parents[effector], **{"child": j for j in np.flatnonzero(parents == effector)}}
+        values |= {f"{name}_distance": np.linalg.norm(gaps[j]) for name, j in neighbours.items()}
+        values |= {"gap": gaps[effector], "distance": np.linalg.norm(gaps[effector])}
+        values |= {name: case.facts[name] for name in ("least", "reach")}
+        values |= {"start_distance": case.facts["before"], "links": len(path) - 1}
+        values |= _sweeps(method, case, poses[0], outputs, same) if method else {}
+    if all(pose.local is not None and pose.answered_positions is not None for pose in poses):
+        q, positions, placed = (
+            np.array([getattr(pose, name) for pose in poses])
+            for name in ("local", "answered_positions", "positions")
+        )
+        start = forward_kinematics(skeleton, inputs["local_rotations"]).positions[None]
+        below = [p >= 0 and effector in path_to(parents, p) for p in parents]
+        masks = {"path": np.isin(np.arange(len(parents)), path), "below": np.array(below),
+                 "effector": np.arange(len(parents)) == effector}  # fmt: skip
+        values |= {name: mask[:, None] for name, mask in masks.items()} | {
+            "q": q, "positions": positions, "placed": placed, "start": start,
+            "placed_before": np.concatenate([start, placed[:-1]]),
+            "positions_before": np.concatenate([start, positions[:-1]]),
+            "targets": np.reshape(inputs.get("target", inputs.get("curve")), (-1, 1, 3)),
+            "forward": lambda q: forward_kinematics(skeleton, q),
+            "local": lambda q: local_from_global(skeleton, q),
+        }  # fmt: skip
+    return values
+
+
+def _sweeps(
+    method: str, case: Case, pose: AnsweredPose, outputs: Mapping[str, Any], same: float
+) -> dict[str, Any]:
+    """Return the sweeps of a pose and the distance before the last, {} if it is no textbook's."""
+    inputs, needed = {**case.inputs, "tolerance": 0.0}, solve(method, case.inputs)[2]
+    for count in (needed, int(outputs.get("iterations", needed))):
+        after, before = (
+            solve(method, {**inputs, "max_iterations": max(sweeps, 0)})[1]
+            for sweeps in (count, count - 1)
+        )
+        if pose.distance_to(after) <= AFTER_SWEEPS * same:
+            gap = before[inputs["effector"]] - inputs["target"]
+            return {"sweeps": count, "distance_before": np.linalg.norm(gap)}
+    return {}
+
+
+def explanations(answers: Sequence[Mapping[str, Any]]) -> list[Explanation]:
+    """Return for each output that is wrong in answers the fault that gives most of them, if any.
+
+    It gives nearly all numbers, and everything that is either true or false.
+    """
+    explanations = []
+    for output, truth in TRUTHS.items():
+        given = [values for values in answers if output in values]
+        wrong = [values for values in given if _agrees(truth, output, values) is False]
+        shares = [
+            (min(_share(fault, given), _share(fault, wrong)), -number, fault)
+            for number, fault in enumerate(FAULTS)
+            if fault.output == output and wrong and len(given) >= MIN_ANSWERS
+        ]
+        share, _, fault = max(shares, default=(0.0, 0, None))
+        if fault and share >= (1.0 if output == "converged" else MIN_SHARE):
+            explanations.append(Explanation((fault.key,), fault.sentence, share, 0.0))
+    return explanations
+
+
+def _share(fault: ClaimFault, answers: Sequence[Mapping[str, Any]]) -> float:
+    """Return the share of answers that a fault gives, of those for which its formula has a value."""
+    matches = [_agrees(fault.formula, fault.output, values) for values in answers]
+    return matches.count(True) / max(len(matches) - matches.count(None), 1)
+
+
+def _agrees(formula: CodeType, output: str, values: Mapping[str, Any]) -> bool | None:
+    """Return whether a formula gives an output, None if it has no value or rounding decides it."""
+    try:
+        with np.errstate(all="ignore"):
+            low, high = (
+                eval(formula, NAMES, {**values, "tolerance": values["tolerance"] + slack})
+                for slack in (-values["same"], values["same"])
+            )
+    except NameError:
+        return None
+    if isinstance(low, bool | np.bool_):
+        return bool(values[output]) == bool(low) if low == high else None
+    gap = float(np.abs(values[output] - low).max())
+    return None if np.isnan(gap) else gap <= AFTER_SWEEPS * values["same"]
+
+
+def with_claims(
+    diagnosis: Diagnosis,
+    judgements: Sequence[CaseJudgement],
+    answers: Sequence[Mapping[str, Any]],
+    is_placed: bool,
+) -> Diagnosis:
+    """Return a diagnosis with the faults of what answers say, where a law about that is broken.
+
+    They come first if nothing else is wrong, and stand beside other mistakes if not. Positions say
+    something unless what places the joints is known to be wrong (`is_placed`).
+    """
+    findings = itertools.chain.from_iterable(judgement.findings for judgement in judgements)
+    broken = {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
+    is_certain = any(explanation.share == 1.0 for explanation in diagnosis.explanations)
+    claims = explanations(answers) if broken & LAWS else []
+    of_poses = [claim for claim in claims if claim.faults[0] in OF_POSES]
+    claims = [claim for claim in claims if claim not in of_poses]
+    if is_placed and not is_certain:
+        claims = [*of_poses, *claims]
+        if claims and (of_poses or broken <= LAWS):
+            diagnosis = replace(diagnosis, explanations=tuple(claims[:1]))
+            claims = claims[1:]
+    if diagnosis.explanations or len(claims) > 1:
+        claims = [claim for claim in claims if claim.faults[0] != FOLLOWS]
+    return replace(diagnosis, hints=(*(claim.sentence for claim in claims), *diagnosis.hints))
