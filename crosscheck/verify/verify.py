@@ -158,7 +158,7 @@ def judge_cases(
     is known to have some faults.
     """
     exchanges = _ask(contestant, cases, partial(notify, task))
-    judge = DISCIPLINES[task].judge
+    judge: Callable[..., TaskReport] = DISCIPLINES[task].judge
     if known_faults:
         judge = partial(judge, base=known_faults)
     if isinstance(discipline := DISCIPLINES[task], Stepping):

@@ -35,8 +35,8 @@ FIRST_ELEMENT = 4
 OF_THE_ARC = 3
 DEGREE = math.pi / 180.0
 # Of `angle`, the number of an angle that is 90 degrees throughout, the first with the sign of a
-# component of the axis, the first of a rotation in a plane, and the first with a sine or a cosine of
-# directions that are not unit.
+# component of the axis, the first of a rotation in a plane, and the first with a sine or a cosine
+# of directions that are not unit.
 QUARTER_TURN, SIGNED, IN_PLANE, UNEQUAL = 19, 21, 24, 27
 
 
@@ -185,8 +185,8 @@ def other_arc(a: Any, b: Any, axis: Any, angle: float, k: int) -> Any:
     """Return a quarter turn (19), an arc of whole degrees (20), or of another sign or axis.
 
     The sign is that of the axis' x, y or z (21 to 23); about z, x or y alone (24 to 26) the angle
-    is the difference of two polar angles. The sine (27 to 29) or the cosine (30 to 32) has in it the
-    length of the first vector, of the second or of both.
+    is the difference of two polar angles. The sine (27 to 29) or the cosine (30 to 32) has in it
+    the length of the first vector, of the second or of both.
     """
     if k >= UNEQUAL:
         lengths = (norm(a), norm(b), norm(a) * norm(b))

@@ -91,7 +91,8 @@ def values_of(
     values.pop("positions", None)
     if "target" in inputs:
         gaps = poses[0].positions - inputs["target"]
-        neighbours = {"parent": parents[effector], **{"child": j for j in np.flatnonzero(parents == effector)}}
+        children = np.flatnonzero(parents == effector)
+        neighbours = {"parent": parents[effector]} | dict(zip(["child"], children, strict=False))
         values |= {f"{name}_distance": np.linalg.norm(gaps[j]) for name, j in neighbours.items()}
         values |= {"gap": gaps[effector], "distance": np.linalg.norm(gaps[effector])}
         values |= {name: case.facts[name] for name in ("least", "reach")}
@@ -154,7 +155,7 @@ def explanations(answers: Sequence[Mapping[str, Any]]) -> list[Explanation]:
 
 
 def _share(fault: ClaimFault, answers: Sequence[Mapping[str, Any]]) -> float:
-    """Return the share of answers that a fault gives, of those for which its formula has a value."""
+    """Return the share of answers that a fault gives, of those for which it has a value."""
     matches = [_agrees(fault.formula, fault.output, values) for values in answers]
     return matches.count(True) / max(len(matches) - matches.count(None), 1)
 

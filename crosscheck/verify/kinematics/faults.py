@@ -62,6 +62,8 @@ SPINS = (
     sentence("all rotates about the origin, x := d x"),
     sentence("the pivot is not rotated, x := d x + x_joint"),
 )
+# The switches of a program that rotates global positions and rotations by hand.
+BY_HAND = {"global_rotations": 2, "rule": 5}
 AS_THE_TEXTBOOK = sentence("It does what the textbook does.")
 
 
@@ -225,8 +227,9 @@ def by_key(method: str) -> dict[str, SwitchFault]:
 
 
 def switches(faults: Sequence[SwitchFault]) -> Switches:
-    """Return the switches that faults set."""
-    return Switches(**{fault.switch: fault.number for fault in faults})
+    """Return the switches that faults set, in a program that they can be in."""
+    numbers = {fault.switch: fault.number for fault in faults}
+    return Switches(**(BY_HAND if "spin" in numbers else {}) | numbers)
 
 
 def combinations(

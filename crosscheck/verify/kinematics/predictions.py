@@ -16,7 +16,15 @@ from ..explain import Variant
 from .algebra import DEGREE
 from .faults import ANGLES, EULER_ORDERS, SwitchFault, combinations, switches
 from .switches import Switches
-from .textbook import IN_FRAMES, OF_GLOBAL_LINKS, SOLVERS, Ending, TextbookChain, TextbookPose, place_all
+from .textbook import (
+    IN_FRAMES,
+    OF_GLOBAL_LINKS,
+    SOLVERS,
+    Ending,
+    TextbookChain,
+    TextbookPose,
+    place_all,
+)
 
 RIGHT = Switches()
 IN_DEGREES = "degrees for radians"
@@ -151,7 +159,7 @@ def programs(
         return [{}]
     is_forward, is_fabrik = method == "forward", method == "fabrik"
     if "spin" in names:
-        return [{"global_rotations": 2, "rule": 5, "grouping": grouping} for grouping in range(2)]
+        return [{"grouping": grouping} for grouping in range(2)]
     # a reversed product shows in the program's rotations of vectors too, by q v q*
     is_reversed = any(fault.key == REVERSED for fault in faults)
     of_globals = any(f.switch == "rotations" and f.number >= OF_GLOBAL_LINKS for f in faults)

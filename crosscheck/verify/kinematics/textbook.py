@@ -51,9 +51,9 @@ SMALL = (1e-4, 1e-3, 1e-2, 1.745329e-2, 5e-2)
 # The distances at which a solve ends whatever the tolerance, by `test` from `FIXED_TEST` on [m].
 FIXED, FIXED_TEST = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2), 5
 # Of `aim` and of FABRIK's `rotations` from these numbers on, the frames of two directions, and what
-# becomes of Q by the arc d between them: P* d P Q (0), Q d (1) or d Q (2). The frames are the world's
-# (0), the joint's (1) or its parent's (2), with R or P not inverted (3, 4), or the target in either
-# frame minus the joint in the world's (5, 6).
+# becomes of Q by the arc d between them: P* d P Q (0), Q d (1) or d Q (2). The frames are the
+# world's (0), the joint's (1) or its parent's (2), with R or P not inverted (3, 4), or the target
+# in either frame minus the joint in the world's (5, 6).
 MIXED_FRAMES, MIXED_LINKS = 13, 28
 FRAMES = (
     (0, 1, 1), (1, 0, 1), (0, 2, 2), (2, 0, 2), (0, 0, 0), (3, 3, 1), (1, 2, 1), (1, 2, 2),
@@ -119,7 +119,7 @@ def place(chain: TextbookChain, faults: Switches, pose: TextbookPose) -> None:
 
 
 def by_depth(parents: IndexArray, is_queue: bool) -> IndexArray:
-    """Return the joints by their depth, those of one depth in the order of a queue or of numbers."""
+    """Return the joints by depth, those of one depth in the order of a queue or of numbers."""
     order, depths, count = np.zeros_like(parents), np.zeros_like(parents), 1
     for j in range(1, len(parents)):
         depths[j] = depths[parents[j]] + 1
@@ -276,7 +276,9 @@ def sweep_ccd(
     return is_over and faults.small > len(SMALL)
 
 
-def sweep_in_frames(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookPose) -> None:
+def sweep_in_frames(
+    chain: TextbookChain, target: Any, faults: Switches, pose: TextbookPose
+) -> None:
     """Rotate each joint in its parent's or its own frame (3), up which the effector is carried.
 
     Faulty: joints' offsets are left out on the way (4), or it begins at its parent's offset (5).
@@ -389,8 +391,8 @@ def rotate_below(
 ) -> None:
     """Rotate joint j and all below it about its position, in global rotations and positions.
 
-    By the number of `spin` only it and its children (1) or it alone (2) rotate, or all about the root
-    (3), or about the origin (4) and then by the joint's position (5).
+    By the number of `spin` only it and its children (1) or it alone (2) rotate, or all about the
+    root (3), or about the origin (4) and then by the joint's position (5).
     """
     x = load_vector(pose.positions, 0 if faults.spin == 3 else j)
     start = x if faults.spin < 4 else ORIGIN
@@ -724,25 +726,15 @@ def point_link(
     p = chain.parents[j]
     Q, R, P = load_quaternion(pose.local, j), load_quaternion(pose.rotations, j), IDENTITY
     if p >= 0 and faults.rotations != 20:
-        P = load_quaternion(solved.rotations if faults.rotations == 4 else pose.rotations, p)
+        P = load_quaternion(solved.rotations if faults.rotations in (4, 26) else pose.rotations, p)
     if faults.rotations == 20 or faults.global_rotations == 1:
         R = product(P, Q, faults)
-    rest = rest_of(chain, k, R, solved, faults, pose)
-    link = link_of(chain, k, solved.points, faults.link)
-    if faults.rotations == 18:  # of the link before
-        rest = link_of(chain, k, solved.positions, 3)
-        link = link_of(chain, k, solved.points, 3) if k > 0 else rest
-    if faults.rule == 1:  # in the parent's frame
-        link = rotated(P if faults.rotations == 9 else inverse(P, faults), link, faults)
+    rest, link = compared_links(chain, k, P, R, solved, faults, pose)
     d = arc(rest, link, faults)
     if faults.rule in (3, 4) or faults.rotations == 26:
         R = load_quaternion(solved.rotations, j)
     elif faults.rule in (1, 2):
         R = IDENTITY
-    if faults.rotations == 26:  # the pose of the start, of the joint's position too
-        P = load_quaternion(solved.rotations, p) if p >= 0 else IDENTITY
-        start = load_vector(solved.positions, j)
-        d = arc(rest, subtract(load_vector(solved.points, child), start), faults)
     if faults.rotations >= MIXED_LINKS:
         first, second, side = LINK_FRAMES[faults.rotations - MIXED_LINKS]
         rest = in_frame(first, rotated(R, load_vector(chain.offsets, child), faults), R, P, faults)
@@ -760,6 +752,33 @@ def point_link(
         rotate_below(chain, rotated_joint, d, faults, pose)
     elif faults.global_rotations == 1:
         store_quaternion(pose.rotations, j, global_of(P, d, R, faults))
+
+
+def compared_links(
+    chain: TextbookChain,
+    k: int,
+    P: Any,
+    R: Any,
+    solved: SolvedPath,
+    faults: Switches,
+    pose: TextbookPose,
+) -> Any:
+    """Return the directions of link k between which its joint rotates, before and after.
+
+    Or those of the link before (18), or the new one from where the joint was at the start (26).
+    """
+    if faults.rotations == 18:
+        rest = link_of(chain, k, solved.positions, 3)
+        return rest, link_of(chain, k, solved.points, 3) if k > 0 else rest
+    rest = rest_of(chain, k, R, solved, faults, pose)
+    link = link_of(chain, k, solved.points, faults.link)
+    if faults.rotations == 26:
+        j, child = chain.path[k], chain.path[k + 1]
+        start = load_vector(solved.positions, j)
+        link = subtract(load_vector(solved.points, child), start)
+    if faults.rule == 1:  # in the parent's frame
+        link = rotated(P if faults.rotations == 9 else inverse(P, faults), link, faults)
+    return rest, link
 
 
 def global_of(P: Any, d: Any, R: Any, faults: Switches) -> Any:

@@ -158,7 +158,9 @@ def _of_solves(explanation: Explanation, base: Sequence[SwitchFault]) -> Explana
     keys = {fault.key for fault in base}
     if not keys.issuperset(explanation.faults[0].split(" + ")):
         return explanation
-    words = sentence("Its inverse_kinematics has the same mistake: {what}", what=explanation.sentence)
+    words = sentence(
+        "Its inverse_kinematics has the same mistake: {what}", what=explanation.sentence
+    )
     return replace(explanation, sentence=words)
 
 
