@@ -161,12 +161,17 @@ def largest_gap(first: Any, second: Any) -> float:
 def _classes(
     matches: Sequence[Match], answers: Sequence[Exchange], tolerance: Callable[[Case], float]
 ) -> list[list[Match]]:
-    """Return matches grouped with others of as many faults that no answer tells apart."""
+    """Return matches grouped with others of the same faults, or that no answer tells apart.
+
+    The latter have as many faults; the former are of programs that make other choices beside them.
+    """
 
     def is_alike(first: Match, second: Match) -> bool:
-        return len(first.variant.faults) == len(second.variant.faults) and all(
-            difference(a, b) <= tolerance(exchange.case)
-            for a, b, exchange in zip(first.predictions, second.predictions, answers, strict=True)
+        faults, others = first.variant.faults, second.variant.faults
+        pairs = zip(first.predictions, second.predictions, answers, strict=True)
+        return faults == others or (
+            len(faults) == len(others)
+            and all(difference(a, b) <= tolerance(exchange.case) for a, b, exchange in pairs)
         )
 
     classes: list[list[Match]] = []

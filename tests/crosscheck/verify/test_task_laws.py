@@ -10,7 +10,7 @@ import pytest
 
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer, Exchange
-from plumbob.crosscheck.verify.explain import Match, Variant, _telling
+from plumbob.crosscheck.verify.explain import Match, Variant, _telling, explain
 from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import (
     CaseJudgement,
@@ -313,3 +313,17 @@ def test_equal_answers_without_numbers_are_equal(again, verdict):
     answers = [Answer({"positions": np.full((2, 3), x)}, 1e-3) for x in (np.nan, again)]
     one = Exchange(Case("one", "mass_spring_step", {}, "x", sentence("It is all.")), *answers)
     assert equal_answers(one, np.nan).verdict is verdict
+
+
+def test_a_fault_is_named_once_for_all_programs_that_it_may_be_in():
+    numbers = [{"energy": float(i)} for i in range(1, 5)]
+    cases = [Case("", "energy", {"i": i}, "", sentence("")) for i in range(4)]
+    asked = [Exchange(case, Answer(x, 0.0), None) for case, x in zip(cases, numbers, strict=True)]
+
+    def variant(last, *faults):
+        right = {case.inputs["i"]: x for case, x in zip(cases, numbers, strict=True)}
+        return Variant(faults, lambda case: right[min(case.inputs["i"], last)])
+
+    variants = [variant(2, "a"), variant(1, "a"), variant(1, "b")]
+    told, _ = explain(variants, asked, lambda case: 1e-9, lambda keys: sentence("It is wrong."))
+    assert [(one.faults, one.share) for one in told] == [(("a",), 0.75), (("b",), 0.5)]
