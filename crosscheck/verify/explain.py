@@ -121,7 +121,7 @@ def _predict(variant: Variant, case: Case) -> Mapping[str, Any]:
     try:
         with np.errstate(all="ignore"):
             return variant.predict(case)
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+    except (ValueError, IndexError, ArithmeticError, np.linalg.LinAlgError):
         return {}
 
 

@@ -17,7 +17,17 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case
 from ..sentence import sentence
-from . import claims, degenerate, early_ends, limits, pose_laws, problems, rounding, sweeps
+from . import (
+    claims,
+    degenerate,
+    early_ends,
+    jacobian_steps,
+    limits,
+    pose_laws,
+    problems,
+    rounding,
+    sweeps,
+)
 from .faults import SwitchFault
 from .pose_laws import AnsweredPose
 from .predictions import solve
@@ -194,7 +204,7 @@ def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> str:
     is_degenerate, is_beyond = case.requirement != "must", nearest > 0.0
     is_nearer = excess < 0.5 * (before - nearest)
     if excess <= rounding.STALL[greeting.precision] * reach:
-        return "target reached, stalled"
+        return "target reached, stalled" if method else SLOW
     if is_beyond and is_nearer:
         return "nearest point, approached"
     if is_nearer and (not method or is_degenerate):
@@ -251,7 +261,7 @@ def _diagnosis(
     max_faults: int,
     base: Sequence[SwitchFault],
 ) -> Diagnosis:
-    """Return the faults of the declared or inferred method that reproduce the answers."""
+    """Return the faults that reproduce the answers, of the method or of a Jacobian's steps."""
     posed_trials = [trial for trial in trials if trial.pose.outputs]
     sweep_trials = [trial for trial in posed_trials if trial.is_sweep]
     names = comparison.wrong
@@ -273,4 +283,8 @@ def _diagnosis(
         solves = [trial for trial in must if trial in wrong or not trial.is_sweep]
         early = early_ends.explanation(solves, wrong, comparison.method, greeting)
         return replace(diagnosis, explanations=(early,)) if early else diagnosis
+    is_right = all(trial.judgement.verdict is Verdict.RIGHT for trial in trials)
+    if not (comparison.method or is_right or diagnosis.explained):
+        steps = jacobian_steps.explanations(trials, greeting, base)
+        return replace(diagnosis, explanations=steps or diagnosis.explanations)
     return diagnosis

@@ -5,7 +5,7 @@ honest solver does. No rotation of a single sweep is close to 0 or pi, where hon
 it differ.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,6 +30,8 @@ MAX_AMPLIFICATION = 30.0
 # A target counts as easy if both textbook solvers reach it in EASY sweeps; ALLOWED are allowed.
 EASY, ALLOWED = 12, 60
 DRAWS = 1000
+# The most iterations of a solve by an own method whose poses are asked one by one.
+CONTINUED = 7
 LOOSE = 1e-2
 
 
@@ -177,7 +179,19 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
         )
         if skeletons.suits(problem.skeleton.parents, greeting, problem.effector)
     ]
-    return [*problems, *_transformed(problems, greeting)]
+    own = () if method.lower() in ("", *SOLVERS) else problems[2:6:2]
+    return [*problems, *_transformed(problems, greeting), *_continued(own)]
+
+
+def _continued(cases: Sequence[Case]) -> Iterator[Case]:
+    """Yield cases of a single sweep again with more, to know the poses before and after each."""
+    for case in cases:
+        for count in range(2, CONTINUED + 1):
+            inputs = {**case.inputs, "max_iterations": count}
+            about = sentence("The case '{case}' with {count} sweeps.", case=case.name, count=count)
+            facts = {**case.facts, "sweeps": count, "continues": case.name}
+            name = f"{case.name}, {count} sweeps"
+            yield Case(name, TASK, inputs, "more sweeps", about, facts=facts)
 
 
 def _case(

@@ -1,14 +1,13 @@
 """Formulas of the catalogue of faults: expressions of the numbers of a problem."""
 
 from collections.abc import Callable, Mapping
-from functools import cache
-from types import CodeType
 from typing import Any
 
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
+from ..formulas import compiled
 from .problem import SpringProblem, all_forces, frames
 
 SHORTEST = 1e-150  # of the lengths by which a formula may divide [m]
@@ -65,11 +64,6 @@ class _Values(dict[str, Any]):
         return NAMES[name](self._problem)
 
 
-@cache
-def _compiled(formula: str) -> CodeType:
-    return compile(formula, "faults.toml", "eval")
-
-
 def evaluate(formula: str, p: SpringProblem, values: Mapping[str, Any] | None = None) -> Any:
     """Return the value of a formula for a problem; `values` are those of further names."""
-    return eval(_compiled(formula), _GLOBALS, _Values(p, values or {}))
+    return eval(compiled(formula), _GLOBALS, _Values(p, values or {}))

@@ -31,6 +31,7 @@ FAMILIES = (
     "QUAT",
     "CCD",
     "FABRIK",
+    "JACOBIAN",
     "STOP",
     "CLAIM",
     "TRACK",
