@@ -242,5 +242,8 @@ def _diagnosis(
     models = {"": (even_points,), **FAULTS}
     variants = [variant(key, points) for key, choices in models.items() for points in choices]
     explanations, count = explain(variants, wrong_first, tolerance, lambda keys: sentences[keys[0]])
-    faulty = tuple(explanation for explanation in explanations if explanation.faults != ("",))
+    keys = [explanation.faults for explanation in explanations]
+    faulty = tuple(  # of the implementations of a fault the best
+        explanations[i] for i in range(len(keys)) if keys[i] not in (("",), *keys[:i])
+    )
     return Diagnosis(faulty, behaviour, variant_count=count)

@@ -548,11 +548,16 @@ def resampler(make):
 
 @pytest.mark.parametrize(
     ("key", "number"),
-    [(key, i) for key, choices in RESAMPLE_FAULTS.items() for i in range(len(choices))],
+    [
+        pytest.param(key, i, marks=pytest.mark.slow if i else ())
+        for key, choices in RESAMPLE_FAULTS.items()
+        for i in range(len(choices))
+    ],
 )
 def test_fault_of_resampling_is_caught_and_named(key, number):
     report = judged(RESAMPLE, resampler(RESAMPLE_FAULTS[key][number]))
-    assert report.verdict >= WRONG
+    # corners that are cut are a reservation
+    assert report.verdict >= (RIGHT_EXCEPT if key == "strokes shortened" else WRONG)
     assert key in named(report)[0]
 
 
