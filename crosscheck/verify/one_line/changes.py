@@ -6,22 +6,25 @@ The kinds of changes are the keys of `faults.toml`; operators of mutation testin
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 # Functions that are taken for one another, and comparisons.
 FUNCTIONS = (
     ("sin", "cos"), ("arcsin", "arccos"), ("asin", "acos"), ("min", "max"), ("ceil", "floor"),
-    ("degrees", "radians"), ("zeros", "ones"), ("sum", "mean"),
+    ("degrees", "radians"), ("zeros", "ones"), ("sum", "mean"), ("repeat", "tile"),
 )  # fmt: skip
 # Functions whose second argument is the type of an array's numbers.
 ALLOCATIONS = ("zeros", "empty", "ones")
 COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
-# What is made of a number or of each number of an array, by the kind of change.
-OF_NUMBERS = {
-    "unit": ("np.degrees({})", "np.radians({})"), "factor": ("2.0 * {}", "0.5 * {}"),
-    "power": ("{} ** 2", "np.sqrt({})"), "sign": ("-{}", "abs({})"),
-}  # fmt: skip
+# What values become, by the kind of change and their shape.
+PATTERNS = tomllib.loads(Path(__file__).with_name("patterns.toml").read_text(encoding="utf-8"))
+# Numbers below are tolerances, in the place of which stand these.
+TOLERANCE, TOLERANCES = 1e-5, [10.0**-i for i in range(1, 11)]
+# The parts of a list that a wrong slice or loop goes through.
+PARTS = ("1:", ":-1", "::-1", ":2", ":3", ":4", ":5", ":10")
 NUMBER, WORD = "()", re.compile(r"\w+(\.\d+)?")
 
 Change = tuple[str, ast.expr]  # the kind, and what an expression becomes
@@ -34,7 +37,6 @@ class Scope(NamedTuple):
 
     shapes: Mapping[str, str]  # by the text of an expression: "int", "()", "(3,)", "list"
     plain: frozenset[str]  # the texts of names and of elements x[i]
-    has_conjugate: bool  # whether the program has quaternions
 
     def alike(self, text: str) -> list[str]:
         """Return the other names and elements that have the shape of an expression."""
@@ -54,10 +56,12 @@ def of_expression(node: Any, parent: ast.AST, scope: Scope) -> Iterator[Change]:
     if isinstance(node, ast.Constant):
         yield from _numbers(node.value, parent)
     text = ast.unparse(node)
+    if isinstance(parent, ast.If | ast.While | ast.IfExp) and node is parent.test:
+        yield "condition", parsed(f"not ({text})")
     if text in scope.shapes:
         yield from _names(text, scope)
         yield from (("name", parsed(other)) for other in _of_one_form(text, scope))
-        yield from _conversions(text, scope)
+        yield from _conversions(text, parent, scope)
         yield from _lost_factors(node, scope)
 
 
@@ -92,17 +96,18 @@ def _other_operators(node: Any) -> Iterator[Change]:
     elif isinstance(node, ast.BinOp) and type(node.op) in opposite:
         kind = "sign" if isinstance(node.op, ast.Add | ast.Sub) else "factor"
         yield kind, ast.BinOp(node.left, opposite[type(node.op)], node.right)
+        if isinstance(node.op, ast.Div):
+            yield "whole numbers", ast.BinOp(node.left, ast.FloorDiv(), node.right)
 
 
 def _bounds(node: Any, parent: ast.AST) -> Iterator[Change]:
     """Yield a slice without its bounds, with others, or a loop that is shorter or reversed."""
     text = ast.unparse(node)
-    parts = ("1:", ":-1", "::-1")
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
         yield "loop", node.value
-        yield from (("loop", parsed(f"({ast.unparse(node.value)})[{part}]")) for part in parts)
+        yield from (("loop", parsed(f"({ast.unparse(node.value)})[{part}]")) for part in PARTS)
     if isinstance(parent, ast.For):
-        yield from (("loop", parsed(f"list({text})[{part}]")) for part in parts)
+        yield from (("loop", parsed(f"list({text})[{part}]")) for part in PARTS)
 
 
 def _calls(node: ast.Call) -> Iterator[Change]:
@@ -131,7 +136,8 @@ def _numbers(value: object, parent: ast.AST) -> Iterator[Change]:
     is_power = isinstance(parent, ast.BinOp) and isinstance(parent.op, ast.Pow)
     is_index = isinstance(parent, ast.Subscript | ast.Call)
     kind = "power" if is_power else "index" if is_index else "number"
-    for number in (0, 1, -value, 2 * value, value / 2, value + 1, value - 1):
+    tolerances = TOLERANCES if 0 < value < TOLERANCE else ()
+    for number in (0, 1, -value, 2 * value, value / 2, value + 1, value - 1, *tolerances):
         if number != value:
             yield kind, parsed(repr(type(value)(number)))
 
@@ -141,7 +147,9 @@ def _names(text: str, scope: Scope) -> Iterator[Change]:
     if text not in scope.plain:
         return
     kind = "index" if scope.shapes[text] == "int" else "name"
-    near = ("0", "-1", f"{text} + 1", f"{text} - 1") if kind == "index" else ()
+    counted = [text, *(name for name in scope.alike(text) if name.isidentifier())]
+    steps = [f"{name} {step} 1" for name in counted for step in "+-"]
+    near = ("0", "-1", *steps) if kind == "index" else ()
     yield from ((kind, parsed(other)) for other in (*scope.alike(text), *near))
 
 
@@ -154,16 +162,17 @@ def _of_one_form(text: str, scope: Scope) -> Iterator[str]:
             yield other
 
 
-def _conversions(text: str, scope: Scope) -> Iterator[Change]:
-    """Yield a value with a wrong unit, factor or power, or inverted."""
+def _conversions(text: str, parent: Any, scope: Scope) -> Iterator[Change]:
+    """Yield a value with a wrong unit, factor or power, inverted, or read or written wrongly."""
     shape = scope.shapes[text]
-    for kind, patterns in OF_NUMBERS.items() if shape.startswith("(") else ():
-        if shape == NUMBER or kind != "unit":
-            yield from ((kind, parsed(pattern.format(f"({text})"))) for pattern in patterns)
-    if shape == "(3, 3)":
-        yield "inverse", parsed(f"({text}).T")
-    if shape == "(4,)" and scope.has_conjugate:
-        yield "inverse", parsed(f"conjugate({text})")
+    is_input = isinstance(parent, ast.Assign) and is_idle(parent)
+    is_output = isinstance(parent, ast.Dict | ast.Return)
+    alike = {"*" if shape.startswith("(") else "", shape, re.sub(r"\d+", "n", shape, count=1)}
+    alike |= {"(n, n)"} if re.fullmatch(r"\((\d+), \1\)", shape) else set()
+    for kind, patterns in PATTERNS.items():
+        if {"reading": is_input, "writing": is_output}.get(kind, not is_input):
+            for pattern in (p for key in alike & patterns.keys() for p in patterns[key]):
+                yield kind, parsed(pattern.replace("{}", f"({text})"))
     if shape == NUMBER and text in scope.plain:
         for other in scope.alike(text):
             yield from (("factor", parsed(f"({text}) {sign} {other}")) for sign in "*/")
@@ -182,6 +191,8 @@ def _lost_factors(node: Any, scope: Scope) -> Iterator[Change]:
 def of_statement(statements: list[ast.stmt], i: int) -> Iterator[Rearrangement]:
     """Yield a block without statement i, with another statement there, or with a later place."""
     statement, before, after = statements[i], statements[:i], statements[i + 1 :]
+    if is_idle(statement):
+        return
     if not isinstance(statement, ast.Return | ast.FunctionDef):
         yield "missing line", "", [*before, ast.Pass(), *after]
     if isinstance(statement, ast.AugAssign):
@@ -194,6 +205,9 @@ def of_statement(statements: list[ast.stmt], i: int) -> Iterator[Rearrangement]:
         for k in range(1, len(after) + 1):
             line = f"{header(statement)}  # after {header(after[k - 1])}"
             yield "moved line", line, [*before, *after[:k], statement, *after[k:]]
+        for k in range(i - 1):  # the line before may move as well
+            line = f"{header(statement)}  # before {header(before[k])}"
+            yield "moved line", line, [*before[:k], statement, *before[k:], *after]
     if isinstance(statement, ast.Assign):
         for lines in _in_place(statement):
             text = "; ".join(map(ast.unparse, lines))
@@ -235,6 +249,13 @@ def _around_loop(
         text = f"{header(before[-1])}  # in the loop: {header(loop)}"
         body = [*loop.body[:1], before[-1], *loop.body[1:]]
         yield "moved line", text, [*before, with_body(body), *after]
+
+
+def is_idle(statement: ast.stmt) -> bool:
+    """Return whether a statement is `x = x`, which stands for the reading of an input."""
+    return isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == ast.unparse(
+        statement.value
+    )
 
 
 def parsed(text: str) -> ast.expr:

@@ -14,13 +14,16 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from .changes import Scope, header, of_expression, of_statement, parsed
+from ..task import TASKS
+from .changes import Scope, header, is_idle, of_expression, of_statement, parsed
 
 T = TypeVar("T")
 FILE, PASS = "right program", "_pass"
 # A program is stopped after so many times the passes through loops of the right one.
 MAX_PASSES = 5
 UNLIMITED = 10**9
+# The functions that are called with a request.
+ENTRIES = {*TASKS, "ccd", "fabrik"}
 MODULES = ("np", "np.linalg", "math")
 # What an expression raises whose names have no value yet, or not the usual one.
 NO_VALUE = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
@@ -62,10 +65,15 @@ class Program:
         for loop in ast.walk(self._tree):
             if isinstance(loop, ast.For | ast.While):
                 loop.body.insert(0, ast.Expr(parsed(f"{PASS}()")))
+        for function in self._functions:
+            if function.name in ENTRIES:
+                names = [arg.arg for arg in function.args.args]
+                function.body[:0] = ast.parse("\n".join(f"{n} = {n}" for n in names)).body
         ast.fix_missing_locations(self._tree)
         self.names: dict[str, Any] = {PASS: self._pass}
         self._passes, self._max_passes = 0, UNLIMITED
         self._scopes: dict[str, Scope] = {}  # of the functions that were observed
+        self._lines = set[int]()  # that were executed
         exec(_compiled(self._tree), self.names)
         if "np" in self.names:
             self.names["np"] = FastNumpy()
@@ -105,6 +113,7 @@ class Program:
             function = frame.f_code.co_name
             if frame.f_code.co_filename != FILE or function not in texts:
                 return None
+            self._lines.add(frame.f_lineno)
             shapes_here = shapes.setdefault(function, {})
             for text in texts[function].keys() - shapes_here.keys() if event != "call" else ():
                 with suppress(*NO_VALUE):
@@ -117,10 +126,9 @@ class Program:
             self.count_passes(run)
         finally:
             sys.settrace(before)
-        has_conjugate = "conjugate" in self.names
         for function, shapes_here in shapes.items():
             plain = frozenset(text for text, is_plain in texts[function].items() if is_plain)
-            self._scopes[function] = Scope(shapes_here, plain, has_conjugate)
+            self._scopes[function] = Scope(shapes_here, plain)
 
     def mutants(self) -> Iterator[Mutant]:
         """Yield each change of a line of the functions that were observed."""
@@ -133,13 +141,18 @@ class Program:
         for name in ("body", "orelse"):
             statements = getattr(block, name, [])
             for i, statement in enumerate(statements):
-                if isinstance(statement, ast.Expr):
-                    continue  # a docstring, or the count of passes
+                if isinstance(statement, ast.Expr) or not self._is_executed(statement):
+                    continue  # a docstring, the count of passes, or without effect
                 yield from self._of_expressions(function, statement)
                 for kind, wrong, changed in of_statement(statements, i):
                     change = kind, header(statement), wrong
                     yield from self._mutant(function, change, (block, name), changed)
                 yield from self._of_block(function, statement)
+
+    def _is_executed(self, statement: Any) -> bool:
+        end = statement.body[0].lineno if hasattr(statement, "body") else statement.end_lineno + 1
+        lines = range(statement.lineno, max(end, statement.lineno + 1))
+        return is_idle(statement) or not self._lines.isdisjoint(lines)
 
     def _of_expressions(self, function: ast.FunctionDef, statement: ast.stmt) -> Iterator[Mutant]:
         """Yield the changes of a statement's expressions."""

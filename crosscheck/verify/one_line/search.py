@@ -1,5 +1,6 @@
 """Search the right program with a changed line that gives a solver's wrong answers."""
 
+import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +16,7 @@ from ..contestant import Answer, Exchange, Failure
 from ..explain import MORE, Variant, difference, explain
 from ..fault_programs import PROGRAMS, source_of
 from ..functions import call
-from ..greeting import Greeting
+from ..greeting import Greeting, Step
 from ..judgement import Explanation, TaskReport, Verdict
 from ..kinematics.sweeps import PoseTrial
 from ..precision import judging_greeting
@@ -71,7 +72,7 @@ def changed_lines(
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     best: tuple[Explanation, ...] = ()
-    programs = list(_programs(report, greeting.step.method))
+    programs = list(_programs(report, greeting.step))
     for i, program in enumerate(programs):
         notify(i, len(programs))
         explanations = _of_program(program, partial(_answer, program, report), compared, tolerance)
@@ -112,14 +113,21 @@ def _of_program(
     return explain(variants, telling, lambda _: tolerance, partial(_describe, mutants), TRIAL)[0]
 
 
-def _programs(report: TaskReport, step: str | None) -> Iterator[Program]:
-    """Yield the right programs of a task that have its method, and its kind of step if declared."""
+def _programs(report: TaskReport, step: Step) -> Iterator[Program]:
+    """Yield the right programs of a task that have its method and the declared step."""
     for name, entry in PROGRAMS.items():
-        if entry.get("task") == report.task and f"def {report.method}" in entry["text"]:
-            program = Program(source_of(name))
-            declared = program.names.get("PLUMBOB", {}).get("step", {}).get("method")
-            if step is None or declared in (None, step):
-                yield program
+        if entry.get("task") != report.task or f"def {report.method}" not in entry["text"]:
+            continue
+        program = Program(source_of(name))
+        own = program.names.get("PLUMBOB", {}).get("step", {})
+        choices = {field.upper() for field in own} & program.names.keys()
+        declared = {field: getattr(step, field) for field in own}
+        program.names |= {c: v for c in choices if (v := declared[c.lower()]) is not None}
+        if entry.get("searched", True) and all(
+            value in (None, own[field]) or field.upper() in choices
+            for field, value in declared.items()
+        ):
+            yield program
 
 
 def _compared(report: TaskReport) -> list[Exchange]:
@@ -201,7 +209,12 @@ def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
 
 
 def excerpts(right: str, wrong: str) -> tuple[str, str]:
-    """Return two lines, of long lines only the difference and some letters around it."""
+    """Return two lines, of long lines only the difference and some letters around it.
+
+    `x = x` reads an input: its value alone is returned, and the value in its place.
+    """
+    if reading := re.fullmatch(r"(\w+) = \1", right):
+        right, wrong = reading[1], wrong.removeprefix(f"{reading[1]} = ")
     if max(len(right), len(wrong)) <= LINE or not wrong:
         return right, wrong
     before = _common_length(right, wrong)

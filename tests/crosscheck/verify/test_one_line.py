@@ -57,8 +57,7 @@ def test_the_line_is_printed_where_the_catalogue_knows_no_mistake():
     screen = " ".join(
         "\n".join(terminal.lines(report, Presentation(speaker("en"), "en", ["solver.py"]))).split()
     )
-    assert "(lengths - rest_lengths) ** 2)` is replaced by `" in screen
-    assert "(lengths - stiffnesses) ** 2)`" in screen
+    assert "`rest_lengths` is replaced by `stiffnesses`" in screen
     assert "[PB-LINE-013]" in screen
 
 
@@ -142,5 +141,5 @@ def test_poses_are_compared_as_the_laws_read_them():
     source = fault.wrong_program.replace('{"local_rotations": q,', '{"local_rotations": -q,')
     assert source != fault.wrong_program
     (explanation,) = changed_lines(source, "inverse_kinematics")
-    assert "`P = conjugate(R[parents[joint]])`" in str(explanation.sentence)
+    assert "`P = R[parents[joint]] * [1, -1, -1, -1]`" in str(explanation.sentence)
     assert explanation.share == 1.0
