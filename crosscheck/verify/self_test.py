@@ -185,7 +185,9 @@ def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str,
 
 
 def _track(method: str, /, **inputs: Any) -> Mapping[str, Any]:
-    return predict_track(method, switches([]), Case("", "", inputs, "", sentence("")))
+    outputs = predict_track(method, switches([]), Case("", "", inputs, "", sentence("")))
+    answer = {"positions": outputs["all_positions"]}
+    return answer | {name: outputs[name] for name in outputs if name == "local_rotations"}
 
 
 # Models of the step, and their declarations.
