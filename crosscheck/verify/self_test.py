@@ -18,7 +18,7 @@ from plumbob.reference.skeleton import Pose
 from ..engines import SKELETON_ENGINES, forward_kinematics_by
 from ..engines.mujoco_mass_spring import MujocoMassSpring
 from .case import Case
-from .fault_programs import coded_faults
+from .fault_programs import coded_faults, contestant_of
 from .functions import FunctionContestant
 from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
 from .judgement import Verdict
@@ -154,8 +154,10 @@ def _limits() -> Iterator[Subject]:
 def _robots() -> Iterator[Subject]:
     for task in (ROBOTS, ROBOT_TRACK, ROBOT_JACOBIAN, ROBOT_VELOCITY):
         programs = [fault for fault in coded_faults().values() if fault.task == task]
-        wrong = {fault.name: _function(task, fault.wrong_program) for fault in programs}
-        yield from _subjects("robots", task, wrong)
+        for fault in programs:
+            function = _function(task, fault.wrong_program)
+            greeting = contestant_of(fault.wrong_program).greeting
+            yield Subject(fault.name, "robots", task, function, greeting, fault.name)
         right = {f"program, {task}": _function(task, programs[0].right_program)}
         yield from _subjects(HONEST, task, right)
     yield from _subjects(HONEST, ROBOT_TRACK, {"reference, tracking": _followed})

@@ -40,6 +40,9 @@ WITH_METHODS = ("inverse_kinematics", "track")
 BUILDS_ON = {
     "inverse_kinematics": ("forward_kinematics",),
     "track": ("inverse_kinematics", "forward_kinematics"),
+    "robot_velocity": ("robot_jacobian",),
+    "robot_inverse_kinematics": ("robot_jacobian",),
+    "robot_track": ("robot_jacobian",),
 }
 Notify = Callable[[str, int, int], None]
 
@@ -63,10 +66,10 @@ DISCIPLINES: Mapping[str, Discipline] = {
     "energy": energy,
     "mass_spring_step": Stepping("mass_spring_step"),
     "mass_spring_motion": Stepping("mass_spring_motion"),
-    "robot_inverse_kinematics": robot_inverse_kinematics,
-    "robot_track": robot_track,
     "robot_jacobian": robot_jacobian,
     "robot_velocity": robot_velocity,
+    "robot_inverse_kinematics": robot_inverse_kinematics,
+    "robot_track": robot_track,
 }
 
 
@@ -88,13 +91,12 @@ def verify(
     for task, method in trials(greeting, tasks):
         causes = [r for r in reports if _builds_on(task, method, r)]
         causes.sort(key=lambda cause: BUILDS_ON[task].index(cause.task))
-        known_faults = next(filter(None, map(faults.explaining, causes)), ())
 
         def judge(
             greeting: Greeting,
             task: str = task,
             method: str = method,
-            known: Sequence[SwitchFault] = known_faults,
+            known: Sequence[SwitchFault | str] | None = _known_faults(task, reports, causes),
         ) -> TaskReport:
             cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
             return judge_cases(contestant, task, method, cases, notify, greeting, known)
@@ -104,6 +106,22 @@ def verify(
         report = with_changed_line(report, contestant.greeting, partial(notify, task))
         reports.append(_with_cause(report, causes))
     return Report(contestant.greeting, reports, seed, remarks)
+
+
+def _known_faults(
+    task: str, reports: Sequence[TaskReport], causes: Sequence[TaskReport]
+) -> Sequence[SwitchFault | str] | None:
+    """Return the faults of what a task builds upon, None if that is right or not explained.
+
+    Of robots they are keys, none if their Jacobian is wrong for an unknown reason.
+    """
+    if not task.startswith("robot"):
+        return next(filter(None, map(faults.explaining, causes)), None)
+    if task not in (robot_inverse_kinematics.TASK, robot_track.TASK):
+        return None
+    wrong = [r for r in reports if r.task == robot_jacobian.TASK and r.verdict >= Verdict.WRONG]
+    explanations = [found for report in wrong for found in report.diagnosis.explanations[:1]]
+    return [key for found in explanations for key in found.faults] if wrong else None
 
 
 def _builds_on(task: str, method: str, report: TaskReport) -> bool:
@@ -150,16 +168,16 @@ def judge_cases(
     cases: Sequence[Case],
     notify: Notify = lambda task, count, total: None,
     declared: Greeting | None = None,
-    known_faults: Sequence[SwitchFault] = (),
+    known_faults: Sequence[SwitchFault | str] | None = None,
 ) -> TaskReport:
     """Ask a solver some cases of a task and judge its answers; arguments as of `verify`.
 
     They are judged by what its greeting declares, or by another greeting. What the task builds upon
-    is known to have some faults.
+    is known to have some faults; None if it is right, or they are not known.
     """
     exchanges = _ask(contestant, cases, partial(notify, task))
     judge: Callable[..., TaskReport] = DISCIPLINES[task].judge
-    if known_faults:
+    if known_faults is not None:
         judge = partial(judge, base=known_faults)
     if isinstance(discipline := DISCIPLINES[task], Stepping):
         judge = partial(discipline.judge, notify=partial(notify, task))

@@ -1,25 +1,33 @@
 """Faults of robots that reach and follow targets: the frames that they explain."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import lru_cache, partial
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache, lru_cache, partial
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray
+from plumbob.reference.skeleton import Pose
 
-from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
-from .faults import sentences_of
+from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, Verdict
+from ..laws import finding
+from .faults import TABLE, sentences_of
+from .formulas import branches, evaluate
 from .robot_faults import FAULTS as POSE_FAULTS
 from .robot_faults import JACOBIAN_FAULTS, POSITION_ONLY, RIGHT, RobotFault
-from .robot_textbook import roll_pitch_yaw, rotation_error, sine_error
-from .trajectories import AT_LIMIT, LENIENT, Trajectory
+from .robot_models import feature_of, tool_pose
+from .robot_targets import HALF_TURNS, LIMIT_STEP, STEP, TOLERANCE
+from .robot_textbook import ancestors, roll_pitch_yaw, rotation_error, sine_error
+from .trajectories import AT_LIMIT, LENIENT, Trajectory, twists_between
 
-# Steps agree if they differ by less than this share, with one of these squared dampings [m^2].
-SAME_STEP, DAMPINGS = 0.05, np.geomspace(1e-9, 1.0, 37)[:, None]
+# Steps agree if they differ by less than this share, with one of these squared dampings [m^2];
+# finer ones are tried where they differ by less than the second; without joints, by the third.
+SAME_STEP, COARSE_STEP, MISPLACED = 0.02, 0.2, 0.1
+DAMPINGS, FINE = np.geomspace(1e-9, 1.0, 37)[:, None], np.geomspace(0.5, 2.0, 41)[:, None]
 # The right step is preferred if its gap is below the former, or the smallest times the latter.
-EQUAL_STEP, NEARER = 1e-3, 1.5
+EQUAL_STEP, NEARER, TIE = 3e-3, 1.5, 1e-6
 # Singular values below this share of the largest are small.
 SINGULAR = 0.05
 # Fewer joints off their limits fit any step, and fewer joints reach no pose in general.
@@ -36,12 +44,13 @@ REDUCED = 0.9
 # too large [m^2]; a step goes nowhere if the cosine of its angle with the right one is smaller.
 SAME_SCALE, SHORT, OVERDAMPED = 0.02, (1e-3, 0.3), np.geomspace(0.3, 1e3, 60)[:, None]
 NOWHERE = 0.15
+# So many of the Jacobians that a fault may lead to are tried in steps: the others take long.
+MAX_JACOBIANS = 3
+ONES = np.ones(6)
 # Coordinates are well beyond a limit by more than this [rad, m].
 WELL_BEYOND = 0.01
 # Coordinates that are at a limit are so near to it [rad, m]; speeds agree to this share.
 EXACT, SAME_SPEED = 1e-9, 1e-3
-# A test that is looser than the tolerance lets pass up to so many tolerances.
-LOOSER = 60.0
 SENTENCES = sentences_of("robot_track")
 SENTENCES |= {key: fault.sentence for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()}
 
@@ -53,18 +62,20 @@ class Evidence(NamedTuple):
     explained: BoolArray
 
 
-# Returns whether errors pass, given displacements and angles, (frame, 2), and their tolerances.
-TestOfErrors = Callable[[FloatArray, FloatArray], BoolArray]
 # Returns the frames, given a motion and the laws that it breaks.
 Signature = Callable[[Trajectory, set[str]], Evidence]
 
 
 def diagnosis_of(
-    judgements: Sequence[CaseJudgement], motions: Mapping[str, Trajectory]
+    judgements: Sequence[CaseJudgement],
+    motions: Mapping[str, Trajectory],
+    known: Sequence[str] | None = None,
 ) -> Diagnosis:
     """Return the fault that explains most of the frames that it concerns, if a law is broken.
 
     The signatures of a later tier are vaguer: they count where no fault of a tier before does.
+    `known` are the faults that explain the program's Jacobian, None if that is right. One that does
+    explains a few frames as well; if none does, vague signatures are left out.
     """
     if max((judgement.verdict for judgement in judgements), default=0) < Verdict.WRONG:
         return Diagnosis()
@@ -74,13 +85,43 @@ def diagnosis_of(
         if (motion := motions.get(judgement.case.name))
         and (judgement.verdict >= Verdict.WRONG or motion.inputs["max_iterations"] == 1)
     ]
-    for signatures, by_family, least in TIERS:
-        shares = {key: _share(rule, wrong, by_family) for key, rule in signatures.items()}
+    every = [(motion, set[str]()) for motion in motions.values()]
+
+    @cache
+    def has_right_steps() -> bool:
+        single = [(motion, laws) for motion, laws in wrong if motion.inputs["max_iterations"] == 1]
+        return _share(RIGHT_STEPS, single, False) >= MIN_SHARE
+
+    if explanations := _of_jacobian(known or (), wrong):
+        return Diagnosis(explanations)
+    for tier in TIERS:
+        if tier.is_vague and known is not None:
+            continue
+        if tier.steps is not None and tier.steps is not has_right_steps():
+            continue
+        concerned = every if tier.is_of_all else wrong
+        shares = {
+            key: _share(rule, concerned, tier.by_family) for key, rule in tier.signatures.items()
+        }
         key = max(shares, key=shares.__getitem__)
-        if shares[key] >= least:
+        if shares[key] >= tier.least_share:
             explanation = Explanation((key,), SENTENCES[key], shares[key], 0.0)
             return Diagnosis((explanation,), variant_count=len(FAULTS))
-    return Diagnosis(variant_count=len(FAULTS))
+    hints = feature_of(judgements) if known is None else ()
+    return Diagnosis(hints=hints, variant_count=len(FAULTS))
+
+
+def _of_jacobian(
+    known: Sequence[str], wrong: Sequence[tuple[Trajectory, set[str]]]
+) -> tuple[Explanation, ...]:
+    """Return the first fault of the Jacobian that explains poses or single iterations."""
+    for key in known:
+        signatures = list[Signature]([POSES[key]] if key in POSES else [])
+        signatures += [partial(_is_step, key)] if key in STEP_FAULTS else []
+        share = max((_share(rule, wrong, True, 1) for rule in signatures), default=0.0)
+        if share >= MIN_SHARE:
+            return (Explanation((key,), SENTENCES[key], share, 0.0),)
+    return ()
 
 
 def _broken(judgement: CaseJudgement) -> set[str]:
@@ -88,7 +129,10 @@ def _broken(judgement: CaseJudgement) -> set[str]:
 
 
 def _share(
-    signature: Signature, wrong: Sequence[tuple[Trajectory, set[str]]], by_family: bool
+    signature: Signature,
+    wrong: Sequence[tuple[Trajectory, set[str]]],
+    by_family: bool,
+    min_frames: int = MIN_FRAMES,
 ) -> float:
     """Return the share of the concerned frames that a fault explains, in all cases or the best."""
     families: dict[str, list[Evidence]] = {}
@@ -98,7 +142,7 @@ def _share(
     shares = [0.0]
     for evidence in families.values():
         concerned, explained = (np.concatenate(part) for part in zip(*evidence, strict=True))
-        if concerned.sum() >= MIN_FRAMES:
+        if concerned.sum() >= min_frames:
             shares.append(float((explained & concerned).sum() / concerned.sum()))
     return max(shares)
 
@@ -106,15 +150,35 @@ def _share(
 # ---- poses: the target is reached, as the solver sees it
 
 
-def _reached(fault: RobotFault, motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames in which a fault's kinematics reach the target.
+# Returns the errors to the targets at coordinates as a solver sees them, (frame, 6).
+SeenErrors = Callable[[Trajectory, FloatArray], FloatArray]
+
+
+def _reached(errors_of: SeenErrors, motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames in which the tool is on its target as a solver with a fault sees it.
 
     Of robots with few joints, which reach no target in other kinematics, and of solves that report
-    failure, only frames that do count.
+    failure, only frames that do count. Zeros, and starts that differ from targets in position or
+    rotation alone, tell nothing.
     """
-    explained = motion.errors(_errors(fault, motion, motion.q, _sine_if_near)) <= LENIENT
+    explained = motion.errors(errors_of(motion, motion.q)) <= LENIENT
     is_pose = explained | (motion.q.shape[1] >= POSE_FREEDOMS and motion.is_claimed is not False)
+    is_pose &= motion.q.any(axis=-1) & (motion.case.family != TOLERANCE)
     return Evidence(_ends_off_target(motion) & is_pose, explained)
+
+
+def _from_other_target(
+    formulas: Mapping[str, str], motion: Trajectory, q: FloatArray
+) -> FloatArray:
+    """Return the twists from tools to other targets than the request's."""
+    tool, targets, frames = tool_pose(motion.inputs, q), motion.targets(), np.arange(len(q))
+    names = {
+        "x": targets.positions, "R": targets.rotations, "tool": rotation.to_matrix(tool.rotations),
+        "late": np.maximum(frames - 1, 0), "early": np.minimum(frames + 1, len(q) - 1),
+        "at_start": tool_pose(motion.inputs, motion.previous[:1]).rotations,
+    }  # fmt: skip
+    pose = Pose(*(evaluate(formulas[name], names) for name in ("positions", "rotations")))
+    return twists_between(tool, pose)
 
 
 def _ends_off_target(motion: Trajectory) -> BoolArray:
@@ -124,16 +188,17 @@ def _ends_off_target(motion: Trajectory) -> BoolArray:
 
 def _errors(
     fault: RobotFault,
+    angular: Callable[[FloatArray, FloatArray], FloatArray],
     motion: Trajectory,
     q: FloatArray,
-    angular: Callable[[FloatArray, FloatArray], FloatArray] = rotation_error,
 ) -> FloatArray:
     """Return the displacements and rotations to the target as a solver sees them, (frame, 6)."""
-    frames, targets = fault.frames(motion.inputs, q), fault.targets(motion.inputs, motion.targets())
-    turned = np.zeros_like(targets.positions)
-    if targets.rotations is not None:
-        turned = angular(frames.rotation, rotation.to_matrix(targets.rotations))
-    return np.concatenate([targets.positions - frames.position, turned], axis=-1)
+    frames = fault.frames(motion.inputs, q)
+    positions, rotations = fault.targets(motion.inputs, motion.targets())
+    turned = np.zeros_like(positions)
+    if rotations is not None:
+        turned = angular(frames.rotation, rotations)
+    return np.concatenate([positions - frames.position, turned], axis=-1)
 
 
 def _sine_if_near(R: FloatArray, goals: FloatArray) -> FloatArray:
@@ -146,6 +211,15 @@ def is_falling_at(motion: Trajectory) -> bool:
     """Return whether the error of a pose has fallen from the start and can fall further."""
     before, after = (np.linalg.norm(motion.twists(q), axis=-1) for q in (motion.previous, motion.q))
     return bool(((after < REDUCED * before) & ~_is_at_minimum(motion)).any())
+
+
+def _in_branch(branch: int, motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames off targets, or in a branch of the way from a matrix to a quaternion."""
+    poses = tool_pose(motion.inputs, motion.q).rotations, motion.targets().rotations
+    is_in = np.any([branches(rotation.to_matrix(pose)) == branch for pose in poses], axis=0)
+    is_missed = _ends_off_target(motion)
+    concerned = motion.case.facts["reachable"] & (motion.inputs["max_iterations"] > 1)
+    return Evidence((is_missed | is_in) & concerned, is_missed & is_in)
 
 
 def _is_at_minimum(motion: Trajectory) -> BoolArray:
@@ -187,53 +261,55 @@ def _stopped(motion: Trajectory, laws: set[str]) -> Evidence:
     return Evidence(concerned, np.full(len(motion.q), is_falling_at(motion)))
 
 
-def _with_another_tolerance(
-    is_enough: TestOfErrors, motion: Trajectory, laws: set[str]
-) -> Evidence:
-    """Return the poses that end off the target with a report of success, and pass a test."""
-    errors = np.linalg.norm(motion.twists(motion.q).reshape(-1, 2, 3), axis=-1)
-    concerned = motion.errors(motion.twists(motion.q)) > 1.0
-    concerned &= motion.case.facts["reachable"] & (motion.inputs["max_iterations"] > 1)
-    concerned &= motion.is_pose & (motion.is_claimed is True)
-    tolerances = np.array([motion.inputs["tolerance"], motion.inputs["tolerance_rotation"]])
-    return Evidence(concerned, np.asarray(is_enough(errors, tolerances).all(axis=-1)))
+def _accepted(test: str, motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the starts off their targets that the answers or another test accept."""
+    p, r = np.linalg.norm(motion.twists(motion.previous).reshape(-1, 2, 3), axis=-1).T
+    tp, tr = (motion.inputs[name] for name in ("tolerance", "tolerance_rotation"))
+    is_accepted = np.abs(motion.changes).max(axis=-1) <= EXACT
+    is_accepted &= motion.is_claimed is not False
+    is_passed = np.asarray(evaluate(test, {"p": p, "r": r, "tp": tp, "tr": tr}))
+    concerned = (is_accepted | is_passed) & ((p > tp) | (r > tr))
+    return Evidence(concerned & (motion.case.family == TOLERANCE), is_accepted == is_passed)
 
 
-def _one_sided(motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames with joints beyond limits on one side, and at limits on the other."""
-    q, (lower, upper) = motion.q, (motion.inputs["lower"], motion.inputs["upper"])
-    is_low, is_high = (x.any(axis=-1) for x in (q <= lower + EXACT, q >= upper - EXACT))
-    is_below, is_above = (x.any(axis=-1) for x in (q < lower - AT_LIMIT, q > upper + AT_LIMIT))
-    explained = (is_below & is_high & ~is_above) | (is_above & is_low & ~is_below)
-    return Evidence(np.asarray((is_below & is_high) | (is_above & is_low)), np.asarray(explained))
+def _within(limits: Sequence[str], motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames well beyond limits, and those in which joints keep other limits.
+
+    Frames that keep them without a joint just at one tell nothing, nor do whole turns.
+    """
+    inputs, joints = motion.inputs, np.arange(motion.q.shape[1])
+    names = {**inputs, "first": joints == 0, "last": joints == joints[-1]}
+    ends = [evaluate(limit, names) for limit in limits]  # reversed ones keep joints at either
+    beyond = np.maximum(np.minimum(*ends) - motion.q, motion.q - np.maximum(*ends))
+    middle = 0.5 * (inputs["lower"] + inputs["upper"])
+    wrapped = motion.q - 2.0 * np.pi * np.round((motion.q - middle) / (2.0 * np.pi))
+    is_wrapped = np.abs(np.clip(wrapped, inputs["lower"], inputs["upper"]) - wrapped) <= EXACT
+    is_seen = (motion.excess * ~is_wrapped).max(axis=-1) > WELL_BEYOND
+    is_told, is_kept = (np.abs(beyond) <= EXACT).any(axis=-1), (beyond <= EXACT).all(axis=-1)
+    return Evidence(is_seen & (is_told | ~is_kept), is_kept)
 
 
-def _within(
-    limits: Callable[[Trajectory], tuple[FloatArray, FloatArray]],
-    motion: Trajectory,
-    laws: set[str],
-) -> Evidence:
-    """Return the frames well beyond limits, and those in which joints keep other limits."""
-    lower, upper = limits(motion)
-    is_within = (motion.q >= lower - EXACT) & (motion.q <= upper + EXACT)
-    is_beyond = motion.excess.max(axis=-1) > WELL_BEYOND
-    return Evidence(is_beyond & motion.is_pose, np.asarray(is_within.all(axis=-1)))
+def _within_speeds(limits: str, motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames that are too fast, and those in which joints keep other greatest speeds."""
+    if "velocity_limits" not in motion.inputs:
+        return Evidence(*np.zeros((2, len(motion.q)), dtype=bool))
+    h, speeds = motion.inputs["h"], motion.inputs["velocity_limits"]
+    steps = h * evaluate(limits, {"v": speeds, "h": h}) - np.abs(motion.changes)
+    is_told = (np.abs(steps) <= EXACT).any(axis=-1)
+    is_fast = (np.abs(motion.changes) > h * speeds + EXACT).any(axis=-1)
+    is_kept = (steps >= -EXACT).all(axis=-1)
+    return Evidence(is_fast & (is_told | ~is_kept), is_kept)
 
 
-def _speeds(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
+def _speeds(speeds: str, motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames whose reported speeds are those of a fault."""
     if motion.velocities is None or "velocities and coordinates" not in laws:
         return Evidence(*np.zeros((2, len(motion.q)), dtype=bool))
-    expected = SPEEDS[key](motion.changes / motion.inputs["h"], motion)
+    names = {**motion.inputs, "q": motion.q, "v": motion.changes / motion.inputs["h"]}
+    expected = evaluate(speeds, names)
     gaps = np.abs(motion.velocities - expected).max(axis=-1)
     scale = np.abs(motion.changes).max(axis=-1) / motion.inputs["h"]
     return Evidence(scale > 0.0, gaps <= SAME_SPEED * np.maximum(scale, np.abs(expected).max(-1)))
-
-
-def _late(motion: Trajectory, shift: int) -> Evidence:
-    is_moving = motion.errors(motion.displacements) > LENIENT
-    is_there = motion.errors(motion.twists(motion.q, shift)) <= LENIENT
-    return Evidence(is_moving & motion.is_off_target, is_there)
 
 
 def _by_law(law: str, motion: Trajectory, laws: set[str]) -> Evidence:
@@ -251,10 +327,18 @@ def _step_gap(motion: Trajectory, J: FloatArray, q: FloatArray, twists: FloatArr
     Relative to the step; joints that end at a limit are left out.
     """
     is_free = ~motion.at_limits
-    changes, steps = (motion.q - q) * is_free, _damped_steps(J, twists, DAMPINGS)
-    gap = _least_gap(changes, steps * is_free[:, None], (0.0, np.inf))
+    changes, dampings = (motion.q - q) * is_free, DAMPINGS
+    lengths = np.maximum(np.linalg.norm(changes, axis=-1), 1e-300)
+    for fine in (FINE, None):
+        steps = _damped_steps(J, twists, dampings) * is_free[:, None]
+        gaps = _gaps(changes, steps, (0.0, np.inf)) / lengths[:, None]
+        nearest = gaps.argmin(axis=-1)
+        if fine is None or (gaps.min(axis=-1) > COARSE_STEP).all():
+            break
+        dampings = DAMPINGS[nearest][:, None] * fine
+    gap = gaps.min(axis=-1)
     gap[is_free.sum(axis=-1) < MIN_FREE] = np.inf
-    return np.asarray(gap / np.maximum(np.linalg.norm(changes, axis=-1), 1e-300))
+    return np.asarray(gap)
 
 
 def _damped_steps(J: FloatArray, twists: FloatArray, dampings: FloatArray) -> FloatArray:
@@ -265,12 +349,11 @@ def _damped_steps(J: FloatArray, twists: FloatArray, dampings: FloatArray) -> Fl
     return np.asarray(np.einsum("fij,fik,fdk->fdj", J, U, parts))
 
 
-def _least_gap(changes: FloatArray, steps: FloatArray, factors: tuple[float, float]) -> FloatArray:
-    """Return the least distance of changes from steps times a factor in a range, (frame)."""
+def _gaps(changes: FloatArray, steps: FloatArray, factors: tuple[float, float]) -> FloatArray:
+    """Return distances of changes from steps times a factor in a range, (frame, damping)."""
     lengths = np.maximum((steps * steps).sum(axis=-1), 1e-300)
     scales = np.clip(np.einsum("fdj,fj->fd", steps, changes) / lengths, *factors)
-    gaps = np.linalg.norm(changes[:, None] - scales[..., None] * steps, axis=-1)
-    return np.asarray(gaps.min(axis=-1))
+    return np.asarray(np.linalg.norm(changes[:, None] - scales[..., None] * steps, axis=-1))
 
 
 def _scaled(
@@ -281,42 +364,55 @@ def _scaled(
     steps = _damped_steps(J, motion.twists(motion.previous), dampings)
     lengths = np.linalg.norm(changes, axis=-1)
     is_single = motion.inputs["max_iterations"] == 1 and changes.shape[1] >= MIN_FREE
-    is_close = _least_gap(changes, steps, factors) <= SAME_SCALE * lengths
+    is_close = _gaps(changes, steps, factors).min(axis=-1) <= SAME_SCALE * lengths
     return Evidence((lengths > AT_LIMIT) & is_single, is_close)
 
 
 def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames that end off the minimum, and where a fault's step goes nowhere.
 
-    A solver that accepts only steps that reduce the error ends where its own do not.
+    A solver that accepts only steps that reduce the error ends where its own do not; a frame that
+    its step leaves at the start tells nothing.
     """
-    e, R = motion.twists(motion.q), RIGHT.frames(motion.inputs, motion.q).rotation
     (J,) = RIGHT.jacobians(motion.inputs, motion.q)
     J = J * ~motion.at_limits[:, None]
-    twists = e, TWISTS[key](e, R, motion.targets().rotations)
+    twists = motion.twists(motion.q), _wrong_twists(motion, motion.q, TWISTS[key])
     right, wrong = (np.einsum("fij,fi->fj", J, twist) for twist in twists)
     scale = np.linalg.norm(right, axis=-1) * np.linalg.norm(wrong, axis=-1)
     cosine = (right * wrong).sum(axis=-1) / np.maximum(scale, 1e-300)
-    is_at_start = np.abs(motion.changes).max(axis=-1) <= AT_LIMIT
-    concerned = _ends_off_target(motion) & motion.is_pose & ~_is_at_minimum(motion)
-    return Evidence(concerned, (np.abs(cosine) <= NOWHERE) | (is_at_start & (cosine < 0.0)))
+    is_left = (np.abs(motion.changes).max(axis=-1) <= AT_LIMIT) & (cosine < 0.0)
+    concerned = _ends_off_target(motion) & motion.is_pose & ~_is_at_minimum(motion) & ~is_left
+    return Evidence(concerned, np.abs(cosine) <= NOWHERE)
 
 
 def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
     """Return the gaps to a right step and to steps of faults, by key."""
     J, q, e = motion.jacobians, motion.previous, motion.twists(motion.previous)
-    R, goals = RIGHT.frames(motion.inputs, q).rotation, motion.targets().rotations
-    twists = {key: rule(e, R, goals) for key, rule in TWISTS.items()}
+    twists = {key: _wrong_twists(motion, q, formula) for key, formula in TWISTS.items()}
     if len(q) > 1:
         twists["no feedback"] = motion.displacements
     gaps = {key: _step_gap(motion, J, q, twist) for key, twist in twists.items()}
-    if motion.inputs["max_iterations"] == 1:
+    in_position = np.repeat([1.0, 0.0], 3)
+    gaps[POSITION_ONLY] = np.minimum(
+        *(_step_gap(motion, J * rows[:, None], q, e * in_position) for rows in (in_position, ONES))
+    )
+    is_right = (gaps[""] <= EQUAL_STEP).all()
+    if motion.inputs["max_iterations"] == 1 and not is_right:
         for key, fault in STEP_FAULTS.items():
-            gaps[key] = np.minimum.reduce(list(_fault_gaps(fault, motion)))
+            if ("seen" in fault.rules) == motion.case.family.startswith(HALF_TURNS):
+                gaps[key] = np.minimum.reduce(list(_fault_gaps(fault, motion)))
     if len(q) > 1:
         first, start = np.repeat(J[:1], len(q), axis=0), np.tile(q[0], (len(q), 1))
         gaps["frames start anew"] = _step_gap(motion, first, start, motion.twists(start))
     return gaps
+
+
+def _wrong_twists(motion: Trajectory, q: FloatArray, formula: str) -> FloatArray:
+    """Return the twists to the targets that a fault makes of the right ones, (frame, 6)."""
+    R = RIGHT.frames(motion.inputs, q).rotation
+    angles = _angles_between(R, motion.targets().rotations)
+    names = {"e": motion.twists(q), "R": R, "along": _both, "angles": angles}
+    return np.asarray(evaluate(formula, names))
 
 
 def _angles_between(R: FloatArray, goals: FloatArray) -> FloatArray:
@@ -328,39 +424,97 @@ def _angles_between(R: FloatArray, goals: FloatArray) -> FloatArray:
 def _fault_gaps(fault: RobotFault, motion: Trajectory) -> Iterator[FloatArray]:
     """Yield the gaps to steps with a fault's Jacobians, and rotation vectors or sines."""
     q = motion.previous
-    errors = [_errors(fault, motion, q)]
-    if len(q) == 1:  # the errors of frames are small
-        errors.append(_errors(fault, motion, q, sine_error))
-    for J in fault.jacobians(motion.inputs, q):
+    angulars = [rotation_error, sine_error] if len(q) == 1 else [rotation_error]
+    errors = [_errors(fault, angular, motion, q) for angular in angulars]
+    for J in islice(fault.jacobians(motion.inputs, q), MAX_JACOBIANS):
         yield from (_step_gap(motion, J, q, error) for error in errors)
 
 
 @lru_cache(maxsize=200)
-def _nearest_steps(motion: Trajectory) -> tuple[BoolArray, list[str]]:
-    """Return the frames that move from off their targets, and the key of each frame's step."""
+def _nearest_steps(motion: Trajectory) -> Mapping[str, Evidence]:
+    """Return the frames that move from off their targets, and those of the nearest step, by key.
+
+    Right steps that a fault does not change tell nothing of it.
+    """
     is_off = motion.errors(motion.twists(motion.previous)) > LENIENT
-    is_moving = np.abs(motion.changes).max(axis=-1) > AT_LIMIT
-    gaps = _step_gaps(motion)
+    is_telling = is_off & motion.case.facts["reachable"] & (motion.case.family != LIMIT_STEP)
+    is_telling &= np.abs(motion.changes).max(axis=-1) > AT_LIMIT
+    is_telling &= (~motion.at_limits).sum(axis=-1) >= MIN_FREE
+    gaps = _step_gaps(motion) if is_telling.any() else {"": np.full(len(motion.q), np.inf)}
     keys, table = list(gaps), np.array(list(gaps.values()))
     is_right = (gaps[""] <= SAME_STEP) & (
         gaps[""] <= np.maximum(EQUAL_STEP, NEARER * table.min(axis=0))
     )
     table[0] = np.where(is_right, 0.0, table[0])
-    names = [keys[i] if table[i, f] <= SAME_STEP else "unknown"
-             for f, i in enumerate(table.argmin(axis=0))]  # fmt: skip
-    return is_off & is_moving & motion.case.facts["reachable"], names
+    is_nearest = (table <= table.min(axis=0) + TIE) & (table <= SAME_STEP)
+    is_nearest[1:] &= ~is_nearest[0]
+    evidence = {
+        key: Evidence(is_telling, found) for key, found in zip(keys, is_nearest, strict=True)
+    }
+    for key, fault in STEP_FAULTS.items():
+        if not fault.changes(motion.inputs):
+            evidence[key] = Evidence(is_telling & ~is_nearest[0], is_telling & False)
+    return evidence
 
 
 def _is_step(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames that move, and where the step is nearest to that of a fault."""
-    is_telling, keys = _nearest_steps(motion)
-    return Evidence(is_telling, np.array([name == key for name in keys]))
+    evidence = _nearest_steps(motion)
+    return evidence.get(key, Evidence(evidence[""].concerned, np.zeros(len(motion.q), dtype=bool)))
 
 
 def _single_step(motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames that make a single right step though more are allowed."""
-    concerned = _ends_off_target(motion) & motion.is_pose
-    return Evidence(concerned, _is_step("", motion, laws).explained)
+    """Return the frames that make exactly a single right step though more are allowed."""
+    concerned, q = _ends_off_target(motion) & motion.is_pose, motion.previous
+    gaps = _step_gap(motion, motion.jacobians, q, motion.twists(q)) if concerned.any() else np.inf
+    is_moved = np.abs(motion.changes).max(axis=-1) > AT_LIMIT
+    return Evidence(concerned, is_moved & (gaps <= EQUAL_STEP))
+
+
+def _misplaced(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the single iterations whose shorter step, without some joints, moves the first joints.
+
+    Left out are joints that do not move the tool, and one that is held at its limit.
+    """
+    is_free = ancestors(motion.inputs) > 0.0
+    facts = motion.case.facts
+    if "held" in facts and not facts["is_leaving"]:
+        is_free[facts["held"]] = False
+    is_moved = np.abs(motion.changes) > AT_LIMIT
+    is_single = motion.case.family in (STEP, LIMIT_STEP) and not is_free.all()
+    concerned = np.array(is_single & is_moved.any(axis=-1)) & (np.arange(len(motion.q)) == 0)
+    is_first = np.arange(len(is_free)) < is_free.sum()
+    is_as_meant = (is_moved == is_first) | motion.at_limits  # joints are clamped after the step
+    steps = np.zeros((len(motion.q), len(DAMPINGS), len(is_free)))
+    steps[..., is_first] = _damped_steps(
+        motion.jacobians[..., is_free], motion.twists(motion.previous), DAMPINGS
+    )
+    changes, steps = motion.changes * ~motion.at_limits, steps * ~motion.at_limits[:, None]
+    gaps = _gaps(changes, steps, (0.0, np.inf)).min(axis=-1)
+    is_step = gaps <= MISPLACED * np.linalg.norm(changes, axis=-1)
+    return Evidence(concerned, is_as_meant.all(axis=-1) & is_step)
+
+
+def limit_laws(motion: Trajectory, motions: Iterable[Trajectory]) -> Iterator[Finding]:
+    """Yield whether a single iteration from a joint's limit moves the joints that it should.
+
+    The joint has to stay in all motions: in one it may be clamped by chance.
+    """
+    facts = motion.case.facts
+    if motion.case.family != LIMIT_STEP or _is_still(motion).all():
+        return
+    stays = [_is_still(other)[other.case.facts["held"]] for other in motions
+             if other.case.family == LIMIT_STEP and other.case.facts["is_leaving"]]  # fmt: skip
+    yield finding("steps at limits", facts["is_leaving"] and all(stays), index=facts["held"])
+    is_other = _is_still(motion) & (ancestors(motion.inputs) > 0.0)
+    others = np.setdiff1d(np.flatnonzero(is_other), facts["held"])
+    yield finding("steps at limits, others", len(others), index=facts["held"],
+                  others=", ".join(map(str, others)))  # fmt: skip
+
+
+def _is_still(motion: Trajectory) -> BoolArray:
+    """Return whether joints stay in the first frame, (joint)."""
+    return np.asarray(np.abs(motion.changes[0]) <= EXACT)
 
 
 def _both(R: FloatArray, twists: FloatArray) -> FloatArray:
@@ -375,7 +529,7 @@ def _transposed(motion: Trajectory, laws: set[str]) -> Evidence:
                       error.reshape(-1, 2, 3))  # fmt: skip
     spans = map(_spans, parts * is_free[..., None], motion.changes * is_free)
     is_right = _is_step("", motion, laws).explained | (motion.q.shape[1] < MIN_FREE)
-    return Evidence(_nearest_steps(motion)[0], np.array(list(spans)) & ~is_right)
+    return Evidence(_nearest_steps(motion)[""].concerned, np.array(list(spans)) & ~is_right)
 
 
 def _spans(columns: FloatArray, vector: FloatArray) -> bool:
@@ -415,9 +569,13 @@ def _is_singular(motion: Trajectory) -> BoolArray:
 
 
 def _undamped(motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the jumps from near a singularity, or towards a target beyond reach."""
+    """Return the jumps from near a singularity, or towards a target beyond reach.
+
+    Other frames that are off their targets have another reason.
+    """
     explained = _is_singular(motion) | ~motion.case.facts["reachable"]
-    return _jumping(motion, explained, repeats=MIN_FRAMES)
+    concerned = ((motion.jumps > 1.0) | motion.is_missed) & (motion.jumps > 1.0).any()
+    return Evidence(np.repeat(concerned, MIN_FRAMES), np.repeat(explained, MIN_FRAMES))
 
 
 def _branch(motion: Trajectory, laws: set[str]) -> Evidence:
@@ -428,67 +586,58 @@ def _branch(motion: Trajectory, laws: set[str]) -> Evidence:
     return _jumping(motion, is_on_target & before & ~whole & ~_is_singular(motion))
 
 
-def _clamped_start(motion: Trajectory) -> FloatArray:
-    return np.clip(motion.inputs["start"], motion.inputs["lower"], motion.inputs["upper"])
+class Tier(NamedTuple):
+    """Signatures that are as telling as each other."""
+
+    signatures: Mapping[str, Signature]
+    by_family: bool = False  # whether the family of cases that shows a fault best decides
+    least_share: float = MIN_SHARE
+    is_vague: bool = False  # whether they are symptoms, which wrong kinematics may have
+    steps: bool | None = None  # whether single iterations have to be right, if that matters
+    is_of_all: bool = False  # whether right answers count as well
 
 
-# The speeds that faults report, given those that lead to the coordinates.
-SPEEDS: Mapping[str, Callable[[FloatArray, Trajectory], FloatArray]] = {
-    "velocities zero": lambda v, motion: 0.0 * v,
-    "velocities reversed": lambda v, motion: -v,
-    "velocities as changes": lambda v, motion: motion.inputs["h"] * v,
-    "velocities times the step": lambda v, motion: motion.inputs["h"] ** 2 * v,
-    "velocities of the frame before": lambda v, motion: np.concatenate([0.0 * v[:1], v[:-1]]),
-    "central differences": lambda v, motion: np.gradient(motion.q, motion.inputs["h"], axis=0),
-    "first velocity zero": lambda v, motion: np.concatenate([0.0 * v[:1], v[1:]]),
-    "first velocity from the clamped start": lambda v, motion: np.concatenate(
-        [(motion.q[:1] - _clamped_start(motion)) / motion.inputs["h"], v[1:]]
-    ),
+def _entries(field: str, make: Callable[..., Evidence]) -> dict[str, Signature]:
+    """Return the signatures of the faults that have a field in the catalogue."""
+    entries = (TABLE["robot_track"] | TABLE["robots"]).items()
+    return {key: partial(make, entry[field]) for key, entry in entries if field in entry}
+
+
+# The right twists e of tools, and those of faults.
+TWISTS: Mapping[str, str] = {"": "e"} | {
+    key: entry["twist"] for key, entry in TABLE["robot_track"].items() if "twist" in entry
+}
+STEP_FAULTS = {
+    key: fault
+    for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()
+    if not (fault.relative or fault.order
+            or key in ("columns negated", "lever arms reversed", POSITION_ONLY))
+}  # fmt: skip
+STEP_KEYS = (*(key for key in TWISTS if key), POSITION_ONLY, "no feedback", "frames start anew",
+             *STEP_FAULTS)  # fmt: skip
+RIGHT_STEPS: Signature = partial(_is_step, "")
+SEEN: Mapping[str, Signature] = {
+    key: partial(_reached, partial(_errors, fault, _sine_if_near))
+    for key, fault in POSE_FAULTS.items()
 }
 # What explains whole poses comes before what explains steps, jumps and misses.
 POSES: Mapping[str, Signature] = {
     "angles from zero": _from_zero,
-    "limits on one side": _one_sided,
     "limits ignored": _limits_ignored,
-    "one frame late": lambda motion, laws: _late(motion, -1),
-    "one frame early": lambda motion, laws: _late(motion, 1),
+    **_entries("target", lambda target, *motion: _reached(
+        partial(_from_other_target, target), *motion)),
     "long way round": partial(_by_law, "both signs of a quaternion"),
-    **{key: partial(_speeds, key) for key in SPEEDS},
+    **_entries("speeds", _speeds),
     "wrong time step": partial(_by_law, "velocities and coordinates"),
     "clamped after the solve": _clamped,
-    "looser tolerance": partial(_with_another_tolerance, lambda b, tol: b <= LOOSER * tol),
-    "squared errors": partial(_with_another_tolerance, lambda b, tol: b <= 1.01 * np.sqrt(tol)),
-    **{k: partial(_reached, fault) for k, fault in POSE_FAULTS.items() if k != POSITION_ONLY},
-}
-NOT_STEPS = ("columns negated", "lever arms reversed", POSITION_ONLY)
-STEP_FAULTS = {
-    key: fault
-    for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()
-    if not (fault.relative or fault.order or key in NOT_STEPS)
-}
-# The right twists e of tools with rotation matrices R to goals, and those of faults.
-TWISTS: Mapping[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] = {
-    "": lambda e, R, goals: e,
-    "Jacobian in the tool's frame": lambda e, R, goals: _both(R, e),
-    "error in the tool's frame": lambda e, R, goals: _both(np.swapaxes(R, 1, 2), e),
-    "rotation error reversed": lambda e, R, goals: e * np.repeat([1.0, -1.0], 3),
-    "linear and angular swapped": lambda e, R, goals: np.roll(e, 3, axis=-1),
-    "step reversed": lambda e, R, goals: -e,
-    "position error reversed": lambda e, R, goals: e * np.repeat([-1.0, 1.0], 3),
-    "rotation error in the tool's frame": lambda e, R, goals: np.concatenate(
-        [e[:, :3], np.einsum("fji,fj->fi", R, e[:, 3:])], axis=-1
-    ),
-    "rotation error doubled": lambda e, R, goals: e * np.repeat([1.0, 2.0], 3),
-    "difference of Euler angles": lambda e, R, goals: np.concatenate(
-        [e[:, :3], _angles_between(R, goals)], axis=-1
-    ),
-}
-STEP_KEYS = (*(key for key in TWISTS if key), "no feedback", "frames start anew", *STEP_FAULTS)
+    **{key: signature for key, signature in SEEN.items() if key != POSITION_ONLY},
+}  # fmt: skip
 STEPS: Mapping[str, Signature] = {
     "damping too large": partial(_scaled, OVERDAMPED, (0.9, 1.1)),
     "steps too short": partial(_scaled, DAMPINGS[DAMPINGS < 0.1][:, None], SHORT),
+    "transposed Jacobian": _transposed,  # as with small columns and large damping
     **{key: partial(_is_step, key) for key in STEP_KEYS},
-    "transposed Jacobian": _transposed,
+    "steps of other joints": _misplaced,
     "single step": _single_step,
     "gain too high": _overshoot,
 }
@@ -499,13 +648,6 @@ VAGUE: Mapping[str, Signature] = {
     "success always claimed": _claimed,
     "stopped early": _stopped,
 }
-OTHER_LIMITS: Mapping[str, Signature] = {
-    "limits in degrees": partial(
-        _within, lambda m: (np.radians(m.inputs["lower"]), np.radians(m.inputs["upper"]))
-    ),
-    "limits mirrored": partial(_within, lambda m: (-m.inputs["upper"], m.inputs["upper"])),
-    "limits of half a turn": partial(_within, lambda m: (0.0 * m.q - np.pi, 0.0 * m.q + np.pi)),
-}
 STUCK: Mapping[str, Signature] = {
     key: partial(_is_stuck, key)
     for key in (
@@ -515,14 +657,15 @@ STUCK: Mapping[str, Signature] = {
 }  # fmt: skip
 # Joints in another order leave their limits, but reach their targets.
 ORDERS: Mapping[str, Signature] = {k: POSES[k] for k, fault in POSE_FAULTS.items() if fault.order}
-# Signatures, whether the family of cases that shows a fault best decides, and the least share.
-TIERS: Sequence[tuple[Mapping[str, Signature], bool, float]] = (
-    (ORDERS, False, 0.97),
-    (OTHER_LIMITS, False, 0.97),
-    (POSES, False, MIN_SHARE),
-    (STEPS, True, MIN_SHARE),
-    (STUCK, True, 0.65),
-    ({POSITION_ONLY: partial(_reached, POSE_FAULTS[POSITION_ONLY])}, False, MIN_SHARE),
-    (VAGUE, False, MIN_SHARE),
+TIERS: Sequence[Tier] = (
+    Tier(ORDERS, least_share=0.97),
+    Tier(_entries("limits", _within) | _entries("speed_limits", _within_speeds), False, 0.97),
+    Tier(_entries("test", _accepted), least_share=0.97, is_of_all=True, steps=True),
+    Tier(POSES),
+    Tier(STEPS, by_family=True),
+    Tier(_entries("branch", _in_branch), least_share=0.97, is_of_all=True),
+    Tier(STUCK, by_family=True, least_share=0.65, is_vague=True, steps=False),
+    Tier({"rotation missed": SEEN[POSITION_ONLY]}, is_vague=True, steps=False),
+    Tier(VAGUE, is_vague=True),
 )
-FAULTS = tuple(dict.fromkeys(key for signatures, *_ in TIERS for key in signatures))
+FAULTS = tuple(dict.fromkeys(key for tier in TIERS for key in tier.signatures))

@@ -18,47 +18,45 @@ from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from ..sentence import sentence
-from . import motion_faults, robot_models, rounding
+from . import motion_faults, robot_targets, rounding
 from .motion_faults import is_falling_at
 from .report import report
-from .robot_models import (
-    ANYWHERE,
-    AT,
-    AT_A_LIMIT,
-    BEYOND,
-    CLOSE,
-    FARTHEST,
-    REDUNDANT,
-    STEP,
-    judgement_of,
-    target_of,
-)
+from .robot_models import FARTHEST, REDUNDANT, judgement_of, target_of
+from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, UNREACHED
 from .trajectories import Trajectory
 
-TASK = robot_models.TASK
+TASK = robot_targets.TASK
 # Coordinates that differ by less are the same answer [rad, m].
 SAME = 1e-9
-cases = robot_models.cases
+cases = robot_targets.cases
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-    """Judge coordinates by the laws of poses; name the faults."""
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    base: Sequence[str] | None = None,
+) -> TaskReport:
+    """Judge coordinates by the laws of poses; name the faults, likely those of its Jacobian.
+
+    `base` are these, None if the Jacobian is right.
+    """
     fails_at_zero = _fails_at_zero(exchanges)
-    judgements = [
-        judge_case(
-            exchange, partial(_findings, exchange.case, greeting, fails_at_zero),
-            rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
-            robot_models.timed_solve(exchange.case.inputs),
-        )
-        for exchange in exchanges
-    ]  # fmt: skip
     motions = {
         exchange.case.name: trajectory_of(exchange.case, exchange.answer.values)
         for exchange in exchanges
         if isinstance(exchange.answer, Answer)
         and np.isfinite(exchange.answer.values.get("q", np.nan)).all()
     }
-    diagnosis = motion_faults.diagnosis_of(judgements, motions)
+    judgements = [
+        judge_case(
+            exchange, partial(_findings, exchange.case, motions, greeting, fails_at_zero),
+            rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
+            robot_targets.timed_solve(exchange.case.inputs),
+        )
+        for exchange in exchanges
+    ]  # fmt: skip
+    diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
     if not diagnosis.explained and _ignores_start(motions.values()):
         words = sentence("Its answers do not depend on start.")
         diagnosis = replace(diagnosis, behaviour=words)
@@ -95,19 +93,23 @@ def trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
 
 
 def _findings(
-    case: Case, greeting: Greeting, fails_at_zero: bool, outputs: Mapping[str, Any]
+    case: Case,
+    motions: Mapping[str, Trajectory],
+    greeting: Greeting,
+    fails_at_zero: bool,
+    outputs: Mapping[str, Any],
 ) -> list[Finding]:
     q = outputs.get("q")
     if q is None:
         return [finding("numbers, no coordinates")]
-    if not np.isfinite(q).all():
+    if case.name not in motions:
         return [not_finite("numbers, of a joint", q)]
     judgement = judgement_of(case.inputs, q)
     limits = _limits(judgement, q, case, greeting)
     laws = [limits, *_target_laws(judgement, outputs, case, greeting, fails_at_zero)]
     if case.family == AT_A_LIMIT:
-        laws.append(finding("limits in the solve", trajectory_of(case, outputs).is_clamped[0]))
-    return laws
+        laws.append(finding("limits in the solve", motions[case.name].is_clamped[0]))
+    return [*laws, *motion_faults.limit_laws(motions[case.name], motions.values())]
 
 
 def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greeting) -> Finding:
@@ -137,7 +139,7 @@ def _target_laws(
     angle_bound = judgement.tolerance_rotation + rounding.rotations(greeting.epsilon, joints)
     # The larger of both errors, in multiples of its bound.
     error = max(distance / bound, angle / angle_bound)
-    if case.family not in (BEYOND, STEP):
+    if case.family not in UNREACHED:
         is_hard = case.family in (ANYWHERE, AT_A_LIMIT)
         verdict = Verdict.RIGHT_EXCEPT if is_hard else None
         is_falling = is_hard and error > 1.0 and is_falling_at(trajectory_of(case, outputs))

@@ -7,19 +7,19 @@ from typing import Any
 import numpy as np
 
 from plumbob.reference import rotation
-from plumbob.reference.arguments import FloatArray
+from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.reference.jacobians import jacobian
 
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import LEAST_SHARE, Diagnosis, Explanation, Finding, TaskReport, Verdict
-from ..laws import judge_case, not_finite, of_joints
-from ..sentence import sentence
+from ..laws import digits, judge_case, not_finite, of_joints
+from ..sentence import Sentence, sentence
 from . import robot_models, rounding
 from .report import report
 from .robot_faults import FAULTS as POSE_FAULTS
-from .robot_faults import JACOBIAN_FAULTS, TARGET_FAULTS, RobotFault
+from .robot_faults import JACOBIAN_FAULTS, RobotFault
 from .robot_models import mechanism, tool_pose
 from .robot_textbook import Inputs
 from .skeletons import suits
@@ -86,7 +86,7 @@ CONVENTIONS: Mapping[str, Convention] = {
 FAULTS: Mapping[str, RobotFault] = {
     key: fault
     for key, fault in (JACOBIAN_FAULTS | POSE_FAULTS).items()
-    if not fault.relative and key not in TARGET_FAULTS
+    if not (fault.relative or fault.is_of_target)
 }
 
 
@@ -119,7 +119,8 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         inputs = exchange.case.inputs
         reference = partial(jacobian, mechanism(inputs), inputs["q"], -1)
         allowed = rounding.repeats(greeting.epsilon, exchange.case.facts["size"])
-        judgements.append(judge_case(exchange, laws, allowed, reference, {"jacobian": J}))
+        count = digits(_gap(exchange, J), 1.0) if exchange in answered else None
+        judgements.append(judge_case(exchange, laws, allowed, reference, {"jacobian": J}, count))
     wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
     missed = [exchange for exchange, is_right in zip(answered, matches[name], strict=True)
               if not is_right]  # fmt: skip
@@ -183,6 +184,64 @@ def _findings(
     yield of_joints("Jacobian", errors, _bound(case, greeting))
 
 
+# Groups of which only one may be wrong, and the parts of columns that they have: by whether a part
+# is angular, of a slide, of the joint that carries the tool and of one at the base.
+GROUPS: Sequence[tuple[Sentence, Callable[..., BoolArray]]] = (
+    (sentence("the linear parts of hinges"), lambda part, slide, last, first: ~part & ~slide),
+    (sentence("the angular parts of hinges"), lambda part, slide, last, first: part & ~slide),
+    (sentence("the columns of slides"), lambda part, slide, last, first: slide),
+    (sentence("the last columns"), lambda part, slide, last, first: last),
+    (sentence("the first columns"), lambda part, slide, last, first: first),
+    (sentence("the columns of hinges"), lambda part, slide, last, first: ~slide),
+)  # fmt: skip
+
+
+def _relation(exchanges: Sequence[Exchange], greeting: Greeting) -> tuple[Sentence, ...]:
+    """Return the factors, or else the only parts, by which all answers differ from a convention."""
+    best, most = tuple[Sentence, ...](), 0.0
+    for name, convention in CONVENTIONS.items():
+        columns = [_columns(exchange, name, convention, greeting) for exchange in exchanges]
+        answer, right, bound, *flags = (np.concatenate(x) for x in zip(*columns, strict=True))
+        is_right = np.abs(answer - right).max(axis=-1) <= bound
+        groups = [(words, has_parts(*np.array(flags, dtype=bool))) for words, has_parts in GROUPS]
+        factors = [(answer * right)[group].sum() / max((right[group] ** 2).sum(), 1e-300)
+                   for _, group in groups[:3]]  # fmt: skip
+        scale = sum(f * group for f, (_, group) in zip(factors, groups, strict=False))
+        if (np.abs(answer - scale[:, None] * right).max(axis=-1) <= bound).all():
+            words = sentence(
+                "Your numbers are the right ones times a factor: {linear:.6g} in the linear parts "
+                "of hinges, {angular:.6g} in their angular parts, {slide:.6g} in slides.",
+                linear=factors[0], angular=factors[1], slide=factors[2],
+            )  # fmt: skip
+            return (words,) if np.ptp(factors) > REMAINDER else ()  # else laws.py says it
+        only = [words for words, group in groups if is_right[~group].all()]
+        if only and is_right.mean() > most:
+            words = sentence("Only {what} of your Jacobians are wrong: all else is right.",
+                             what=only[0])  # fmt: skip
+            best, most = (words,), float(is_right.mean())
+    return best
+
+
+def _columns(
+    exchange: Exchange, name: str, convention: Convention, greeting: Greeting
+) -> Sequence[FloatArray]:
+    """Return the answer's and the right parts of columns, (part, 3), bounds, and flags of each."""
+    assert isinstance(exchange.answer, Answer)
+    inputs = exchange.case.inputs
+    shift = 3 if "angular part first" in name else 0
+    both = exchange.answer.values["jacobian"], right_jacobian(inputs, convention)
+    parts = [np.roll(J, shift, axis=0).reshape(2, 3, -1).swapaxes(1, 2) for J in both]
+    joints = np.arange(len(inputs["q"]))
+    flags = (inputs["slides"], joints == inputs["effector"], inputs["parents"] < 0)
+    bounds = np.full(2 * len(joints), _bound(exchange.case, greeting))
+    return (
+        *(part.reshape(-1, 3) for part in parts),
+        bounds,
+        np.repeat([0, 1], len(joints)),
+        *(np.tile(x, 2) for x in flags),
+    )
+
+
 def _diagnosis(
     wrong: Sequence[Exchange], right: Sequence[Exchange], greeting: Greeting
 ) -> Diagnosis:
@@ -193,6 +252,6 @@ def _diagnosis(
     shares = {key: _share(fault, exchanges, greeting) for key, fault in FAULTS.items()}
     key = max(shares, key=shares.__getitem__, default="")
     if not key or shares[key] < LEAST_SHARE:
-        return Diagnosis(variant_count=len(FAULTS))
+        return Diagnosis(hints=_relation(exchanges, greeting), variant_count=len(FAULTS))
     explanation = Explanation((key,), FAULTS[key].sentence, shares[key], 0.0)
     return Diagnosis((explanation,), variant_count=len(FAULTS))

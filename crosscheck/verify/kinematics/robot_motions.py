@@ -17,15 +17,22 @@ from plumbob.reference.tracking import track
 from ..case import Case
 from ..greeting import Greeting
 from ..sentence import Sentence
-from .robot_models import PRECISION, TOLERANCES, mechanism, robots, tool_pose, urdf
+from .robot_models import BENT, PRECISION, TOLERANCES, mechanism, robots, tool_pose, urdf
+from .robot_targets import (
+    HALF_TURNS,
+    TOLERANCE,
+    Request,
+    half_turns,
+    limited_steps,
+    off_by_tolerances,
+    tight_limits,
+)
 from .skeletons import suits
 
 TASK = "robot_track"
 CURVE, FLIPPED, STEPS = "curve", "opposite quaternions", "single steps"
 BOUNDARY = "boundary of the reach"
 FRAMES, ITERATIONS, H = 24, 40, 0.02
-# Angles of the robot of seven hinges, bent so that no singular value of its Jacobian is small.
-BENT = np.array([0.3, -0.6, 0.2, 1.2, -0.3, 0.9, 0.4])
 # The last joint of this robot may rotate so far [rad]: further than half a turn.
 WRIST = 5.0
 # How far a target goes along a ray from the bent arm; a sixth of a metre of it is beyond reach [m].
@@ -44,8 +51,9 @@ class ToolMotion(NamedTuple):
 
     start: FloatArray  # (joint,)
     tool: Pose  # in each frame, without the frames of rest
-    upper: FloatArray | None = None  # limits that are tighter than the robot's
+    inputs: Mapping[str, Any] = {}  # other than the robot's and most motions'
     is_reachable: BoolArray | bool = True  # in each frame
+    facts: Mapping[str, Any] = {}
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -54,13 +62,18 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     collection = robots(rng)
     arm, twisted = collection["seven hinges"], collection["seven hinges in rotated frames 1"]
     arm["upper"][-1], arm["lower"][-1] = WRIST, -WRIST
-    motions = []
+    motions = list[tuple[str, Mapping[str, Any], dict[str, ToolMotion]]]()
     for number in range(1, 4 if thorough else 2):
         q = loop(rng.uniform(-0.6, 0.6, 7), rng)
         curve = ToolMotion(q[0], tool_pose(twisted, q))
         motions += [(f"rotated frames {number}", twisted, {CURVE: curve, STEPS: curve})]
         middle = BENT + rng.uniform(-0.1, 0.1, 7)
         motions += [(f"seven hinges {number}", arm, _motions(arm, middle, rng))]
+        tolerances = TOLERANCES[greeting.precision] * np.ones(2)
+        requests = [*off_by_tolerances(arm, tolerances, rng)]
+        for robot in (arm, twisted):
+            requests += [*tight_limits(robot, rng), *limited_steps(robot, rng)]
+        motions += [_of_request(request, i) for i, request in enumerate(requests)]
     return [
         _case(name, family, arm, motion, greeting)
         for name, arm, families in motions
@@ -98,7 +111,28 @@ def _motions(
         "singularity": ToolMotion(start, tool_pose(arm, elbow)),
         BOUNDARY: _excursion(arm, rng),
         "at a limit": _limited(arm, rng),
+        **_half_turns(arm, q[:8]),
     }
+
+
+def _half_turns(arm: Mapping[str, Any], q: FloatArray) -> dict[str, ToolMotion]:
+    """Return motions of tools rotated by nearly half a turn, solved and in single steps."""
+    motions = dict[str, ToolMotion]()
+    for family, turned in zip(HALF_TURNS, half_turns(arm, q[0]), strict=True):
+        inputs = {"tool_rotation": turned["tool_rotation"]}
+        motion = ToolMotion(q[0], tool_pose(turned, q), inputs)
+        motions |= {family: motion, f"{family}, {STEPS}": motion}
+    return motions
+
+
+def _of_request(
+    request: Request, number: int
+) -> tuple[str, Mapping[str, Any], dict[str, ToolMotion]]:
+    """Return a name, a robot and a motion to a target that rests for a frame."""
+    tool = Pose(*(np.repeat(part[None], 2, axis=0) for part in request.tool))
+    inputs, is_reachable = {**request.robot, **request.options}, request.family == TOLERANCE
+    motion = ToolMotion(request.start, tool, inputs, is_reachable, request.facts)
+    return f"target {number + 1}", request.robot, {request.family: motion}
 
 
 def loop(middle: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -136,9 +170,8 @@ def _draw_excursion(arm: Mapping[str, Any], rng: np.random.Generator) -> ToolMot
 
 def _is_easy(arm: Mapping[str, Any], motion: ToolMotion) -> bool:
     """Return whether two of the reference's solvers end on the last target and do not jump."""
-    upper = arm["upper"] if motion.upper is None else motion.upper
     for solver in ("levenberg_marquardt", "damped_least_squares"):
-        q = followed({**arm, "upper": upper}, motion.start, motion.tool, solver)
+        q = followed({**arm, **motion.inputs}, motion.start, motion.tool, solver)
         error = np.linalg.norm(tool_pose(arm, q[-1]).positions - motion.tool.positions[-1])
         if error > 1e-3 or np.abs(np.diff(q, axis=0)).max() > EASY:
             return False
@@ -157,7 +190,7 @@ def _draw_limited(arm: Mapping[str, Any], rng: np.random.Generator) -> ToolMotio
     joint = max(range(7), key=lambda j: (_is_spare(arm, q, j), free[:, j].max()))
     frame = int(np.argmax(free[:, joint]))
     upper[joint] = start[joint] + 0.1 * free[frame, joint]
-    return ToolMotion(start, Pose(*(part[: frame + 1] for part in tool)), upper)
+    return ToolMotion(start, Pose(*(part[: frame + 1] for part in tool)), {"upper": upper})
 
 
 def _is_spare(arm: Mapping[str, Any], q: FloatArray, joint: int) -> bool:
@@ -189,14 +222,13 @@ def _case(
     name: str, family: str, arm: Mapping[str, Any], motion: ToolMotion, greeting: Greeting
 ) -> Case:
     entry = _TABLE[family]
-    robot = {**arm, "upper": arm["upper"] if motion.upper is None else motion.upper}
-    reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
+    reach = float(sum(np.linalg.norm(x) for x in (*arm["origins"], arm["tool_position"])))
     tolerance, rest = TOLERANCES[greeting.precision], entry.get("rest", 0)
     positions, rotations = (
         np.concatenate([part, np.repeat(part[-1:], rest, axis=0)]) for part in motion.tool
     )
     inputs = {
-        **robot,
+        **arm,
         "start": motion.start,
         "target_positions": positions,
         "target_rotations": rotations,
@@ -204,14 +236,17 @@ def _case(
         "tolerance": tolerance * max(reach, 1.0),
         "tolerance_rotation": tolerance,
         "max_iterations": entry.get("iterations", ITERATIONS),
-        "urdf": urdf(robot),
+        **motion.inputs,
     }
-    if "velocity_limit" in entry:
-        inputs["velocity_limits"] = np.full(len(motion.start), entry["velocity_limit"])
+    inputs["urdf"] = urdf(inputs)
+    if "velocity_limit" in entry:  # the limits of joints differ
+        limits = entry["velocity_limit"] * np.linspace(1.0, 0.5, len(arm["axes"]))
+        inputs["velocity_limits"] = limits
     is_reachable = np.ones(len(positions), dtype=bool)
     is_reachable[: len(motion.tool.positions)] = motion.is_reachable
     facts = {"size": reach, "reachable": is_reachable, "rest": rest, "laps": entry.get("laps", 1)}
     # Coming back from beyond reach there are several configurations.
     facts["certain"] = FRAMES if family == BOUNDARY else len(positions)
+    facts |= motion.facts
     return Case(f"{name}, {family}", TASK, inputs, family, Sentence(entry["about"], {}),
                 facts=facts)  # fmt: skip

@@ -23,7 +23,7 @@ from . import robot_jacobian, robot_models, rounding
 from .faults import sentences_of
 from .report import report
 from .robot_jacobian import CONVENTIONS, right_jacobian
-from .robot_models import mechanism
+from .robot_models import feature_of, mechanism
 from .robot_textbook import Inputs
 from .skeletons import suits
 
@@ -42,6 +42,7 @@ SINGULAR = "a singular pose"
 READING_FAULTS = sentences_of("robot_velocity")
 # Those that invert a singular matrix, which is so for robots with too few joints or too many.
 TOO_FEW, TO_SPARE = "too few joints", "joints to spare"
+CUT = "cut too large"
 # Those whose speeds may be short by any share: with a factor of the transposed matrix, or damping.
 SHORTENED = ("transposed matrix", "damping too large")
 SENTENCES = dict(READING_FAULTS) | {
@@ -221,6 +222,38 @@ def _readings(inputs: Inputs) -> Mapping[str, Equation]:
     }
 
 
+def _in_rows(J: FloatArray, speeds: FloatArray, rank: int) -> FloatArray:
+    """Return speeds without what a matrix of a lower rank than the right one does not use.
+
+    Right speeds solve an equation that lacks rows too, but not with the least length.
+    """
+    inverse = np.linalg.pinv(J, RANK)
+    return inverse @ J @ speeds if np.linalg.matrix_rank(inverse) < rank else speeds
+
+
+def _truncated(equation: Equation, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the speeds nearest to an answer without the smallest singular values, and the shares
+    of the largest that the smallest used one and the largest unused one are.
+    """  # noqa: D205 -- the sentence is long
+    J, twist = equation
+    U, s, V = np.linalg.svd(J, full_matrices=False)
+    sums = np.cumsum((U.T @ twist / np.maximum(s, 1e-300))[:, None] * V, axis=0)
+    count = 1 + int(np.abs(sums - speeds).max(axis=-1).argmin())
+    return sums[count - 1], np.append(s, 0.0)[count - 1 : count + 1] / s[0]
+
+
+# The speeds nearest to an answer that programs with a fault answer, given also the largest speed.
+ANSWERS: Mapping[str, Callable[[Equation, FloatArray, float], FloatArray]] = {
+    CUT: lambda equation, speeds, largest: _truncated(equation, speeds)[0],
+    "speeds clipped": lambda equation, speeds, largest: np.clip(
+        _shortest(equation), -largest, largest
+    ),
+    "speeds scaled down": lambda equation, speeds, largest: (
+        min(1.0, largest / np.abs(_shortest(equation)).max()) * _shortest(equation)
+    ),
+}
+
+
 def _reading(key: str, inputs: Inputs) -> Iterator[Equation]:
     yield _readings(inputs)[key]
 
@@ -229,6 +262,21 @@ def _by_jacobian(key: str, inputs: Inputs) -> Iterator[Equation]:
     """Yield what speeds solve with a wrong Jacobian."""
     for J in robot_jacobian.FAULTS[key].jacobians(inputs, inputs["q"]):
         yield J, _equation(inputs)[1]
+
+
+def _nearest(
+    answers: Mapping[str, FloatArray],
+    equations: Callable[[Inputs], Iterable[Equation]],
+    loss: float,
+    case: Case,
+) -> dict[str, Any]:
+    """Return the speeds nearest to an answer that solve one of a fault's equations."""
+    speeds, rank = answers[case.name], len(_singular_values(case.inputs, case.inputs["q"]))
+    solutions = [
+        solving(equation, _in_rows(equation[0], speeds, rank), loss)[0]
+        for equation in equations(case.inputs)
+    ]
+    return {"velocities": min(solutions, key=lambda one: float(np.abs(one - speeds).max()))}
 
 
 def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagnosis:
@@ -242,20 +290,20 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
         for judgement in ordered
         if isinstance(judgement.answer, Answer) and judgement.case.family != SINGULAR
     }
+    largest = max((float(np.abs(speeds).max()) for speeds in answers.values()), default=0.0)
 
-    def nearest(
-        equations: Callable[[Inputs], Iterable[Equation]], loss: float, case: Case
-    ) -> dict[str, Any]:
+    def answer(key: str, case: Case) -> dict[str, Any]:
         speeds = answers[case.name]
-        solutions = [solving(equation, speeds, loss)[0] for equation in equations(case.inputs)]
-        return {"velocities": min(solutions, key=lambda one: float(np.abs(one - speeds).max()))}
+        return {"velocities": ANSWERS[key](_equation(case.inputs), speeds, largest)}
 
-    readings = [key for key in READING_FAULTS if key not in (TOO_FEW, TO_SPARE)]
+    nearest = partial(_nearest, answers)
+    readings = [key for key in READING_FAULTS if key not in (TOO_FEW, TO_SPARE, *ANSWERS)]
     variants = [
+        *(Variant((key,), partial(answer, key)) for key in ANSWERS),
         *(Variant((key,), partial(nearest, partial(_reading, key),
                                   1.0 if key in SHORTENED else LARGEST_LOSS)) for key in readings),
         *(Variant((key,), partial(nearest, partial(_by_jacobian, key), LARGEST_LOSS))
-          for key in robot_jacobian.FAULTS),
+          for key in robot_jacobian.FAULTS if key != "angular part missing"),
     ]  # fmt: skip
     explanations, count = explain(
         variants,
@@ -265,7 +313,19 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
         lambda keys: either([[SENTENCES[key]] for key in keys]),
         trial=2,
     )  # fmt: skip
-    return Diagnosis(explanations, variant_count=count)
+    hints = feature_of(judgements) if not explanations else ()
+    if explanations and explanations[0].faults == (CUT,):
+        hints = (_cut(judgements, answers),)
+    return Diagnosis(explanations, hints=hints, variant_count=count)
+
+
+def _cut(judgements: Sequence[CaseJudgement], answers: Mapping[str, FloatArray]) -> Sentence:
+    """Return the shares of the largest singular value between which values are cut off."""
+    shares = [_truncated(_equation(judgement.case.inputs), answers[judgement.case.name])[1]
+              for judgement in judgements if judgement.case.name in answers]  # fmt: skip
+    kept, dropped = np.transpose(shares)
+    return sentence("You drop singular values up to {dropped:.2g} of the largest and use those "
+                    "from {kept:.2g} of it.", dropped=dropped.max(), kept=kept.min())  # fmt: skip
 
 
 def _inverted(judgements: Sequence[CaseJudgement]) -> str:

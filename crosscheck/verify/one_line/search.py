@@ -36,6 +36,8 @@ MIN_DIFFERENT = 3
 MIN_SHARE = 0.75
 # Cases for which a right program goes through its loops more often are left out: they take long.
 MAX_PASSES = 200
+# The input that asks for a single iteration of a solver.
+ITERATIONS = "max_iterations"
 # Longer lines are cut to what differs, with so many letters before and after.
 LINE, AROUND = 60, 20
 # Relative differences that rounding and the ends of iterations explain, by precision.
@@ -101,6 +103,9 @@ def _of_program(
             passes[exchange.case.name] = count
             is_same = difference(right, exchange.answer.values) <= tolerance
             (same if is_same else different).append(exchange)
+    # Single iterations of another solver differ everywhere: they decide soon.
+    single = [exchange for exchange in different if exchange.case.inputs.get(ITERATIONS) == 1]
+    different = single if len(single) >= MIN_DIFFERENT else different
     if len(different) < MIN_DIFFERENT:
         return ()
     program.observe(partial(run, different[0].case))
@@ -144,6 +149,8 @@ def _compared(report: TaskReport) -> list[Exchange]:
     wrong = [j for j in judgements if j.verdict >= Verdict.UNDECIDED]
     right = [j for j in judgements if j.verdict < Verdict.UNDECIDED]
     telling = [*wrong[:SMALL], *wrong[SMALL:][-LARGE:], *right[:SMALL]]
+    single = [j for j in right if j.case.inputs.get(ITERATIONS) == 1 and j not in telling]
+    telling += single if judgements is not is_sweep else []
     return [_comparable(Exchange(j.case, j.answer, j.answer)) for j in telling if wrong]
 
 

@@ -10,7 +10,7 @@ from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
-from plumbob.crosscheck.verify.kinematics import robot_models
+from plumbob.crosscheck.verify.kinematics import robot_models, robot_targets
 from plumbob.crosscheck.verify.kinematics.motion_faults import STEP_FAULTS
 from plumbob.crosscheck.verify.kinematics.robot_faults import FAULTS, RIGHT
 from plumbob.crosscheck.verify.kinematics.robot_inverse_kinematics import (
@@ -18,8 +18,9 @@ from plumbob.crosscheck.verify.kinematics.robot_inverse_kinematics import (
     judge,
     solve_by_reference,
 )
-from plumbob.crosscheck.verify.kinematics.robot_models import AT_A_LIMIT, CLOSE, STEP, tool_pose
-from plumbob.crosscheck.verify.kinematics.robot_textbook import rotation_error
+from plumbob.crosscheck.verify.kinematics.robot_models import tool_pose
+from plumbob.crosscheck.verify.kinematics.robot_targets import AT_A_LIMIT, CLOSE, STEP
+from plumbob.crosscheck.verify.kinematics.robot_textbook import UNROTATED, rotation_error
 from plumbob.crosscheck.verify.kinematics.trajectories import twists_between
 from plumbob.crosscheck.verify.verify import judge_cases
 from plumbob.reference import forward_kinematics, jacobians, rotation
@@ -27,10 +28,10 @@ from plumbob.reference.formats import urdf
 from plumbob.reference.skeleton import Pose
 
 GREETING = Greeting(PROTOCOL, (TASK,), name="robots")
-CASES = robot_models.cases(GREETING, "", 0, False)
+CASES = robot_targets.cases(GREETING, "", 0, False)
 FEW = [
     case for case in CASES
-    if case.name.startswith(("two", "seven")) and case.family != robot_models.ANYWHERE
+    if case.name.startswith(("two", "seven")) and case.family != robot_targets.ANYWHERE
 ]  # fmt: skip
 SOLVERS = ("levenberg_marquardt", "damped_least_squares")
 
@@ -72,11 +73,11 @@ def test_a_right_solver_is_right_or_stuck_somewhere():
 ELSEWHERE = ("parents ignored", "effector ignored", "slides not rotated", "slides not rotated 2")
 KEYS = [
     key for key, one in FAULTS.items()
-    if not (one.switches.hinge or one.switches.sign or key in ELSEWHERE)
+    if not (UNROTATED & one.rules.keys() or key in ELSEWHERE)
 ]  # fmt: skip
 QUICK = 6
 SAMPLES = [pytest.param(k, marks=pytest.mark.slow if i % QUICK else ()) for i, k in enumerate(KEYS)]
-NEAR = [case for case in CASES if case.family in (robot_models.AT, CLOSE)]
+NEAR = [case for case in CASES if case.family in (robot_targets.AT, CLOSE)]
 
 
 @pytest.mark.parametrize("key", SAMPLES)
@@ -189,13 +190,13 @@ def test_limits_that_are_kept_only_after_the_solve_are_named():
 
 
 def test_angles_from_zero_to_two_pi_are_named():
-    near = [case for case in FEW if case.family == robot_models.AT]
+    near = [case for case in FEW if case.family == robot_targets.AT]
     exchanges = [exchange_of(case, case.inputs["start"] % (2.0 * np.pi)) for case in near]
     assert named(exchanges) == (Verdict.WRONG, ["angles from zero"])
 
 
 def test_success_that_is_always_claimed_is_named():
-    beyond = [case for case in FEW if case.family == robot_models.BEYOND]
+    beyond = [case for case in FEW if case.family == robot_targets.BEYOND]
     exchanges = [exchange_of(case, case.inputs["start"], converged=True) for case in beyond]
     assert named(exchanges) == (Verdict.WRONG, ["success always claimed"])
 
@@ -205,10 +206,13 @@ def test_a_single_step_where_a_solve_is_asked_is_named():
     for case in [case for case in CASES if case.family == CLOSE]:
         tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
         e = twists_between(tool_pose(case.inputs, case.inputs["start"]), tool)
-        (J,) = RIGHT.jacobians(case.inputs, case.inputs["start"])
-        step = J.T @ np.linalg.solve(J @ J.T + 1e-3 * np.eye(6), e)
-        exchanges.append(exchange_of(case, case.inputs["start"] + step))
+        exchanges.append(exchange_of(case, case.inputs["start"] + damped_step(case, e)))
     assert named(exchanges) == (Verdict.WRONG, ["single step"])
+
+
+def damped_step(case, twist):
+    (J,) = RIGHT.jacobians(case.inputs, case.inputs["start"])
+    return J.T @ np.linalg.solve(J @ J.T + 1e-3 * np.eye(6), twist)
 
 
 @pytest.mark.parametrize(
@@ -220,36 +224,45 @@ def test_other_limits_than_the_request_s_are_named(key, limit):
     assert named(exchanges) == (Verdict.WRONG, [key])
 
 
-@pytest.mark.parametrize(("share", "key"), [(20.0, "looser tolerance"), (200.0, "squared errors")])
-def test_another_test_of_convergence_is_named(share, key):
-    """Answers whose tool is off by many tolerances, on its way from a start near the target."""
+PASSES = {
+    "looser tolerance": lambda errors, tolerances: (errors <= 10.0 * tolerances).all(),
+    "squared errors": lambda errors, tolerances: (errors**2 <= tolerances).all(),
+}
+
+
+@pytest.mark.parametrize("key", PASSES)
+def test_another_test_of_convergence_is_named(key):
+    """Starts near their targets that the test accepts, and right single iterations."""
     exchanges = []
-    for case in [case for case in CASES if case.family == CLOSE]:
-        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
-        right, _ = robot_models.solved(case.inputs, case.inputs["start"], tool)
-        e = twists_between(tool_pose(case.inputs, case.inputs["start"]), tool)
-        error = np.linalg.norm(e[3:]) / case.inputs["tolerance_rotation"]
-        part = min(share / max(error, 1.0), 1.0)
-        exchanges.append(
-            exchange_of(case, right + part * (case.inputs["start"] - right), converged=True)
-        )
+    for case in [c for c in CASES if c.family in (robot_targets.TOLERANCE, STEP)]:
+        start, inputs = case.inputs["start"], case.inputs
+        tool = Pose(inputs["target_position"], inputs["target_rotation"])
+        e = twists_between(tool_pose(inputs, start), tool)
+        tolerances = np.array([inputs["tolerance"], inputs["tolerance_rotation"]])
+        if case.family == STEP:
+            exchanges.append(exchange_of(case, start + damped_step(case, e)))
+        elif PASSES[key](np.linalg.norm(e.reshape(2, 3), axis=-1), tolerances):
+            exchanges.append(exchange_of(case, start, converged=True))
+        else:
+            q, _ = robot_models.solved(inputs, start, tool)
+            exchanges.append(exchange_of(case, q, converged=True))
     assert named(exchanges) == (Verdict.WRONG, [key])
 
 
 def test_an_answer_that_does_not_depend_on_the_start_is_reported():
     answers = {}
-    for case in [c for c in CASES if c.family in (robot_models.AT, CLOSE, robot_models.ANYWHERE)]:
+    for case in [c for c in CASES if c.family in (robot_targets.AT, CLOSE, robot_targets.ANYWHERE)]:
         answers.setdefault(case.inputs["target_position"].tobytes(), case.inputs["start"])
     exchanges = [
         exchange_of(case, answers[case.inputs["target_position"].tobytes()])
         for case in CASES
-        if case.inputs["target_position"].tobytes() in answers
+        if case.inputs["target_position"].tobytes() in answers and case.inputs["max_iterations"] > 1
     ]
     assert "start" in str(judge(exchanges, GREETING, "").diagnosis.behaviour)
 
 
 def test_failure_at_the_target_alone_says_what_divides_by_zero():
-    near = [case for case in CASES if case.family in (robot_models.AT, CLOSE)]
+    near = [case for case in CASES if case.family in (robot_targets.AT, CLOSE)]
     exchanges = []
     for case in near:
         tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])

@@ -24,6 +24,7 @@ from plumbob.crosscheck.verify.kinematics import (
     resample,
     robot_inverse_kinematics,
     robot_models,
+    robot_targets,
     track,
 )
 from plumbob.crosscheck.verify.kinematics.polylines import Polyline
@@ -210,8 +211,8 @@ ROBOTS = Greeting(1, (robot_inverse_kinematics.TASK,))
 @pytest.fixture(scope="module")
 def robot():
     """A request for a robot of seven hinges, from where its target is."""
-    cases = robot_models.cases(ROBOTS, "", 0, False)
-    return next(c for c in cases if c.name.startswith("seven") and c.family == robot_models.AT)
+    cases = robot_targets.cases(ROBOTS, "", 0, False)
+    return next(c for c in cases if c.name.startswith("seven") and c.family == robot_targets.AT)
 
 
 @pytest.mark.parametrize(("share", "verdict"), EDGES)
@@ -220,7 +221,8 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
     """Sixteen epsilons of the largest limit, 2.4 rad."""
     q = robot.inputs["start"].copy()
     q[3] = robot.inputs[side][3] + sign * share * 16 * EPSILON * 2.4
-    (found, *_) = robot_inverse_kinematics._findings(robot, ROBOTS, False, {"q": q})
+    motions = {robot.name: robot_inverse_kinematics.trajectory_of(robot, {"q": q})}
+    (found, *_) = robot_inverse_kinematics._findings(robot, motions, ROBOTS, False, {"q": q})
     assert (found.law, found.verdict, found.index) == ("limits kept", verdict, 3)
 
 

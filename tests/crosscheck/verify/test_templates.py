@@ -14,13 +14,13 @@ import planted_programs
 import pytest
 
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting, Step, System
-from plumbob.crosscheck.verify.kinematics import robot_jacobian, robot_models
+from plumbob.crosscheck.verify.kinematics import robot_jacobian, robot_targets
 from plumbob.crosscheck.verify.message import encode_case
 from plumbob.crosscheck.verify.solvers import open_contestant
 from plumbob.crosscheck.verify.task import TASKS
 from plumbob.crosscheck.verify.templates import GREETING_FIELDS, LANGUAGES, template
 
-ROBOT = next(iter(robot_models.cases(Greeting(PROTOCOL, ()), "", 0, False)))
+ROBOT = next(iter(robot_targets.cases(Greeting(PROTOCOL, ()), "", 0, False)))
 JACOBIAN = next(iter(robot_jacobian.cases(Greeting(PROTOCOL, ()), "", 0, False)))
 REQUESTS = [
     *planted_programs.requests(),

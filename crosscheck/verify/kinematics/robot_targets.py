@@ -1,0 +1,277 @@
+"""Requests to bring a robot's tool to a pose, many of which show a single rule of a program."""
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from itertools import count, islice
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.reference import rotation, solve_ik
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.jacobians import jacobian
+from plumbob.reference.skeleton import Pose
+
+from ..case import Case
+from ..greeting import Greeting
+from ..sentence import sentence
+from .robot_models import (
+    BENT,
+    IDENTITY,
+    ITERATIONS,
+    PRECISION,
+    REDUNDANT,
+    TOLERANCES,
+    mechanism,
+    robots,
+    solved,
+    target_of,
+    tool_pose,
+    urdf,
+)
+from .robot_textbook import ancestors
+from .skeletons import suits
+
+TASK = "robot_inverse_kinematics"
+# Starts at the answer, near it, anywhere; targets that nothing reaches; a joint that comes to its
+# limit while the others can reach the target.
+AT, CLOSE, ANYWHERE, BEYOND = "start at the target", "near start", "any start", "beyond reach"
+AT_A_LIMIT = "at a limit"
+# Starts off their targets by multiples of one tolerance; limits close to the start; a single
+# iteration, without a joint at its limit and with one.
+TOLERANCE, TIGHT, STEP = "off by tolerances", "tight limits", "a single iteration"
+LIMIT_STEP = "a single iteration at a limit"
+# Single iterations of tools that are rotated by nearly half a turn about x, y and z.
+HALF_TURNS = tuple(f"half a turn about {axis}" for axis in "xyz")
+# Requests whose targets need not be reached.
+UNREACHED = (BEYOND, STEP, TIGHT, LIMIT_STEP, *HALF_TURNS)
+# From a start so near to an answer [rad, m] no other minimum than the target's is nearer.
+NEAR = 0.1
+# How far single iterations and motions to a limit begin from an answer [rad, m]; of slides a share.
+DISTANCE, SLIDE = 0.3, 0.1
+# The largest share of a joint in a movement that the others can make up for in few iterations.
+SHARE, DRAWS = 0.5, 50
+# A test passes all errors up to some multiple of the tolerance, which lies between two of these;
+# degrees are between the second and the third. No start is farther off [m, rad].
+RATIOS, MAX_ERROR = (3.0, 20.0, 90.0, 500.0), 0.6
+# The larger of two tolerances, of which square roots are other multiples than of the smaller.
+LARGE_TOLERANCE = 1e-3
+# Limits of single iterations [rad, m], which even steps of wrong kinematics do not reach.
+UNLIMITED = 100.0
+# How near tight limits are, and how far beyond the target's joints are [rad].
+WIDTHS, AWAY, FEW_ITERATIONS, SOME_ITERATIONS = (0.03, 0.09), 1.0, 40, 100
+# Squared dampings with all of which a joint moves to one side, by this share of the longest step.
+STEP_DAMPINGS, CLEAR = (1e-6, 1e-3, 1e-1), 0.3
+# Rotations by nearly half a turn [rad].
+NEARLY_HALF = 2.9
+# The joints of robots that show one feature of their kinematics near their targets alone.
+ONE_FEATURE = 3
+_SEED = 1955
+
+
+class Request(NamedTuple):
+    """A pose that a robot's tool is to have."""
+
+    family: str
+    robot: Mapping[str, Any]
+    start: FloatArray
+    tool: Pose  # the target
+    options: Mapping[str, Any] = {}  # inputs other than most requests'
+    facts: Mapping[str, Any] = {}
+
+
+def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
+    """Return robots of one joint to seven, each from starts at, near and far from the target."""
+    rng = np.random.default_rng([_SEED, seed])
+    tolerance = TOLERANCES[greeting.precision]
+    cases = []
+    for name, robot in robots(rng).items():
+        for number in range(3 if thorough else 1):
+            numbers: dict[str, Iterator[int]] = {}
+            for request in _requests(name, robot, tolerance, rng):
+                order = next(numbers.setdefault(request.family, count()))
+                label = f"{name}, pose {number + 1}, {request.family}"
+                label += ("", " again")[order] if order < 2 else f" {order + 1}"
+                if suits(robot["parents"], greeting, robot["effector"]):
+                    cases.append(_case(label, request, tolerance))
+    return cases
+
+
+def _case(name: str, request: Request, tolerance: float) -> Case:
+    robot = request.robot
+    inputs = {
+        **robot,
+        "start": request.start,
+        "target_position": request.tool.positions,
+        "target_rotation": request.tool.rotations,
+        "tolerance": tolerance * max(_size(robot), 1.0),
+        "tolerance_rotation": tolerance,
+        "max_iterations": ITERATIONS,
+        "urdf": urdf(robot),
+        **request.options,
+    }
+    about = sentence("A robot of {joints} joints.", joints=len(request.start))
+    is_reachable = np.array([request.family not in (BEYOND, TIGHT)])
+    facts = {"size": _size(robot), "reachable": is_reachable, **request.facts}
+    return Case(name, TASK, inputs, request.family, about, facts=facts)
+
+
+def _size(robot: Mapping[str, Any]) -> float:
+    """Return the sum of a robot's lengths [m]."""
+    reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
+    return reach + float(robot["slides"] @ (robot["upper"] - robot["lower"]))
+
+
+def _requests(
+    name: str, robot: dict[str, Any], tolerance: float, rng: np.random.Generator
+) -> Iterator[Request]:
+    """Yield the requests of a robot: those that the fewest robots show come last."""
+    lower, upper, joints = robot["lower"], robot["upper"], len(robot["lower"])
+    answer = lower + (upper - lower) * rng.uniform(0.2, 0.8, joints)
+    close = np.clip(answer + rng.uniform(-NEAR, NEAR, joints), lower, upper)
+    anywhere = rng.uniform(lower, upper)
+    tool = tool_pose(robot, answer)
+    unreachable = tool._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * _size(robot))
+    yield Request(AT, robot, answer, tool)
+    yield Request(CLOSE, robot, close, tool)
+    if joints != ONE_FEATURE:
+        yield Request(ANYWHERE, robot, anywhere, tool)
+        yield Request(BEYOND, robot, anywhere, unreachable, {"max_iterations": FEW_ITERATIONS})
+    if joints >= REDUNDANT - 1 or not ancestors(robot).all():
+        yield from _single_steps(robot, rng)
+        yield from limited_steps(robot, rng)
+    if joints >= REDUNDANT:
+        draws = (_draw_limited(robot, rng) for _ in range(DRAWS))
+        yield from islice((draw for draw in draws if draw is not None), 2)
+        yield from tight_limits(robot, rng)
+    if name == "seven hinges":
+        tolerances = tolerance * np.array([max(_size(robot), 1.0), 1.0])
+        yield from off_by_tolerances(robot, tolerances, rng)
+        for family, turned in zip(HALF_TURNS, half_turns(robot, BENT), strict=True):
+            for near in BENT + rng.uniform(-NEAR, NEAR, (3, joints)):
+                tool = tool_pose(turned, near)
+                yield Request(family, turned, BENT, tool, {"max_iterations": 1})
+            yield Request(CLOSE, turned, BENT, tool)
+
+
+def _single_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[Request]:
+    far = np.full(len(robot["lower"]), UNLIMITED)
+    for _ in range(2):
+        answer = _middle(robot, rng)
+        start = answer + _distances(robot) * rng.uniform(-1.0, 1.0, len(answer))
+        options = {"max_iterations": 1, "lower": -far, "upper": far}
+        options["urdf"] = urdf({**robot, **options})
+        yield Request(STEP, robot, start, tool_pose(robot, answer), options)
+
+
+def _draw_limited(robot: dict[str, Any], rng: np.random.Generator) -> Request | None:
+    """Return limits that one joint would leave on its way to a target, if the others suffice.
+
+    By Klein and Huang (1983), a step of least length of all joints has a share of the joint that is
+    the diagonal entry of J^+ J.
+    """
+    start = _middle(robot, rng)
+    target = tool_pose(robot, start + _distances(robot) * rng.uniform(-1.0, 1.0, len(start)))
+    changes = solved(robot, start, target)[0] - start
+    J = jacobian(mechanism(robot), start, -1)
+    is_spare = (np.diag(np.linalg.pinv(J) @ J) < SHARE) & ~robot["slides"]
+    joint = int(np.argmax(np.abs(changes) * is_spare))
+    side = "upper" if changes[joint] > 0.0 else "lower"
+    limits = robot[side].copy()
+    limits[joint] = start[joint] + 0.3 * changes[joint]
+    limited = {**robot, side: limits}
+    solvers = ("levenberg_marquardt", "damped_least_squares")
+    results = [solved(limited, start, target, solver) for solver in solvers]
+    is_solvable = is_spare[joint] and all(is_reached for _, is_reached in results)
+    return Request(AT_A_LIMIT, limited, start, target) if is_solvable else None
+
+
+def limited_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[Request]:
+    """Yield single iterations from a joint's limit, which its step leaves or would pass.
+
+    The joint is neither the first nor the last, so that steps of other joints show.
+    """
+    for is_leaving in (True, False):
+        for _ in range(DRAWS):
+            start = _middle(robot, rng)
+            target = tool_pose(robot, start + _distances(robot) * rng.uniform(-1, 1, len(start)))
+            steps = _steps(robot, start, target)
+            is_clear = (np.sign(steps) == np.sign(steps[0])).all(axis=0)
+            is_clear &= np.abs(steps).min(axis=0) > CLEAR
+            if is_clear[1:-1].any():
+                joint = 1 + int(np.argmax(is_clear[1:-1]))
+                side = "lower" if (steps[0, joint] > 0.0) == is_leaving else "upper"
+                limits = robot[side].copy()
+                limits[joint] = start[joint]
+                facts = {"held": joint, "is_leaving": is_leaving}
+                limited, options = {**robot, side: limits}, {"max_iterations": 1}
+                yield Request(LIMIT_STEP, limited, start, target, options, facts)
+                break
+
+
+def _steps(robot: Mapping[str, Any], start: FloatArray, tool: Pose) -> FloatArray:
+    """Return steps along the gradient and with several dampings, the longest joint's 1."""
+    here, J = tool_pose(robot, start), jacobian(mechanism(robot), start, -1)
+    turn = rotation.multiply(tool.rotations, rotation.conjugate(here.rotations))
+    error = np.concatenate([tool.positions - here.positions, rotation.logarithm(turn)])
+    steps = [J.T @ error]
+    steps += [J.T @ np.linalg.solve(J @ J.T + d * np.eye(6), error) for d in STEP_DAMPINGS]
+    return np.array([step / np.abs(step).max() for step in steps])
+
+
+def tight_limits(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[Request]:
+    """Yield targets far beyond limits that differ from joint to joint."""
+    scale = np.where(robot["slides"], SLIDE, 1.0)
+    for _ in range(3):
+        start = _middle(robot, rng)
+        below, above = rng.uniform(*WIDTHS, (2, len(start))) * scale
+        limited = {**robot, "lower": start - below, "upper": start + above}
+        tool = tool_pose(robot, start + AWAY * scale * rng.choice([-1.0, 1.0], len(start)))
+        yield Request(TIGHT, limited, start, tool, {"max_iterations": FEW_ITERATIONS})
+
+
+def off_by_tolerances(
+    robot: Mapping[str, Any], tolerances: FloatArray, rng: np.random.Generator
+) -> Iterator[Request]:
+    """Yield starts whose position or rotation is off by multiples of two sizes of tolerances."""
+    pose = tool_pose(robot, BENT)
+    for scale in (1.0, max(LARGE_TOLERANCE / tolerances[1], 10.0)):
+        position, angle = (scale * tolerances).tolist()
+        options = {"tolerance": position, "tolerance_rotation": angle}
+        options["max_iterations"] = SOME_ITERATIONS
+        for part, ratio in [(part, ratio) for part in range(2) for ratio in RATIOS]:
+            vector = rng.standard_normal(3)
+            vector *= ratio * scale * tolerances[part] / np.linalg.norm(vector)
+            rotated = rotation.multiply(rotation.exponential(vector), pose.rotations)
+            shifted = pose._replace(positions=pose.positions + vector)
+            target = pose._replace(rotations=rotated) if part else shifted
+            if np.linalg.norm(vector) <= MAX_ERROR:
+                yield Request(TOLERANCE, robot, BENT, target, options)
+
+
+def half_turns(robot: Mapping[str, Any], start: FloatArray) -> Iterator[Mapping[str, Any]]:
+    """Yield the robot with tools that are rotated by nearly half a turn about x, y and z."""
+    for axis in np.eye(3) + 0.1:
+        turn = rotation.exponential(NEARLY_HALF * axis / np.linalg.norm(axis))
+        flange = tool_pose({**robot, "tool_rotation": IDENTITY}, start).rotations
+        yield {**robot, "tool_rotation": rotation.multiply(rotation.conjugate(flange), turn)}
+
+
+def _distances(robot: Mapping[str, Any]) -> FloatArray:
+    """Return how far joints may be from an answer at the start."""
+    return np.where(robot["slides"], SLIDE * DISTANCE, DISTANCE)
+
+
+def _middle(robot: Mapping[str, Any], rng: np.random.Generator) -> FloatArray:
+    """Return coordinates well within the limits."""
+    lower, upper = robot["lower"], robot["upper"]
+    return np.asarray(lower + (upper - lower) * rng.uniform(0.3, 0.7, len(lower)))
+
+
+def timed_solve(inputs: Mapping[str, Any]) -> Callable[[], object]:
+    """Return the call of the reference that answers a request, to be timed."""
+    options = {name: inputs[name] for name in PRECISION}
+    return partial(
+        solve_ik, mechanism(inputs), inputs["start"], target_of(inputs), "levenberg_marquardt",
+        restarts=0, **options,
+    )  # fmt: skip
