@@ -184,6 +184,48 @@ def _classes(
     return classes
 
 
+def ending_test(
+    tests: Sequence[tuple[Callable[[Any], Any], float | None, Sentence]],
+    runs: Sequence[Any],
+    is_early: Sequence[bool],
+) -> Sentence | None:
+    """Return the test by which iterations end too early, None if no test does.
+
+    Its quantity has a number for each iterate, those at early ends smaller than any before an end,
+    and smaller than the constant of a test that has one. The first test is of the number of
+    iterations, which a single run does not show.
+    """
+    for quantity, constant, words in tests:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = [quantity(run) for run in runs]
+        last = [v[-1] for v, early in zip(values, is_early, strict=True) if early]
+        before = np.concatenate([v[:-1] for v in values])
+        largest, least = float(max(last)), float(min(before, default=np.inf))
+        if constant is not None and not largest < constant <= least:
+            continue
+        bound = separating_bound(largest, least)
+        if bound is not None and (len(last) > 1 or quantity is not tests[0][0]):
+            count = -round(max(last))
+            return Sentence(words.template, {
+                **words.values, "bound": bound, "sweeps": count, "iterations": count,
+            })  # fmt: skip
+    return None
+
+
+def separating_bound(last: float, before: float) -> float | None:
+    """Return a round number above `last` and not above `before`, None if there is none.
+
+    It is 1, 2 or 5 times a power of ten if possible, else their geometric mean.
+    """
+    if not last < before < np.inf:
+        return None
+    if last <= 0.0:
+        return before
+    power = 10.0 ** math.floor(math.log10(last))
+    numbers = (power * factor for factor in (1.0, 10.0, 5.0, 2.0))
+    return next((n for n in numbers if last < n <= before), math.sqrt(last * before))
+
+
 def together(mistakes: Sequence[Sentence]) -> Sentence:
     """Return the sentences of one to three simultaneous mistakes as a single sentence."""
     if len(mistakes) == 1:

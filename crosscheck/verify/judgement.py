@@ -98,9 +98,14 @@ class Diagnosis:
     is_double: bool = False  # whether the answers have more digits than single precision leaves
 
     @property
+    def share(self) -> float:
+        """The share of the answers that the best explanation reproduces."""
+        return max((explanation.share for explanation in self.explanations), default=0.0)
+
+    @property
     def explained(self) -> bool:
         """Whether a fault is likely."""
-        return any(explanation.share >= LEAST_SHARE for explanation in self.explanations)
+        return self.share >= LEAST_SHARE
 
 
 def smallest_failure(judgements: Sequence[CaseJudgement], explained: bool) -> CaseJudgement | None:

@@ -4,7 +4,6 @@ The textbook's sweeps are followed up to the pose of each answer, which shows af
 ended.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
+from ..explain import ending_test
 from ..greeting import Greeting
 from ..judgement import Explanation
 from ..sentence import Sentence, sentence, with_code
@@ -22,8 +22,6 @@ from .sweeps import PoseTrial
 KEY = "early by another test"
 # A pose is that after a sweep up to this share of the skeleton's size, by precision.
 SAME_POSE = {"double": 1e-7, "single": 1e-5}
-# So many solves end after the same sweep before their number is taken for the reason.
-MIN_SOLVES = 2
 
 
 class FollowedSolve(NamedTuple):
@@ -137,32 +135,14 @@ def explanation(
     ended = [solve for solve in solves.values() if solve is not None]
     if not all((s := solves[trial.case.name]) is not None and s.is_early for trial in wrong):
         return None
-    for quantity, constant, words in TESTS:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            values = [quantity(solve) for solve in ended]
-        last = [v[-1] for v, solve in zip(values, ended, strict=True) if solve.is_early]
-        before = np.concatenate([v[:-1] for v in values])
-        largest, bound = float(max(last)), float(min(before, default=np.inf))
-        if constant is not None and not largest < constant <= bound:
-            continue
-        if largest < bound < np.inf and (len(last) >= MIN_SOLVES or quantity is not TESTS[0][0]):
-            fields = {"sweeps": -round(largest), "bound": round_number(largest, bound)}
-            test = Sentence(words.template, {**words.values, **fields})
-            entry = TABLE["stop"][KEY]
-            count = {"count": len(last), "total": len(ended), "test": test}
-            return Explanation(
-                (KEY,), with_code(entry["code"], Sentence(entry["sentence"], count)), 1.0, 0.0
-            )
-    return None
-
-
-def round_number(low: float, high: float) -> float:
-    """Return 1, 2 or 5 times a power of ten in (low, high], or their mean if none is in it."""
-    if low <= 0.0:
-        return high
-    power = 10.0 ** math.floor(math.log10(low))
-    numbers = (power * factor for factor in (1.0, 10.0, 5.0, 2.0))
-    return next((n for n in numbers if low < n <= high), math.sqrt(low * high))
+    test = ending_test(TESTS, ended, [solve.is_early for solve in ended])
+    if test is None:
+        return None
+    count = sum(solve.is_early for solve in ended)
+    entry, fields = TABLE["stop"][KEY], {"count": count, "total": len(ended), "test": test}
+    return Explanation(
+        (KEY,), with_code(entry["code"], Sentence(entry["sentence"], fields)), 1.0, 0.0
+    )
 
 
 def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> FollowedSolve | None:
