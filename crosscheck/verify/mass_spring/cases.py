@@ -141,11 +141,16 @@ def _lengths(x: FloatArray, springs: Any) -> FloatArray:
 def scenes(seed: int, thorough: bool) -> list[SpringScene]:
     """Return all scenes in their order; the long list has more random cloths."""
     more, base = 12 if thorough else 0, _cloth(seed, 3, name="cloth 3 x 3")
+    pair, stiff = (
+        [SpringScene(**_fields(_TABLE["pair_defaults"] | entry)) for entry in _TABLE[name]]
+        for name in ("pair", "stiff")
+    )
     return [
-        *(SpringScene(**_fields(_TABLE["pair_defaults"] | entry)) for entry in _TABLE["pair"]),
+        *pair,
         *(_random(seed, **entry) for entry in _TABLE["random"]),
         *_changes(seed),
         *(_random(seed, **entry) for entry in _TABLE["small_step"]),
+        *stiff,
         base,
         *(_transformed(base, **_fields(entry)) for entry in _TABLE["symmetry"]),
         *(_cloth(seed, **entry) for entry in _TABLE["cloth"]),
@@ -167,9 +172,13 @@ def _fields(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _random(seed: int, count: int, **entry: Any) -> SpringScene:
-    """Return a triangle or a chain of triangles in which every spring has numbers of its own."""
+    """Return a triangle or a chain of triangles in which every spring has numbers of its own.
+
+    Every third spring is listed from its higher end.
+    """
     rng = np.random.default_rng([11, seed, count])
     springs = [(i, j) for i in range(count) for j in range(i + 1, min(i + 3, count))]
+    springs[1::3] = [(j, i) for i, j in springs[1::3]]
     rest = np.cumsum(rng.uniform(0.2, 0.4, (count, 3)) * [1.0, -0.6, 0.5], axis=0)
     rest += [0.0, 1.6, 0.0]
     n = len(springs)

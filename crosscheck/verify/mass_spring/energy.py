@@ -6,11 +6,13 @@ several places, and only differences to the first of them count.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import groupby, islice, product
+from functools import partial
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
 
+from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
@@ -21,7 +23,7 @@ from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskRepo
 from ..laws import digits, finding, hints_of, judge_case
 from ..sentence import sentence
 from .cases import task_cases
-from .faults import ENERGY_FAULTS, Option, apply, combined
+from .faults import ENERGY_FAULTS, Option, apply, pairs
 from .formulas import evaluate
 from .model import StepModel
 from .problem import (
@@ -32,6 +34,7 @@ from .problem import (
     state_of,
     system_of,
 )
+from .relations import Sample, fitted, relation_of
 
 TASK = "energy"
 Energies = Mapping[str, Any]
@@ -42,8 +45,8 @@ ADDENDS = ("kinetic", "elastic", "gravitational")
 FORMULAS = ("kinetic", "elastic")
 ROUNDINGS = 16.0
 MAX_EXPLANATIONS = 3
-# Of solvers that answer sums alone, so many faults at once are assumed.
-MAX_TOGETHER = 2
+# The number of wrong answers to which a fault's number is fitted: more have more local minima.
+FITTED = 8
 # Gauss points that integrate the force along a displacement of a tenth of a spring to rounding.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
@@ -85,7 +88,7 @@ def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
     parts = np.array([kinetic, elastic_energy(p), -(p.constant * p.positions).sum()])
     for fault in faults:
         parts *= fault.parts or 1.0
-        if len(fault.energy) == 1:
+        if fault.energy and fault.energy[0] in ADDENDS:
             parts[ADDENDS.index(fault.energy[0])] = evaluate(fault.formula, p)
     energies = dict(zip(ADDENDS, parts.tolist(), strict=True))
     return {name: _sum(name, faults, energies) for name in SUMS} | energies
@@ -95,9 +98,12 @@ def _sum(whole: str, faults: Sequence[Option], energies: Energies) -> float:
     """Return the total or the potential energy of these parts, as faults of sums have it [J]."""
     factors = {part: 1.0 for part in ADDENDS if whole == "total" or part != "kinetic"}
     for fault in faults:
-        if len(fault.energy) == 3 and fault.energy[0] == whole:
-            named = SUMS["potential"] if fault.energy[1] == "potential" else fault.energy[1:2]
-            factors |= dict.fromkeys(named, fault.energy[2])
+        if fault.energy[:1] != (whole,):
+            continue
+        if fault.formula:
+            return float(evaluate(fault.formula, None, energies))
+        named = SUMS["potential"] if fault.energy[1] == "potential" else fault.energy[1:2]
+        factors |= dict.fromkeys(named, fault.energy[2])
     return sum(factor * energies[part] for part, factor in factors.items())
 
 
@@ -226,48 +232,77 @@ def _by_energy(
         if found.verdict >= Verdict.WRONG
     }
     groups = [
-        [fault for fault in ENERGY_FAULTS if _explains(fault, name, answers, epsilon)]
+        _mistakes(name, answers, epsilon)
         for name in PARTS
-        if name in named and (_is_no_sum(name, answers, epsilon) if name in SUMS else name in wrong)
+        if name in named and (name in wrong or name in SUMS)
+        if not _explains((), name, answers, epsilon)
     ]
     explained = [group for group in groups if group]
     share = len(explained) / max(len(groups), 1)
-    return list(islice(product(*explained), MAX_EXPLANATIONS)) if explained else [], share
+    if not explained:
+        return [], share
+    keys = [{fault.key for fault in group} for group in explained]
+    if common := [fault for fault in explained[0] if all(fault.key in group for group in keys)]:
+        return [(fault,) for fault in common[:MAX_EXPLANATIONS]], share
+    return list(islice(product(*explained), MAX_EXPLANATIONS)), share
 
 
-def _is_no_sum(whole: str, answers: Answers, epsilon: float) -> bool:
-    """Return whether an energy is not the sum of the answered parts in any case."""
-    return any(
-        abs(values[whole] - _sum(whole, (), values)) > 8.0 * tolerance(p, epsilon)
-        for p, values in answers
-    )
+def _mistakes(name: str, answers: Answers, epsilon: float) -> list[Option]:
+    """Return the faults that give all answers of an energy, else one with a number that they tell.
+
+    The last resort is another combination of known terms.
+    """
+
+    def difference(fault: Option) -> FloatArray:
+        gaps = [(_expected((fault,), name, p, e) - e[name]) / tolerance(p, epsilon)
+                for p, e in wrong[:FITTED]]  # fmt: skip
+        return np.array(gaps)
+
+    wrong = [answer for answer in answers if not _explains((), name, [answer], epsilon)]
+    concerned = [
+        fault
+        for fault in ENERGY_FAULTS
+        if fault.rare != "relation"
+        and (fault.energy[:1] == (name,) or not (fault.energy or name in SUMS))
+    ]
+    samples = [
+        Sample(np.array([e[name]]), partial(evaluate, p=p, values=e), 4.0 * tolerance(p, epsilon))
+        for p, e in answers
+    ]
+    plain = (fault for fault in concerned if fault.at is None)
+    fits = (fitted(fault, difference, 1.0) for fault in concerned if fault.at is not None)
+    relation = (relation_of(name, samples) for _ in range(1))
+    for faults in (plain, filter(None, fits), filter(None, relation)):
+        if matching := [fault for fault in faults if _explains((fault,), name, answers, epsilon)]:
+            return matching
+    return []
 
 
-def _explains(fault: Option, name: str, answers: Answers, epsilon: float) -> bool:
-    """Return whether a fault gives all answers of an energy, a sum from the answered parts."""
-    is_of_sum = len(fault.energy) == 3
-    if (name in SUMS) != is_of_sum or (is_of_sum and fault.energy[0] != name):
-        return False
+def _expected(faults: Sequence[Option], name: str, p: SpringProblem, energies: Energies) -> float:
+    """Return an energy of a solver with faults, a sum from the answered parts."""
+    return _sum(name, faults, energies) if name in SUMS else predict(faults, p)[name]
+
+
+def _explains(faults: Sequence[Option], name: str, answers: Answers, epsilon: float) -> bool:
+    """Return whether faults, or the formula if there are none, give all answers of an energy."""
     return all(
-        abs(
-            values[name]
-            - (_sum(name, (fault,), values) if is_of_sum else predict((fault,), p)[name])
-        )
-        <= 8.0 * (tolerance(p, epsilon) + epsilon * abs(values[name]))
-        for p, values in answers
+        abs(e[name] - _expected(faults, name, p, e))
+        <= 8.0 * (tolerance(p, epsilon) + epsilon * abs(e[name]))
+        for p, e in answers
     )
 
 
 def _together(answers: Answers, epsilon: float) -> list[tuple[Option, ...]]:
     """Return the fewest faults that explain all answers, at most two."""
-    for count, same_size in groupby(combined(ENERGY_FAULTS), key=len):
+    usual = [fault for fault in ENERGY_FAULTS if fault.rare != "relation" and fault.at is None]
+    for groups in ([()], zip(usual), pairs(usual)):
         matches = [
             faults
-            for faults in same_size
+            for faults in groups
             if all(_matches(predict(faults, p), p, values, epsilon) for p, values in answers)
         ]
-        if matches or count == MAX_TOGETHER:
-            return matches
+        if matches:
+            return [faults for faults in matches if faults]
     return []
 
 

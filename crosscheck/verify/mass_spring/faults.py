@@ -2,7 +2,6 @@
 
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from fractions import Fraction
 from functools import partial
 from itertools import combinations, product
 from pathlib import Path
@@ -10,13 +9,14 @@ from typing import Any, NamedTuple
 
 from ..sentence import Sentence, sentence, with_code
 from .formulas import evaluate
-from .model import Integrator, StepModel, SystemMatrix
+from .model import RIGHT_MATRIX, Integrator, StepModel, SystemMatrix
 from .problem import SpringProblem
 
 # Aspects of a step in the order of the computation.
 ASPECTS = (
-    "time", "inertia", "masses", "gravity", "springs", "damping", "damper", "integrator",
-    "matrix", "substeps", "pins", "velocity", "update", "scaling", "frames", "factorisation",
+    "time", "reading", "inertia", "masses", "gravity", "springs", "damping", "damper", "integrator",
+    "matrix", "substeps", "pins", "velocity", "update", "scaling", "frames", "answers",
+    "factorisation",
 )  # fmt: skip
 # Aspects of which the forces and the matrix of an implicit step may have different versions.
 IN_PARTS = ("masses", "springs", "damping")
@@ -37,26 +37,24 @@ class Option(NamedTuple):
     parts: tuple[float, ...] = ()  # factors of the kinetic, elastic and gravitational energy
     # which energy has another formula, or a sum, one of its parts, and the factor of that
     energy: tuple[Any, ...] = ()
-    # what it makes of all forces at the end: a formula, or true for a key of OUTPUTS in forces.py
-    output: str | bool = False
+    output: str = ""  # a formula of what all forces become at the end
     formula: str = ""  # of the energy that `energy` names
     # whether it is not tried together with faults of a step, nor with two of forces, or "alone"
     rare: bool | str = False
     part: str = ""  # the part of a step that it changes alone: forces, matrix; "" or both
+    # of a fault with a number that answers tell: least and greatest, and the fault with a number
+    range: tuple[float, float] | None = None
+    at: "Callable[[float], Option] | None" = None
 
 
 # What an entry of faults.toml may hold.
 FIELDS = {
     *("code", "program", "lines", "example", "key", "sentence", "tasks", "parts", "rare", "each"),
-    *("scale", "set", "change", "length", "formula", "model", "integrator", "matrix", "value"),
-    *("part", "energy", "output"),
+    *("scale", "set", "change", "formula", "model", "integrator", "matrix", "value"),
+    *("part", "energy", "output", "whole", "fit", "length", "pull", "damper_pull", "damper_rest"),
 }
-# The numbers with which springs pull as if they were of another length L.
-OF_OTHER_LENGTH = {
-    "rest_lengths": "0.0 * r",
-    "stiffnesses": "k * (({L}) - r) / ({L})",
-    "dampings": "c * (l / ({L})) ** 2",
-}
+# Fields of a problem that are formulas, computed wherever a step needs them.
+RULES = ("length", "pull", "damper_pull", "damper_rest")
 
 
 def read_table(name: str) -> dict[str, Any]:
@@ -69,36 +67,69 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
     ranges = entry.get("each", {})
     for numbers in product(*ranges.values()):
         values = dict(zip(ranges, numbers, strict=True))
-        fields = dict(entry.get("model", {}))
-        if "value" in entry:
-            fields[aspect] = entry["value"].format(**values)
-        elif "matrix" in entry:
-            fields["matrix"] = _matrix(entry["matrix"] | values)
-        elif "integrator" in entry:
-            fields["integrator"] = Integrator(**entry["integrator"], **values)
-        elif aspect == "time" and values:
-            fields["time"] = float(Fraction(values["time"]))
-        elif aspect in values and aspect in StepModel._fields:
-            fields[aspect] = values[aspect]
-        name = " ".join(map(str, fields.get("integrator", ()))) or f"{aspect} {entry.get('value')}"
-        key = entry.get("key", name).format(**values)
-        message, parts = Sentence(entry["sentence"], values), tuple(entry.get("parts", ()))
-        message = with_code(entry["code"], message) if "code" in entry else message
-        rare = entry.get("rare", False)
-        rare = any(x in rare for x in values.values()) if isinstance(rare, list) else rare
-        change, part = _change(entry, values), entry.get("part", "")
-        energy = tuple(values.get(name, name) for name in entry.get("energy", ()))
-        output = entry.get("output", False)
-        formula = entry.get("formula", "").format(**values)
-        output = output.format(**values) if isinstance(output, str) else output
-        option = Option(
-            key, aspect, message, change, fields, parts, energy, output, formula, rare, part
-        )
+        if "fit" in entry:
+            yield _fitted(aspect, entry, values)
+            continue
+        option = _option(aspect, entry, values)
         yield option
-        if aspect == "inertia":
-            yield option._replace(fields={**fields, "right_start": True})
-        if "matrix" in entry and "dv" not in fields and entry["matrix"].get("masses", 1.0) == 1.0:
-            yield option._replace(fields={**fields, "dv": True})
+        if aspect == "inertia" and option.fields:
+            yield option._replace(fields={**option.fields, "right_start": True})
+        matrix = option.fields.get("matrix")
+        if matrix is not None and "dv" not in option.fields and matrix.masses == 1.0:
+            yield option._replace(fields={**option.fields, "dv": True})
+        if matrix is not None and matrix.pins_element is None:
+            right = matrix._replace(pins_element=RIGHT_MATRIX.element)
+            yield option._replace(fields={**option.fields, "matrix": right})
+
+
+def _fitted(aspect: str, entry: Mapping[str, Any], values: Mapping[str, Any]) -> Option:
+    """Return a fault with a number that answers tell, until then that of its example or the least.
+
+    Its fields, its key and its sentence depend on the number.
+    """
+    ((name, (low, high)),) = entry["fit"].items()
+
+    def at(number: float) -> Option:
+        return _option(aspect, entry, {**values, name: number})
+
+    example = entry.get("example", {}).get(name, low)
+    return at(example)._replace(range=(low, high), at=at)
+
+
+def _option(aspect: str, entry: Mapping[str, Any], values: Mapping[str, Any]) -> Option:
+    """Return the option of an entry with numbers by their names."""
+    fields = _filled(dict(entry.get("model", {})), values)
+    if "value" in entry:
+        fields[aspect] = entry["value"].format(**values)
+    elif "matrix" in entry:
+        fields["matrix"] = _matrix(entry["matrix"] | values)
+    elif "integrator" in entry:
+        fields["integrator"] = Integrator(**entry["integrator"], **values)
+    elif aspect in values and aspect in StepModel._fields and not fields:
+        fields[aspect] = values[aspect]
+    name = " ".join(map(str, fields.get("integrator", ()))) or f"{aspect} {entry.get('value')}"
+    message = Sentence(entry["sentence"], values)
+    rare = entry.get("rare", False)
+    return Option(
+        key=entry.get("key", name).format(**values),
+        aspect=aspect,
+        sentence=with_code(entry["code"], message) if "code" in entry else message,
+        change=_change(entry, values),
+        fields=fields,
+        parts=tuple(entry.get("parts", ())),
+        energy=tuple(values.get(name, name) for name in entry.get("energy", ())),
+        output=entry.get("output", "").format(**values),
+        formula=entry.get("formula", "").format(**values),
+        rare=any(x in rare for x in values.values()) if isinstance(rare, list) else rare,
+        part=entry.get("part", ""),
+    )
+
+
+def _filled(content: Any, values: Mapping[str, Any]) -> Any:
+    """Return the content of a table with numbers in place of their names in its texts."""
+    if isinstance(content, dict):
+        return {name.format(**values): _filled(inner, values) for name, inner in content.items()}
+    return content.format(**values) if isinstance(content, str) else content
 
 
 def _matrix(fields: Mapping[str, Any]) -> SystemMatrix:
@@ -108,19 +139,25 @@ def _matrix(fields: Mapping[str, Any]) -> SystemMatrix:
 
 
 def _in_parts(option: Option, entry: Mapping[str, Any]) -> Iterator[Option]:
-    """Yield a fault of a step, then the same fault of the forces and of the matrix alone."""
+    """Yield a fault of a step, then the same fault of the forces and of the matrix alone.
+
+    In the equation for dv the damper's force stands besides its matrix, and M on one side only.
+    """
     yield option
-    if option.part or option.aspect not in IN_PARTS:
+    in_dv, is_whole = {**option.fields, "dv": True}, bool(option.part or entry.get("whole"))
+    if "damper_pull" in entry:
+        yield option._replace(fields=in_dv)
+    if is_whole or option.rare not in (False, "parts") or option.aspect not in IN_PARTS:
         return
     for part, words in _FAULTS["part"].items():
         where = with_code(words["code"], Sentence(words["sentence"], {}))
         message = sentence("{fault} {where}", fault=option.sentence, where=where)
         alone = option._replace(key=f"{option.key}, {part} only", sentence=message, part=part)
         has_dampers = option.aspect == "damping" or "set" in entry
-        if option.aspect != "damping" or part == "matrix":
+        if option.aspect != "damping" or part != "forces":
             yield alone
-        if has_dampers and part == "forces":  # those of dampers stand in the equation for dv only
-            yield alone._replace(fields={"dv": True})
+        if (part == "forces" and has_dampers) or (part == "matrix" and option.aspect == "masses"):
+            yield alone._replace(fields=in_dv)
 
 
 def _change(entry: Mapping[str, Any], values: Mapping[str, Any]) -> Change | None:
@@ -130,16 +167,16 @@ def _change(entry: Mapping[str, Any], values: Mapping[str, Any]) -> Change | Non
         return lambda p: {name: f * getattr(p, name) for name, f in entry["scale"].items()}
     if "set" in entry:
         return lambda p: entry["set"]
-    formulas = entry.get("change", {})
-    if "length" in entry:
-        formulas = {name: f.format(L=entry["length"]) for name, f in OF_OTHER_LENGTH.items()}
-    return partial(_evaluated, formulas, values) if formulas else None
+    if not entry.keys() & {"change", *RULES}:
+        return None
+    filled = _filled({name: entry[name] for name in entry.keys() & {"change", *RULES}}, values)
+    changes = filled.pop("change", {})
+    rules = {name: partial(_value, formula, values) for name, formula in filled.items()}
+    return lambda p: rules | {field: evaluate(f, p, values) for field, f in changes.items()}
 
 
-def _evaluated(
-    formulas: Mapping[str, str], values: Mapping[str, Any], p: SpringProblem
-) -> Mapping[str, Any]:
-    return {name: evaluate(formula, p, values) for name, formula in formulas.items()}
+def _value(formula: str, numbers: Mapping[str, Any], p: SpringProblem, **values: Any) -> Any:
+    return evaluate(formula, p, {**numbers, **values})
 
 
 _FAULTS = read_table("faults.toml")
@@ -164,9 +201,23 @@ def faults_of(task: str, aspects: Sequence[str]) -> tuple[Option, ...]:
     return options
 
 
-FORCE_FAULTS = faults_of("forces", ("gravity", "springs", "damping", "forces"))
-ENERGY_FAULTS = faults_of("energy", ("kinetic", "elastic", "springs", "gravitational", "sum"))
-STEP_FAULTS = faults_of("step", ASPECTS)
+def relation_fault(aspect: str, values: Mapping[str, Any]) -> Option:
+    """Return the fault of an aspect that a quantity is a combination of known terms, `relation`."""
+    entry = next(entry for entry in _FAULTS[aspect] if "relation" in entry.get("each", {}))
+    return _option(aspect, entry, values)
+
+
+FORCE_FAULTS = faults_of("forces", ("reading", "gravity", "springs", "damping", "forces"))
+ENERGY_FAULTS = faults_of(
+    "energy", ("reading", "kinetic", "elastic", "springs", "gravitational", "sum")
+)
+STEP_FAULTS, OF_ENERGY = (
+    tuple(fault for fault in faults_of("step", ASPECTS) if (fault.part == "energy") is is_energy)
+    for is_energy in (False, True)
+)
+EARLY_END = _FAULTS["end"][0]
+# Of iterations that are followed.
+FOLLOWED_FAULTS = (*faults_of("step", ("followed",)), *OF_ENERGY)
 
 
 def apply(
@@ -185,11 +236,9 @@ def apply(
     return p.changed(linear=linear) if is_apart else p, model
 
 
-def combined(options: Sequence[Option]) -> Iterator[tuple[Option, ...]]:
-    """Yield each option, then each pair and each triple without rare ones, of other aspects."""
-    paired = [option for option in options if option.rare != "alone"]
-    usual = [option for option in options if not option.rare]
-    for count, choices in enumerate((options, paired, usual), start=1):
-        for faults in combinations(choices, count):
-            if len({fault.aspect for fault in faults}) == count:
-                yield faults
+def pairs(options: Sequence[Option]) -> Iterator[tuple[Option, ...]]:
+    """Yield two faults of different aspects, none of which may be alone only."""
+    usual = [option for option in options if option.rare != "alone" and option.at is None]
+    for first, second in combinations(usual, 2):
+        if first.aspect != second.aspect:
+            yield first, second

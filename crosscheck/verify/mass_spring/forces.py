@@ -1,7 +1,8 @@
 """The task mass_spring_forces: its cases and its judgement."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,13 @@ from plumbob.reference.mass_spring import forces as reference_forces
 
 from ..case import Case
 from ..contestant import Answer, Exchange
-from ..explain import Variant, either, explain, first_broken
+from ..explain import TRIAL, Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, hints_of, judge_case
 from ..sentence import Sentence, sentence
 from .cases import task_cases
-from .faults import FORCE_FAULTS, Option, apply, combined
+from .faults import FORCE_FAULTS, Option, apply, pairs
 from .formulas import evaluate
 from .laws import symmetry
 from .model import StepModel
@@ -30,13 +31,13 @@ from .problem import (
     state_of,
     system_of,
 )
+from .relations import Sample, fitted, relation_of
 
 TASK = "mass_spring_forces"
 # Rounding of a length by the coordinates' epsilon, times the stiffness, and of some ten terms.
 ROUNDINGS = 8.0
 # An error is like a force if the cosine of the angle between them is larger.
 ALIKE = 0.7
-_SENTENCES = {fault.key: fault.sentence for fault in FORCE_FAULTS}
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -115,90 +116,54 @@ def _balance(p: SpringProblem, output: FloatArray, allowed: float) -> Finding:
     return finding("momentum balance", gap, allowed * np.sqrt(p.count) * 2.0)
 
 
-def _pulls(p: SpringProblem) -> FloatArray:
-    """Return the force of each spring and its damper on its first end [N], (spring, 3)."""
-    single = p.changed(
-        masses=np.ones(2 * len(p.springs)),
-        springs=np.arange(2 * len(p.springs)).reshape(-1, 2),
-        positions=p.positions[p.springs.ravel()],
-        velocities=p.velocities[p.springs.ravel()],
-    )
-    x, v = single.positions, single.velocities
-    return (spring_forces(single, x) + damper_forces(single, x, v))[::2]
+def _predict(
+    faults: tuple[Option, ...], problems: Mapping[str, SpringProblem], case: Case
+) -> Mapping[str, Any]:
+    return {"forces": forces_with(faults, problems[case.name])}
 
 
-def _shortened(vectors: FloatArray, limit: float) -> FloatArray:
-    """Return vectors that are no longer than a limit."""
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors * np.minimum(1.0, limit / np.maximum(lengths, 1e-300))
+def forces_with(faults: Sequence[Option], p: SpringProblem) -> FloatArray:
+    """Return the forces of a solver with faults."""
+    p = apply(faults, p, StepModel())[0]
+    output = next((fault.output for fault in faults if fault.output), None)
+    return np.asarray(evaluate(output, p)) if output else all_forces(p)
 
 
-# What faults make of all forces in the end, by their keys, and with a number that answers show.
-OUTPUTS: Mapping[str, Callable[[SpringProblem, float], FloatArray]] = {
-    "components of forces clipped": lambda p, limit: np.clip(all_forces(p), -limit, limit),
-    "components of springs' forces clipped": lambda p, limit: (
-        p.constant + p.incidence.T @ np.clip(_pulls(p), -limit, limit)
-    ),
-    "springs' forces clipped": lambda p, limit: (
-        p.constant + p.incidence.T @ _shortened(_pulls(p), limit)
-    ),
-    "drag": lambda p, factor: all_forces(p) - factor * p.velocities,
-}
+def variants(
+    exchanges: Sequence[Exchange], epsilon: float, sentences: dict[str, Sentence]
+) -> Iterator[Variant]:
+    """Yield the right formula, its faults, another combination of its terms, and pairs of faults.
 
-
-def _numbers(
-    exchanges: Sequence[Exchange], problems: Mapping[str, SpringProblem]
-) -> dict[str, float]:
-    """Return the limits and factors that faults of outputs have, if a solver has these faults."""
+    The sentence of each fault is noted by its key.
+    """
+    problems = {exchange.case.name: problem_of(exchange.case.inputs) for exchange in exchanges}
     answers = [
         (problems[exchange.case.name], exchange.answer.values["forces"])
         for exchange in exchanges
         if isinstance(exchange.answer, Answer)
     ]
-    errors = [(all_forces(p) - f, p.velocities) for p, f in answers]
-    squares = [float((v * v).sum()) for _, v in errors]
-    rates = [float((e * v).sum()) / s for (e, v), s in zip(errors, squares, strict=True) if s]
-    return {
-        "components of forces clipped": max((np.abs(f).max() for _, f in answers), default=0.0),
-        "drag": float(np.median(rates)) if rates else 0.0,
-    }
 
+    def difference(fault: Option) -> FloatArray:
+        return np.concatenate(
+            [(forces_with((fault,), p) - f).ravel() / max(np.abs(f).max(), 1e-3)
+             for p, f in answers[:TRIAL]]
+        )  # fmt: skip
 
-def _predict(
-    faults: tuple[Option, ...],
-    problems: Mapping[str, SpringProblem],
-    numbers: Mapping[str, float],
-    case: Case,
-) -> Mapping[str, Any]:
-    return {"forces": forces_with(faults, problems[case.name], numbers)}
-
-
-def forces_with(
-    faults: Sequence[Option], p: SpringProblem, numbers: Mapping[str, float]
-) -> FloatArray:
-    """Return the forces of a solver with faults; numbers are those that `OUTPUTS` take."""
-    p = apply(faults, p, StepModel())[0]
-    fault = next((fault for fault in faults if fault.output), None)
-    if fault is None:
-        return all_forces(p)
-    if isinstance(fault.output, str):
-        return np.asarray(evaluate(fault.output, p))
-    name, _, number = fault.key.partition(" at ")
-    return OUTPUTS[name](p, float(number or numbers.get(name, 0.0)))
-
-
-def variants(exchanges: Sequence[Exchange]) -> Iterator[Variant]:
-    """Yield the right formula's faults, up to three of different aspects."""
-    problems = {exchange.case.name: problem_of(exchange.case.inputs) for exchange in exchanges}
-    numbers = _numbers(exchanges, problems)
-    for faults in combined(FORCE_FAULTS):
+    samples = [
+        Sample(f, partial(evaluate, p=p), tolerance(p, epsilon))
+        for p, f in answers
+        if np.isfinite(f).all()
+    ]
+    usual = [fault for fault in FORCE_FAULTS if fault.rare != "relation"]
+    singles = (fault for fault in usual if fault.at is None)
+    fits = (fitted(fault, difference, epsilon) for fault in usual if fault.at is not None)
+    relations = (relation_of(name, samples) for name in ("forces",))
+    special = filter(None, chain(fits, relations))
+    for faults in chain([()], zip(singles), zip(special), pairs(usual)):
+        sentences.update((fault.key, fault.sentence) for fault in faults)
         keys = tuple(fault.key for fault in faults)
-        yield Variant(keys, partial(_predict, faults, problems, numbers))
-
-
-def describe(keys: Sequence[str]) -> Sentence:
-    """Return the sentences of faults, given the keys of a class that no answer tells apart."""
-    return either([[_SENTENCES[fault] for fault in key.split(" + ")] for key in keys])
+        is_special = any(fault.range or fault.rare == "relation" for fault in faults)
+        yield Variant(keys, partial(_predict, faults, problems), is_special)
 
 
 def _diagnose(
@@ -217,6 +182,11 @@ def _diagnose(
     # Wrong answers come first, for they tell variants apart.
     order = sorted(range(len(wrong)), key=lambda i: not wrong[i])
     telling = [exchanges[i] for i in order]
-    explanations, count = explain(variants(telling), telling, relative_tolerance, describe)
+    sentences = {"": sentence("")}
+    explanations, count = explain(
+        variants(telling, greeting.epsilon, sentences), telling, relative_tolerance,
+        lambda keys: either([[sentences[fault] for fault in key.split(" + ")] for key in keys]),
+    )  # fmt: skip
+    explanations = tuple(found for found in explanations if found.faults != ("",))
     first = None if explanations else first_broken(judgements)
     return Diagnosis(explanations, None, first, hints_of(judgements), count)

@@ -7,7 +7,7 @@ from typing import Any
 from ..greeting import Step
 from ..sentence import sentence
 from .faults import ASPECTS, STEP_FAULTS, Option, options_of, read_table
-from .model import EXPLICIT, Integrator
+from .model import EXPLICIT, RIGHT_MATRIX, Integrator
 
 # Dampers that explicit methods can have, and of these the ones that only symplectic Euler has.
 EXPLICIT_DAMPERS = ("none", "explicit", "diagonal", "blocks", "matrix")
@@ -87,7 +87,8 @@ def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
         options = [(option, int(not declared(option, step))) for option in right.get(aspect, ())]
         if not options:
             options = [(Option("", aspect, sentence("as it should be")), 0)]
-        options += [(fault, 1) for fault in STEP_FAULTS if fault.aspect == aspect]
+        faults = (fault for fault in STEP_FAULTS if fault.aspect == aspect)
+        options += [(fault, 1) for fault in faults if fault.rare != "relation"]
         costs[aspect] = sorted(options, key=lambda pair: pair[1])
     return costs
 
@@ -96,12 +97,7 @@ def compatible(options: Mapping[str, Option]) -> bool:
     """Return whether choices make sense together, as far as they are made."""
     fields = {k: value for option in options.values() for k, value in option.fields.items()}
     damper, velocity = fields.get("damper"), fields.get("velocity")
-    needs_substeps = (
-        fields.get("pins") == "at_the_end"
-        or fields.get("time") in ("undivided", "one substep less")
-        or velocity == "over the whole h"
-    )
-    if needs_substeps and fields.get("substeps") == 1:
+    if "substeps" in fields and fields["substeps"] < _least_substeps(fields):
         return False
     if "integrator" not in fields:
         return True
@@ -109,8 +105,12 @@ def compatible(options: Mapping[str, Option]) -> bool:
     if method in EXPLICIT and ("matrix" in fields or fields.get("time") == "before"):
         return False
     is_linearised = fields["integrator"][:3] == ("newton", "x_n", 1)
-    inverse = fields["matrix"].inverse if "matrix" in fields else "exact"
-    if not is_linearised and (fields.get("dv") or inverse == "first order"):
+    matrix = fields.get("matrix", RIGHT_MATRIX)
+    is_for_linearised = fields.get("dv") or matrix.inverse == "first order"
+    is_for_local_global = matrix.pins_element is not None
+    if (is_for_linearised and not is_linearised) or (
+        is_for_local_global and method != "local_global"
+    ):
         return False
     parts = {option.part for option in options.values()} - {"", "both"}
     if method in EXPLICIT and (parts or ("update" in fields and method != "symplectic")):
@@ -124,6 +124,18 @@ def compatible(options: Mapping[str, Option]) -> bool:
     if velocity == "displacement" and method in ("explicit", "taylor", "runge_kutta"):
         return False
     return _are_few(fields, method)
+
+
+def _least_substeps(fields: Mapping[str, Any]) -> int:
+    """Return the number of substeps below which a choice is another one."""
+    if fields.get("time") == "one substep less":
+        return 3  # one of two would be half of h
+    needs_several = (
+        fields.get("pins") == "at_the_end"
+        or fields.get("time") == "undivided"
+        or fields.get("velocity") == "d / whole"
+    )
+    return 2 if needs_several else 1
 
 
 def _are_few(fields: Mapping[str, Any], method: str) -> bool:

@@ -52,16 +52,21 @@ def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
     step multiplies earlier errors by hs² k / m. The largest eigenvalue of M^-1 L is bounded by
     the largest sum of |k| + |c| / h over the springs of a particle, times 2 / m.
     """
-    stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
-    stiffest = float((2.0 * np.abs(p.incidence).T @ stiffness / p.masses).max(initial=0.0))
     n, steps, growth = model.substeps, p.steps or 1, 1.0
     if model.integrator.explicit:
-        growth = min(max(1.0, stiffest * (p.h / n) ** 2) ** (n - 1), 1e12)
+        growth = min(max(1.0, stiffness_of(p) / n**2) ** (n - 1), 1e12)
     size = np.abs(p.positions).max() + p.h * steps * np.abs(p.velocities).max()
     size += (p.h * steps) ** 2 * float(np.linalg.norm(p.gravity))
-    x = ROUNDINGS * epsilon * size * (1.0 + n + p.h * p.h * stiffest) * growth * steps**2
+    x = ROUNDINGS * epsilon * size * (1.0 + n + stiffness_of(p)) * growth * steps**2
     v = 2.0 * x / p.h + ROUNDINGS * epsilon * float(np.abs(p.velocities).max())
     return Rounding(float(x), float(v))
+
+
+def stiffness_of(p: SpringProblem) -> float:
+    """Return h² times a bound of the largest eigenvalue of M^-1 L, dampers included."""
+    stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
+    sums = 2.0 * np.abs(p.incidence).T @ stiffness / p.masses
+    return p.h**2 * float(sums.max(initial=0.0))
 
 
 def relative_gap(
@@ -177,7 +182,7 @@ def _excused(context: StepContext) -> Verdict:
     model, judgement = context.model, None
     if context.allowed.positions > context.displacement:
         return Verdict.UNDECIDED
-    if model.integrator.method == "newton" and _indefinite(context.problem):
+    if model.integrator.method == "newton" and is_indefinite(context.problem):
         return Verdict.UNDECIDED
     if model.integrator.method == "converged" and (model.substeps, model.scaling) == (1, 1.0):
         judgement = context.judgement
@@ -187,7 +192,7 @@ def _excused(context: StepContext) -> Verdict:
     return Verdict.RIGHT if is_near else Verdict.WRONG
 
 
-def _indefinite(p: SpringProblem) -> bool:
+def is_indefinite(p: SpringProblem) -> bool:
     """Return whether Newton's method may meet a Hessian that no two programs correct alike."""
     length, _ = frames(p, p.positions)
     softening = p.stiffnesses * np.maximum(p.rest_lengths / length - 1.0, 0.0) * p.h**2

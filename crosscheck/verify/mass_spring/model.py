@@ -5,18 +5,27 @@ minimum of g(x) = 1/2 (x - y)' M (x - y) + h² E(x) (Liu et al. 2013). Everythin
 NumPy, for up to some thirty particles, and independent of the solvers of `reference`.
 """
 
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
-from typing import NamedTuple
+from itertools import islice
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from plumbob.reference.arguments import BoolArray, FloatArray
 
+from .formulas import evaluate
 from .problem import SpringProblem, accelerations, damper_forces, frames, spring_forces, stretches
 
+# Pins that a step does not move.
+ELIMINATED = ("eliminated", "unattached", "first", "origin", "dropped")
 # Newton's method ends in rounding long before this on systems of this size.
 MAX_ITERATIONS = 200
+# The usual share of the decrease promised by the slope that a line search demands.
+DECREASE = 1e-4
+# It ends where so many iterations have not halved the gradient.
+MAX_STALLED = 3
 # A first step longer than this share of the displacement shows that positions are not the solution.
 ESTIMATED = 1e-2
 
@@ -29,9 +38,17 @@ class Integrator(NamedTuple):
     method: str
     start: str = "x_n"  # of the iterations, "x_n", "y" or "s_n"
     iterations: int = 1
-    # of Newton's method: a key of HESSIANS; or frozen: exact at x_n
+    # of Newton's method: a key of HESSIANS; or frozen: exact where iterations begin
     hessian: str = "exact"
     rate: float = 1.0  # factor of the step of Newton's method or of the gradient
+    is_stale: bool = False  # whether all iterations use the gradient of the first
+    # the share of the decrease promised by the slope that a line search of Newton's method demands;
+    # None: there is no line search, and an indefinite Hessian is not projected
+    decrease: float | None = None
+    # of conjugate gradients: formulas of their preconditioner, and of β from r·z before and after a
+    # step
+    scale: str = ""
+    beta: str = "after / before"
 
     @property
     def explicit(self) -> bool:
@@ -49,6 +66,7 @@ class SystemMatrix(NamedTuple):
     # what a spring adds to the rows of its first and of its second end, in the columns of both
     element: tuple[float, ...] = (1.0, -1.0, -1.0, 1.0)
     accumulated: bool = True  # whether springs add up on the diagonal; else the last one stays
+    filled: str = "A"  # a formula of what becomes of it if a triangle is not filled
     components: bool = True  # whether x, y and z are coupled
     damper_power: int = 0  # the power of h by which the dampers' part differs from h C
     # of the equation for dv: the factor of h K v, and the powers of h by which that and the
@@ -57,8 +75,17 @@ class SystemMatrix(NamedTuple):
     drag_power: int = 0
     right_power: int = 0
     is_by_columns: bool = False  # the right-hand side: all x, then all y, in rows of x, y and z
-    # exact; "first order": multiplied by 1 - h²/m K; or a key of ITERATIONS with a number of them
+    # exact; "first order": multiplied by 1 - h²/m K; a key of ITERATIONS with a number of them; or
+    # "factors", the number of terms that their inner products lack, and a formula of L, D and b
     inverse: str = "exact"
+    # of local/global iterations: the element of the pins' part of the right-hand side, which has no
+    # other mistake; None: it is made of the matrix
+    pins_element: tuple[float, ...] | None = None
+
+    @property
+    def is_skew(self) -> bool:
+        """Whether it is not symmetric."""
+        return self.element[1] != self.element[2] or self.filled in ("np.triu(A)", "np.tril(A)")
 
 
 RIGHT_MATRIX = SystemMatrix()
@@ -77,43 +104,35 @@ class StepModel(NamedTuple):
     # falling (mass); at_the_end: free through the substeps; free; unattached: no springs to them;
     # first: only one is held; origin: their columns dropped, so that springs end at the origin;
     # dropped: eliminated, then moved by gravity; identity rows: of the matrix, but the right-hand
-    # side is not zero
+    # side is not zero; coordinates: those with the numbers of a formula are held
     pins: str = "eliminated"
-    velocity: str = "displacement"  # displacement, separate; or a key of VELOCITIES
+    # displacement, separate; or a formula with d = x' - x (for names see `Substep.value`)
+    velocity: str = "displacement"
     matrix: SystemMatrix = RIGHT_MATRIX  # of an implicit step
     # whether a Newton step solves (M + h C + h² K) dv = h (f - h K v) for the change of velocity
     # instead of the displacement, which matters beside a fault
     dv: bool = False
     dampers_apart: bool = False  # whether a fault of the springs' part spares the dampers' part
-    # what stands for y: y; x_n: no velocity; doubled: x_n + 2 h v; squared: x_n + h² v
-    inertia: str = "y"
+    inertia: str = ""  # a formula of what stands for y = x + h v
     # divided among substeps; undivided; one substep less: divided by a number that is one more;
-    # before: of the last request, in the matrix only; or a
-    # number of seconds instead of h
-    time: str | float = "divided"
+    # before: of the last request, in the matrix only; or a formula of what stands for h
+    time: str = "divided"
     # of a matrix that is not positive definite: LU; or Cholesky's, unchecked. Eigen's dense LLT
     # stops at a pivot and solves with what it has (LLT); its SimplicialLLT does not solve, so that
     # the unknown, a displacement or a change of velocity, stays zero or what memory held
     factorisation: str = "LU"
-    # of positions and velocities by the solution; else a key of UPDATES, of some with a number
-    update: str = "solved"
+    # formulas of what is made of positions and velocities, x1 and v1, after each solution
+    update: Mapping[str, str] = {}
     right_start: bool = False  # whether iterations begin at x + h v, whatever stands for y
-    frames: str = "each"  # of several steps, or a key of FRAMES
+    # formulas of a motion: problem, fields of the problem of each step; end, the state that a step
+    # ends with; state, that which the next one starts from; answer, of the positions X and the
+    # velocities V of the start and of all frames; matrix: that of the first step is kept
+    frames: Mapping[str, Mapping[str, str]] = {}
 
     @property
     def pin_kind(self) -> str:
         """The first word of `pins`."""
         return self.pins.split()[0]
-
-    @property
-    def update_kind(self) -> str:
-        """The key of `update` in UPDATES."""
-        return self.update if self.update in UPDATES else self.update.split()[0]
-
-    @property
-    def update_number(self) -> float:
-        """The number in `update`."""
-        return float(self.update.split()[-1])
 
     @property
     def pin_strength(self) -> float:
@@ -134,28 +153,32 @@ class Substep(NamedTuple):
 
     @property
     def free(self) -> BoolArray:
-        """Which particles the step may move."""
-        free = np.ones(self.p.count, dtype=bool)
-        if self.model.pins in ("eliminated", "unattached", "first", "origin", "dropped"):
-            free[self.p.pinned] = False
-        return free
+        """Which coordinates the step may move, shape (particle, 3)."""
+        return ~_held(self.p, self.model)
+
+    def value(self, formula: str, **values: Any) -> FloatArray:
+        """Return a formula's value, with names of `formulas.py` and of the request's state x0, v0.
+
+        x, v and h are those at the start of the substep, `whole` is the whole time step.
+        """
+        p = self.p.changed(positions=self.x, velocities=self.v)
+        if self.model.damper == "none":
+            p = p.changed(dampings=0.0 * p.dampings)
+        start = {"x0": self.p.positions, "v0": self.p.velocities, "whole": self.p.h}
+        return np.asarray(evaluate(formula, p, {"h": self.h, **start, **values}))
+
+
+def _held(p: SpringProblem, model: StepModel) -> BoolArray:
+    """Return which coordinates the step may not move, shape (particle, 3)."""
+    held = np.zeros((p.count, 3), dtype=bool)
+    if model.pins in ELIMINATED:
+        held[p.pinned] = True
+    elif model.pin_kind == "coordinates":
+        held.flat[evaluate(model.pins.removeprefix("coordinates "), p) % held.size] = True
+    return held
 
 
 State = tuple[FloatArray, FloatArray]  # positions and velocities
-# What a wrong motion has in place of the state at the end of a step, and in place of all states.
-BETWEEN: Mapping[str, Callable[[SpringProblem, FloatArray, FloatArray], State]] = {
-    "restarts": lambda p, x, v: (p.positions, p.velocities),
-    "velocity zero": lambda p, x, v: (x, np.zeros_like(v)),
-    "velocity first": lambda p, x, v: (x, p.velocities),
-}
-FRAMES: Mapping[str, Callable[[SpringProblem, list[State]], list[State]]] = {
-    "start first": lambda p, states: [(p.positions, p.velocities), *states[:-1]],
-    "last only": lambda p, states: states[-1:] * len(states),
-    "last positions": lambda p, states: [(states[-1][0], v) for _, v in states],
-    "velocities late": lambda p, states: [
-        (x, v) for (x, _), v in zip(states, [p.velocities, *(v for _, v in states)], strict=False)
-    ],
-}
 
 
 def simulate(
@@ -170,30 +193,49 @@ def simulate(
     p = _with_pins(p, model)
     if model.integrator.explicit and model.damper == "none":
         p = p.changed(dampings=np.zeros_like(p.dampings))
-    if near is not None and np.isfinite(near).all() and model.frames not in FRAMES:
+    if near is not None and np.isfinite(near).all() and not model.frames.keys() & {"end", "answer"}:
         frames: list[FloatArray | None] = [*near.reshape(-1, p.count, 3)]
     else:
         frames = [None] * (p.steps or 1)
-    x, v, states = p.positions, p.velocities, list[State]()
-    for frame in frames:
-        start = x
-        x, v = _step(p, model, x, v, frame if _ends_solved(model) else None)
-        states.append((x, v))
-        if frame is not None and _norm(x - frame) > ESTIMATED * _norm(frame - start):
+    states, start = [(p.positions, p.velocities)], (p.positions, p.velocities)
+    for number, frame in enumerate(frames):
+        values = {"X": [x for x, _ in states], "V": [v for _, v in states], "step": number}
+        now = Substep(p, model, *start, p.h)
+        q = p.changed(**_formulas(now, "problem", values)) if "problem" in model.frames else p
+        x, v = _step(q, model, *start, frame if _ends_solved(model) else None)
+        states.append(_replaced(now, "end", (x, v), values))
+        if frame is not None and _norm(x - frame) > ESTIMATED * _norm(frame - start[0]):
             break
-        x, v = BETWEEN[model.frames](p, x, v) if model.frames in BETWEEN else (x, v)
-    states += states[-1:] * (len(frames) - len(states))
-    if p.steps is None:
-        return {"positions": x, "velocities": v}
-    if model.frames in FRAMES:
-        states = FRAMES[model.frames](p, states)
-    positions, velocities = map(np.array, zip(*states, strict=True))
-    return {"positions": positions, "velocities": velocities}
+        start = _replaced(now, "state", states[-1], values)
+    states += states[-1:] * (len(frames) + 1 - len(states))
+    return _answer(Substep(p, model, *states[0], p.h), states)
+
+
+def _formulas(start: Substep, name: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of the formulas of a motion by the fields that they replace."""
+    formulas = start.model.frames.get(name, {})
+    return {field: start.value(formula, **values) for field, formula in formulas.items()}
+
+
+def _replaced(start: Substep, name: str, state: State, values: Mapping[str, Any]) -> State:
+    """Return a state as the formulas of a motion have it."""
+    if name not in start.model.frames:
+        return state
+    fields = _formulas(start, name, {**values, "x1": state[0], "v1": state[1]})
+    return fields.get("positions", state[0]), fields.get("velocities", state[1])
+
+
+def _answer(start: Substep, states: list[State]) -> dict[str, FloatArray]:
+    """Return the answer of a step or a motion with these states, the first of them its start."""
+    X, V = map(np.array, zip(*states, strict=True))
+    answer = {"positions": X[1:], "velocities": V[1:]}
+    answer |= _formulas(start, "answer", {"X": X, "V": V}) if "answer" in start.model.frames else {}
+    return answer if start.p.steps else {name: frames[-1] for name, frames in answer.items()}
 
 
 def _ends_solved(model: StepModel) -> bool:
     """Return whether the positions at the end of a step are the solution of its equation."""
-    is_changed = model.update != "solved" or model.pins in ("overwritten", "at_the_end")
+    is_changed = model.update or model.pins in ("overwritten", "at_the_end")
     return model.substeps == 1 and not is_changed
 
 
@@ -222,13 +264,21 @@ def _with_pins(p: SpringProblem, model: StepModel) -> SpringProblem:
     if kind == "unattached":
         attached = ~np.isin(p.springs, pinned).any(axis=1)
         return p.changed(stiffnesses=attached * p.stiffnesses, dampings=attached * p.dampings)
+    if kind == "coordinates":
+        return p.changed(velocities=np.where(_held(p, model), 0.0, p.velocities))
     return p.changed(pinned=pinned[: {"first": 1, "free": 0}.get(kind)])
+
+
+# What `time` of a model is, beside formulas.
+TIMES = ("divided", "undivided", "one substep less", "before")
 
 
 def _step(
     p: SpringProblem, model: StepModel, x: FloatArray, v: FloatArray, near: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
-    h = p.h if isinstance(model.time, str) else model.time
+    h = p.h
+    if model.time not in TIMES:
+        h = float(evaluate(model.time, p))
     if model.time != "undivided":
         h /= model.substeps
     pins = x[p.pinned]
@@ -244,7 +294,7 @@ def _step(
 
 def _falls_freely(p: SpringProblem, model: StepModel) -> bool:
     """Return whether the forces of all substeps of an explicit method are the same."""
-    usual = (model.velocity, model.scaling) == ("separate", 1.0) and model.update == "solved"
+    usual = (model.velocity, model.scaling) == ("separate", 1.0) and not model.update
     usual &= model.time != "one substep less"
     coupled = p.stiff or p.damped or p.pinned.size
     return bool(usual and not coupled and model.integrator.method in SHARES)
@@ -267,12 +317,17 @@ def substep(start: Substep) -> tuple[FloatArray, FloatArray]:
         equation = StepEquation(start)
         x = _implicit(equation)
         if model.velocity == "separate":
-            force = x - equation.y - equation.gradient(x) / p.masses[:, None]
+            force = x - equation.y - equation.gradient(x) / p.inertia
             separate = separate + force / h
-    v = VELOCITIES[model.velocity](start, x, separate) * model.scaling
-    if model.update != "solved":
-        x, v = UPDATES[model.update_kind](start, x, v)
-    if model.pins == "overwritten" or not start.free.all():
+    v = (x - x_n) / h if model.velocity == "displacement" else separate
+    if model.velocity not in ("displacement", "separate"):
+        v = start.value(model.velocity, d=x - x_n, x1=x)
+    v = v * model.scaling
+    if model.update:
+        values = {name: start.value(formula, d=x - x_n, x1=x, v1=v)
+                  for name, formula in model.update.items()}  # fmt: skip
+        x, v = values.get("positions", x), values.get("velocities", v)
+    if model.pins in ("overwritten", *ELIMINATED):
         x, v = x.copy(), v.copy()
         fall = h * h * p.gravity if model.pins == "dropped" else 0.0
         x[p.pinned], v[p.pinned] = x_n[p.pinned] + fall, 0.0
@@ -292,7 +347,7 @@ def _explicit_rates(start: Substep, x: FloatArray, v: FloatArray) -> FloatArray:
     a = accelerations(p, x, v)
     if model.pin_kind in ("penalty", "springs"):
         pull = model.pin_strength * (p.positions - x)[p.pinned]
-        a[p.pinned] += pull / p.masses[p.pinned, None]
+        a[p.pinned] += pull / p.inertia[p.pinned]
     a[~start.free] = 0.0
     if model.damper not in ("diagonal", "blocks", "matrix"):
         return a
@@ -303,7 +358,7 @@ def _explicit_rates(start: Substep, x: FloatArray, v: FloatArray) -> FloatArray:
         D = np.diag(np.diag(D))
     elif model.damper == "blocks":
         D = D * np.kron(np.eye(p.count), np.ones((3, 3)))
-    M, free = np.repeat(p.masses, 3), np.repeat(start.free, 3)
+    M, free = p.inertia_diagonal, start.free.ravel()
     solution = np.zeros(len(M))
     A = (np.diag(M) + start.h * D)[np.ix_(free, free)]
     solution[free] = np.linalg.solve(A, (M * a.ravel())[free])
@@ -318,7 +373,8 @@ def _by_one_rate(start: Substep) -> tuple[FloatArray, FloatArray]:
     """Step by the acceleration at the start: explicit or symplectic Euler, or x + h v + h²/2 a."""
     _, model, x, v, h, _ = start
     a = _explicit_rates(start, x, v)
-    return x + h * (v + SHARES[model.integrator.method] * h * a), v + h * a
+    y = start.value(model.inertia) if model.inertia else x + h * v
+    return y + SHARES[model.integrator.method] * h * h * a, v + h * a
 
 
 def _half_a(start: Substep) -> tuple[FloatArray, FloatArray]:
@@ -360,54 +416,6 @@ EXPLICIT: Mapping[str, Callable[[Substep], tuple[FloatArray, FloatArray]]] = {
 }
 
 
-def _old_forces(start: Substep, x: FloatArray, separate: FloatArray) -> FloatArray:
-    p = start.p
-    p = p.changed(dampings=0.0 * p.dampings) if start.model.damper == "none" else p
-    rates = accelerations(p, start.x, start.v)
-    return start.v + start.h * np.where(start.free[:, None], rates, 0.0)
-
-
-# The velocity after a substep from its start, its new positions, and the velocity integrated apart.
-VELOCITIES: Mapping[str, Callable[[Substep, FloatArray, FloatArray], FloatArray]] = {
-    "displacement": lambda s, x, separate: (x - s.x) / s.h,
-    "separate": lambda s, x, separate: separate,
-    "old forces": _old_forces,
-    "kept": lambda s, x, separate: s.v,
-    "over 2h": lambda s, x, separate: (x - s.x) / (2.0 * s.h),
-    "over h²": lambda s, x, separate: (x - s.x) / s.h**2,
-    "not divided": lambda s, x, separate: x - s.x,
-    "over the whole h": lambda s, x, separate: (x - s.x) / s.p.h,
-    "with the old": lambda s, x, separate: s.v + (x - s.x) / s.h,
-    "averaged": lambda s, x, separate: 0.5 * (s.v + (x - s.x) / s.h),
-    "from y": lambda s, x, separate: (x - s.x) / s.h - s.v,
-    "zero": lambda s, x, separate: np.zeros_like(s.v),
-    "backwards": lambda s, x, separate: (s.x - x) / s.h,
-    "times h": lambda s, x, separate: (x - s.x) * s.h,
-    "with gravity": lambda s, x, separate: (x - s.x) / s.h + s.h * s.p.gravity,
-    "over 1/60": lambda s, x, separate: (x - s.x) * 60.0,
-    "from s": lambda s, x, separate: (
-        (x - s.x) / s.h - s.v - s.h * s.p.constant / s.p.masses[:, None]
-    ),
-}
-
-# Positions and velocities after a substep from its start and the right ones.
-Update = Callable[[Substep, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-UPDATES: Mapping[str, Update] = {
-    "old velocity": lambda s, x, v: (s.x + s.h * s.v, v),
-    "change only": lambda s, x, v: (x - s.h * s.v, v - s.v),
-    "change of position only": lambda s, x, v: (x - s.h * s.v, v),
-    "without h": lambda s, x, v: (s.x + (x - s.x) / s.h, v),
-    "twice": lambda s, x, v: (2.0 * x - s.x, v),
-    "mean velocity": lambda s, x, v: (s.x + 0.5 * s.h * (s.v + v), v),
-    "with h²": lambda s, x, v: (s.x + s.h * (x - s.x), v),
-    "over 1/60 s": lambda s, x, v: (s.x + v / 60.0, v),
-    "times": lambda s, x, v: (s.x + s.model.update_number * (x - s.x), s.model.update_number * v),
-    "floor": lambda s, x, v: (
-        np.where([False, True, False], np.maximum(x, s.model.update_number), x), v
-    ),
-}  # fmt: skip
-
-
 class StepEquation:
     """M (x - y) - h² f(x) = 0 of a substep, its derivative and, where it exists, g."""
 
@@ -416,7 +424,7 @@ class StepEquation:
         p, model, x, v, h, _ = start
         self.start, self.free = start, start.free
         self.linear = p.linear or p  # whose springs the matrix is put together from
-        self.y = x + SHIFTS[model.inertia](h) * v
+        self.y = start.value(model.inertia) if model.inertia else x + h * v
         self.constant = p.constant
         if model.damper == "explicit":
             self.constant = self.constant + damper_forces(p, x, v)
@@ -431,6 +439,7 @@ class StepEquation:
             p.ends == (1.0, 1.0)
             and p.accumulated
             and p.normalised
+            and (p.length, p.pull, p.damper_pull) == (None, None, None)
             and (self.by_length or not self.damped)
         )
 
@@ -439,7 +448,7 @@ class StepEquation:
         """Where iterations may begin; s_n = y + h² M⁻¹ f_ext (Bouaziz et al. 2014, Algorithm 1)."""
         start = self.start
         y = start.x + start.h * start.v if start.model.right_start else self.y
-        s_n = self.y + start.h**2 * self.constant / start.p.masses[:, None]
+        s_n = self.y + start.h**2 * self.constant / start.p.inertia
         return {"x_n": start.x, "y": y, "s_n": s_n}
 
     @property
@@ -451,8 +460,11 @@ class StepEquation:
 
     @cached_property
     def length_n(self) -> FloatArray:
-        """Length of each spring at the start."""
-        return frames(self.start.p, self.start.x)[0]
+        """Length of each spring at the start, at which dampers are at rest."""
+        p, start = self.start.p, self.start
+        if p.damper_rest is not None:
+            return p.damper_rest(p, x=start.x, v=start.v, h=start.h, x0=p.positions, y=self.y)
+        return frames(p, start.x)[0]
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return M (x - y) - h² f(x), shape (particle, 3)."""
@@ -461,26 +473,27 @@ class StepEquation:
         if self.damped and self.by_length:
             length, u = frames(p, x)
             rate = (length - self.length_n) / h
-            f = f - p.pulled.T @ ((p.dampings * rate)[:, None] * u)
+            pull = p.damper_pull(p, l=length, rate=rate) if p.damper_pull else p.dampings * rate
+            f = f - p.pulled.T @ (pull[:, None] * u)
         elif self.damped:
             f = f + damper_forces(p, x, (x - self.start.x) / h)
-        gradient = p.masses[:, None] * (x - self.y) - h * h * f
+        gradient = p.inertia * (x - self.y) - h * h * f
         gradient[self.pins] += self.hold * (x - p.positions)[self.pins]
         return gradient
 
     def free_gradient(self, x: FloatArray) -> FloatArray:
         """Return the gradient, zero at particles that the step may not move."""
-        return np.where(self.free[:, None], self.gradient(x), 0.0)
+        return np.where(self.free, self.gradient(x), 0.0)
 
     def value(self, x: FloatArray) -> float:
         """Return g(x)."""
-        p, h = self.start.p, self.start.h
+        p, h = self.start.p.merit or self.start.p, self.start.h
         length, _ = frames(p, x)
         energy = 0.5 * (p.stiffnesses * stretches(p, length) ** 2).sum()
         if self.damped:
             energy += 0.5 / h * (p.dampings * (length - self.length_n) ** 2).sum()
         penalty = 0.5 * self.hold * ((x - p.positions)[self.pins] ** 2).sum()
-        inertia = 0.5 * (p.masses[:, None] * (x - self.y) ** 2).sum()
+        inertia = 0.5 * (p.inertia * (x - self.y) ** 2).sum()
         return float(inertia + h * h * (energy - (self.constant * x).sum()) + penalty)
 
     def blocks(self, x: FloatArray, kind: str) -> tuple[FloatArray, FloatArray | None]:
@@ -532,7 +545,9 @@ class StepEquation:
         if dampers is not None:
             A += h ** (2 + rule.damper_power) * _assemble(p, dampers)
         size = springs.shape[1]
-        A.flat[:: len(A) + 1] += rule.masses * np.repeat(p.masses, size)
+        A.flat[:: len(A) + 1] += rule.masses * np.broadcast_to(p.inertia, (p.count, size)).ravel()
+        if rule.filled != "A":
+            A = evaluate(rule.filled, p, {"A": A})
         if self.hold:
             rows = (self.pins[:, None] * size + np.arange(size)).ravel()
             A[rows, rows] += self.hold
@@ -545,31 +560,51 @@ class StepEquation:
 
         Iterative solvers begin at a guess, by default zero.
         """
-        free = np.repeat(self.free, len(A) // len(right))
+        free = self.free.ravel() if len(A) == 3 * len(right) else self.free.all(axis=1)
         if self.start.model.pins == "identity rows":
             rows = np.isin(np.arange(len(A)) * len(right) // len(A), self.start.p.pinned)
             A = np.where(rows[:, None], np.eye(len(A)), A)
-        solution = np.zeros_like(right).reshape(len(A), -1)
         part = A if free.all() else A[np.ix_(free, free)]
+        solution, b = np.zeros_like(right).reshape(len(A), -1), right.reshape(len(A), -1)[free]
         kind, inverse = self.start.model.factorisation, self.start.model.matrix.inverse
-        if inverse != "exact":
+        if inverse.startswith("factors"):
+            lost, formula = inverse.removeprefix("factors ").split(" ", 1)
+            values = {**_factors(part, int(lost)), "b": b}
+            solution[free] = evaluate(formula, self.start.p, values)
+        elif inverse != "exact":
             method, count = inverse.rsplit(" ", 1)
-            start = solution if guess is None else guess.reshape(len(A), -1)
-            b = right.reshape(len(A), -1)[free]
-            solution[free] = ITERATIONS[method](part, b, start[free], int(count))
-            return solution.reshape(right.shape)
-        if kind != "LU" and not is_positive_definite(part):
+            x = solution if guess is None else guess.reshape(len(A), -1)
+            solution[free] = nth(ITERATIONS[method](part, b, x[free]), int(count))
+        elif kind != "LU" and not is_positive_definite(part):
             if kind == "change of velocity":
-                return np.where(self.free[:, None], self.start.h * self.start.v, 0.0)
+                return np.where(self.free, self.start.h * self.start.v, 0.0)
             if kind == "displacement":
                 return np.zeros_like(right)
             L = stopped_cholesky(part)
-            part = L @ L.T
-        solution[free] = np.linalg.solve(part, right.reshape(len(A), -1)[free])
+            solution[free] = np.linalg.solve(L @ L.T, b)
+        else:
+            solution[free] = np.linalg.solve(part, b)
         return solution.reshape(right.shape)
 
-    def newton_step(self, x: FloatArray, base: FloatArray, kind: str) -> FloatArray:
-        """Return the displacement of an iteration with the Hessian of a base."""
+    def newton_step(self, A: FloatArray, right: FloatArray, drift: FloatArray) -> FloatArray:
+        """Return the displacement of an iteration from its linear system."""
+        if self.start.model.matrix.inverse == "first order":
+            right = np.where(self.free, right, 0.0)
+            M = self.start.p.inertia_diagonal
+            step = right.ravel() / M
+            step -= (A @ step - M * step) / M
+            step = step.reshape(right.shape)
+        else:
+            step = self.solve(A, right)
+        return np.where(self.free, drift + step, 0.0)
+
+    def linear_system(
+        self, x: FloatArray, base: FloatArray, kind: str
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the matrix, with the Hessian of a base, the right-hand side, and a displacement.
+
+        That is what the solution lacks: h v where the unknown is a change of velocity, times h.
+        """
         springs, dampers = self.blocks(base, kind)
         A, right = self.put_together(springs, dampers), -self.gradient(x)
         p, rule, h = self.start.p, self.start.model.matrix, self.start.h
@@ -578,19 +613,11 @@ class StepEquation:
             drift = h * self.start.v
             K = _assemble(p, springs * np.eye(3) if not rule.components else springs, rule)
             drag = rule.drag * h ** (2 + rule.drag_power) * K @ drift.ravel()
-            right = right - p.masses[:, None] * drift - drag.reshape(right.shape)
+            right = right - p.inertia * drift - drag.reshape(right.shape)
             right = right + h**2 * damper_forces(p, x, self.start.v) if self.damped else right
         right = right * h**rule.right_power if rule.right_power else right
         right = right.T.reshape(right.shape) if rule.is_by_columns else right
-        if rule.inverse == "first order":
-            right = np.where(self.free[:, None], right, 0.0)
-            M = np.repeat(p.masses, 3)
-            step = right.ravel() / M
-            step -= (A @ step - M * step) / M
-            step = step.reshape(right.shape)
-        else:
-            step = self.solve(A, right)
-        return np.where(self.free[:, None], drift + step, 0.0)
+        return A, right, drift
 
 
 def is_positive_definite(A: FloatArray) -> bool:
@@ -640,49 +667,66 @@ HESSIANS: Mapping[
     "unscaled": lambda ratio, length: (length**2 * ratio + 1.0 - ratio, 1.0 - ratio),
 }
 
-# What h makes of the old velocity before it is added to x_n.
-SHIFTS: Mapping[str, Callable[[float], float]] = {
-    "y": lambda h: h,
-    "x_n": lambda h: 0.0,
-    "doubled": lambda h: 2.0 * h,
-    "squared": lambda h: h * h,
-    "undivided": lambda h: 1.0,
-    "backwards": lambda h: -h,
-}
 
-
-def _jacobi(A: FloatArray, b: FloatArray, x: FloatArray, count: int) -> FloatArray:
-    for _ in range(count):
+def _jacobi(A: FloatArray, b: FloatArray, x: FloatArray) -> Iterator[FloatArray]:
+    while True:
+        yield x
         x = x + (b - A @ x) / np.diag(A)[:, None]
-    return x
 
 
-def _gauss_seidel(A: FloatArray, b: FloatArray, x: FloatArray, count: int) -> FloatArray:
+def _gauss_seidel(A: FloatArray, b: FloatArray, x: FloatArray) -> Iterator[FloatArray]:
     lower = np.tril(A)
-    for _ in range(count):
+    while True:
+        yield x
         x = x + np.linalg.solve(lower, b - A @ x)
-    return x
 
 
-def _conjugate_gradient(A: FloatArray, b: FloatArray, x: FloatArray, count: int) -> FloatArray:
-    residual = b - A @ x
-    direction, square = residual, (residual**2).sum(0)
-    for _ in range(count):
+def conjugate_gradients(
+    A: FloatArray,
+    b: FloatArray,
+    x: FloatArray,
+    scale: FloatArray | float = 1.0,
+    beta: Callable[[FloatArray, FloatArray], FloatArray] = lambda before, after: after / before,
+) -> Iterator[FloatArray]:
+    """Yield the iterates, preconditioned by a diagonal; each column is solved on its own.
+
+    β follows from r·z before and after a step.
+    """
+    residual, direction, before = b - A @ x, 0.0 * b, np.ones(b.shape[1])
+    while True:
+        yield x
+        z = residual / scale
+        after = (residual * z).sum(0)
+        direction = z + beta(before, after) * direction if direction.any() else z
         image = A @ direction
         curvature = (direction * image).sum(0)  # negative where the matrix is indefinite
-        rate = np.where(curvature != 0.0, square / np.where(curvature, curvature, 1.0), 0.0)
-        x, residual = x + rate * direction, residual - rate * image
-        square_before, square = square, (residual**2).sum(0)
-        direction = residual + square / np.maximum(square_before, 1e-300) * direction
-    return x
+        rate = np.where(curvature != 0.0, after / np.where(curvature, curvature, 1.0), 0.0)
+        x, residual, before = x + rate * direction, residual - rate * image, after
 
 
-# Iterative solutions of A x = b, each column on its own, from a guess.
-ITERATIONS: Mapping[str, Callable[[FloatArray, FloatArray, FloatArray, int], FloatArray]] = {
+# Iterative solutions of A x = b from a guess.
+ITERATIONS: Mapping[str, Callable[[FloatArray, FloatArray, FloatArray], Iterator[FloatArray]]] = {
     "Jacobi": _jacobi,
     "Gauss-Seidel": _gauss_seidel,
-    "conjugate gradient": _conjugate_gradient,
+    "conjugate gradient": conjugate_gradients,
 }
+
+
+def nth(iterates: Iterator[FloatArray], count: int) -> FloatArray:
+    """Return the iterate after so many iterations, the last one if there are fewer."""
+    return deque(islice(iterates, count + 1), maxlen=1)[0]
+
+
+def _factors(A: FloatArray, lost: int) -> dict[str, FloatArray]:
+    """Return L and D of A = L D L'; `lost` terms are missing in each inner product."""
+    L, D = np.eye(len(A)), np.zeros((len(A), 1))
+    for i in range(len(A)):
+        row = A[i, :i].copy()
+        for j in range(i):
+            row[j] -= row[: max(j - lost, 0)] @ L[j, : max(j - lost, 0)]
+        L[i, :i] = row / D[:i, 0]
+        D[i] = A[i, i] - row @ L[i, :i]
+    return {"L": L, "D": D}
 
 
 def _isotropic(scale: FloatArray) -> FloatArray:
@@ -715,77 +759,110 @@ def _assemble(
 
 def _implicit(equation: StepEquation) -> FloatArray:
     """Return the positions at the end of an implicit step."""
-    start, free = equation.start, equation.free[:, None]
+    start, free = equation.start, equation.free
     integrator = start.model.integrator
     x = np.where(free, equation.starts[integrator.start], start.x)
     if equation.uncoupled:  # g is quadratic: each iteration leaves the same share of the way
         minimum = equation.starts["s_n"]
-        scale = start.p.masses[:, None] if integrator.method == "descent" else 1.0
+        scale = start.p.inertia if integrator.method == "descent" else 1.0
         remainder = (1.0 - integrator.rate * scale) ** integrator.iterations
         return np.where(free, minimum + remainder * (x - minimum), x)
-    return _METHODS[integrator.method](equation, x, integrator)
+    if integrator.method == "converged":
+        return _converged(equation, x)
+    return nth(ITERATES[integrator.method](equation, x), integrator.iterations)
 
 
-def _newton(equation: StepEquation, x: FloatArray, integrator: Integrator) -> FloatArray:
-    for _ in range(integrator.iterations):
-        base = equation.start.x if integrator.hessian == "frozen" else x
-        x = x + integrator.rate * equation.newton_step(x, base, integrator.hessian)
-    return x
+def _newton(equation: StepEquation, x: FloatArray) -> Iterator[FloatArray]:
+    start, first = equation.start, x
+    integrator, decrease = start.model.integrator, start.model.integrator.decrease
+    free = np.ix_(*2 * [equation.free.ravel()])
+    while True:
+        yield x
+        at = first if integrator.is_stale else x
+        base = first if integrator.hessian == "frozen" else x
+        base = start.p.positions if "matrix" in start.model.frames else base
+        system = equation.linear_system(at, base, integrator.hessian)
+        if decrease is not None and not is_positive_definite(system[0][free]):
+            system = equation.linear_system(at, base, "projected")
+        step = equation.newton_step(*system)
+        if decrease is None:
+            x = x + integrator.rate * step
+        elif (lower := _lower(equation, x, equation.free_gradient(x), step, decrease)) is None:
+            return
+        else:
+            x = lower
 
 
-def _local_global(equation: StepEquation, x: FloatArray, integrator: Integrator) -> FloatArray:
+def _local_global(equation: StepEquation, x: FloatArray) -> Iterator[FloatArray]:
     """Solve (M + h²L) x_next = h² J d + M y + h² f_ext, pins moved to the right-hand side."""
-    start = equation.start
-    p, h = start.p, start.h
+    start, rule = equation.start, equation.start.model.matrix
+    p, h, free = start.p, start.h, equation.free
     k, c = p.stiffnesses, (p.dampings / h if equation.damped else 0.0 * p.dampings)
-    weights = equation.linear.stiffnesses if start.model.matrix.stiffness else np.ones_like(k)
-    c_matrix = (c if equation.linear is p else equation.linear.dampings / h)[:, None, None]
-    A = equation.put_together(weights[:, None, None], c_matrix if equation.damped else None)
-    free = equation.free[:, None]
+    weights = equation.linear.stiffnesses if rule.stiffness else np.ones_like(k)
+    c_matrix = c if equation.linear is p else equation.linear.dampings / h
+    # components differ where they have masses of their own or are held apart
+    is_by_component = 2 in (p.masses.ndim, equation.linear.masses.ndim)
+    is_by_component |= bool((free.any(axis=1) != free.all(axis=1)).any())
+    unit = np.eye(3) if is_by_component else np.eye(1)
+    blocks, c_blocks = weights[:, None, None] * unit, c_matrix[:, None, None] * unit
+    A = equation.put_together(blocks, c_blocks if equation.damped else None)
     pinned_x = np.where(free | (start.model.pins == "origin"), 0.0, x)
-    fixed = p.masses[:, None] * equation.y + h * h * equation.constant - A @ pinned_x
+    of_pins = A
+    if rule.pins_element is not None:
+        springs = (k + c)[:, None, None] * unit
+        of_pins = h * h * _assemble(p, springs, SystemMatrix(element=rule.pins_element))
+    fixed = p.inertia * equation.y + h * h * equation.constant
+    fixed -= (of_pins @ pinned_x.reshape(len(A), -1)).reshape(x.shape)
     fixed[equation.pins] += equation.hold * p.positions[equation.pins]
-    is_exact = start.model.matrix.inverse == "exact"
+    is_exact = rule.inverse == "exact" and not is_by_component
     inverse = equation.solve(A, np.eye(len(A))) if is_exact else A
-    for _ in range(integrator.iterations):
+    while True:
+        yield x
         length, u = frames(p, x)
         rest = np.where(p.tension_only & (length < p.rest_lengths), length, p.rest_lengths)
         rest = rest if p.normalised else rest * length
         pull = (k * rest + c * equation.length_n)[:, None] * u
         right = fixed + h * h * (p.pulled.T @ pull)
         x = np.where(free, inverse @ right if is_exact else equation.solve(A, right, x), x)
-    return x
 
 
-def _descent(equation: StepEquation, x: FloatArray, integrator: Integrator) -> FloatArray:
-    for _ in range(integrator.iterations):
-        x = x - integrator.rate * equation.free_gradient(x)
-    return x
+def _descent(equation: StepEquation, x: FloatArray) -> Iterator[FloatArray]:
+    while True:
+        yield x
+        x = x - equation.start.model.integrator.rate * equation.free_gradient(x)
 
 
-def _converged(equation: StepEquation, x: FloatArray, integrator: Integrator) -> FloatArray:
+def _converged(equation: StepEquation, x: FloatArray) -> FloatArray:
     """Minimise g by Newton's method with a shift and a line search, else solve by residuals.
 
-    From positions near the solution a long first step shows that they are not: it is the estimate.
+    The matrix is always the right one, since it does not change the solution. From positions near
+    that a long step, the first or the last, shows that they are not: it is the estimate.
     """
-    best, stalled, near = np.inf, 0, equation.start.near
-    x = x if near is None else np.where(equation.free[:, None], near, x)
+    start = equation.start
+    right = StepEquation(start._replace(
+        p=start.p.changed(linear=None), model=start.model._replace(matrix=RIGHT_MATRIX)
+    ))  # fmt: skip
+    best, stalled, near, step = np.inf, 0, start.near, np.zeros_like(x)
+    x = x if near is None else np.where(equation.free, near, x)
     for iteration in range(MAX_ITERATIONS):
         gradient = equation.free_gradient(x)
         norm = _norm(gradient)
         stalled = 0 if norm < 0.5 * best else stalled + 1
         best = min(best, norm)
-        if norm == 0.0 or not np.isfinite(norm) or stalled > 3:
-            break
-        A = equation.matrix(x, "exact")
+        if norm == 0.0 or not np.isfinite(norm):
+            return x
+        A = right.matrix(x, "exact")
         if equation.conservative:
             A = _shifted(equation, A)
-        step = -equation.solve(A, gradient)
+        step = -right.solve(A, gradient)
         moved = x - equation.start.x
         if near is not None and not iteration and _norm(step) > ESTIMATED * _norm(moved):
             return x + step
-        x = _line_search(equation, x, gradient, step)
-    return x
+        lower = _lower(equation, x, gradient, step, DECREASE)
+        if lower is None or stalled > MAX_STALLED:
+            break
+        x = lower
+    return x if near is None else x + step
 
 
 def _norm(x: FloatArray) -> float:
@@ -794,8 +871,8 @@ def _norm(x: FloatArray) -> float:
 
 def _shifted(equation: StepEquation, A: FloatArray) -> FloatArray:
     """Return A plus the least of some multiples of M that makes it positive definite."""
-    free = np.ix_(*2 * [np.repeat(equation.free, 3)])
-    M = np.diag(np.repeat(equation.start.p.masses, 3))
+    free = np.ix_(*2 * [equation.free.ravel()])
+    M = np.diag(equation.start.p.inertia_diagonal)
     shift = 0.0
     while shift < 1e12:
         if is_positive_definite((A + shift * M)[free]):
@@ -804,29 +881,31 @@ def _shifted(equation: StepEquation, A: FloatArray) -> FloatArray:
     return A + shift * M
 
 
-def _line_search(
-    equation: StepEquation, x: FloatArray, gradient: FloatArray, step: FloatArray
-) -> FloatArray:
-    """Return x + t step with the largest t = 1, 1/2, ... that lowers g, or the residual."""
+def _lower(
+    equation: StepEquation, x: FloatArray, gradient: FloatArray, step: FloatArray, decrease: float
+) -> FloatArray | None:
+    """Return x + t step with the largest t = 1, 1/2, ... that lowers g, or the residual, enough.
+
+    It is None if no t does.
+    """
     norm, slope = _norm(gradient), float((gradient * step).sum())
-    start_value = equation.value(x) if equation.conservative else 0.0
-    for t in 0.5 ** np.arange(20.0):
+    is_conservative = equation.conservative or equation.start.p.merit is not None
+    start_value = equation.value(x) if is_conservative else 0.0
+    noise = 1e-13 * abs(start_value)  # rounding of g hides that it falls
+    for t in 0.5 ** np.arange(40.0):
         trial = x + t * step
-        residual = _norm(equation.free_gradient(trial))
-        if not equation.conservative:
-            is_lower = residual < (1.0 - 1e-4 * t) * norm
-        elif norm < 1e-6 and residual < 0.5 * norm:  # rounding of g hides that it falls
-            is_lower = True
+        if is_conservative:
+            is_lower = equation.value(trial) <= start_value + decrease * t * slope + noise
         else:
-            is_lower = equation.value(trial) <= start_value + 1e-4 * t * slope
+            is_lower = _norm(equation.free_gradient(trial)) < (1.0 - decrease * t) * norm
         if is_lower:
             return trial
-    return x + step if norm < 1e-6 else x
+    return None
 
 
-_METHODS: Mapping[str, Callable[[StepEquation, FloatArray, Integrator], FloatArray]] = {
+# The iterates of a method from a start, without end.
+ITERATES: Mapping[str, Callable[[StepEquation, FloatArray], Iterator[FloatArray]]] = {
     "newton": _newton,
     "local_global": _local_global,
     "descent": _descent,
-    "converged": _converged,
 }

@@ -23,7 +23,7 @@ COINCIDENT = 1e-150
 class SpringProblem:
     """The content of a request of a force, an energy or a step, as a solver reads it."""
 
-    masses: FloatArray  # of inertia [kg]
+    masses: FloatArray  # of inertia [kg], of some wrong solvers one for each component
     springs: IndexArray
     rest_lengths: FloatArray
     stiffnesses: FloatArray
@@ -36,6 +36,7 @@ class SpringProblem:
     external: FloatArray  # forces besides gravity [N], shape (particle, 3)
     weighing: FloatArray  # the masses that gravity pulls [kg]
     weights: FloatArray  # the force of gravity [N], shape (particle, 3)
+    late: FloatArray | None = None  # forces that act after the solve of a step only [N]
     h: float = 0.0  # time step [s]
     h_before: float = 0.0  # time step of the request before [s]
     steps: int | None = None  # number of steps, or None for a task of one step
@@ -48,14 +49,31 @@ class SpringProblem:
     # the spring ("own"); "one end": along the spring, but the first end alone feels the damper
     damping: str = "along"
     normalised: bool = True  # whether a spring's direction is of length one
+    # what takes the place of the length of springs, of their pull k (l - r), of the pull of dampers
+    # c rate, and of the length at which dampers are at rest in an implicit step
+    length: "Rule | None" = None
+    pull: "Rule | None" = None
+    damper_pull: "Rule | None" = None
+    damper_rest: "Rule | None" = None
     # positions and velocities at the end of the last request of as many particles, if there is any
     before: tuple[FloatArray, FloatArray] | None = None
     linear: "SpringProblem | None" = None  # whose springs the matrix of a step has, if others
+    merit: "SpringProblem | None" = None  # whose energy a line search compares, if another
 
     @property
     def count(self) -> int:
         """Number of particles."""
         return len(self.masses)
+
+    @property
+    def inertia(self) -> FloatArray:
+        """The masses as a column, or as three of them."""
+        return self.masses if self.masses.ndim == 2 else self.masses[:, None]
+
+    @property
+    def inertia_diagonal(self) -> FloatArray:
+        """The mass of each coordinate, shape (3 * particle,)."""
+        return np.broadcast_to(self.inertia, (self.count, 3)).ravel()
 
     @cached_property
     def incidence(self) -> FloatArray:
@@ -94,6 +112,8 @@ class SpringProblem:
         return dataclasses.replace(self, **fields)
 
 
+# A formula of a problem, and of values by their names.
+Rule = Callable[..., FloatArray]
 _NUMBERS = ("masses", "rest_lengths", "stiffnesses", "dampings", "gravity", "positions")
 
 
@@ -137,6 +157,8 @@ def frames(p: SpringProblem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the length of each spring and its direction from the second end to the first."""
     d = x[p.springs[:, 0]] - x[p.springs[:, 1]]
     length = np.sqrt((d * d).sum(axis=1))
+    if p.length is not None:
+        length = p.length(p, l=length, d=d)
     if length.min(initial=1.0) > COINCIDENT:
         return length, d / length[:, None]
     u = np.where(
@@ -155,6 +177,8 @@ def spring_forces(p: SpringProblem, x: FloatArray) -> FloatArray:
     """Return the springs' forces on the particles [N], shape (particle, 3)."""
     length, u = frames(p, x)
     pull = p.stiffnesses * stretches(p, length) * (1.0 if p.normalised else length)
+    if p.pull is not None:
+        pull = p.pull(p, l=length, x=x)
     return -p.pulled.T @ (pull[:, None] * u)
 
 
@@ -183,11 +207,14 @@ def damper_forces(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
         return np.zeros_like(x)
     if p.damping == "drag":
         return -p.dampings[0] * v
-    c, (_, u) = p.dampings[:, None], frames(p, x)
+    c, (length, u) = p.dampings[:, None], frames(p, x)
     first, second = v[p.springs[:, 0]], v[p.springs[:, 1]]
     if p.damping == "own":
         own = np.maximum(p.pulled, 0.0).T @ (c * along(first, u))
         return -own - np.maximum(-p.pulled, 0.0).T @ (c * along(second, u))
+    if p.damper_pull is not None:
+        rate = ((first - second) * u).sum(axis=1)
+        return -p.pulled.T @ (p.damper_pull(p, l=length, rate=rate)[:, None] * u)
     pulled = np.maximum(p.pulled, 0.0) if p.damping == "one end" else p.pulled
     return -pulled.T @ (c * RATES[p.damping](first, second, u))
 
@@ -201,7 +228,7 @@ def all_forces(p: SpringProblem) -> FloatArray:
 def accelerations(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return M^-1 f, pins included, shape (particle, 3) [m/s^2]."""
     total = p.constant + damper_forces(p, x, v)
-    return (total + spring_forces(p, x) if p.stiff else total) / p.masses[:, None]
+    return (total + spring_forces(p, x) if p.stiff else total) / p.inertia
 
 
 def elastic_energy(p: SpringProblem) -> float:

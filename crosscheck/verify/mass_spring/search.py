@@ -5,22 +5,29 @@ has mattered so far. Where no honest choice of the aspects that a probe adds rep
 single faults are assumed, then pairs of which one alone brings the answer nearer and the other
 moves it. So every fault answers for evidence of its own, and few of the millions of combinations
 are tried. All is tried in a fixed order, within a fixed amount of work, on every machine.
+
+A wrong velocity that is a combination of known terms is told from the answers alone. The first step
+of a motion is searched as a step, then what a motion adds to it.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from plumbob.reference.arguments import FloatArray
+
 from ..contestant import Answer, Exchange
 from ..greeting import Step
 from ..judgement import LEAST_SHARE
 from .faults import ASPECTS, MAX_FAULTS, STEP_FAULTS, Option, apply
-from .honest import compatible, domains
+from .honest import compatible, domains, honest
 from .laws import SOLVED, Rounding, relative_gap, rounding
-from .model import RIGHT_MATRIX, Integrator, StepModel, first_equation, predicted
+from .model import RIGHT_MATRIX, Integrator, StepModel, Substep, first_equation, predicted
 from .problem import SpringProblem
+from .relations import Sample, fitted, relation_of
 
 # The number of iterations and substeps that predictions with single faults take at one stage, and
 # those with pairs: a few seconds each.
@@ -28,6 +35,10 @@ WORK, WORK_OF_PAIRS = 40_000, 10_000
 # The number of hypotheses that are kept from one probe to the next, and of those to which a second
 # fault is added: the nearest.
 HYPOTHESES, NEAREST = 32, 40
+# The number of hypotheses to which faults with a number are fitted.
+FITTED = 8
+# The complexity of a match with a single fault.
+ONE_FAULT = (1, 1)
 # The share of the evidence that may stay unexplained beside a fault.
 UNEXPLAINED = 0.25
 # The iterations that a converged substep takes, about, unless the answer tells its solution.
@@ -40,12 +51,16 @@ DOUBLE = 1e-11
 LARGEST = 1e4
 # Aspects that matter in any step; the others where there are dampers or pins.
 ALWAYS = (
-    "time", "inertia", "masses", "gravity", "integrator", "matrix", "substeps", "velocity",
-    "update", "scaling", "springs",
+    "time", "reading", "inertia", "masses", "gravity", "integrator", "matrix", "substeps",
+    "velocity", "update", "scaling", "springs", "answers",
 )  # fmt: skip
 # A step that arrives at once where no spring acts.
 ONE_STEP = Integrator("newton", "x_n", 1, "gauss")
 FAULTY = frozenset(map(id, STEP_FAULTS))
+VELOCITIES = [
+    fault for fault in STEP_FAULTS if (fault.aspect, fault.rare) == ("velocity", "relation")
+]
+FRAMES = [fault for fault in STEP_FAULTS if fault.aspect == "frames"]
 FACTORISATIONS = [fault for fault in STEP_FAULTS if fault.aspect == "factorisation"]
 
 # An option for each aspect. Where no spring has acted yet, "flight" stands for "integrator": the
@@ -104,21 +119,43 @@ class Probe(NamedTuple):
         more = {"damper": p.damped, "damping": p.damped, "pins": p.pinned.size, "frames": p.steps}
         return [*ALWAYS, *(aspect for aspect, matters in more.items() if matters)]
 
+    def first_step(self) -> "Probe":
+        """Return the first step of a motion as a step."""
+        first = {name: frames[0] for name, frames in self.answers.items()}
+        return self._replace(problem=self.problem.changed(steps=None), answers=first)
+
+    def positions(self) -> "Probe":
+        """Return the probe without velocities."""
+        return self._replace(answers={"positions": self.answers["positions"]})
+
     def stages(self) -> list["Probe"]:
         """Return the probe with the positions alone, on which fewer aspects act, then with all."""
         if self.problem.steps or len(self.answers) < 2 or "positions" not in self.answers:
             return [self]
-        return [self._replace(answers={"positions": self.answers["positions"]}), self]
+        return [self.positions(), self]
 
 
 class ModelSearch:
     """The search of the choices that explain a solver's answers to the probes."""
 
-    def __init__(self, probes: Sequence[Probe], step: Step, epsilon: float) -> None:
-        """Set up the domains of all choices."""
+    def __init__(
+        self,
+        probes: Sequence[Probe],
+        step: Step,
+        epsilon: float,
+        faulty_aspects: Collection[str] | None = None,
+    ) -> None:
+        """Set up the domains of all choices, with faults of some aspects or of all."""
         self.probes, self.step, self.epsilon = probes, step, epsilon
         self.stages = [stage for probe in probes for stage in probe.stages()]
-        self.domains = domains(step)
+        self.domains = {
+            aspect: [
+                (option, cost)
+                for option, cost in domain
+                if not cost or faulty_aspects is None or aspect in faulty_aspects
+            ]
+            for aspect, domain in domains(step).items()
+        }
         # where masses are wrong, local/global iterations differ from Newton's even in flight
         self.flight = Integrator("local_global") if step.method == "local_global" else ONE_STEP
         # the integrators that each one of the domain "flight" stands for
@@ -146,6 +183,11 @@ class ModelSearch:
         self._skipped: set[int] = set()  # stages that no hypothesis explains
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
         self._gaps: dict[tuple[Any, ...], float | None] = {}
+        self._fitted: list[Option] = []  # which stay, so that no other option gets their id
+
+    def with_probes(self, probes: Sequence[Probe]) -> "ModelSearch":
+        """Return the search with more probes."""
+        return ModelSearch([*self.probes, *probes], self.step, self.epsilon)
 
     def run(
         self,
@@ -181,10 +223,14 @@ class ModelSearch:
         branches = [branch for h in hypotheses for branch in self._branches(h, index)]
         explaining = [branch for branch in branches if self._explains(branch, index)]
         # Free flight alone does not tell some honest steps from others with a fault.
-        if not self._reproducing(explaining, index) or not self.stages[index].coupled:
+        is_flight = not any(stage.coupled for stage in self.stages[: index + 1])
+        if is_flight or not self._reproducing(explaining, index):
             failing = [branch for branch in branches if not self._explains(branch, index)]
             singles = list(self._singles(failing, index))
             explaining += [one.choices for one in singles if self._fits(one.choices, index)]
+            for fits in (self._with_numbers(failing, index), self._with_flights(failing, index)):
+                if not self._reproducing(explaining, index):
+                    explaining += [choices for choices in fits if self._fits(choices, index)]
             if not self._skipped and not self._reproducing(explaining, index):
                 explaining += [
                     pair for pair in self._pairs(singles, index) if self._fits(pair, index)
@@ -193,9 +239,18 @@ class ModelSearch:
         ranked = sorted(unique.values(), key=lambda choices: self._rank(choices, index))
         if not self._is_complete(index):
             return ranked
-        reproducing = self._reproducing(ranked, index)
+        reproducing = self._varied(self._reproducing(ranked, index))
         unpredicted = [choices for choices in ranked if self._gap(choices, index) is None]
         return reproducing[:HYPOTHESES] + unpredicted[:HYPOTHESES]
+
+    def _varied(self, hypotheses: Sequence[Choices]) -> list[Choices]:
+        """Return hypotheses, simplest first, in turn with each set of faults."""
+        counts, order = dict[frozenset[int], int](), list[tuple[int, int]]()
+        for choices in hypotheses:
+            faults = frozenset(id(o) for o in choices.values() if self.costs[id(o)])
+            counts[faults] = counts.get(faults, 0) + 1
+            order.append((len(faults), counts[faults]))
+        return [hypotheses[i] for i in sorted(range(len(order)), key=order.__getitem__)]
 
     def _explains_all(self, match: ModelMatch, cases: Sequence[Probe]) -> bool:
         """Return whether a match explains every case."""
@@ -253,7 +308,9 @@ class ModelSearch:
         """Yield what each single fault makes of each hypothesis that fails at a stage."""
         limit = self._work + (WORK_OF_PAIRS if self._skipped else WORK)
         branches = sorted(branches, key=_effort)
-        trials = [(b, aspect, o) for b in branches for aspect, o in self._faults(b, index)]
+        trials = [
+            (b, aspect, o) for b in branches for aspect, o in self._faults(b, index) if o.at is None
+        ]
         for branch, aspect, option in sorted(trials, key=lambda trial: _takes_long(trial[2])):
             before = self._gap(branch, index) or 0.0
             choices = branch | {aspect: option}
@@ -262,9 +319,69 @@ class ModelSearch:
                 if gap != before:
                     yield SingleFault(branch, aspect, option, gap, before)
 
+    def _with_numbers(self, branches: Sequence[Choices], index: int) -> Iterator[Choices]:
+        """Yield the simplest right hypotheses with each fault that answers tell a number of."""
+        stage, limit = self.stages[index], self._work + WORK_OF_PAIRS
+        for branch in self._simplest_right(branches, index):
+
+            def difference(fault: Option, branch: Choices = branch) -> FloatArray:
+                self._work += _effort(branch)
+                options = tuple((branch | {fault.aspect: fault}).values())
+                problem, model = apply(options, stage.problem, StepModel(damper="none"))
+                prediction = predicted(problem, model, stage.answers.get("positions"))
+                if "positions" not in prediction:
+                    return np.full(stage.answers["positions"].size, np.inf)
+                return (prediction["positions"] - stage.answers["positions"]).ravel()
+
+            faults = [fault for _, fault in self._faults(branch, index) if fault.at is not None]
+            allowed = self._rounding(stage, StepModel()).positions
+            for fault in faults:
+                fit = fitted(fault, difference, allowed) if self._work < limit else None
+                yield from self._added(branch, fit)
+
+    def _with_flights(self, branches: Sequence[Choices], index: int) -> Iterator[Choices]:
+        """Yield right hypotheses with a flight that is another combination of its terms."""
+        if not self.stages[index].coupled:
+            for branch in self._simplest_right(branches, index):
+                yield from self._added(branch, relation_of("inertia", self._flights()))
+
+    def _simplest_right(self, branches: Sequence[Choices], index: int) -> list[Choices]:
+        """Return the hypotheses without faults that take least, of these the nearest."""
+        right = [b for b in branches if not (self._cost(b) or self._is_rare(b))]
+        distinct = {
+            frozenset((k, id(o)) for k, o in b.items() if k != "velocity"): b for b in right
+        }
+        order = sorted(distinct.values(), key=lambda b: (_effort(b), self._gap(b, index) or 0.0))
+        return order[:FITTED]
+
+    def _added(self, branch: Choices, fault: Option | None) -> Iterator[Choices]:
+        """Yield a hypothesis, with each right velocity, and a fault made for the answers."""
+        if fault is None:
+            return
+        self._fitted.append(fault)
+        self.costs[id(fault)] = 1
+        for velocity in (option for option, cost in self.domains["velocity"] if not cost):
+            choices = branch | {"velocity": velocity, fault.aspect: fault}
+            if compatible(choices):
+                yield choices
+
+    def _flights(self) -> list[Sample]:
+        """Return the displacements where no spring acts."""
+        flights = [probe for probe in self.probes if not (probe.coupled or probe.problem.steps)]
+        return [
+            Sample(
+                probe.answers["positions"] - probe.problem.positions,
+                _start(probe.problem).value,
+                self._rounding(probe, StepModel()).positions,
+            )
+            for probe in flights
+            if "positions" in probe.answers
+        ]
+
     def _faults(self, branch: Choices, index: int) -> Iterator[tuple[str, Option]]:
         """Yield the faults that may be added to a hypothesis, each with its aspect."""
-        if self._cost(branch) >= MAX_FAULTS or self._is_rare(branch):
+        faults = [option for option in branch.values() if self.costs[id(option)]]
+        if len(faults) >= MAX_FAULTS or self._is_rare(branch) or any(o.rare for o in faults):
             return
         for aspect in self.stages[index].aspects():
             domain = self.domains[aspect]
@@ -274,7 +391,7 @@ class ModelSearch:
                 domain = self.classes[in_flight(branch[aspect].fields["integrator"], self.flight)]
                 domain = domain + self.symplectic
             if not self.costs[id(branch[aspect])]:
-                yield from ((aspect, option) for option, cost in domain if cost)
+                yield from ((aspect, o) for o, cost in domain if cost and not (faults and o.rare))
 
     def _pairs(self, singles: Sequence[SingleFault], index: int) -> Iterator[Choices]:
         """Yield two faults at once: one brings the answer nearer, the other moves it.
@@ -282,7 +399,7 @@ class ModelSearch:
         Those of which the first brings it nearest come first.
         """
         limit = self._work + WORK_OF_PAIRS
-        singles = [one for one in singles if not _takes_long(one.option)]
+        singles = [one for one in singles if not (one.option.rare or _takes_long(one.option))]
         nearer = sorted((one for one in singles if one.gap < one.before), key=lambda one: one.gap)
         for first in nearer[:NEAREST]:
             for second in singles:
@@ -299,6 +416,7 @@ class ModelSearch:
         return any(
             option.rare and option.aspect not in self.declared_aspects
             for option in choices.values()
+            if not self.costs[id(option)]
         )
 
     def _fits(self, choices: Choices, index: int) -> bool:
@@ -372,6 +490,93 @@ class ModelSearch:
         return ModelMatch(options, tuple(o for o in options if self.costs[id(o)]))
 
 
+def _start(p: SpringProblem) -> Substep:
+    return Substep(p, StepModel(), p.positions, p.velocities, p.h)
+
+
+def matches_of(
+    search: ModelSearch,
+    notify: Callable[[int, int], None] = lambda count, total: None,
+    cases: Sequence[Probe] = (),
+) -> list[ModelMatch]:
+    """Return the matches of probes of steps or of motions, as `ModelSearch.run` does."""
+    probes, step, epsilon = search.probes, search.step, search.epsilon
+    if not any(probe.problem.steps for probe in probes):
+        return _step_matches(search, notify, cases)
+    matches = ModelSearch(probes, step, epsilon, ("frames",)).run(notify, cases)
+    if matches:
+        return matches
+    firsts = [probe.first_step() for probe in probes]
+    matches = _step_matches(ModelSearch(firsts, step, epsilon), notify, ())
+    return _with_frames(matches, probes, epsilon)
+
+
+def _step_matches(
+    search: ModelSearch, notify: Callable[[int, int], None], cases: Sequence[Probe]
+) -> list[ModelMatch]:
+    """Return the matches of steps; a wrong velocity is told without its step where it can be."""
+    probes, step, epsilon = search.probes, search.step, search.epsilon
+    fault = velocity_fault(probes, epsilon)
+    if fault is None:
+        return search.run(notify, cases)
+    matches = ModelSearch(probes, step, epsilon, ()).run(notify, cases)
+    if matches:
+        return matches
+    positions = [probe.positions() for probe in probes]
+    matches = [
+        _with_velocity(match, fault, probes, step, epsilon)
+        for match in ModelSearch(positions, step, epsilon).run(notify)
+    ]
+    fewest = min((match.complexity for match in matches), default=(MAX_FAULTS, 0))
+    others = search.run(notify, cases) if fewest > ONE_FAULT else []
+    if others and others[0].complexity < fewest:
+        return others
+    return [match for match in matches if match.complexity == fewest]
+
+
+def _with_velocity(
+    match: ModelMatch, fault: Option, probes: Sequence[Probe], step: Step, epsilon: float
+) -> ModelMatch:
+    """Return a match of positions with a right velocity if that explains all, else a fault."""
+    for velocity in honest(step)["velocity"]:
+        options = tuple(velocity if o.aspect == "velocity" else o for o in match.options)
+        if max(gaps_of(options, probes, epsilon)) <= SOLVED:
+            return ModelMatch(options, match.faults)
+    return _with_fault(match, fault)
+
+
+def _with_fault(match: ModelMatch, fault: Option) -> ModelMatch:
+    options = (option for option in match.options if option.aspect != fault.aspect)
+    return ModelMatch((*options, fault), (*match.faults, fault))
+
+
+def velocity_fault(probes: Sequence[Probe], epsilon: float) -> Option | None:
+    """Return the fault that velocities are another combination of known terms than (x' - x) / h."""
+    samples = []
+    for probe in probes:
+        if not {"positions", "velocities"} <= probe.answers.keys():
+            return None
+        p, x = probe.problem, probe.answers["positions"]
+        d, v = x - p.positions, probe.answers["velocities"].copy()
+        v[p.pinned] = d[p.pinned] / p.h
+        value = partial(_start(p).value, d=d, x1=x)
+        samples.append(Sample(v, value, rounding(p, StepModel(), epsilon).velocities))
+    return relation_of("velocity", samples, VELOCITIES)
+
+
+def _with_frames(
+    matches: Sequence[ModelMatch], probes: Sequence[Probe], epsilon: float
+) -> list[ModelMatch]:
+    """Return the matches of the first steps that explain most motions, with what these add."""
+    trials = [trial for match in matches
+              for trial in (match, *(_with_fault(match, fault) for fault in FRAMES))]  # fmt: skip
+    hits = [sum(gap <= SOLVED for gap in gaps_of(trial.options, probes, epsilon))
+            for trial in trials]  # fmt: skip
+    best = [trial for trial, count in zip(trials, hits, strict=True) if count == max(hits)]
+    fewest = min((trial.complexity for trial in best), default=None)
+    return [trial for trial in best if trial.complexity == fewest and trial.faults]
+
+
 def gaps_of(options: Sequence[Option], probes: Sequence[Probe], epsilon: float) -> list[float]:
     """Return how far answers are from a step with these options, relative to displacements."""
     gaps = []
@@ -395,6 +600,8 @@ def with_factorisation(
 
 
 def _factorised(match: ModelMatch, cases: Sequence[Probe], epsilon: float) -> ModelMatch | None:
+    if any(fault.aspect == "matrix" for fault in match.faults):
+        return None
     gaps = np.array(gaps_of(match.options, cases, epsilon))
     is_indefinite = np.array([_is_indefinite(match, case) for case in cases], dtype=bool)
     if not is_indefinite.any() or ((gaps > SOLVED) != is_indefinite).any():
@@ -477,7 +684,8 @@ def _relevant_in_flight(choices: Choices) -> Choices:
 def _acts_in_flight(option: Option) -> bool:
     """Return whether a matrix matters where no spring acts."""
     matrix = option.fields.get("matrix", RIGHT_MATRIX)
-    return bool(matrix.masses != 1.0 or matrix.right_power or matrix.is_by_columns)
+    is_other = matrix.masses != 1.0 or matrix.right_power or matrix.is_by_columns
+    return bool(is_other or matrix.inverse.startswith("factors"))
 
 
 def in_flight(integrator: Integrator, usual: Integrator = ONE_STEP) -> Integrator:

@@ -22,7 +22,7 @@ from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import digits, finding, hints_of, judge_case, laws_that_hold, proportion_of
 from ..sentence import Sentence, sentence
-from . import laws
+from . import iterations, laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
 from .honest import compatible, domains, honest
@@ -30,16 +30,22 @@ from .laws import SOLVED, StepContext, rounding
 from .model import EXPLICIT, StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
 from .search import (
+    UNEXPLAINED,
     ModelMatch,
     ModelSearch,
     Probe,
     fields_of,
     gaps_of,
+    matches_of,
     probes_of,
     with_factorisation,
 )  # fmt: skip
 
 MAX_EXPLANATIONS = 3
+# The number of larger cases in which faults are sought if all small ones are right.
+LARGER = 2
+# The least shares of the answers that several faults at once, or one, explain if not by chance.
+MANY, SOME = 0.7, 0.3
 LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
     laws.pins, laws.declared_step, laws.velocities, laws.pin_velocities, laws.momentum,
     laws.minimiser,
@@ -71,21 +77,70 @@ class Stepping(NamedTuple):
         telling = [] if is_constant else probes_of(exchanges, problems)
         search = ModelSearch(telling, greeting.step, greeting.epsilon)
         probes = probes_of(exchanges, problems, every=True)
-        matches = with_factorisation(search.run(notify, probes), probes, greeting.epsilon)
-        options = honest_options(matches, greeting.step)
-        faults = {fault.aspect for fault in matches[0].faults} if matches else {"unknown"}
-        recognised = greeting.step.method is not None or faults <= {"factorisation"}
-        judgements = [
-            _judge_case(
-                exchange, exchanges, problems[exchange.case.name], greeting, options, recognised
-            )
-            for exchange in exchanges
-        ]
+        step, epsilon, matches = greeting.step, greeting.epsilon, list[ModelMatch]()
+
+        def iteration_of(is_hasty: bool) -> Explanation | None:
+            options = honest_options(matches, step)
+            return iterations.explanation(options, probes, step.start, epsilon, is_hasty)
+
+        is_iterative = step.method in ("converged", "linearised") or step.iterations is not None
+        iteration = iteration_of(is_hasty=True) if is_iterative else None
+        if iteration is None or iteration.share < 1.0 - UNEXPLAINED:
+            matches = with_factorisation(matches_of(search, notify, probes), probes, epsilon)
+        if iteration is None and (step.method is not None or matches):
+            iteration = iteration_of(is_hasty=False)
+        judgements, recognised = _judge_all(exchanges, problems, greeting, matches)
+        is_right = iteration is None and bool(matches) and not matches[0].faults
+        larger = _faults_of_larger(search, judgements, probes, notify) if is_right else []
+        if larger:
+            matches = larger
+            judgements, recognised = _judge_all(exchanges, problems, greeting, matches)
         diagnosis = _diagnose(judgements, search, matches, probes)
+        if iteration is not None and iteration.share > diagnosis.share:
+            diagnosis = replace(diagnosis, explanations=(iteration,), first_broken=None, hints=())
+        elif not diagnosis.explained:
+            hint = iterations.stiffness_hint(honest_options(matches, step), probes, epsilon)
+            first = diagnosis.first_broken if hint is None else first_broken(judgements)
+            hints = diagnosis.hints if hint is None else (hint,)
+            diagnosis = replace(diagnosis, first_broken=first, hints=hints)
+        faults = {fault.aspect for match in matches[:1] for fault in match.faults}
         is_wrong = diagnosis.explained and (not recognised or "factorisation" in faults)
         if is_wrong or any(found.share == 1.0 for found in diagnosis.explanations):
             judgements = list(map(_with_wrong_step, judgements))
         return TaskReport(self.task, "", judgements, diagnosis)
+
+
+def _faults_of_larger(
+    search: ModelSearch,
+    judgements: Sequence[CaseJudgement],
+    probes: Sequence[Probe],
+    notify: Callable[[int, int], None],
+) -> list[ModelMatch]:
+    """Return the matches with faults of the small probes and of some larger wrong answers."""
+    wrong = {judgement.case.name for judgement in judgements if judgement.verdict >= Verdict.WRONG}
+    larger = [probe for probe in probes if probe.name in wrong][:LARGER]
+    is_tried = bool(search.probes and larger)
+    matches = matches_of(search.with_probes(larger), notify, probes) if is_tried else []
+    return [match for match in matches if match.faults]
+
+
+def _judge_all(
+    exchanges: Sequence[Exchange],
+    problems: Mapping[str, SpringProblem],
+    greeting: Greeting,
+    matches: Sequence[ModelMatch],
+) -> tuple[list[CaseJudgement], bool]:
+    """Return the judgements of all answers, and whether their step is declared or recognised."""
+    options = honest_options(matches, greeting.step)
+    faults = {fault.aspect for fault in matches[0].faults} if matches else {"unknown"}
+    recognised = greeting.step.method is not None or faults <= {"factorisation"}
+    judgements = [
+        _judge_case(
+            exchange, exchanges, problems[exchange.case.name], greeting, options, recognised
+        )
+        for exchange in exchanges
+    ]
+    return judgements, recognised
 
 
 def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, SpringProblem]:
@@ -239,7 +294,9 @@ def _diagnose(
     explanations: tuple[Explanation, ...] = ()
     behaviour, step = None, search.step
     if matches and matches[0].faults:
-        explanations = (_explanation(matches, probes, search.epsilon),)
+        explanation = _explanation(matches, probes, search.epsilon)
+        is_likely = explanation.share >= (MANY if len(matches[0].faults) > 1 else SOME)
+        explanations = (explanation,) if is_likely else ()
     elif matches and (
         (is_open := _leaves_open(step, options := honest_options(matches, step)))
         or fields_of({option.aspect: option for option in options})["integrator"].hessian != "exact"

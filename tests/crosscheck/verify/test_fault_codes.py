@@ -142,10 +142,11 @@ def test_a_wrong_program_is_named_by_its_code(fault):
 RIGHT_PROGRAMS = sorted({fault.program for fault in coded_faults().values()})
 STEPS = (
     "step", "substeps", "local-global step", "Newton iterations", "change of velocity",
-    "damped change of velocity", "particle by particle", "motion",
+    "damped change of velocity", "particle by particle", "motion", "conjugate gradients",
+    "Newton's method with a line search", "implicit step", "implicit motion", "linearised motion",
 )  # fmt: skip
 SLOW = ("limited ccd", "robot", "robot_track", "newton step", *STEPS[2:])
-RESERVED = ("robot", "robot_track", *STEPS[2:6])
+RESERVED = ("robot", "robot_track", "conjugate gradients", *STEPS[2:6])
 
 
 @pytest.mark.parametrize(

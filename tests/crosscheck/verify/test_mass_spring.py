@@ -151,6 +151,8 @@ PAIRS = [
     for i, first in enumerate(BY_KEY)
     for second in [list(BY_KEY)[(7 * i + 13) % len(BY_KEY)]]
     if BY_KEY[first].aspect != BY_KEY[second].aspect
+    and "frames" not in (BY_KEY[first].aspect, BY_KEY[second].aspect)
+    and not (BY_KEY[first].rare or BY_KEY[second].rare or BY_KEY[first].at or BY_KEY[second].at)
     and not {first, second} & {*NOT_LINEARISED, "springs missing", "factor kept", "matrix L",
                                "matrix L without h²", "tension only ignored"}
     and not any(BY_KEY[one].aspect == "integrator" for one in (first, second))
