@@ -130,8 +130,8 @@ def _requests(
     """Yield the requests of a robot: those that the fewest robots show come last."""
     lower, upper, joints = robot["lower"], robot["upper"], len(robot["lower"])
     generators = [rng, *np.random.default_rng(_SEED).spawn(FEW_DRAWS - 1)]
-    draws = [lower + (upper - lower) * one.uniform(0.2, 0.8, joints) for one in generators]
-    answer = max(draws, key=lambda q: np.linalg.svd(jacobian(mechanism(robot), q, -1))[1].min())
+    answers = [lower + (upper - lower) * one.uniform(0.2, 0.8, joints) for one in generators]
+    answer = max(answers, key=lambda q: np.linalg.svd(jacobian(mechanism(robot), q, -1))[1].min())
     close = np.clip(answer + rng.uniform(-NEAR, NEAR, joints), lower, upper)
     anywhere = rng.uniform(lower, upper)
     tool = tool_pose(robot, answer)
