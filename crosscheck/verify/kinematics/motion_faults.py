@@ -175,7 +175,6 @@ def _from_other_target(
     names = {
         "x": targets.positions, "R": targets.rotations, "tool": rotation.to_matrix(tool.rotations),
         "late": np.maximum(frames - 1, 0), "early": np.minimum(frames + 1, len(q) - 1),
-        "at_start": tool_pose(motion.inputs, motion.previous[:1]).rotations,
     }  # fmt: skip
     pose = Pose(*(evaluate(formulas[name], names) for name in ("positions", "rotations")))
     return twists_between(tool, pose)

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from plumbob.reference.arguments import FloatArray
+
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport
@@ -15,6 +17,7 @@ from ..sentence import sentence
 from . import motion_faults, robot_motions, rounding
 from .report import report
 from .robot_models import FARTHEST
+from .robot_targets import TOLERANCE
 from .trajectories import LENIENT, Trajectory
 
 TASK = robot_motions.TASK
@@ -35,6 +38,12 @@ NO_DRIFT = 1e-2
 SAME = 1e-2
 # The joints of a start beyond its limits are to be within after so many frames.
 RETURN = 10
+# What may be on another frame's target, and the components of twists that it has.
+PARTS = (
+    (sentence("the tool is on"), np.ones(6)),
+    (sentence("the position of the tool is that of"), np.repeat([1.0, 0.0], 3)),
+    (sentence("the rotation of the tool is that of"), np.repeat([0.0, 1.0], 3)),
+)
 
 
 def judge(
@@ -130,6 +139,8 @@ def _on_target(
     if is_behind and twin is not None and twin is not motion:
         key += ", one iteration" * bool(np.abs(motion.q - twin.q).max() <= SAME)
     key = key if frame < facts["certain"] else "target followed, another"
+    if motion.case.family == TOLERANCE and motion.changes.any():
+        key = "target followed, behind"  # it does not take the start for near enough
     return _at(frame, finding(key, errors[frame], bound, distance=distance, angle=angle))
 
 
@@ -165,14 +176,22 @@ def _beyond_reach(motion: Trajectory) -> Iterator[Finding]:
 
 
 def _shifted(motion: Trajectory) -> Iterator[Finding]:
-    """Yield whether tools are on the targets of the frames before or after."""
-    is_moving = motion.errors(motion.displacements)[1:] > LENIENT
-    errors = motion.errors(motion.twists(motion.q))[1:]
+    """Yield whether tools are on the targets of the frames before or after, or a part of them."""
     for key, shift in (("frames in step, late", -1), ("frames in step, early", 1)):
-        others = motion.errors(motion.twists(motion.q, shift))[1:]
-        matches = (others <= LENIENT) & (errors > LENIENT)
-        share = matches[is_moving].mean() if is_moving.sum() > LENIENT else 0.0
-        yield finding(key, share, 0.5)
+        shares = [_share_on_target(motion, shift, parts) for _, parts in PARTS]
+        most = int(np.argmax(shares))
+        yield finding(key, shares[most], 0.5, what=PARTS[most][0])
+
+
+def _share_on_target(motion: Trajectory, shift: int, parts: FloatArray) -> float:
+    """Return the share of moving frames in which parts of a tool are on another frame's target."""
+    moved, missed, off = (
+        motion.errors(twists * parts)[1:]
+        for twists in (motion.displacements, motion.twists(motion.q),
+                       motion.twists(motion.q, shift))
+    )  # fmt: skip
+    is_moving, matches = moved > LENIENT, (off <= LENIENT) & (missed > LENIENT)
+    return float(matches[is_moving].mean()) if is_moving.sum() > LENIENT else 0.0
 
 
 def _jumps(motion: Trajectory) -> Finding:
