@@ -100,7 +100,10 @@ def attempt(subject: Subject) -> Trial:
         laws |= {"takes what is sent"}
     explanations = report.diagnosis.explanations
     keys = explanations[0].faults if explanations else ()
-    is_named = subject.fault in keys if subject.fault else not keys
+    covered = {
+        key for faults in FAULTS.values() for f in faults if f.key in keys for key in f.covers
+    }
+    is_named = subject.fault in {*keys, *covered} if subject.fault else not keys
     return Trial(subject, report.verdict, laws, is_named)
 
 

@@ -73,7 +73,8 @@ def judge(
     limited = [exchange for exchange in exchanges if "cones" in exchange.case.inputs]
     unlimited = [exchange for exchange in exchanges if exchange not in limited]
     judgements, diagnosis = _judge_unlimited(unlimited, greeting, method, base)
-    limited_judgements, readings = limits.judge(limited, greeting)
+    is_sound = all(judgement.verdict <= Verdict.RIGHT_EXCEPT for judgement in judgements)
+    limited_judgements, readings = limits.judge(limited, greeting, is_sound)
     explanations = (*diagnosis.explanations, *readings.explanations)
     count = diagnosis.variant_count + readings.variant_count
     diagnosis = replace(diagnosis, explanations=explanations, variant_count=count)

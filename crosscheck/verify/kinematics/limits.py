@@ -183,14 +183,18 @@ def _largest_rotation(local: FloatArray, inputs: Inputs) -> float:
 
 
 def judge(
-    exchanges: Sequence[Exchange], greeting: Greeting
+    exchanges: Sequence[Exchange], greeting: Greeting, is_sound: bool
 ) -> tuple[list[CaseJudgement], Diagnosis]:
-    """Return the judgements of answers to requests with limits, and how they are misread."""
+    """Return the judgements of answers to requests with limits, and how they are misread.
+
+    Only where answers without limits are sound, missed targets tell anything about limits.
+    """
     pairs = [(exchange.case, _local(exchange)) for exchange in exchanges]
     answers = [(case, local) for case, local in pairs if local is not None]
     misses = [_miss(local, case.inputs) > _reach(case, greeting) for case, local in answers]
     is_lost = sum(misses) > MAX_MISSES * len(misses)
     key = _misreading(answers, is_lost, greeting)
+    key = "" if key == CLAMPED and not is_sound else key
     miss = "within limits"
     if key or is_lost:
         miss = "most" if is_lost else "misread"

@@ -80,7 +80,7 @@ def hinge(angle, tilt=0.0):
     ],
 )
 def test_a_hinge_keeps_its_limits_and_reaches_its_target(angle, tilt, law, verdict):
-    ((judgement,), _) = limits.judge([hinge(angle, tilt)], GREETING)
+    ((judgement,), _) = limits.judge([hinge(angle, tilt)], GREETING, True)
     broken = {found.law for found in judgement.findings if found.verdict}
     assert judgement.verdict is verdict
     assert law in broken if law else not broken
@@ -89,7 +89,7 @@ def test_a_hinge_keeps_its_limits_and_reaches_its_target(angle, tilt, law, verdi
 def test_an_answer_without_rotations_is_broken():
     exchange = hinge(0.5)
     answer = Answer({"positions": np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])}, 0.0)
-    ((judgement,), diagnosis) = limits.judge([replace(exchange, answer=answer)], GREETING)
+    ((judgement,), diagnosis) = limits.judge([replace(exchange, answer=answer)], GREETING, True)
     assert judgement.verdict is Verdict.BROKEN
     assert not diagnosis.explanations
 
@@ -117,6 +117,19 @@ def test_a_misreading_is_wrong_and_named(fault):
     report = judge_cases(contestant_of(fault.wrong_program), TASK, "ccd", cases())
     assert report.verdict is Verdict.WRONG
     assert [explanation.codes for explanation in report.diagnosis.explanations] == [(fault.code,)]
+
+
+def test_targets_that_another_mistake_misses_tell_nothing_about_limits():
+    (clamped,) = (fault for fault in FAULTS if fault.code == "PB-LIMIT-002")
+    greeting = Greeting(PROTOCOL, (TASK,), methods=("ccd",), limits=True)
+    asked = [case for case in inverse_kinematics.cases(greeting, "ccd", 0, False)
+             if "cones" in case.inputs or case.name.startswith("one sweep")]  # fmt: skip
+    program = clamped.wrong_program
+    without_root = program.replace("(parents, effector)[1:]:", "(parents, effector)[1:-1]:")
+    assert without_root != program
+    report = judge_cases(contestant_of(without_root), TASK, "ccd", asked)
+    assert not any("PB-LIMIT-002" in one.codes for one in report.diagnosis.explanations)
+    assert report.verdict is Verdict.WRONG
 
 
 def solve_by(method, kind, inputs):
