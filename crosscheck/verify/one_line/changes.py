@@ -242,9 +242,9 @@ def _around_loop(
     yield "loop", f"{header(loop)}  # once", [*before, single_pass, *after]
     for k in range(1, len(loop.body)):  # the first counts the passes
         line, rest = loop.body[k], with_body([*loop.body[:k], *loop.body[k + 1 :]])
-        text = f"{header(line)}  # {{}} the loop: {header(loop)}"
-        yield "moved line", text.format("before"), [*before, line, rest, *after]
-        yield "moved line", text.format("after"), [*before, rest, line, *after]
+        for place, lines in (("before", [line, rest]), ("after", [rest, line])):
+            text = f"{header(line)}  # {place} the loop: {header(loop)}"
+            yield "moved line", text, [*before, *lines, *after]
     if before and isinstance(before[-1], ast.Assign):
         text = f"{header(before[-1])}  # in the loop: {header(loop)}"
         body = [*loop.body[:1], before[-1], *loop.body[1:]]

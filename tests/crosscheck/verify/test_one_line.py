@@ -124,6 +124,13 @@ def test_the_program_is_as_it_was_after_all_changes():
     assert {kind for kind, _ in first} <= set(search.FAULTS)
 
 
+def test_lines_with_braces_are_moved_out_of_a_loop():
+    program = Program(LOOP.replace("i = i + 1", "i = {'next': i + 1}['next']"))
+    program.observe(partial(program.names["count"], 4))
+    moved = [mutant.wrong for mutant in program.mutants() if mutant.kind == "moved line"]
+    assert any("{'next': i + 1}" in line and "before the loop" in line for line in moved)
+
+
 def test_long_lines_are_cut_to_what_differs():
     line = "result = " + " + ".join(f"term_{i}" for i in range(30))
     right, wrong = search.excerpts(line, line.replace("term_15", "term_51"))
