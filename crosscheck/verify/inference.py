@@ -132,7 +132,7 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
     )  # fmt: skip
     if best.verdict <= Verdict.RIGHT_EXCEPT and report.diagnosis.explained:
         explanations = tuple(
-            replace(found, sentence=sentence("Of other requests: {what}", what=found.sentence))
+            replace(found, sentence=sentence("If that is not meant: {what}", what=found.sentence))
             for found in report.diagnosis.explanations
         )
         best = replace(best, diagnosis=replace(best.diagnosis, explanations=explanations))

@@ -115,10 +115,16 @@ def equal_answers(exchange: Exchange, allowed: float | Mapping[str, float]) -> F
     return findings[int(np.argmax(ratios))] if findings else finding("equal answers", 0.0)
 
 
-def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
-    """Return hints at mistakes that no variant has, from the laws that are broken."""
+def hints_of(
+    judgements: Sequence[CaseJudgement], is_explained: bool = False
+) -> tuple[Sentence, ...]:
+    """Return hints at mistakes that no variant has, from the laws that are broken.
+
+    Where a mistake explains the answers, numbers that are none come from it.
+    """
     findings = chain.from_iterable(judgement.findings for judgement in judgements)
     broken = {found.law for found in findings if found.verdict >= Verdict.WRONG}
+    broken -= {"numbers"} if is_explained else set()
     hints = (entry for law, entry in LAWS["hints"].items() if law in broken)
     return tuple(Sentence(entry["sentence"], {}) for entry in hints)
 

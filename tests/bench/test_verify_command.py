@@ -247,7 +247,7 @@ def test_tasks_are_listed_with_what_they_ask(capsys):
     assert "forward_kinematics(parents, offsets, local_rotations)" in out
     assert "Returns some of: positions, rotations" in out
     code, out, _ = plumbob(capsys, "--list", "--task", "mass_spring_step")
-    assert "[tension_only] (spring): springs that resist no compression" in out
+    assert "[tension_only] (spring): true: the spring resists no compression" in out
     assert "forward_kinematics" not in out
 
 

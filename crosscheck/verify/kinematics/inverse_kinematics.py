@@ -272,6 +272,7 @@ def _diagnosis(
     if any(trial.case.facts["sweeps"] == 1 for trial in wrong) or (wrong and comparison.damped):
         diagnosis = sweeps.explained(comparison, sweep_trials, wrong, greeting, max_faults, base)
     elif comparison.method:
+        wrong = [t for t in wrong if t in must]
         wrong += [t for t in must if not t.is_sweep and (t.is_wrong or _ends_elsewhere(t))]
         bound = partial(sweeps.prediction_bound, greeting)
         exchanges = {trial.case.name: trial.comparable for trial in must}
@@ -282,7 +283,8 @@ def _diagnosis(
     is_certain = any(explanation.share == 1.0 for explanation in diagnosis.explanations)
     if wrong and comparison.method and not is_certain:
         solves = [trial for trial in must if trial in wrong or not trial.is_sweep]
-        early = early_ends.explanation(solves, wrong, comparison.method, greeting)
+        missed = [trial for trial in wrong if trial in must]
+        early = early_ends.explanation(solves, missed, comparison.method, greeting)
         return replace(diagnosis, explanations=(early,)) if early else diagnosis
     is_right = all(trial.judgement.verdict is Verdict.RIGHT for trial in trials)
     if not (comparison.method or is_right or diagnosis.explained):

@@ -63,7 +63,7 @@ def report(
     broken = None
     if len(failures) == 1 and not diagnosis.explained:
         broken = first_broken(failures)
-    hints = (*diagnosis.hints, *hints_of(judgements))
+    hints = (*diagnosis.hints, *hints_of(judgements, diagnosis.explained))
     if broken:
         hints += proportion_of(judgements)
     if max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED:

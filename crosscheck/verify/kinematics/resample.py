@@ -114,8 +114,8 @@ def _behaviour_at_strokes(exchanges: Sequence[Exchange], greeting: Greeting) -> 
             if _distances(points, line, True).max() > bound:
                 continue  # nothing is known from points off the line
             if _distances(points, line, False).max() > bound:
-                return sentence("It bridges strokes: points lie between them as well.")
-            return sentence("It keeps strokes apart: no points lie between them.")
+                return sentence("It joins strokes, as is allowed: points lie between them as well.")
+            return sentence("It keeps strokes apart, as is allowed: no points lie between them.")
     return None
 
 

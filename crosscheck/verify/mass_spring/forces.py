@@ -189,4 +189,4 @@ def _diagnose(
     )  # fmt: skip
     explanations = tuple(found for found in explanations if found.faults != ("",))
     first = None if explanations else first_broken(judgements)
-    return Diagnosis(explanations, None, first, hints_of(judgements), count)
+    return Diagnosis(explanations, None, first, hints_of(judgements, bool(explanations)), count)

@@ -312,7 +312,7 @@ def _diagnose(
             model=describe_model(options),
             declaration=declaration,
         )
-    hints = hints_of(judgements)
+    hints = hints_of(judgements, bool(explanations))
     if _repeats(judgements, 1.0):
         first = sentence(
             "Positions are those of the request in all its answers: nothing moves. Answer the "

@@ -204,12 +204,14 @@ def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
     right, wrong = excerpts(mutant.right, mutant.wrong)
     if wrong:
         words = sentence(
-            "{what} The answers are those of a right program in which `{right}` is replaced by "
-            "`{wrong}`.", what=Sentence(entry["sentence"], {}), right=right, wrong=wrong,
+            "{what} Where a right program has `{right}`, your answers are as if yours had "
+            "`{wrong}`; names in it may differ.",
+            what=Sentence(entry["sentence"], {}), right=right, wrong=wrong,
         )  # fmt: skip
     else:
         words = sentence(
-            "{what} The answers are those of a right program without the line `{right}`.",
+            "{what} Your answers are as if the line `{right}` of a right program were missing in "
+            "yours; names in it may differ.",
             what=Sentence(entry["sentence"], {}), right=right,
         )  # fmt: skip
     return with_code(entry["code"], words)

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from difflib import get_close_matches, unified_diff
 from itertools import groupby
 
+import numpy as np
+
 from ..fault_programs import FAMILIES, CodedFault, coded_faults, contestant_of
 from ..judgement import CaseJudgement, Verdict
 from ..sentence import Sentence, sentence
@@ -100,7 +102,8 @@ def failure_of(fault: CodedFault) -> CaseJudgement | None:
     first = None
     for case in cases:
         asked = cases_of(SavedCase(task, method, seed, False, case.name), cases)
-        failure = judge_cases(contestant, task, method, asked).smallest_failure
+        with np.errstate(all="ignore"):  # a wrong program may divide by zero
+            failure = judge_cases(contestant, task, method, asked).smallest_failure
         if failure and any(
             finding.verdict >= Verdict.WRONG and finding.law != "one sweep"
             for finding in failure.findings

@@ -137,6 +137,11 @@ def explanations(report: TaskReport) -> Iterator[Sentence]:
 def advice(tasks: Sequence[TaskReport]) -> Sentence:
     """Return what to do next."""
     bad = [task for task in tasks if task.verdict not in GOOD]
+    if not bad and any(task.verdict is Verdict.RIGHT_EXCEPT for task in tasks):
+        return sentence(
+            "Next: correct what is said above, or leave it if it is meant. Then --junit FILE for "
+            "your CI, plumbob.testing for your pytest, --thorough for more cases."
+        )
     if not bad:
         return sentence(
             "Next: --junit FILE for your CI, plumbob.testing for your pytest, --thorough for "

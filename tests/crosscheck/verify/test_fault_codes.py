@@ -192,6 +192,13 @@ def test_a_code_in_small_letters_is_explained_with_lines_and_a_failing_case(lang
     assert "positions[" in text or "rotations[" in text
 
 
+def test_a_program_whose_answers_are_no_numbers_is_explained():
+    code, text = printed("PB-FABRIK-014")
+    assert code == 0
+    assert "Warning" not in text
+    assert "NaN" in text
+
+
 def test_an_unknown_code_is_refused_with_the_nearest():
     code, text = printed("PB-FORCE-999")
     assert code == 2

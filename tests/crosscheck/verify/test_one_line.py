@@ -57,7 +57,10 @@ def test_the_line_is_printed_where_the_catalogue_knows_no_mistake():
     screen = " ".join(
         "\n".join(terminal.lines(report, Presentation(speaker("en"), "en", ["solver.py"]))).split()
     )
-    assert "`rest_lengths` is replaced by `stiffnesses`" in screen
+    assert (
+        "a right program has `rest_lengths`, your answers are as if yours had `stiffnesses`"
+        in screen
+    )
     assert "[PB-LINE-013]" in screen
 
 
