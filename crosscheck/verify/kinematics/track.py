@@ -1,6 +1,7 @@
 """Following a curve: each frame an honest pose, on its target, near the frame before."""
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -18,9 +19,9 @@ from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..laws import HOLDS, finding, judge_case
-from ..sentence import sentence
+from ..sentence import Sentence, sentence, with_code
 from . import claims, pose_laws, problems, rounding, skeletons, sweeps
-from .faults import SwitchFault
+from .faults import TABLE, SwitchFault
 from .inverse_kinematics import METHODS
 from .pose_laws import AnsweredPose
 from .predictions import forward, predict_track
@@ -143,8 +144,11 @@ def judge(
         for textbook in ((method,) if method in METHODS else METHODS)
     ]
     best = max(diagnoses, key=lambda d: max((e.share for e in d.explanations), default=0.0))
-    explanations = (_of_solves(explanation, base) for explanation in best.explanations)
-    best = replace(best, explanations=tuple(explanations))
+    explanations = tuple(_of_solves(explanation, base) for explanation in best.explanations)
+    if wrong and not any(explanation.share == 1.0 for explanation in explanations):
+        blended = _blended([frames_of(exchange) for exchange in exchanges])
+        explanations = (blended,) if blended else explanations
+    best = replace(best, explanations=explanations)
     answers = [
         claims.values_of(e.case, [frame.pose for frame in frames_of(e)], {}, method, greeting)
         for e in exchanges
@@ -162,6 +166,40 @@ def _of_solves(explanation: Explanation, base: Sequence[SwitchFault]) -> Explana
         "Its inverse_kinematics has the same mistake: {what}", what=explanation.sentence
     )
     return replace(explanation, sentence=words)
+
+
+def _blended(answers: Sequence[Sequence[Frame]]) -> Explanation | None:
+    """Return that effectors go a part of the way to each target, if they do.
+
+    They set out where they were, or from the target before, and end within the tolerance.
+    """
+    pairs = [pair for frames in answers for pair in itertools.pairwise(frames)]
+    pairs = [pair for pair in pairs if all(frame.case.facts["least"] == 0.0 for frame in pair)]
+    for where, start_of in STARTS:
+        ways = np.array([frame.case.inputs["target"] - start_of(last) for last, frame in pairs])
+        gone = np.array([_effector(frame) - start_of(last) for last, frame in pairs])
+        part = float((ways * gone).sum() / max((ways * ways).sum(), 1e-300)) if pairs else 1.0
+        misses = np.linalg.norm(gone - part * ways, axis=-1)
+        if LEAST_PART < part < 1.0 - LEAST_PART and misses.max() <= 2.0 * TOLERANCE:
+            entry = TABLE["follow"][BLENDED]
+            words = sentence(
+                "{what} It goes {part:.0%} of the way from {where} to each target.",
+                what=Sentence(entry["sentence"], {}), part=part, where=where,
+            )  # fmt: skip
+            return Explanation((BLENDED,), with_code(entry["code"], words), 1.0, 0.0)
+    return None
+
+
+def _effector(frame: Frame) -> FloatArray:
+    return np.asarray(frame.pose.positions[frame.case.inputs["effector"]])
+
+
+# Where effectors set out that go a part of the way to targets, by the frame before.
+STARTS: Sequence[tuple[Sentence, Callable[[Frame], FloatArray]]] = (
+    (sentence("the target before"), lambda last: np.asarray(last.case.inputs["target"])),
+    (sentence("where it was"), _effector),
+)
+BLENDED, LEAST_PART = "targets blended", 0.02
 
 
 def _is_wrong(judgement: CaseJudgement) -> bool:

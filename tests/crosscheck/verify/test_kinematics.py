@@ -275,6 +275,36 @@ def test_helper_that_drops_small_rotations_stalls():
     assert sum("small rotations are lost" in words for words in told(report)) >= 5
 
 
+@pytest.mark.parametrize(
+    ("from_targets", "part"),
+    [
+        (False, 0.5),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in [(True, 0.75), (False, 0.9)]),
+    ],
+)
+def test_a_part_of_the_way_to_each_target_is_told(from_targets, part):
+    def function(curve, local_rotations, effector, **inputs):
+        frames, q = [], local_rotations
+        x, _ = forward({**inputs, "local_rotations": q})
+        for before, target in zip([x[effector], *curve], curve, strict=False):
+            start = before if from_targets else x[effector]
+            inputs["target"] = start + part * (target - start)
+            q, x, _ = solve("ccd", {**inputs, "local_rotations": q, "effector": effector})
+            frames.append((q, x))
+        return {
+            "local_rotations": np.array([q for q, _ in frames]),
+            "positions": np.array([x for _, x in frames]),
+        }
+
+    report = judged(TRACK, function, "ccd")
+    assert report.verdict is Verdict.WRONG
+    assert named(report) == [{"targets blended"}]
+    (words,) = (str(one.sentence) for one in report.diagnosis.explanations)
+    assert (
+        f"{part:.0%} of the way from {'the target before' if from_targets else 'where it'}" in words
+    )
+
+
 def test_solver_that_continues_to_the_target_has_a_reservation():
     def function(**inputs):
         return {
