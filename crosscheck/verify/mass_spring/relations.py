@@ -78,7 +78,7 @@ def _fault(name: str, factors: Mapping[str, float], region: Mapping[str, str]) -
     symbols = {term["formula"]: term["symbol"] for term in _TABLE[name]}
     words, formula = "", "0.0"
     for term, factor in factors.items():
-        size = "" if abs(factor) == 1.0 else f"{abs(factor):.6g} "
+        size = f"{abs(factor):.6g} ".removeprefix("1 ")
         words += f" {'-' if factor < 0.0 else '+'} {size}{symbols[term]}"
         formula += f" + {factor!r} * ({term})"
     words = words.removeprefix(" + ") if factors else "0"
