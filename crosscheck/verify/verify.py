@@ -42,7 +42,7 @@ BUILDS_ON = {
     "track": ("inverse_kinematics", "forward_kinematics"),
     "robot_velocity": ("robot_jacobian",),
     "robot_inverse_kinematics": ("robot_jacobian",),
-    "robot_track": ("robot_jacobian",),
+    "robot_track": ("robot_inverse_kinematics", "robot_jacobian"),
 }
 Notify = Callable[[str, int, int], None]
 
@@ -90,7 +90,7 @@ def verify(
     reports = list[TaskReport]()
     for task, method in trials(greeting, tasks):
         causes = [r for r in reports if _builds_on(task, method, r)]
-        causes.sort(key=lambda cause: BUILDS_ON[task].index(cause.task))
+        causes.sort(key=lambda r: (not r.diagnosis.explained, BUILDS_ON[task].index(r.task)))
 
         def judge(
             greeting: Greeting,
@@ -103,7 +103,8 @@ def verify(
 
         report = inferred(contestant, judge(contestant.greeting), judge)
         report = with_kept_state(contestant, report)
-        report = with_changed_line(report, contestant.greeting, partial(notify, task))
+        if not causes:
+            report = with_changed_line(report, contestant.greeting, partial(notify, task))
         reports.append(_with_cause(report, causes))
     return Report(contestant.greeting, reports, seed, remarks)
 
@@ -113,32 +114,37 @@ def _known_faults(
 ) -> Sequence[SwitchFault | str] | None:
     """Return the faults of what a task builds upon, None if that is right or not explained.
 
-    Of robots they are keys, none if their Jacobian is wrong for an unknown reason.
+    Of robots they are keys, none if their Jacobian is wrong for an unknown reason. Poses that miss
+    for a known reason do so in motions too.
     """
     if not task.startswith("robot"):
         return next(filter(None, map(faults.explaining, causes)), None)
     if task not in (robot_inverse_kinematics.TASK, robot_track.TASK):
         return None
     wrong = [r for r in reports if r.task == robot_jacobian.TASK and r.verdict >= Verdict.WRONG]
+    wrong += [cause for cause in causes if cause.task == robot_inverse_kinematics.TASK]
     explanations = [found for report in wrong for found in report.diagnosis.explanations[:1]]
     return [key for found in explanations for key in found.faults] if wrong else None
 
 
 def _builds_on(task: str, method: str, report: TaskReport) -> bool:
-    """Return whether a task builds upon that of a report whose mistake is known."""
+    """Return whether a task builds upon that of a report, which is wrong."""
     is_earlier = report.task in BUILDS_ON.get(task, ()) and report.method in ("", method)
-    return is_earlier and report.verdict >= Verdict.WRONG and report.diagnosis.explained
+    return is_earlier and report.verdict >= Verdict.WRONG
 
 
 def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
     """Return a report on unexplained answers that names the mistakes of the task it builds upon."""
     if report.verdict < Verdict.WRONG or report.diagnosis.explained or not causes:
         return report
-    hint = sentence(
-        "Its {task} is wrong as well ({codes}): correct that first, since this builds upon it.",
-        task=causes[0].task,
-        codes=", ".join(causes[0].diagnosis.explanations[0].codes),
+    cause = causes[0]
+    codes = [code for found in cause.diagnosis.explanations[:1] for code in found.codes]
+    words = sentence(
+        "Its {task} is wrong as well ({codes}): correct that first, since this builds upon it."
+        if codes
+        else "Its {task} is wrong as well: correct that first, since this builds upon it."
     )
+    hint = Sentence(words.template, {"task": cause.task, "codes": ", ".join(codes)})
     diagnosis = replace(report.diagnosis, hints=(hint, *report.diagnosis.hints))
     return replace(report, diagnosis=diagnosis)
 

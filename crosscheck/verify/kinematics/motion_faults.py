@@ -657,7 +657,7 @@ STUCK: Mapping[str, Signature] = {
 # Joints in another order leave their limits, but reach their targets.
 ORDERS: Mapping[str, Signature] = {k: POSES[k] for k, fault in POSE_FAULTS.items() if fault.order}
 TIERS: Sequence[Tier] = (
-    Tier(ORDERS, least_share=0.97),
+    Tier(ORDERS, least_share=0.95),
     Tier(_entries("limits", _within) | _entries("speed_limits", _within_speeds), False, 0.97),
     Tier(_entries("test", _accepted), least_share=0.97, is_of_all=True, steps=True),
     Tier(POSES),
