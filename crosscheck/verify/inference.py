@@ -132,8 +132,11 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
     )  # fmt: skip
     if best.verdict <= Verdict.RIGHT_EXCEPT and report.diagnosis.explained:
         explanations = tuple(
-            replace(found, sentence=sentence("If that is not meant: {what}", what=found.sentence))
-            for found in report.diagnosis.explanations
+            replace(
+                explanation,
+                sentence=sentence("If that is not meant: {what}", what=explanation.sentence),
+            )
+            for explanation in report.diagnosis.explanations
         )
         best = replace(best, diagnosis=replace(best.diagnosis, explanations=explanations))
     return replace(best, assumptions=(*best.assumptions, *notes), is_asked=is_asked)

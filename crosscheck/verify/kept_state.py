@@ -13,7 +13,7 @@ from .sentence import Sentence, with_code
 NAME = "state kept between requests"
 FAULT = tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8"))["state"][NAME]
 # The number of wrong answers that are asked again, the last first.
-ASKED = 4
+REQUESTS = 4
 # Relative differences of answers above this do not come from threads that add up in another order.
 SAME = 1e-6
 STEPS = ("mass_spring_step", "mass_spring_motion")
@@ -29,7 +29,7 @@ def with_kept_state(contestant: Contestant, report: TaskReport) -> TaskReport:
     if report.verdict < Verdict.WRONG or contestant.greeting.system.continues or is_stuck:
         return report
     wrong = [judgement for judgement in report.judgements if _is_steady(judgement)]
-    share = _changed_share(contestant, wrong[-ASKED:])
+    share = _changed_share(contestant, wrong[-REQUESTS:])
     if not share:
         return report
     words = with_code(FAULT["code"], Sentence(FAULT["sentence"], {}))

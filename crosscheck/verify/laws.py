@@ -111,7 +111,7 @@ def equal_answers(exchange: Exchange, allowed: float | Mapping[str, float]) -> F
         for name, output in answer.values.items()
         if name in bounds
     ]  # fmt: skip
-    ratios = [found.error / max(found.tolerance, 1e-300) for found in findings]
+    ratios = [entry.error / max(entry.tolerance, 1e-300) for entry in findings]
     return findings[int(np.argmax(ratios))] if findings else finding("equal answers", 0.0)
 
 
@@ -123,7 +123,7 @@ def hints_of(
     Where a mistake explains the answers, numbers that are none come from it.
     """
     findings = chain.from_iterable(judgement.findings for judgement in judgements)
-    broken = {found.law for found in findings if found.verdict >= Verdict.WRONG}
+    broken = {law_entry.law for law_entry in findings if law_entry.verdict >= Verdict.WRONG}
     broken -= {"numbers"} if is_explained else set()
     hints = (entry for law, entry in LAWS["hints"].items() if law in broken)
     return tuple(Sentence(entry["sentence"], {}) for entry in hints)
@@ -228,8 +228,8 @@ def _common_factor(pairs: Pairs) -> float | None:
 def laws_that_hold(judgements: Sequence[CaseJudgement]) -> Sentence:
     """Return the laws that no answer breaks."""
     verdicts: dict[str, Verdict] = {}
-    for found in chain.from_iterable(judgement.findings for judgement in judgements):
-        verdicts[found.law] = max(found.verdict, verdicts.get(found.law, Verdict.RIGHT))
+    for entry in chain.from_iterable(judgement.findings for judgement in judgements):
+        verdicts[entry.law] = max(entry.verdict, verdicts.get(entry.law, Verdict.RIGHT))
     names = ", ".join(law for law, verdict in verdicts.items() if not verdict)
     return sentence("Laws that hold in every case: {laws}.", laws=names or "–")
 

@@ -123,8 +123,10 @@ def _known_faults(
         return None
     wrong = [r for r in reports if r.task == robot_jacobian.TASK and r.verdict >= Verdict.WRONG]
     wrong += [cause for cause in causes if cause.task == robot_inverse_kinematics.TASK]
-    explanations = [found for report in wrong for found in report.diagnosis.explanations[:1]]
-    return [key for found in explanations for key in found.faults] if wrong else None
+    explanations = [
+        explanation for report in wrong for explanation in report.diagnosis.explanations[:1]
+    ]
+    return [key for explanation in explanations for key in explanation.faults] if wrong else None
 
 
 def _builds_on(task: str, method: str, report: TaskReport) -> bool:
@@ -138,7 +140,7 @@ def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
     if report.verdict < Verdict.WRONG or report.diagnosis.explained or not causes:
         return report
     cause = causes[0]
-    codes = [code for found in cause.diagnosis.explanations[:1] for code in found.codes]
+    codes = [code for explanation in cause.diagnosis.explanations[:1] for code in explanation.codes]
     words = sentence(
         "Its {task} is wrong as well ({codes}): correct that first, since this builds upon it."
         if codes
@@ -249,9 +251,9 @@ def _ask(
         hangs += is_hung(answers[-1])
         if hangs == MAX_HANGS:
             break
-    exchanges, asked = [], list(zip(cases, answers, strict=False))
+    exchanges, requests = [], list(zip(cases, answers, strict=False))
     order = -1 if cases and cases[0].task in (forces.TASK, energy.TASK) else 1
-    for i, (case, answer) in enumerate(asked[::order]):
+    for i, (case, answer) in enumerate(requests[::order]):
         notify(len(cases) + i, 2 * len(cases))
         is_last = isinstance(answer, Failure) or hangs >= 2 * MAX_HANGS
         repeat = answer if is_last else contestant.answer(case)

@@ -65,7 +65,7 @@ def product(a: Any, b: Any, faults: Switches) -> Any:
 
 
 def cross_product(a: Any, b: Any, faults: Switches) -> Any:
-    """Return a x b: negative (1), a component negative (2 to 4), or a term of one."""
+    """Return a x b: negative (1), a component negative (2 to 4), or a term of a component."""
     x, y, z = cross(a, b)
     k = faults.cross
     if k == 1:

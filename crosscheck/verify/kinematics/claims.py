@@ -1,4 +1,4 @@
-"""What an answer says of itself: formulas that give its residual, its success or its positions.
+"""Claims of answers: formulas that give their residual, their success or their positions.
 
 The entries of the table `claim` in `faults.toml` name an output, and the formula that gives it in a
 program with the fault, whatever its method is. The names in formulas are those of `values_of`.
@@ -141,12 +141,12 @@ def explanations(answers: Sequence[Mapping[str, Any]]) -> list[Explanation]:
     """
     explanations = []
     for output, truth in TRUTHS.items():
-        given = [values for values in answers if output in values]
-        wrong = [values for values in given if _agrees(truth, output, values) is False]
+        reports = [values for values in answers if output in values]
+        wrong = [values for values in reports if _agrees(truth, output, values) is False]
         shares = [
-            (min(_share(fault, given), _share(fault, wrong)), -number, fault)
+            (min(_share(fault, reports), _share(fault, wrong)), -number, fault)
             for number, fault in enumerate(FAULTS)
-            if fault.output == output and wrong and len(given) >= MIN_ANSWERS
+            if fault.output == output and wrong and len(reports) >= MIN_ANSWERS
         ]
         share, _, fault = max(shares, default=(0.0, 0, None))
         if fault and share >= (1.0 if output == "converged" else MIN_SHARE):
@@ -155,7 +155,7 @@ def explanations(answers: Sequence[Mapping[str, Any]]) -> list[Explanation]:
 
 
 def _share(fault: ClaimFault, answers: Sequence[Mapping[str, Any]]) -> float:
-    """Return the share of answers that a fault gives, of those for which it has a value."""
+    """Return the share of answers that a fault gives, of all for which it has a value."""
     matches = [_agrees(fault.formula, fault.output, values) for values in answers]
     return matches.count(True) / max(len(matches) - matches.count(None), 1)
 

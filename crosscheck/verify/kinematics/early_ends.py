@@ -46,8 +46,8 @@ def _beyond(solve: FollowedSolve, links: slice) -> FloatArray:
     """Return after each sweep the distance from the nearest point of some links [m]."""
     lengths, d = solve.lengths[links], solve.root_distance
     reach, longest = float(lengths.sum()), float(lengths.max(initial=0.0))
-    least = max(0.0, d - reach, 2.0 * longest - reach - d)
-    return np.append(np.inf, _distances(solve)[1:] - least)
+    shortest = max(0.0, d - reach, 2.0 * longest - reach - d)
+    return np.append(np.inf, _distances(solve)[1:] - shortest)
 
 
 # What programs compare with a constant or with the tolerance, the constant if the words of the test

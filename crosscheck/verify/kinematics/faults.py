@@ -291,9 +291,9 @@ def describe(method: str, keys: Sequence[str]) -> Sentence:
 
 def explaining(report: TaskReport) -> tuple[SwitchFault, ...]:
     """Return the faults that explain most answers of a report, () if none do."""
-    known = by_key("ccd") | by_key("fabrik")
+    by_name = by_key("ccd") | by_key("fabrik")
     for explanation in report.diagnosis.explanations[:1]:
         keys = explanation.faults[0].split(" + ")
-        if explanation.share >= LEAST_SHARE and all(key in known for key in keys):
-            return tuple(known[key] for key in keys)
+        if explanation.share >= LEAST_SHARE and all(key in by_name for key in keys):
+            return tuple(by_name[key] for key in keys)
     return ()

@@ -252,7 +252,7 @@ def _equal_worlds(
 def _ends_elsewhere(trial: PoseTrial) -> bool:
     """Return whether a solve goes on within its tolerance, or ends short of the nearest point."""
     laws = (STOPS, "nearest point")
-    return any(found.law in laws and found.verdict for found in trial.judgement.findings)
+    return any(entry.law in laws and entry.verdict for entry in trial.judgement.findings)
 
 
 def _diagnosis(
@@ -283,8 +283,8 @@ def _diagnosis(
     is_certain = any(explanation.share == 1.0 for explanation in diagnosis.explanations)
     if wrong and comparison.method and not is_certain:
         solves = [trial for trial in must if trial in wrong or not trial.is_sweep]
-        missed = [trial for trial in wrong if trial in must]
-        early = early_ends.explanation(solves, missed, comparison.method, greeting)
+        failures = [trial for trial in wrong if trial in must]
+        early = early_ends.explanation(solves, failures, comparison.method, greeting)
         return replace(diagnosis, explanations=(early,)) if early else diagnosis
     is_right = all(trial.judgement.verdict is Verdict.RIGHT for trial in trials)
     if not (comparison.method or is_right or diagnosis.explained):

@@ -273,7 +273,7 @@ def _scaled(factor: float, names: Sequence[str], limits: JointLimits) -> JointLi
 
 
 def _shifted(shift: int, limits: JointLimits) -> JointLimits:
-    """Return limits with those of each joint from another."""
+    """Return limits with each joint's from another."""
     return JointLimits(*(np.roll(array, shift, axis=0) for array in limits))
 
 

@@ -46,7 +46,7 @@ SAME_SCALE, SHORT, OVERDAMPED = 0.02, (1e-3, 0.3), np.geomspace(0.3, 1e3, 60)[:,
 NOWHERE = 0.15
 # So many of the Jacobians that a fault may lead to are tried in steps: the others take long.
 MAX_JACOBIANS = 3
-ONES = np.ones(6)
+UNIT_WEIGHTS = np.ones(6)
 # Coordinates are well beyond a limit by more than this [rad, m].
 WELL_BEYOND = 0.01
 # Coordinates that are at a limit are so near to it [rad, m]; speeds agree to this share.
@@ -125,7 +125,7 @@ def _of_jacobian(
 
 
 def _broken(judgement: CaseJudgement) -> set[str]:
-    return {found.law for found in judgement.findings if found.verdict >= Verdict.WRONG}
+    return {entry.law for entry in judgement.findings if entry.verdict >= Verdict.WRONG}
 
 
 def _share(
@@ -301,7 +301,7 @@ def _within_speeds(limits: str, motion: Trajectory, laws: set[str]) -> Evidence:
 
 
 def _speeds(speeds: str, motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the frames whose reported speeds are those of a fault."""
+    """Return the frames with the reported speeds of a fault."""
     if motion.velocities is None or "velocities and coordinates" not in laws:
         return Evidence(*np.zeros((2, len(motion.q)), dtype=bool))
     names = {**motion.inputs, "q": motion.q, "v": motion.changes / motion.inputs["h"]}
@@ -393,7 +393,10 @@ def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
     gaps = {key: _step_gap(motion, J, q, twist) for key, twist in twists.items()}
     in_position = np.repeat([1.0, 0.0], 3)
     gaps[POSITION_ONLY] = np.minimum(
-        *(_step_gap(motion, J * rows[:, None], q, e * in_position) for rows in (in_position, ONES))
+        *(
+            _step_gap(motion, J * rows[:, None], q, e * in_position)
+            for rows in (in_position, UNIT_WEIGHTS)
+        )
     )
     is_right = (gaps[""] <= EQUAL_STEP).all()
     if motion.inputs["max_iterations"] == 1 and not is_right:
@@ -448,7 +451,7 @@ def _nearest_steps(motion: Trajectory) -> Mapping[str, Evidence]:
     is_nearest = (table <= table.min(axis=0) + TIE) & (table <= SAME_STEP)
     is_nearest[1:] &= ~is_nearest[0]
     evidence = {
-        key: Evidence(is_telling, found) for key, found in zip(keys, is_nearest, strict=True)
+        key: Evidence(is_telling, is_near) for key, is_near in zip(keys, is_nearest, strict=True)
     }
     for key, fault in STEP_FAULTS.items():
         if not fault.changes(motion.inputs):
@@ -471,7 +474,7 @@ def _single_step(motion: Trajectory, laws: set[str]) -> Evidence:
 
 
 def _misplaced(motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the single iterations whose shorter step, without some joints, moves the first joints.
+    """Return the single iterations that a shorter step, without some joints, explains.
 
     Left out are joints that do not move the tool, and one that is held at its limit.
     """
@@ -506,9 +509,9 @@ def limit_laws(motion: Trajectory, motions: Iterable[Trajectory]) -> Iterator[Fi
              if other.case.family == LIMIT_STEP and other.case.facts["is_leaving"]]  # fmt: skip
     yield finding("steps at limits", facts["is_leaving"] and all(stays), index=facts["held"])
     is_other = _is_still(motion) & (ancestors(motion.inputs) > 0.0)
-    others = np.setdiff1d(np.flatnonzero(is_other), facts["held"])
-    yield finding("steps at limits, others", len(others), index=facts["held"],
-                  others=", ".join(map(str, others)))  # fmt: skip
+    other_joints = np.setdiff1d(np.flatnonzero(is_other), facts["held"])
+    yield finding("steps at limits, others", len(other_joints), index=facts["held"],
+                  others=", ".join(map(str, other_joints)))  # fmt: skip
 
 
 def _is_still(motion: Trajectory) -> BoolArray:
@@ -615,7 +618,7 @@ STEP_FAULTS = {
 STEP_KEYS = (*(key for key in TWISTS if key), POSITION_ONLY, "no feedback", "frames start anew",
              *STEP_FAULTS)  # fmt: skip
 RIGHT_STEPS: Signature = partial(_is_step, "")
-SEEN: Mapping[str, Signature] = {
+APPARENT: Mapping[str, Signature] = {
     key: partial(_reached, partial(_errors, fault, _sine_if_near))
     for key, fault in POSE_FAULTS.items()
 }
@@ -629,7 +632,7 @@ POSES: Mapping[str, Signature] = {
     **_entries("speeds", _speeds),
     "wrong time step": partial(_by_law, "velocities and coordinates"),
     "clamped after the solve": _clamped,
-    **{key: signature for key, signature in SEEN.items() if key != POSITION_ONLY},
+    **{key: signature for key, signature in APPARENT.items() if key != POSITION_ONLY},
 }  # fmt: skip
 STEPS: Mapping[str, Signature] = {
     "damping too large": partial(_scaled, OVERDAMPED, (0.9, 1.1)),
@@ -664,7 +667,7 @@ TIERS: Sequence[Tier] = (
     Tier(STEPS, by_family=True),
     Tier(_entries("branch", _in_branch), least_share=0.97, is_of_all=True),
     Tier(STUCK, by_family=True, least_share=0.65, is_vague=True, steps=False),
-    Tier({"rotation missed": SEEN[POSITION_ONLY]}, is_vague=True, steps=False),
+    Tier({"rotation missed": APPARENT[POSITION_ONLY]}, is_vague=True, steps=False),
     Tier(VAGUE, is_vague=True),
 )
 FAULTS = tuple(dict.fromkeys(key for tier in TIERS for key in tier.signatures))

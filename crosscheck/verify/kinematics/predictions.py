@@ -81,7 +81,7 @@ def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
 
 
 def _through_euler_angles(local: FloatArray, order: str, other_order: str) -> FloatArray:
-    """Return rotations whose Euler angles of one order are put together in another."""
+    """Return rotations with Euler angles of an order put together in another."""
     angles = Rotation.from_quat(local, scalar_first=True).as_euler(order, suppress_warnings=True)
     columns = [order.upper().index(axis) for axis in other_order.upper()]
     if order[0] == order[2]:
@@ -154,8 +154,8 @@ def programs(
     They show beside a single fault, or a single one besides those of the `base`.
     """
     parts, names = {fault.part for fault in faults}, {fault.switch for fault in faults}
-    known = {fault.key for fault in base}
-    if not faults or sum(fault.key not in known for fault in faults) > 1:
+    base_keys = {fault.key for fault in base}
+    if not faults or sum(fault.key not in base_keys for fault in faults) > 1:
         return [{}]
     is_forward, is_fabrik = method == "forward", method == "fabrik"
     if "spin" in names:

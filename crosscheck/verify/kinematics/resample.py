@@ -144,9 +144,9 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
     A closed line may be walked either way round.
     """
     findings = _point_laws(points, case, greeting)
-    if case.inputs["closed"] and any(found.verdict >= Verdict.WRONG for found in findings):
+    if case.inputs["closed"] and any(entry.verdict >= Verdict.WRONG for entry in findings):
         backwards = _point_laws(np.roll(points[::-1], 1, axis=0), case, greeting)
-        if all(found.verdict < Verdict.WRONG for found in backwards):
+        if all(entry.verdict < Verdict.WRONG for entry in backwards):
             return backwards
     return findings
 
@@ -223,8 +223,8 @@ def _closing(points: FloatArray, arc: FloatArray, line: Polyline, bound: float) 
     is_open = float(np.linalg.norm(points[-1] - points[0])) > bound
     gap = line.length - float(arc[-1]) if is_open else 0.0
     widest = float(np.diff(arc).max()) * (1.0 + UNEVEN)
-    shown, limit = distinct_texts(gap, widest, 3)
-    return finding("closing side", gap, widest + 2.0 * bound, gap=shown, widest=limit)
+    gap_text, limit = distinct_texts(gap, widest, 3)
+    return finding("closing side", gap, widest + 2.0 * bound, gap=gap_text, widest=limit)
 
 
 def _diagnosis(

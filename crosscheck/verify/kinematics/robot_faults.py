@@ -108,12 +108,12 @@ def _with_other_angles(
     """Return rotations whose roll, pitch and yaw are changed, or applied in another order."""
     turns = rotation.to_matrix(quaternions).reshape(-1, 3, 3)
     angles = scale * np.array([roll_pitch_yaw(R) for R in turns])[:, columns]
-    others = Rotation.from_euler(order, angles).as_quat(scalar_first=True)
-    return np.array(others).reshape(quaternions.shape)
+    alternatives = Rotation.from_euler(order, angles).as_quat(scalar_first=True)
+    return np.array(alternatives).reshape(quaternions.shape)
 
 
 def _load(entries: Mapping[str, Any]) -> Iterator[tuple[str, RobotFault]]:
-    """Yield the faults of a table by their keys: that of an entry, or one for each of its rules."""
+    """Yield the faults of a table by their keys: of an entry, or of each of its rules."""
     for key, entry in entries.items():
         fields = {k: entry[k] for k in ("change", "scale", "relative", "order") if k in entry}
         fault = RobotFault(with_code(entry["code"], Sentence(entry["sentence"], {})), **fields)

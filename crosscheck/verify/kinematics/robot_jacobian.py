@@ -122,10 +122,10 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         count = digits(_gap(exchange, J), 1.0) if exchange in answered else None
         judgements.append(judge_case(exchange, laws, allowed, reference, {"jacobian": J}, count))
     wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
-    missed = [exchange for exchange, is_right in zip(answered, matches[name], strict=True)
+    failures = [exchange for exchange, is_right in zip(answered, matches[name], strict=True)
               if not is_right]  # fmt: skip
-    others = [exchange for exchange in answered if exchange not in missed]
-    diagnosis = _diagnosis(missed, others, greeting) if wrong else Diagnosis()
+    rest = [exchange for exchange in answered if exchange not in failures]
+    diagnosis = _diagnosis(failures, rest, greeting) if wrong else Diagnosis()
     if not wrong and answered:
         words = sentence("The Jacobian's convention: {convention}.", convention=name)
         diagnosis = Diagnosis(behaviour=words)
@@ -198,7 +198,7 @@ GROUPS: Sequence[tuple[Sentence, Callable[..., BoolArray]]] = (
 
 def _relation(exchanges: Sequence[Exchange], greeting: Greeting) -> tuple[Sentence, ...]:
     """Return the factors, or else the only parts, by which all answers differ from a convention."""
-    best, most = tuple[Sentence, ...](), 0.0
+    best, share = tuple[Sentence, ...](), 0.0
     for name, convention in CONVENTIONS.items():
         columns = [_columns(exchange, name, convention, greeting) for exchange in exchanges]
         answer, right, bound, *flags = (np.concatenate(x) for x in zip(*columns, strict=True))
@@ -215,10 +215,10 @@ def _relation(exchanges: Sequence[Exchange], greeting: Greeting) -> tuple[Senten
             )  # fmt: skip
             return (words,) if np.ptp(factors) > REMAINDER else ()  # else laws.py says it
         only = [words for words, group in groups if is_right[~group].all()]
-        if only and is_right.mean() > most:
+        if only and is_right.mean() > share:
             words = sentence("Only {what} of your Jacobians are wrong: all else is right.",
                              what=only[0])  # fmt: skip
-            best, most = (words,), float(is_right.mean())
+            best, share = (words,), float(is_right.mean())
     return best
 
 
@@ -229,8 +229,8 @@ def _columns(
     assert isinstance(exchange.answer, Answer)
     inputs = exchange.case.inputs
     shift = 3 if "angular part first" in name else 0
-    both = exchange.answer.values["jacobian"], right_jacobian(inputs, convention)
-    parts = [np.roll(J, shift, axis=0).reshape(2, 3, -1).swapaxes(1, 2) for J in both]
+    pair = exchange.answer.values["jacobian"], right_jacobian(inputs, convention)
+    parts = [np.roll(J, shift, axis=0).reshape(2, 3, -1).swapaxes(1, 2) for J in pair]
     joints = np.arange(len(inputs["q"]))
     flags = (inputs["slides"], joints == inputs["effector"], inputs["parents"] < 0)
     bounds = np.full(2 * len(joints), _bound(exchange.case, greeting))

@@ -21,7 +21,7 @@ from .robot_models import BENT, PRECISION, TOLERANCES, mechanism, robots, tool_p
 from .robot_targets import (
     HALF_TURNS,
     TOLERANCE,
-    Request,
+    ToolRequest,
     half_turns,
     limited_steps,
     off_by_tolerances,
@@ -126,7 +126,7 @@ def _half_turns(arm: Mapping[str, Any], q: FloatArray) -> dict[str, ToolMotion]:
 
 
 def _of_request(
-    request: Request, number: int
+    request: ToolRequest, number: int
 ) -> tuple[str, Mapping[str, Any], dict[str, ToolMotion]]:
     """Return a name, a robot and a motion to a target that rests for a frame."""
     tool = Pose(*(np.repeat(part[None], 2, axis=0) for part in request.tool))

@@ -71,7 +71,7 @@ ONE_FEATURE = 3
 _SEED = 1955
 
 
-class Request(NamedTuple):
+class ToolRequest(NamedTuple):
     """A pose that a robot's tool is to have."""
 
     family: str
@@ -99,7 +99,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return cases
 
 
-def _case(name: str, request: Request, tolerance: float) -> Case:
+def _case(name: str, request: ToolRequest, tolerance: float) -> Case:
     robot = request.robot
     inputs = {
         **robot,
@@ -126,21 +126,23 @@ def _size(robot: Mapping[str, Any]) -> float:
 
 def _requests(
     name: str, robot: dict[str, Any], tolerance: float, rng: np.random.Generator
-) -> Iterator[Request]:
+) -> Iterator[ToolRequest]:
     """Yield the requests of a robot: those that the fewest robots show come last."""
     lower, upper, joints = robot["lower"], robot["upper"], len(robot["lower"])
     generators = [rng, *np.random.default_rng(_SEED).spawn(FEW_DRAWS - 1)]
-    answers = [lower + (upper - lower) * one.uniform(0.2, 0.8, joints) for one in generators]
+    answers = [
+        lower + (upper - lower) * generator.uniform(0.2, 0.8, joints) for generator in generators
+    ]
     answer = max(answers, key=lambda q: np.linalg.svd(jacobian(mechanism(robot), q, -1))[1].min())
     close = np.clip(answer + rng.uniform(-NEAR, NEAR, joints), lower, upper)
     anywhere = rng.uniform(lower, upper)
     tool = tool_pose(robot, answer)
     unreachable = tool._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * _size(robot))
-    yield Request(AT, robot, answer, tool)
-    yield Request(CLOSE, robot, close, tool)
+    yield ToolRequest(AT, robot, answer, tool)
+    yield ToolRequest(CLOSE, robot, close, tool)
     if joints != ONE_FEATURE:
-        yield Request(ANYWHERE, robot, anywhere, tool)
-        yield Request(BEYOND, robot, anywhere, unreachable, {"max_iterations": FEW_ITERATIONS})
+        yield ToolRequest(ANYWHERE, robot, anywhere, tool)
+        yield ToolRequest(BEYOND, robot, anywhere, unreachable, {"max_iterations": FEW_ITERATIONS})
     if joints >= REDUNDANT - 1 or not ancestors(robot).all():
         yield from _single_steps(robot, rng)
         yield from limited_steps(robot, rng)
@@ -154,21 +156,21 @@ def _requests(
         for family, turned in zip(HALF_TURNS, half_turns(robot, BENT), strict=True):
             for near in BENT + rng.uniform(-NEAR, NEAR, (3, joints)):
                 tool = tool_pose(turned, near)
-                yield Request(family, turned, BENT, tool, {"max_iterations": 1})
-            yield Request(CLOSE, turned, BENT, tool)
+                yield ToolRequest(family, turned, BENT, tool, {"max_iterations": 1})
+            yield ToolRequest(CLOSE, turned, BENT, tool)
 
 
-def _single_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[Request]:
-    far = np.full(len(robot["lower"]), UNLIMITED)
+def _single_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[ToolRequest]:
+    unlimited = np.full(len(robot["lower"]), UNLIMITED)
     for _ in range(2):
         answer = _middle(robot, rng)
         start = answer + _distances(robot) * rng.uniform(-1.0, 1.0, len(answer))
-        options = {"max_iterations": 1, "lower": -far, "upper": far}
+        options = {"max_iterations": 1, "lower": -unlimited, "upper": unlimited}
         options["urdf"] = urdf({**robot, **options})
-        yield Request(STEP, robot, start, tool_pose(robot, answer), options)
+        yield ToolRequest(STEP, robot, start, tool_pose(robot, answer), options)
 
 
-def _draw_limited(robot: dict[str, Any], rng: np.random.Generator) -> Request | None:
+def _draw_limited(robot: dict[str, Any], rng: np.random.Generator) -> ToolRequest | None:
     """Return limits that one joint would leave on its way to a target, if the others suffice.
 
     By Klein and Huang (1983), a step of least length of all joints has a share of the joint that is
@@ -187,10 +189,10 @@ def _draw_limited(robot: dict[str, Any], rng: np.random.Generator) -> Request | 
     solvers = ("levenberg_marquardt", "damped_least_squares")
     results = [solved(limited, start, target, solver) for solver in solvers]
     is_solvable = is_spare[joint] and all(is_reached for _, is_reached in results)
-    return Request(AT_A_LIMIT, limited, start, target) if is_solvable else None
+    return ToolRequest(AT_A_LIMIT, limited, start, target) if is_solvable else None
 
 
-def limited_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[Request]:
+def limited_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[ToolRequest]:
     """Yield single iterations from a joint's limit, which its step leaves or would pass.
 
     The joint is neither the first nor the last, so that steps of other joints show.
@@ -209,7 +211,7 @@ def limited_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterato
                 limits[joint] = start[joint]
                 facts = {"held": joint, "is_leaving": is_leaving}
                 limited, options = {**robot, side: limits}, {"max_iterations": 1}
-                yield Request(LIMIT_STEP, limited, start, target, options, facts)
+                yield ToolRequest(LIMIT_STEP, limited, start, target, options, facts)
                 break
 
 
@@ -223,7 +225,7 @@ def _steps(robot: Mapping[str, Any], start: FloatArray, tool: Pose) -> FloatArra
     return np.array([step / np.abs(step).max() for step in steps])
 
 
-def tight_limits(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[Request]:
+def tight_limits(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[ToolRequest]:
     """Yield targets far beyond limits that differ from joint to joint."""
     scale = np.where(robot["slides"], SLIDE, 1.0)
     for _ in range(3):
@@ -231,12 +233,12 @@ def tight_limits(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator
         below, above = rng.uniform(*WIDTHS, (2, len(start))) * scale
         limited = {**robot, "lower": start - below, "upper": start + above}
         tool = tool_pose(robot, start + AWAY * scale * rng.choice([-1.0, 1.0], len(start)))
-        yield Request(TIGHT, limited, start, tool, {"max_iterations": FEW_ITERATIONS})
+        yield ToolRequest(TIGHT, limited, start, tool, {"max_iterations": FEW_ITERATIONS})
 
 
 def off_by_tolerances(
     robot: Mapping[str, Any], tolerances: FloatArray, rng: np.random.Generator
-) -> Iterator[Request]:
+) -> Iterator[ToolRequest]:
     """Yield starts whose position or rotation is off by multiples of two sizes of tolerances."""
     pose = tool_pose(robot, BENT)
     for scale in (1.0, max(LARGE_TOLERANCE / tolerances[1], 10.0)):
@@ -250,7 +252,7 @@ def off_by_tolerances(
             shifted = pose._replace(positions=pose.positions + vector)
             target = pose._replace(rotations=rotated) if part else shifted
             if np.linalg.norm(vector) <= MAX_ERROR:
-                yield Request(TOLERANCE, robot, BENT, target, options)
+                yield ToolRequest(TOLERANCE, robot, BENT, target, options)
 
 
 def half_turns(robot: Mapping[str, Any], start: FloatArray) -> Iterator[Mapping[str, Any]]:

@@ -179,28 +179,28 @@ def _shifted(motion: Trajectory) -> Iterator[Finding]:
     """Yield whether tools are on the targets of the frames before or after, or a part of them."""
     for key, shift in (("frames in step, late", -1), ("frames in step, early", 1)):
         shares = [_share_on_target(motion, shift, parts) for _, parts in PARTS]
-        most = int(np.argmax(shares))
-        yield finding(key, shares[most], 0.5, what=PARTS[most][0])
+        largest = int(np.argmax(shares))
+        yield finding(key, shares[largest], 0.5, what=PARTS[largest][0])
 
 
 def _share_on_target(motion: Trajectory, shift: int, parts: FloatArray) -> float:
     """Return the share of moving frames in which parts of a tool are on another frame's target."""
-    moved, missed, off = (
+    moved, missed, shifted = (
         motion.errors(twists * parts)[1:]
         for twists in (motion.displacements, motion.twists(motion.q),
                        motion.twists(motion.q, shift))
     )  # fmt: skip
-    is_moving, matches = moved > LENIENT, (off <= LENIENT) & (missed > LENIENT)
+    is_moving, matches = moved > LENIENT, (shifted <= LENIENT) & (missed > LENIENT)
     return float(matches[is_moving].mean()) if is_moving.sum() > LENIENT else 0.0
 
 
 def _jumps(motion: Trajectory) -> Finding:
     certain = motion.jumps[: motion.case.facts["certain"]]
     frame = int(np.argmax(certain if certain.max() > 1.0 else motion.jumps))
-    changes, least = np.abs(motion.changes[frame]), float(motion.least_changes[frame])
+    changes, smallest = np.abs(motion.changes[frame]), float(motion.least_changes[frame])
     joint = int(np.argmax(changes))
     key = "no jumps" if frame < motion.case.facts["certain"] else "no jumps, coming back"
-    return _at(frame, finding(key, motion.jumps[frame], 1.0, index=joint, least=least,
+    return _at(frame, finding(key, motion.jumps[frame], 1.0, index=joint, least=smallest,
                               change=float(changes[joint])))  # fmt: skip
 
 

@@ -204,7 +204,7 @@ def _behaviour(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Sente
 
 
 def _readings(inputs: Inputs) -> Mapping[str, Equation]:
-    """Return what speeds with a fault solve, by its key."""
+    """Return the equations that speeds with a fault solve, by its key."""
     J, twist = _equation(inputs)
     tool, spatial = (right_jacobian(inputs, CONVENTIONS[f"{frame}, linear part first"])
                      for frame in ("tool", "spatial"))  # fmt: skip
@@ -223,7 +223,7 @@ def _readings(inputs: Inputs) -> Mapping[str, Equation]:
 
 
 def _in_rows(J: FloatArray, speeds: FloatArray, rank: int) -> FloatArray:
-    """Return speeds without what a matrix of a lower rank than the right one does not use.
+    """Return speeds without the part that a matrix of lower rank does not use.
 
     Right speeds solve an equation that lacks rows too, but not with the least length.
     """
@@ -233,7 +233,7 @@ def _in_rows(J: FloatArray, speeds: FloatArray, rank: int) -> FloatArray:
 
 def _truncated(equation: Equation, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the speeds nearest to an answer without the smallest singular values, and the shares
-    of the largest that the smallest used one and the largest unused one are.
+    of the largest that the smallest used and the largest unused are.
     """  # noqa: D205 -- the sentence is long
     J, twist = equation
     U, s, V = np.linalg.svd(J, full_matrices=False)
@@ -259,7 +259,7 @@ def _reading(key: str, inputs: Inputs) -> Iterator[Equation]:
 
 
 def _by_jacobian(key: str, inputs: Inputs) -> Iterator[Equation]:
-    """Yield what speeds solve with a wrong Jacobian."""
+    """Yield the equations that speeds solve with a wrong Jacobian."""
     for J in robot_jacobian.FAULTS[key].jacobians(inputs, inputs["q"]):
         yield J, _equation(inputs)[1]
 
@@ -270,17 +270,19 @@ def _nearest(
     loss: float,
     case: Case,
 ) -> dict[str, Any]:
-    """Return the speeds nearest to an answer that solve one of a fault's equations."""
+    """Return the speeds nearest to an answer that solve an equation of a fault."""
     speeds, rank = answers[case.name], len(_singular_values(case.inputs, case.inputs["q"]))
     solutions = [
         solving(equation, _in_rows(equation[0], speeds, rank), loss)[0]
         for equation in equations(case.inputs)
     ]
-    return {"velocities": min(solutions, key=lambda one: float(np.abs(one - speeds).max()))}
+    return {
+        "velocities": min(solutions, key=lambda solution: float(np.abs(solution - speeds).max()))
+    }
 
 
 def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagnosis:
-    """Return the faults that explain most answers, those with wrong answers first."""
+    """Return the faults that explain most answers, of wrong answers first."""
     key = _inverted(judgements)
     if key:
         return Diagnosis((Explanation((key,), SENTENCES[key], 1.0, 0.0),))
@@ -323,9 +325,10 @@ def _cut(judgements: Sequence[CaseJudgement], answers: Mapping[str, FloatArray])
     """Return the shares of the largest singular value between which values are cut off."""
     shares = [_truncated(_equation(judgement.case.inputs), answers[judgement.case.name])[1]
               for judgement in judgements if judgement.case.name in answers]  # fmt: skip
-    kept, dropped = np.transpose(shares)
+    retained, dropped = np.transpose(shares)
     return sentence("You drop singular values up to {dropped:.2g} of the largest and use those "
-                    "from {kept:.2g} of it.", dropped=dropped.max(), kept=kept.min())  # fmt: skip
+                    "from {kept:.2g} of it.", dropped=dropped.max(),
+                    kept=retained.min())  # fmt: skip
 
 
 def _inverted(judgements: Sequence[CaseJudgement]) -> str:

@@ -372,7 +372,7 @@ def directions_of(
 
 
 def in_frame(frame: int, v: Any, R: Any, P: Any, faults: Switches) -> Any:
-    """Return a vector in one of the first five frames of `FRAMES`."""
+    """Return a vector in any of the first five frames of `FRAMES`."""
     if frame == 0:
         return v
     rotations = (R, inverse(R, faults), inverse(P, faults), R, P)
@@ -380,7 +380,7 @@ def in_frame(frame: int, v: Any, R: Any, P: Any, faults: Switches) -> Any:
 
 
 def raised(a: Any, b: Any, angle: float) -> Any:
-    """Return the rotation from one direction towards another by an angle."""
+    """Return the rotation from a direction towards another by an angle."""
     axis = cross(a, b)
     sine = norm(axis)
     return IDENTITY if sine == 0.0 else rotation_about(scale(1.0 / sine, axis), angle)
@@ -461,7 +461,7 @@ def beside(side: int, P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
 
 
 def from_world(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
-    """Return P* d P Q, where R is P Q, in one of the groupings of programs."""
+    """Return P* d P Q, where R is P Q, in a grouping of programs."""
     inverse_P = inverse(P, faults)
     if faults.grouping == 1:
         return product(inverse_P, product(d, R, faults), faults)
@@ -476,7 +476,7 @@ def from_world(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
 
 
 def wrong_rotation(P: Any, d: Any, Q: Any, R: Any, faults: Switches) -> Any:
-    """Return what becomes of Q in the world rotation d, by the number of `applied`."""
+    """Return the local rotation Q after the world rotation d, by the number of `applied`."""
     unit, P_inverse, R_inverse = IDENTITY, inverse(P, faults), inverse(R, faults)
     products = (
         (unit, unit, unit, Q),
@@ -721,7 +721,7 @@ def follow(chain: TextbookChain, sweeps: int, faults: Switches, pose: TextbookPo
 def point_link(
     chain: TextbookChain, k: int, solved: SolvedPath, faults: Switches, pose: TextbookPose
 ) -> None:
-    """Rotate joint k of the path, or its child (3), by one of the rules of programs."""
+    """Rotate joint k of the path, or its child (3), by a rule of programs."""
     j, child = chain.path[k], chain.path[k + 1]
     p = chain.parents[j]
     Q, R, P = load_quaternion(pose.local, j), load_quaternion(pose.rotations, j), IDENTITY
@@ -765,7 +765,7 @@ def compared_links(
 ) -> Any:
     """Return the directions of link k between which its joint rotates, before and after.
 
-    Or those of the link before (18), or the new one from where the joint was at the start (26).
+    Or of the link before (18), or the new direction from where the joint was at the start (26).
     """
     if faults.rotations == 18:
         rest = link_of(chain, k, solved.positions, 3)

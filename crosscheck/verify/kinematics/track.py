@@ -158,7 +158,7 @@ def judge(
 
 
 def _of_solves(explanation: Explanation, base: Sequence[SwitchFault]) -> Explanation:
-    """Return an explanation that says if its faults are those of the single solves."""
+    """Return an explanation that says if its faults are also of single solves."""
     keys = {fault.key for fault in base}
     if not keys.issuperset(explanation.faults[0].split(" + ")):
         return explanation
@@ -175,16 +175,16 @@ def _blended(answers: Sequence[Sequence[Frame]]) -> Explanation | None:
     """
     pairs = [pair for frames in answers for pair in itertools.pairwise(frames)]
     pairs = [pair for pair in pairs if all(frame.case.facts["least"] == 0.0 for frame in pair)]
-    for where, start_of in STARTS:
+    for origin, start_of in STARTS:
         ways = np.array([frame.case.inputs["target"] - start_of(last) for last, frame in pairs])
-        gone = np.array([_effector(frame) - start_of(last) for last, frame in pairs])
-        part = float((ways * gone).sum() / max((ways * ways).sum(), 1e-300)) if pairs else 1.0
-        misses = np.linalg.norm(gone - part * ways, axis=-1)
+        moves = np.array([_effector(frame) - start_of(last) for last, frame in pairs])
+        part = float((ways * moves).sum() / max((ways * ways).sum(), 1e-300)) if pairs else 1.0
+        misses = np.linalg.norm(moves - part * ways, axis=-1)
         if LEAST_PART < part < 1.0 - LEAST_PART and misses.max() <= 2.0 * TOLERANCE:
             entry = TABLE["follow"][BLENDED]
             words = sentence(
                 "{what} It goes {part:.0%} of the way from {where} to each target.",
-                what=Sentence(entry["sentence"], {}), part=part, where=where,
+                what=Sentence(entry["sentence"], {}), part=part, where=origin,
             )  # fmt: skip
             return Explanation((BLENDED,), with_code(entry["code"], words), 1.0, 0.0)
     return None
@@ -205,7 +205,7 @@ BLENDED, LEAST_PART = "targets blended", 0.02
 def _is_wrong(judgement: CaseJudgement) -> bool:
     """Return whether frames break a law, or jump."""
     return judgement.verdict >= Verdict.WRONG or any(
-        found.verdict and found.law in ("continuity", CONTINUES) for found in judgement.findings
+        entry.verdict and entry.law in ("continuity", CONTINUES) for entry in judgement.findings
     )
 
 
@@ -273,12 +273,12 @@ def _frame_laws(frames: Sequence[Frame], greeting: Greeting) -> list[Finding]:
         findings = pose_laws.all_of(pose, case, greeting)
         if pose.finite:
             findings.append(_on_target(pose, case, greeting))
-        for found in findings:
-            previous = worst.get(found.law)
-            rank = found.verdict, found.error
+        for entry in findings:
+            previous = worst.get(entry.law)
+            rank = entry.verdict, entry.error
             if previous is None or rank > (previous.verdict, previous.error):
-                words = sentence("Frame {frame}: {what}", frame=i, what=found.sentence)
-                worst[found.law] = replace(found, sentence=words) if found.verdict else found
+                words = sentence("Frame {frame}: {what}", frame=i, what=entry.sentence)
+                worst[entry.law] = replace(entry, sentence=words) if entry.verdict else entry
     return list(worst.values())
 
 

@@ -226,10 +226,10 @@ def _by_energy(
     """Return the faults that explain each wrong energy by itself, and the share of those."""
     named = answers[0][1].keys()
     wrong = {
-        str(found.sentence.values.get("name"))
+        str(entry.sentence.values.get("name"))
         for judgement in judgements
-        for found in judgement.findings
-        if found.verdict >= Verdict.WRONG
+        for entry in judgement.findings
+        if entry.verdict >= Verdict.WRONG
     }
     groups = [
         _mistakes(name, answers, epsilon)

@@ -150,8 +150,8 @@ def _in_parts(option: Option, entry: Mapping[str, Any]) -> Iterator[Option]:
     if is_whole or option.rare not in (False, "parts") or option.aspect not in IN_PARTS:
         return
     for part, words in _FAULTS["part"].items():
-        where = with_code(words["code"], Sentence(words["sentence"], {}))
-        message = sentence("{fault} {where}", fault=option.sentence, where=where)
+        place = with_code(words["code"], Sentence(words["sentence"], {}))
+        message = sentence("{fault} {where}", fault=option.sentence, where=place)
         alone = option._replace(key=f"{option.key}, {part} only", sentence=message, part=part)
         has_dampers = option.aspect == "damping" or "set" in entry
         if option.aspect != "damping" or part != "forces":

@@ -187,6 +187,6 @@ def _diagnose(
         variants(telling, greeting.epsilon, sentences), telling, relative_tolerance,
         lambda keys: either([[sentences[fault] for fault in key.split(" + ")] for key in keys]),
     )  # fmt: skip
-    explanations = tuple(found for found in explanations if found.faults != ("",))
+    explanations = tuple(explanation for explanation in explanations if explanation.faults != ("",))
     first = None if explanations else first_broken(judgements)
     return Diagnosis(explanations, None, first, hints_of(judgements, bool(explanations)), count)

@@ -67,8 +67,8 @@ TESTS = [
 ]
 
 
-class Course(NamedTuple):
-    """A method whose iterations are followed, right or with a mistake."""
+class FollowedMethod(NamedTuple):
+    """A method with its iterations, right or with a mistake."""
 
     integrator: Integrator
     fault: Option | None = None
@@ -80,7 +80,7 @@ class Course(NamedTuple):
         return rank, self.integrator.decrease is None
 
 
-class Trial(NamedTuple):
+class StepAnswer(NamedTuple):
     """An answer to a single step, or to the first of several."""
 
     problem: SpringProblem
@@ -120,7 +120,7 @@ def explanation(
     _, model = apply(options, trials[0].problem, StepModel(damper="none"))
     courses, vague = sorted(_courses(model, STARTS[start]), key=lambda c: c.order), None
     for _, group in groupby(courses, key=lambda c: c.order):
-        matches: dict[str, Course] = {}
+        matches: dict[str, FollowedMethod] = {}
         for course in group:
             key = course.fault.key if course.fault else EARLY_END["key"]
             is_tried = not is_hasty or course.fault in (None, *FOLLOWED_FAULTS)
@@ -162,29 +162,31 @@ def stiffness_hint(
     )  # fmt: skip
 
 
-def trials_of(options: Sequence[Option], probes: Sequence[Probe], epsilon: float) -> list[Trial]:
+def trials_of(
+    options: Sequence[Option], probes: Sequence[Probe], epsilon: float
+) -> list[StepAnswer]:
     """Return the answers as single steps."""
     return [_trial(options, epsilon, probe) for probe in probes if "positions" in probe.answers]
 
 
-def _trial(options: Sequence[Option], epsilon: float, probe: Probe) -> Trial:
+def _trial(options: Sequence[Option], epsilon: float, probe: Probe) -> StepAnswer:
     """Return the answer to a single step, or to the first of several."""
     problem = probe.problem.changed(steps=None)
     positions = probe.answers["positions"].reshape(-1, problem.count, 3)[0]
     p, model = apply(options, problem, StepModel(damper="none"))
     expected, allowed = predicted(p, model, positions), rounding(p, model, epsilon)
     if not expected:
-        return Trial(problem, positions, np.inf, 0.0)
+        return StepAnswer(problem, positions, np.inf, 0.0)
     gap = float(np.abs(expected["positions"] - positions).max())
     error = relative_gap(problem, expected, {"positions": positions}, allowed)
     error = error if gap > ROUNDED * allowed.positions else 0.0
     size = float(np.abs(positions - problem.positions).max())
     bound = SAME * gap if error > SOLVED else SOLVED * size
-    return Trial(problem, positions, error, 4.0 * allowed.positions + bound)
+    return StepAnswer(problem, positions, error, 4.0 * allowed.positions + bound)
 
 
 def _explanation(
-    courses: Mapping[str, Course], tracks: Mapping[str, Sequence[Track | None]]
+    courses: Mapping[str, FollowedMethod], tracks: Mapping[str, Sequence[Track | None]]
 ) -> Explanation | None:
     """Return the courses, by keys, that have most answers among their iterates."""
     shares = {key: np.mean([track is not None for track in row]) for key, row in tracks.items()}
@@ -194,8 +196,8 @@ def _explanation(
     return Explanation(tuple(keys), either(words), share, 0.0) if share >= LEAST_SHARE else None
 
 
-def _words(course: Course, tracks: Sequence[Track | None]) -> Sentence:
-    """Return what a course does wrong, and by which test it ends early."""
+def _words(course: FollowedMethod, tracks: Sequence[Track | None]) -> Sentence:
+    """Return the mistake of a course, and the test by which it ends early."""
     early = [track for track in tracks if track is not None and track.is_early]
     ends, test = [len(track.residuals) - 1 for track in early], _ending(tracks)
     if test is None and min(ends) == max(ends):
@@ -222,7 +224,7 @@ def _ending(tracks: Sequence[Track | None]) -> Sentence | None:
 
 
 def _delay(fault: Option) -> Any:
-    """Return what of a fault may delay Newton's method: the fault itself, or of its integrator."""
+    """Return the part of a fault that may delay Newton's method: itself, or its integrator."""
     integrator = fault.fields.get("integrator")
     if integrator is not None:
         integrator = integrator._replace(iterations=1, start="x_n")
@@ -244,30 +246,30 @@ LINEAR = [
 FACTORISATIONS = [fault for fault in STEP_FAULTS if fault.aspect == "factorisation"]
 
 
-def _courses(model: StepModel, starts: Sequence[str]) -> Iterator[Course]:
+def _courses(model: StepModel, starts: Sequence[str]) -> Iterator[FollowedMethod]:
     """Yield the methods that a model may stand for, right and with mistakes."""
     method, right = model.integrator.method, model.integrator._replace(method="linear")
     if method == "newton" and right.iterations == 1:
         for fault, scale, start in product([None, *LINEAR], _TABLE["scales"], ("x_n", "y")):
             beta = fault.fields.get("integrator", right).beta if fault else right.beta
-            yield Course(right._replace(start=start, scale=scale, beta=beta), fault)
-        yield from (Course(model.integrator, fault) for fault in FACTORISATIONS)
+            yield FollowedMethod(right._replace(start=start, scale=scale, beta=beta), fault)
+        yield from (FollowedMethod(model.integrator, fault) for fault in FACTORISATIONS)
         return
     if method in ("local_global", "converged"):
-        yield from (Course(Integrator("local_global", start)) for start in starts)
+        yield from (FollowedMethod(Integrator("local_global", start)) for start in starts)
     is_newton = method in ("newton", "converged")
     for start, decrease in product(starts if is_newton else (), (DECREASE, None)):
         for newton in RIGHT_NEWTONS:
-            yield Course(newton._replace(start=start, decrease=decrease))
+            yield FollowedMethod(newton._replace(start=start, decrease=decrease))
         for fault in DELAYS.values():
             changed = fault.fields.get("integrator", RIGHT_NEWTONS[0])._replace(start=start)
             if changed.decrease is None:
                 changed = changed._replace(decrease=decrease)
             if decrease is not None or (fault.part != "energy" and changed.decrease is None):
-                yield Course(changed, fault)
+                yield FollowedMethod(changed, fault)
 
 
-def _track(options: Sequence[Option], trial: Trial, course: Course) -> Track | None:
+def _track(options: Sequence[Option], trial: StepAnswer, course: FollowedMethod) -> Track | None:
     """Return the iterates up to an answer, None if it is not among them."""
     equation = _equation(course, options, trial.problem)
     is_slow = course.integrator.method != "newton"
@@ -298,8 +300,10 @@ def _track(options: Sequence[Option], trial: Trial, course: Course) -> Track | N
     return None
 
 
-def _equation(course: Course, options: Sequence[Option], problem: SpringProblem) -> StepEquation:
-    """Return the equation of a course, whose line search may compare another energy."""
+def _equation(
+    course: FollowedMethod, options: Sequence[Option], problem: SpringProblem
+) -> StepEquation:
+    """Return the equation of a course; its line search may compare another energy."""
     usual, model = p, _ = apply(options, problem, StepModel(damper="none"))
     if course.fault is not None:
         part = course.fault.part
@@ -313,7 +317,7 @@ def _equation(course: Course, options: Sequence[Option], problem: SpringProblem)
 def _iteration(
     equation: StepEquation, start: FloatArray
 ) -> tuple[Iterator[FloatArray], Callable[[FloatArray], FloatArray]]:
-    """Return the iterates from a start, and what they leave of the equation."""
+    """Return the iterates from a start, and the residuals that they leave."""
     p, model, x_n, _, _, _ = equation.start
     free, integrator = equation.free.ravel(), model.integrator
     if integrator.method != "linear":

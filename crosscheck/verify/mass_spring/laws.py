@@ -147,8 +147,8 @@ def pins(context: StepContext) -> Finding | None:
     if context.expected:
         expected = (context.expected["positions"] - p.positions)[..., p.pinned, :]
         motion = 2.0 * float(np.abs(expected).max())
-        most = np.inf if context.pins_declared else HELD * float(np.abs(x - p.positions).max())
-        tolerance += min(motion, most)
+        largest = np.inf if context.pins_declared else HELD * float(np.abs(x - p.positions).max())
+        tolerance += min(motion, largest)
     is_exact = context.model.pins in ("eliminated", "overwritten") and context.pins_declared
     verdict = Verdict.RIGHT_EXCEPT if worst <= tolerance and not is_exact else Verdict.WRONG
     index = int(p.pinned[offsets.max(axis=0).argmax()])

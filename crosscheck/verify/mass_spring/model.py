@@ -170,12 +170,12 @@ class Substep(NamedTuple):
 
 def _held(p: SpringProblem, model: StepModel) -> BoolArray:
     """Return which coordinates the step may not move, shape (particle, 3)."""
-    held = np.zeros((p.count, 3), dtype=bool)
+    mask = np.zeros((p.count, 3), dtype=bool)
     if model.pins in ELIMINATED:
-        held[p.pinned] = True
+        mask[p.pinned] = True
     elif model.pin_kind == "coordinates":
-        held.flat[evaluate(model.pins.removeprefix("coordinates "), p) % held.size] = True
-    return held
+        mask.flat[evaluate(model.pins.removeprefix("coordinates "), p) % mask.size] = True
+    return mask
 
 
 State = tuple[FloatArray, FloatArray]  # positions and velocities

@@ -82,11 +82,11 @@ def _fault(name: str, factors: Mapping[str, float], region: Mapping[str, str]) -
         words += f" {'-' if factor < 0.0 else '+'} {size}{symbols[term]}"
         formula += f" + {factor!r} * ({term})"
     words = words.removeprefix(" + ") if factors else "0"
-    where = Sentence(region["sentence"], {}) if "sentence" in region else EVERYWHERE
+    place = Sentence(region["sentence"], {}) if "sentence" in region else EVERYWHERE
     right = _TABLE["right"][name]
     if "sentence" in region:
         formula = f"np.where({region['formula']}, {formula}, {right})"
-    values = {"relation": words.strip(), "formula": formula, "where": where, "whole": name}
+    values = {"relation": words.strip(), "formula": formula, "where": place, "whole": name}
     return relation_fault("sum" if name in SUMS else name, values)
 
 
@@ -98,10 +98,10 @@ def combination(
     for count in range(MOST_TERMS + 1):
         if count * ROWS_FOR_EACH > len(target):
             break
-        for chosen in combinations(columns, count):
-            factors = _factors(target, [columns[term] for term in chosen], allowed)
+        for names in combinations(columns, count):
+            factors = _factors(target, [columns[term] for term in names], allowed)
             if factors is not None:
-                return dict(zip(chosen, factors, strict=True))
+                return dict(zip(names, factors, strict=True))
     return None
 
 

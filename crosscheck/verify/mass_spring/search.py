@@ -219,7 +219,7 @@ class ModelSearch:
         return list(reversed(first.values()))
 
     def _explaining(self, hypotheses: Sequence[Choices], index: int) -> list[Choices]:
-        """Return the hypotheses, extended by what a stage adds, that explain it, simplest first."""
+        """Return the hypotheses, extended by a stage, that explain it, simplest first."""
         branches = [branch for h in hypotheses for branch in self._branches(h, index)]
         explaining = [branch for branch in branches if self._explains(branch, index)]
         # Free flight alone does not tell some honest steps from others with a fault.
@@ -227,7 +227,9 @@ class ModelSearch:
         if is_flight or not self._reproducing(explaining, index):
             failing = [branch for branch in branches if not self._explains(branch, index)]
             singles = list(self._singles(failing, index))
-            explaining += [one.choices for one in singles if self._fits(one.choices, index)]
+            explaining += [
+                single.choices for single in singles if self._fits(single.choices, index)
+            ]
             for fits in (self._with_numbers(failing, index), self._with_flights(failing, index)):
                 if not self._reproducing(explaining, index):
                     explaining += [choices for choices in fits if self._fits(choices, index)]
@@ -305,7 +307,7 @@ class ModelSearch:
         return self.step.pins is None and is_single and model.pin_kind in ("penalty", "springs")
 
     def _singles(self, branches: Sequence[Choices], index: int) -> Iterator[SingleFault]:
-        """Yield what each single fault makes of each hypothesis that fails at a stage."""
+        """Yield each hypothesis that fails at a stage with each single fault."""
         limit = self._work + (WORK_OF_PAIRS if self._skipped else WORK)
         branches = sorted(branches, key=_effort)
         trials = [
@@ -399,8 +401,13 @@ class ModelSearch:
         Those of which the first brings it nearest come first.
         """
         limit = self._work + WORK_OF_PAIRS
-        singles = [one for one in singles if not (one.option.rare or _takes_long(one.option))]
-        nearer = sorted((one for one in singles if one.gap < one.before), key=lambda one: one.gap)
+        singles = [
+            single for single in singles if not (single.option.rare or _takes_long(single.option))
+        ]
+        nearer = sorted(
+            (single for single in singles if single.gap < single.before),
+            key=lambda single: single.gap,
+        )
         for first in nearer[:NEAREST]:
             for second in singles:
                 if second.branch is first.branch and second.aspect != first.aspect:
@@ -528,9 +535,9 @@ def _step_matches(
         for match in ModelSearch(positions, step, epsilon).run(notify)
     ]
     fewest = min((match.complexity for match in matches), default=(MAX_FAULTS, 0))
-    others = search.run(notify, cases) if fewest > ONE_FAULT else []
-    if others and others[0].complexity < fewest:
-        return others
+    further = search.run(notify, cases) if fewest > ONE_FAULT else []
+    if further and further[0].complexity < fewest:
+        return further
     return [match for match in matches if match.complexity == fewest]
 
 

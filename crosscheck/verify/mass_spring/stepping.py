@@ -274,7 +274,7 @@ def _findings(
         findings.append(laws.consistency(context))
     if context.model.damper != "diagonal":
         findings.append(laws.symmetry(exchange, exchanges, allowed))
-    return [found for found in findings if found is not None]
+    return [entry for entry in findings if entry is not None]
 
 
 def _reference_step(p: SpringProblem, model: StepModel) -> State:

@@ -33,7 +33,7 @@ Rearrangement = tuple[str, str, list[ast.stmt]]
 
 
 class Scope(NamedTuple):
-    """The expressions of a function whose values have been seen."""
+    """The expressions of a function with values that were seen."""
 
     shapes: Mapping[str, str]  # by the text of an expression: "int", "()", "(3,)", "list"
     plain: frozenset[str]  # the texts of names and of elements x[i]

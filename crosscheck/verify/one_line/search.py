@@ -161,7 +161,7 @@ def _is_telling(case: Case, answer: Answer | Failure) -> bool:
     outputs = [np.asarray(value, dtype=float) for value in answer.values.values()]
     inputs = [np.zeros(()), *(np.asarray(v) for v in case.inputs.values() if np.ndim(v) > 0)]
     is_new = (
-        not any(np.array_equal(output, given) for given in inputs) and output.any()
+        not any(np.array_equal(output, array) for array in inputs) and output.any()
         for output in outputs
     )
     return all(np.isfinite(output).all() for output in outputs) and any(is_new)

@@ -101,9 +101,9 @@ def failure_of(fault: CodedFault) -> CaseJudgement | None:
     cases = DISCIPLINES[task].cases(contestant.greeting, method, seed, False)
     first = None
     for case in cases:
-        asked = cases_of(SavedCase(task, method, seed, False, case.name), cases)
+        requests = cases_of(SavedCase(task, method, seed, False, case.name), cases)
         with np.errstate(all="ignore"):  # a wrong program may divide by zero
-            failure = judge_cases(contestant, task, method, asked).smallest_failure
+            failure = judge_cases(contestant, task, method, requests).smallest_failure
         if failure and any(
             finding.verdict >= Verdict.WRONG and finding.law != "one sweep"
             for finding in failure.findings

@@ -149,10 +149,10 @@ def _failing(task: TaskReport, failure: CaseJudgement, kinds: int, say: Say) -> 
         count = sum(judgement.verdict == verdict for judgement in task.judgements)
         fields: dict[str, Any] = {"verdict": say(VERDICTS[verdict]), "count": count, "name": name}
         short = sentence("{verdict} cases: {count}; the smallest is {name}.", **fields)
-        what = sentence(
+        message = sentence(
             "{verdict} cases: {count}; the smallest, {name}: {what}", what=complaint, **fields
         )
-        return wrapped(say(short if is_told else what), "  ")
+        return wrapped(say(short if is_told else message), "  ")
     if is_told:
         return []
     return wrapped(

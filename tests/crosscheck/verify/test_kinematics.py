@@ -631,7 +631,7 @@ def start_repeated(case):
 
 @pytest.mark.parametrize(
     ("make", "word"),
-    [(bridged, "bridges"), (kept, "keeps"), (by_reference_spacing, ""), (start_repeated, "")],
+    [(bridged, "joins"), (kept, "keeps"), (by_reference_spacing, ""), (start_repeated, "")],
 )
 def test_honest_rule_is_not_accused(make, word):
     report = judged(RESAMPLE, resampler(make))
