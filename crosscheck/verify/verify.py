@@ -40,6 +40,8 @@ WITH_METHODS = ("inverse_kinematics", "track")
 BUILDS_ON = {
     "inverse_kinematics": ("forward_kinematics",),
     "track": ("inverse_kinematics", "forward_kinematics"),
+    "mass_spring_step": ("mass_spring_forces",),
+    "mass_spring_motion": ("mass_spring_step", "mass_spring_forces"),
     "robot_velocity": ("robot_jacobian",),
     "robot_inverse_kinematics": ("robot_jacobian",),
     "robot_track": ("robot_inverse_kinematics", "robot_jacobian"),
@@ -142,9 +144,9 @@ def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
     cause = causes[0]
     codes = [code for explanation in cause.diagnosis.explanations[:1] for code in explanation.codes]
     words = sentence(
-        "Its {task} is wrong as well ({codes}): correct that first, since this builds upon it."
+        "Its {task} is wrong as well ({codes}): correct that first, since this may build upon it."
         if codes
-        else "Its {task} is wrong as well: correct that first, since this builds upon it."
+        else "Its {task} is wrong as well: correct that first, since this may build upon it."
     )
     hint = Sentence(words.template, {"task": cause.task, "codes": ", ".join(codes)})
     diagnosis = replace(report.diagnosis, hints=(hint, *report.diagnosis.hints))

@@ -34,8 +34,8 @@ BACKENDS = ("numba", "python")
 RELAXATIONS = {"reassoc", "contract", "nsz"}
 # Names in kernels that make arrays.
 ALLOCATING = {"np", "copy"}
-# Callees of more instructions of the interpreter are inlined only once.
-LARGE = 5000
+# The size of callees that are inlined wherever they are called, in the interpreter's instructions.
+INLINED_SIZE = 5000
 # The interpreter's instructions that read a global.
 GLOBAL_LOADS = {"LOAD_GLOBAL", "LOAD_NAME"}
 
@@ -63,18 +63,27 @@ class Kernel:
 
     `relaxed` lets the compiler reorder sums and fuse products with them: the backends then agree
     only to rounding, and dense loops run up to four times faster. `label` is its name for users.
+    Callees of more than `inlined_size` instructions of the interpreter are inlined only once.
     """
 
-    def __init__(self, plain: PythonKernel, *, relaxed: bool = False, label: str | None = None):
+    def __init__(
+        self,
+        plain: PythonKernel,
+        *,
+        relaxed: bool = False,
+        label: str | None = None,
+        inlined_size: int = INLINED_SIZE,
+    ):
         self.plain = plain
         self.relaxed = relaxed
         self.label = label
+        self.inlined_size = inlined_size
         functools.update_wrapper(self, plain)
 
     @functools.cached_property
     def compiled(self) -> PythonKernel:
         """The version compiled by numba, on the same arguments."""
-        return compile_kernel(self.plain, self.relaxed, self.label)
+        return compile_kernel(self.plain, self.relaxed, self.label, self.inlined_size)
 
     @property
     def in_force(self) -> Callable[..., Any]:
@@ -91,7 +100,10 @@ class Kernel:
 
 @functools.cache
 def compile_kernel(
-    kernel: PythonKernel, relaxed: bool = False, label: str | None = None
+    kernel: PythonKernel,
+    relaxed: bool = False,
+    label: str | None = None,
+    inlined_size: int = INLINED_SIZE,
 ) -> PythonKernel:
     """Compile a kernel and all kernels it calls, from their plain sources; cached on disk.
 
@@ -99,8 +111,8 @@ def compile_kernel(
     strict: no reordering and no fused operations, so that both backends round alike.
 
     Callees are inlined: a call would pass every number of every array in its tuples, more than a
-    hundred, and take longer than most kernels. Exceptions are LARGE callees that are called in
-    several places, as copies of them would take seconds to compile.
+    hundred, and take longer than most kernels. Exceptions are callees above a size that are called
+    in several places, as copies of them would take seconds to compile.
 
     Where NUMBA_DISABLE_JIT turns numba's compiler off, the interpreter runs the kernel.
     """
@@ -110,7 +122,7 @@ def compile_kernel(
 
     compilation.watch_numba()
     options = {"pipeline_class": linking.KernelCompiler} if linking.is_supported() else {}
-    compiled = _jit(kernel, relaxed, **options)
+    compiled = _jit(kernel, relaxed, inlined_size, **options)
     compiled.label = label or kernel.__name__.strip("_").replace("_", " ")
     disk_cache.use_cache(compiled)
     return compiled
@@ -141,7 +153,9 @@ def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
 
 
 @functools.cache
-def _callee(kernel: PythonKernel, relaxed: bool, inline: bool) -> PythonKernel:
+def _callee(
+    kernel: PythonKernel, relaxed: bool, inline: bool, inlined_size: int = INLINED_SIZE
+) -> PythonKernel:
     """Compile a callee of another kernel, without an entry point for Python."""
     module = getattr(kernel, "compiled_in", None)
     if module is not None:
@@ -152,17 +166,17 @@ def _callee(kernel: PythonKernel, relaxed: bool, inline: bool) -> PythonKernel:
     if not allocates(kernel):
         options["_nrt"] = False
     if not linking.is_supported():
-        return _jit(kernel, relaxed, **options)
-    compiled = _jit(kernel, relaxed, pipeline_class=linking.LinkedCompiler, **options)
+        return _jit(kernel, relaxed, inlined_size, **options)
+    compiled = _jit(kernel, relaxed, inlined_size, pipeline_class=linking.LinkedCompiler, **options)
     return linking.compile_directly(compiled)
 
 
-def _jit(kernel: PythonKernel, relaxed: bool, **options: Any) -> PythonKernel:
+def _jit(kernel: PythonKernel, relaxed: bool, inlined_size: int, **options: Any) -> PythonKernel:
     import numba
 
     calls = _calls(kernel)
     compiled_globals = {
-        name: _compiled_global(value, relaxed, calls[name] == 1)
+        name: _compiled_global(value, relaxed, calls[name] == 1, inlined_size)
         for name, value in _named_globals(kernel)
         if _kernels_in(value) and value is not kernel
     }
@@ -172,11 +186,12 @@ def _jit(kernel: PythonKernel, relaxed: bool, **options: Any) -> PythonKernel:
     return numba.njit(fastmath=RELAXATIONS if relaxed else False, **options)(rebuilt)
 
 
-def _compiled_global(value: Any, relaxed: bool, inline: bool) -> Any:
+def _compiled_global(value: Any, relaxed: bool, inline: bool, inlined_size: int) -> Any:
     """Return a callee compiled, or a NamedTuple of kernels with each compiled."""
     if not isinstance(value, types.FunctionType):
-        return value._make(_compiled_global(kernel, relaxed, True) for kernel in value)
-    return _callee(value, relaxed, inline or _inlined_size(value) <= LARGE)
+        return value._make(_compiled_global(k, relaxed, True, inlined_size) for k in value)
+    inline |= _inlined_size(value) <= inlined_size
+    return _callee(value, relaxed, inline, inlined_size)
 
 
 def _calls(kernel: PythonKernel) -> Counter[str]:

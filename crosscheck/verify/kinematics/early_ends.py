@@ -15,7 +15,7 @@ from ..explain import ending_test
 from ..greeting import Greeting
 from ..judgement import Explanation
 from ..sentence import Sentence, sentence, with_code
-from .faults import TABLE
+from .faults import TABLE, by_key
 from .predictions import solve
 from .sweeps import PoseTrial
 
@@ -58,7 +58,7 @@ TESTS: Sequence[tuple[Quantity, float | None, Sentence]] = (
     (
         lambda s: -np.arange(len(s.gaps), dtype=float),
         None,
-        sentence("{sweeps} sweeps are made, whatever max_iterations is"),
+        sentence("the number of sweeps is {sweeps}, whatever max_iterations is"),
     ),
     *(
         (
@@ -135,11 +135,14 @@ def explanation(
     ended = [solve for solve in solves.values() if solve is not None]
     if not all((s := solves[trial.case.name]) is not None and s.is_early for trial in wrong):
         return None
+    early = [solve for solve in ended if solve.is_early]
+    if method == "fabrik" and len(early) > 1 and all(len(solve.gaps) == 2 for solve in early):
+        fault = by_key("fabrik")["measured between the passes"]  # after one sweep
+        return Explanation((fault.key,), fault.sentence, 1.0, 0.0)
     test = ending_test(TESTS, ended, [solve.is_early for solve in ended])
     if test is None:
         return None
-    count = sum(solve.is_early for solve in ended)
-    entry, fields = TABLE["stop"][KEY], {"count": count, "total": len(ended), "test": test}
+    entry, fields = TABLE["stop"][KEY], {"count": len(early), "total": len(ended), "test": test}
     return Explanation(
         (KEY,), with_code(entry["code"], Sentence(entry["sentence"], fields)), 1.0, 0.0
     )

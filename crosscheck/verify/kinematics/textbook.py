@@ -902,11 +902,13 @@ class Method(NamedTuple):
 
 method = Method(sweep_ccd, keep, never)
 FABRIK = Method(sweep_fabrik, finish_fabrik, stretch)
-place_all = Kernel(place, label="forward kinematics with faults")
+# Inlined wherever they are called, products with faults would take a minute to compile and not ten
+# seconds; a solve is a tenth slower so.
+INLINED_SIZE = 300
+place_all = Kernel(place, label="forward kinematics with faults", inlined_size=INLINED_SIZE)
 SOLVERS = {
-    "ccd": Kernel(solve, label="CCD with faults"),
+    "ccd": Kernel(solve, label="CCD with faults", inlined_size=INLINED_SIZE),
     "fabrik": Kernel(
-        bind(solve, method=Method(sweep_fabrik, finish_fabrik, stretch)),
-        label="FABRIK with faults",
+        bind(solve, method=FABRIK), label="FABRIK with faults", inlined_size=INLINED_SIZE
     ),
 }
