@@ -78,10 +78,10 @@ def test_kernels_are_called_what_the_user_calls_them():
     assert IK_SOLVERS["levenberg_marquardt"].mechanism.label == "levenberg_marquardt for mechanisms"
 
 
-def callee_of(kernel, name="power"):
-    dispatcher = compiled.compile_kernel(kernel)
+def callee_of(kernel, inlined_size=compiled.INLINED_SIZE):
+    dispatcher = compiled.Kernel(kernel, inlined_size=inlined_size).compiled
     dispatcher(2.0)
-    return dispatcher.py_func.__globals__[name]
+    return dispatcher.py_func.__globals__["power"]
 
 
 def test_a_callee_is_compiled_once_for_all_integers():
@@ -123,24 +123,21 @@ def test_another_numba_compiles_as_ever(version, monkeypatch):
     assert not isinstance(result.library, linking.LinkedLibrary)
 
 
-@pytest.mark.parametrize(("large", "inlined"), [(10**6, True), (0, False)])
-def test_a_large_callee_in_several_places_is_not_copied(large, inlined, monkeypatch):
-    monkeypatch.setattr(compiled, "LARGE", large)
-    assert callee_of(fresh(polynomial)).targetoptions["forceinline"] == inlined
+@pytest.mark.parametrize(("size", "inlined"), [(10**6, True), (0, False)])
+def test_a_large_callee_in_several_places_is_not_copied(size, inlined):
+    assert callee_of(fresh(polynomial), size).targetoptions["forceinline"] == inlined
 
 
 def once(x):
     return power(x, 2)
 
 
-def test_a_callee_in_one_place_is_inlined_whatever_its_size(monkeypatch):
-    monkeypatch.setattr(compiled, "LARGE", 0)
-    assert callee_of(fresh(once)).targetoptions["forceinline"]
+def test_a_callee_in_one_place_is_inlined_whatever_its_size():
+    assert callee_of(fresh(once), 0).targetoptions["forceinline"]
 
 
-def test_numbers_are_the_same_however_it_is_compiled(monkeypatch):
+def test_numbers_are_the_same_however_it_is_compiled():
     x = np.pi
     expected = polynomial(x)
-    for large in (0, 10**6):
-        monkeypatch.setattr(compiled, "LARGE", large)
-        assert compiled.compile_kernel(fresh(polynomial))(x) == expected
+    for size in (0, 10**6):
+        assert compiled.Kernel(fresh(polynomial), inlined_size=size)(x) == expected
