@@ -5,10 +5,20 @@ import itertools
 import pytest
 from kinematics_solvers import FORWARD, INVERSE, METHODS, named, textbook
 
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.crosscheck.verify.judgement import (
+    CaseJudgement,
+    Diagnosis,
+    Explanation,
+    TaskReport,
+)
 from plumbob.crosscheck.verify.kinematics.faults import by_key
-from plumbob.crosscheck.verify.verify import verify
+from plumbob.crosscheck.verify.laws import finding
+from plumbob.crosscheck.verify.sentence import Sentence, sentence
+from plumbob.crosscheck.verify.verify import _with_cause, verify
 
 # Faults of forward kinematics: one, two, and one that is never tried together with others.
 BASES = [
@@ -59,3 +69,18 @@ def test_fault_on_top_of_wrong_forward_kinematics_is_named(base, method):
     for own in OWN[method]:
         _, inverse = reports(base, [own], method)
         assert any({*base, own} <= set(key.split(" + ")) for key in named(inverse)[0])
+
+
+@pytest.mark.parametrize("codes", [("PB-FORCE-001",), ()])
+def test_a_step_points_to_wrong_forces(codes):
+    """With the code of their mistake, if that is known."""
+    case = Case("one", "mass_spring_forces", {}, "x", sentence("It is all."))
+    broken = finding("nearest point", 1.0)
+    wrong = [CaseJudgement(case, Answer({}, 0.0), (broken,), {}, None, 0.0)]
+    words = Sentence("[{code}] {what}", {"code": codes[0], "what": ""}) if codes else None
+    known = (Explanation(("weight",), words, 1.0, 0.0),) if codes else ()
+    forces = TaskReport("mass_spring_forces", "", wrong, Diagnosis(known))
+    step = TaskReport("mass_spring_step", "", wrong, Diagnosis())
+    (hint,) = map(str, _with_cause(step, [forces]).diagnosis.hints)
+    assert "Its mass_spring_forces is wrong as well" in hint
+    assert ("PB-FORCE-001" in hint) == bool(codes)
