@@ -22,6 +22,8 @@ ROUNDED = 1e-5
 MAX_DECIMALS = 6
 HOLDS = sentence("It holds.")
 LAWS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+# The hint that a known mistake makes needless, since numbers that are none come from it.
+NO_NUMBERS = Sentence(LAWS["hints"]["numbers"]["sentence"], {})
 
 
 def finding(
@@ -118,15 +120,13 @@ def equal_answers(exchange: Exchange, allowed: float | Mapping[str, float]) -> F
 def hints_of(
     judgements: Sequence[CaseJudgement], is_explained: bool = False
 ) -> tuple[Sentence, ...]:
-    """Return hints at mistakes that no variant has, from the laws that are broken.
-
-    Where a mistake explains the answers, numbers that are none come from it.
-    """
+    """Return hints at mistakes that no variant has, from the laws that are broken."""
     findings = chain.from_iterable(judgement.findings for judgement in judgements)
-    broken = {law_entry.law for law_entry in findings if law_entry.verdict >= Verdict.WRONG}
-    broken -= {"numbers"} if is_explained else set()
-    hints = (entry for law, entry in LAWS["hints"].items() if law in broken)
-    return tuple(Sentence(entry["sentence"], {}) for entry in hints)
+    broken = {entry.law for entry in findings if entry.verdict >= Verdict.WRONG}
+    hints = (
+        Sentence(entry["sentence"], {}) for law, entry in LAWS["hints"].items() if law in broken
+    )
+    return tuple(hint for hint in hints if not (is_explained and hint == NO_NUMBERS))
 
 
 def proportion_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:

@@ -26,6 +26,7 @@ from .kinematics import (
     track,
 )
 from .kinematics.faults import SwitchFault
+from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
 from .mass_spring.stepping import Stepping
 from .one_line.search import with_changed_line
@@ -149,7 +150,8 @@ def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
         else "Its {task} is wrong as well: correct that first, since this may build upon it."
     )
     hint = Sentence(words.template, {"task": cause.task, "codes": ", ".join(codes)})
-    diagnosis = replace(report.diagnosis, hints=(hint, *report.diagnosis.hints))
+    others = [other for other in report.diagnosis.hints if other != NO_NUMBERS]
+    diagnosis = replace(report.diagnosis, hints=(hint, *others))
     return replace(report, diagnosis=diagnosis)
 
 

@@ -28,7 +28,7 @@ from plumbob.crosscheck.verify.judgement import (
 )
 from plumbob.crosscheck.verify.language import translator
 from plumbob.crosscheck.verify.output import comparison, drawing, json_file, junit, page, terminal
-from plumbob.crosscheck.verify.output.words import GOOD, Presentation, explanations, speaker
+from plumbob.crosscheck.verify.output.words import GOOD, Presentation, digits, explanations, speaker
 from plumbob.crosscheck.verify.sentence import Sentence, sentence
 from plumbob.reference import Skeleton, forward_kinematics
 
@@ -232,8 +232,28 @@ def test_what_is_saved_of_a_broken_task_is_what_it_breaks_on(explained, case):
     told = replace(task, diagnosis=replace(task.diagnosis, first_broken=law))
     text = normal(" ".join(terminal.lines(Report(Greeting(1, ("energy",)), [told], 0), shown())))
     assert text.count("large is off.") == 1
-    assert 'WRONG cases: 1; the smallest, "small": small is off.' in text
-    assert 'BROKEN cases: 2; the smallest is "large".' in text
+    broken, wrong = 'BROKEN cases: 2; the smallest is "large".', "small is off."
+    assert text.index(broken) < text.index(f'WRONG cases: 1; the smallest, "small": {wrong}')
+
+
+def test_what_is_the_same_of_several_tasks_is_printed_once():
+    (energy,) = undecided(Verdict.UNDECIDED).tasks
+    tasks = [replace(energy, task=task) for task in ("energy", "mass_spring_forces", "resample")]
+    tasks[2] = replace(tasks[2], diagnosis=Diagnosis(behaviour=sentence("It is another.")))
+    report = Report(Greeting(1, tuple(task.task for task in tasks)), tasks, 0)
+    screen = terminal.lines(report, shown(), terminal.ENDLESS)
+    assert [line for line in screen if line.endswith(":")] == [
+        "energy, mass_spring_forces:", "resample:",
+    ]  # fmt: skip
+    assert " ".join(screen).count("Damping is explicit.") == 1
+
+
+def test_zeros_have_no_sign():
+    answer, expected = {"forces": -np.zeros((1, 3))}, {"forces": np.array([[-0.0, 1.0, 2.0]])}
+    case = Case("one", "mass_spring_forces", {}, "x", sentence("It is all."))
+    failure = CaseJudgement(case, Answer(answer, 1e-3), (), expected, -0.0)
+    screen = [*terminal.numbers(failure, speaker("en"), 3), digits(failure)]
+    assert "-0" not in " ".join(screen)
 
 
 @pytest.mark.parametrize("verdict", Verdict)

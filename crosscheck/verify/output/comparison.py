@@ -111,7 +111,7 @@ def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[Number
     return [
         NumberRow(
             f"{name}[{', '.join(map(str, i))}]" if i else name,
-            np.atleast_1d(a[i]).tolist(), np.atleast_1d(b[i]).tolist(),
+            *((np.atleast_1d(array[i]) + 0.0).tolist() for array in (a, b)),  # -0 is 0
         )
         for i in indices
     ]  # fmt: skip

@@ -3,6 +3,7 @@
 import re
 import sys
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 from typing import Any
 
 from rich.cells import cell_len, set_cell_size
@@ -63,7 +64,7 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
         room = height - len(screen) - len(end) - len(brief) - 2
         screen += ["", *_details(bad[0], context, room), *brief]
     else:
-        screen += [line for task in bad for line in ("", *_details(task, context, height))]
+        screen += _all_details(bad, context, height)
     if any(line.endswith(_ELLIPSIS) for line in screen):
         hint = sentence("Cut at …: use --html FILE or | cat to see all of it.")
         end = [*wrapped(say(hint)), *end]
@@ -113,6 +114,16 @@ def _summary(task: TaskReport, say: Say, indent: str = "") -> list[str]:
     return wrapped(f"{title(task)}: " + " ".join(new), indent)
 
 
+def _all_details(tasks: Sequence[TaskReport], context: Presentation, room: int) -> list[str]:
+    """Return the details of tasks, once for neighbours of which the same is said."""
+    screen = list[str]()
+    details = [(title(task), _details(task, context, room)[1:]) for task in tasks]
+    for text, group in groupby(details, key=lambda pair: pair[1]):
+        heading = ", ".join(name for name, _ in group)
+        screen += ["", *wrapped(f"{heading}:"), *text]
+    return screen
+
+
 def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:
     """Return the mistakes of a task and its smallest failing case, in so many lines if possible."""
     say = context.say
@@ -121,6 +132,8 @@ def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:
     if failure is None:
         return [heading, *_shorten(paragraphs(_reservations(task), say, "  "), why_limit)]
     failures = smallest_failures(task.judgements, task.diagnosis.explained)
+    # what is BROKEN has no numbers: then those of the WRONG case stand below its complaint, last
+    failures.sort(key=lambda other: other.verdict, reverse=True)
     case = [
         line
         for other in failures
@@ -128,11 +141,11 @@ def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:
     ]
     rerun = []
     if command:
-        rerun = [f"  {say(sentence('The case is saved. To run it again:'))}", f"    {say(command)}"]
+        saved = sentence('The case "{name}" is saved. To run it again:', name=failure.case.name)
+        rerun = [*wrapped(say(saved), "  "), f"    {say(command)}"]
     room -= 1 + len(case) + len(rerun)
     why = paragraphs(explanations(task), say, "  ")
     why = _shorten(why, max(2, min(why_limit, room - 3)))
-    # what is BROKEN has no numbers: then those of the WRONG case stand below its complaint
     rows = numbers(failures[-1], say, room - len(why) - 1)
     return [heading, *why, *case, *rows, *rerun]
 

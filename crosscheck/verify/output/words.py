@@ -58,7 +58,7 @@ def passed(report: TaskReport) -> str:
 
 def digits(subject: TaskReport | CaseJudgement) -> str:
     """Return the number of correct digits, a dash if it cannot be counted."""
-    return "–" if subject.digits is None else f"{subject.digits:.1f}"
+    return "–" if subject.digits is None else f"{max(0.0, subject.digits):.1f}"
 
 
 def speed(report: TaskReport, say: Say) -> str:
@@ -152,7 +152,7 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
         return Sentence(template.template, {"task": title(bad[0])})
     first = bad[0]
     if first.is_asked:
-        return sentence("Next: declare what is meant in the greeting, or correct it.")
+        return sentence("Next: declare what is meant in the greeting; correct the rest.")
     if first.verdict is Verdict.UNDECIDED:
         return (
             sentence("Next: compare your step with the nearest known one; if it is meant to be "
