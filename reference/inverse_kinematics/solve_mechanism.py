@@ -121,8 +121,7 @@ def solve_mechanisms(
     made unit here, and the fields of Result.
     """
     joints, mechanism_fields, restarts, restart_frames = model
-    limits = limits_of(numbers)
-    mechanism = Mechanism(*mechanism_fields)
+    limits, mechanism = limits_of(numbers), Mechanism(*mechanism_fields)
     n = len(mechanism.columns)
     row = np.zeros(n + 5 + mixing_size(n, depth))
     data, mixing = data_on(mechanism, row[: n + 5]), mixing_on(row[n + 5 :], n, depth)
@@ -132,9 +131,8 @@ def solve_mechanisms(
         mechanism, data, row, mixing, new_workspace(mechanism), restarts, restart_frames,
         np.empty(len(restarts)),
     )  # fmt: skip
-    count = len(restarts) + 1 + SPARE_ROWS
-    saved, progress = np.empty((count, len(state.row))), np.empty((count, LIMIT + 1))
-    rotations = np.empty((len(joints), 4))
+    saved = np.empty((len(restarts) + 1 + SPARE_ROWS, len(row)))
+    progress, rotations = np.empty((len(saved), LIMIT + 1)), np.empty((len(joints), 4))
     for i in range(len(targets)):
         q, target = coordinates[i], targets[i]
         chained = limits.chained and i > 0

@@ -23,7 +23,7 @@ from .motion_faults import is_falling_at
 from .report import report
 from .robot_models import FARTHEST, REDUNDANT, judgement_of, target_of
 from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, UNREACHED
-from .trajectories import Trajectory
+from .trajectories import Trajectory, trajectories
 
 TASK = robot_targets.TASK
 # Coordinates that differ by less are the same answer [rad, m].
@@ -42,12 +42,7 @@ def judge(
     `base` are these, None if the Jacobian is right.
     """
     fails_at_zero = _fails_at_zero(exchanges)
-    motions = {
-        exchange.case.name: trajectory_of(exchange.case, exchange.answer.values)
-        for exchange in exchanges
-        if isinstance(exchange.answer, Answer)
-        and np.isfinite(exchange.answer.values.get("q", np.nan)).all()
-    }
+    motions = trajectories(exchanges, trajectory_of)
     judgements = [
         judge_case(
             exchange, partial(_findings, exchange.case, motions, greeting, fails_at_zero),

@@ -9,7 +9,8 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ..contestant import Answer, Exchange
+from ..case import Case
+from ..contestant import Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport
 from ..laws import finding, judge_case, not_finite
@@ -18,7 +19,7 @@ from . import motion_faults, robot_motions, rounding
 from .report import report
 from .robot_models import FARTHEST
 from .robot_targets import TOLERANCE
-from .trajectories import LENIENT, Trajectory
+from .trajectories import LENIENT, Trajectory, trajectories
 
 TASK = robot_motions.TASK
 cases = robot_motions.cases
@@ -56,16 +57,7 @@ def judge(
 
     `base` are these, None if the Jacobian is right.
     """
-    motions = {
-        exchange.case.name: Trajectory(
-            exchange.case,
-            np.clip(q, -FARTHEST, FARTHEST),
-            velocities=exchange.answer.values.get("velocities"),
-        )
-        for exchange in exchanges
-        if isinstance(exchange.answer, Answer)
-        and np.isfinite(q := exchange.answer.values.get("q", np.nan)).all()
-    }
+    motions = trajectories(exchanges, _trajectory_of)
     judgements = [
         judge_case(
             exchange, partial(_findings, exchange.case.name, motions, greeting),
@@ -97,6 +89,11 @@ def _findings(
         *_velocities(motion),
         *motion_faults.limit_laws(motion, motions.values()),
     ]
+
+
+def _trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
+    q = np.clip(outputs["q"], -FARTHEST, FARTHEST)
+    return Trajectory(case, q, velocities=outputs.get("velocities"))
 
 
 def _at(frame: int, law: Finding) -> Finding:

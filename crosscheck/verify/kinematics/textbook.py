@@ -856,36 +856,17 @@ def wrong_local(
     Q_child = load_quaternion(pose.local, chain.path[k + 1])
     if chain.parents[j] >= 0:
         Q_parent = load_quaternion(pose.local, chain.parents[j])
+    alone = (unit, unit, d)  # of the numbers that are no products
     products = (
-        (unit, unit, d),
-        (unit, unit, d),
-        (unit, d, Q),
-        (unit, unit, d),
-        (unit, unit, d),
-        (P, d, R),
-        (d, R, P_inverse),
-        (unit, Q, d),
-        (P_inverse, d, P),
-        (unit, unit, d),
-        (P_inverse, d, Q),
-        (P, d, product(P_inverse, Q, faults)),
-        (inverse(Q_parent, faults), d, R),
-        (unit, unit, d),
-        (unit, d, R),
-        (unit, P_inverse, d),
-        (P_inverse, R, d),
-        (unit, inverse(product(d, R, faults), faults), P),
-        (unit, unit, d),
-        (unit, unit, d),
-        (unit, unit, d),
-        (unit, unit, d),
-        (unit, d, Q_child),
-        (product(inverse(R, faults), d, faults), R, Q_child),
-        (product(P_inverse, d, faults), P, Q_child),
-        (unit, Q_child, d),
-        (unit, unit, d),
+        alone, alone, (unit, d, Q), alone,
+        alone, (P, d, R), (d, R, P_inverse), (unit, Q, d),
+        (P_inverse, d, P), alone, (P_inverse, d, Q), (P, d, product(P_inverse, Q, faults)),
+        (inverse(Q_parent, faults), d, R), alone, (unit, d, R), (unit, P_inverse, d),
+        (P_inverse, R, d), (unit, inverse(product(d, R, faults), faults), P), alone, alone,
+        alone, alone, (unit, d, Q_child), (product(inverse(R, faults), d, faults), R, Q_child),
+        (product(P_inverse, d, faults), P, Q_child), (unit, Q_child, d), alone,
         (product(Q, P_inverse, faults), d, P),
-    )
+    )  # fmt: skip
     if faults.rotations == 17 and chain.parents[j] < 0:
         return product(d, R, faults)
     a, b, c = products[faults.rotations]

@@ -1,6 +1,6 @@
 """The frames of a robot's motion, or its one answer: errors, displacements of targets, jumps."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,6 +13,7 @@ from plumbob.reference.jacobians import jacobian
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
+from ..contestant import Answer, Exchange
 from .robot_models import mechanism, tool_pose
 from .robot_motions import ITERATIONS
 
@@ -152,3 +153,15 @@ class Trajectory:
         """How far coordinates are beyond their limits, (frame, joint)."""
         lower, upper = self.inputs["lower"], self.inputs["upper"]
         return np.maximum(np.maximum(lower - self.q, self.q - upper), 0.0)
+
+
+def trajectories(
+    exchanges: Sequence[Exchange], trajectory_of: Callable[[Case, Mapping[str, Any]], Trajectory]
+) -> dict[str, Trajectory]:
+    """Return the trajectories of the answers with finite coordinates, by the names of cases."""
+    return {
+        exchange.case.name: trajectory_of(exchange.case, exchange.answer.values)
+        for exchange in exchanges
+        if isinstance(exchange.answer, Answer)
+        and np.isfinite(exchange.answer.values.get("q", np.nan)).all()
+    }

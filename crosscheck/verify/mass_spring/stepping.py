@@ -297,21 +297,9 @@ def _diagnose(
         explanation = _explanation(matches, probes, search.epsilon)
         is_likely = explanation.share >= (MANY if len(matches[0].faults) > 1 else SOME)
         explanations = (explanation,) if is_likely else ()
-    elif matches and (
-        (is_open := _leaves_open(step, options := honest_options(matches, step)))
-        or fields_of({option.aspect: option for option in options})["integrator"].hessian != "exact"
-    ):
+    elif matches:
         is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
-        declaration = declaration_of(options) if is_open and not is_wrong else ""
-        behaviour = sentence(
-            "In small cases it behaves like {model}, with which it is compared."
-            if is_wrong
-            else "It behaves like {model}. Declare it with {declaration}."
-            if declaration
-            else "It behaves like {model}.",
-            model=describe_model(options),
-            declaration=declaration,
-        )
+        behaviour = _behaviour(honest_options(matches, step), step, is_wrong)
     hints = hints_of(judgements, bool(explanations))
     if _repeats(judgements, 1.0):
         first = sentence(
@@ -331,6 +319,24 @@ def _diagnose(
     if search.probes and behaviour is None and (step.method is None or is_undecided):
         hints += (_nearest(search), laws_that_hold(judgements))
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
+
+
+def _behaviour(options: Sequence[Option], step: Step, is_wrong: bool) -> Sentence | None:
+    """Return the honest model that answers are of, None if it is the one that is declared."""
+    is_open = _leaves_open(step, options)
+    integrator = fields_of({option.aspect: option for option in options})["integrator"]
+    if not is_open and integrator.hessian == "exact":
+        return None
+    declaration = declaration_of(options) if is_open and not is_wrong else ""
+    return sentence(
+        "In small cases it behaves like {model}, with which it is compared."
+        if is_wrong
+        else "It behaves like {model}. Declare it with {declaration}."
+        if declaration
+        else "It behaves like {model}.",
+        model=describe_model(options),
+        declaration=declaration,
+    )
 
 
 def _repeats(asked: Sequence[Exchange] | Sequence[CaseJudgement], factor: float) -> bool:
