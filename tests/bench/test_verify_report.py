@@ -160,13 +160,20 @@ def test_cut_is_marked_and_a_larger_screen_shows_more(wrong, language):
 
 def test_numbers_side_by_side_are_whole():
     ours = np.array([[0.48315384, 0.24848917, -0.82854335, 0.1364]])
-    for apart in (1e-8, 1e-15):
+    for apart in (1e-8, 1e-11):
         theirs = ours + np.array([[0.0, 0.0, 0.0, apart]])
         one = answered("forward_kinematics", {}, {"rotations": theirs}, {"rotations": ours})
         text = "\n".join(terminal.numbers(one, speaker("en"), 6))
         row = comparison.rows(one)[0]
         assert all(number in text for side in comparison.texts(row) for number in side.split())
         assert apart < 1e-10 or max(map(len, text.split("\n"))) <= terminal.WIDTH
+
+
+def test_numbers_that_differ_by_rounding_are_not_shown():
+    """The mistake is elsewhere: in what the answer says of itself, for example."""
+    ours = np.array([[0.6, 0.8, 0.0, 0.0]])
+    one = answered("forward_kinematics", {}, {"rotations": ours + 1e-15}, {"rotations": ours})
+    assert comparison.rows(one) == []
 
 
 def a_wrong_task(share, words=MEND):
@@ -336,6 +343,11 @@ def test_page_is_self_contained_and_escapes_the_texts_of_a_solver(wrong):
     assert "script" not in parsed.tags
 
 
+def test_the_page_says_why_a_task_is_not_simply_right_before_it_lists_the_cases():
+    text = page.render(undecided(Verdict.RIGHT_EXCEPT), shown())
+    assert "2 dampers" in text.partition("<details")[0]
+
+
 def test_the_page_draws_theirs_and_ours(wrong):
     forward, inverse, cloth = (
         Page(page.render(Report(wrong.greeting, [task], 0), shown())) for task in wrong.tasks
@@ -449,11 +461,12 @@ def test_any_answer_is_drawn_without_a_number_that_svg_does_not_have(theirs):
 
 def test_a_small_difference_is_drawn_larger():
     ours = {"positions": np.eye(3)[:2]}
-    theirs = {"positions": np.eye(3)[:2] + 1e-9}
+    theirs = {"positions": np.eye(3)[:2] + 1e-5}
     seen = comparison.drawing_of(answered("forward_kinematics", ARM, theirs, ours))
     larger, factor = drawing.magnified(seen)
-    assert factor == pytest.approx(0.2 / (3**0.5 * 1e-9), rel=0.5)
+    assert factor == pytest.approx(0.2 / (3**0.5 * 1e-5), rel=0.5)
     assert drawing.distance(larger) == pytest.approx(0.2, rel=0.5)
-    theirs["positions"][:] += 1.0
-    drawn = comparison.drawing_of(answered("forward_kinematics", ARM, theirs, ours))
-    assert drawing.magnified(drawn)[1] == 1
+    for other in (1.0, 1e-7):  # large, or as small as the rounding of single precision
+        theirs["positions"][:] = ours["positions"] + other
+        drawn = comparison.drawing_of(answered("forward_kinematics", ARM, theirs, ours))
+        assert drawing.magnified(drawn)[1] == 1

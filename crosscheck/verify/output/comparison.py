@@ -16,6 +16,8 @@ Outputs = Mapping[str, Any]
 _PARTING = 0.01
 # An output that differs by less than this part of another one is rounded, not wrong.
 _ROUNDED = 1e-4
+# So are numbers that differ by less than this part of the largest number of their output.
+_ROUNDING = 1e-12
 # The length of the longest force arrow, relative to the system's extent.
 _ARROW = 0.3
 
@@ -106,7 +108,8 @@ def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[Number
     gaps = np.nan_to_num(np.abs(a - b), nan=np.inf)
     if a.ndim:
         gaps = gaps.max(-1)
-    parting = np.argwhere((gaps > 0.0) & (gaps >= _PARTING * gaps.max(initial=0.0)))[:count]
+    least = max(_PARTING * gaps.max(initial=0.0), _ROUNDING * np.abs(b).max(initial=0.0))
+    parting = np.argwhere((gaps > 0.0) & (gaps >= least))[:count]
     indices = [tuple(map(int, index)) for index in parting]
     return [
         NumberRow(

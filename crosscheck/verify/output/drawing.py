@@ -18,6 +18,8 @@ from .comparison import CaseDrawing, Wireframe
 
 # Differences below the first share of the extent are magnified to about the second.
 _VISIBLE, _MAGNIFIED = 0.02, 0.2
+# Smaller shares are left: they may be the rounding of single precision.
+_ROUNDING = 1e-6
 # Points are numbered if there are no more than this.
 _NUMBERED = 12
 # Points farther from the middle than so many extents of the right answer are left out.
@@ -129,7 +131,7 @@ def magnified(drawing: CaseDrawing) -> tuple[CaseDrawing, float]:
         return drawing, 1.0
     expected = drawing.expected.points
     extent = float(np.ptp(expected, axis=0).max(initial=0.0))
-    if gap >= _VISIBLE * extent:
+    if gap >= _VISIBLE * extent or gap < _ROUNDING * extent:
         return drawing, 1.0
     factor = float(f"{_MAGNIFIED * extent / gap:.0e}")
     points = expected + factor * (drawing.answer.points - expected)

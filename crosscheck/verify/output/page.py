@@ -90,7 +90,7 @@ def _task(task: TaskReport, context: Presentation) -> dict[str, Any]:
         "about": Sentence(TASKS[task.task].about, {}),
         "passed": words.passed(task),
         "speed": words.speed(task, context.say),
-        "explanations": list(words.explanations(task)),
+        "explanations": list(words.explanations(task)) if failure else words.reservations(task),
         "failure": failure,
         "drawing": picture,
         "apart": caption,

@@ -26,6 +26,7 @@ from .words import (
     is_unwritten,
     passed,
     remarks,
+    reservations,
     speed,
     title,
 )
@@ -55,7 +56,7 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
     screen = [*wrapped(say(introduction(report))), *_table(report.tasks, say)]
     screen += paragraphs(remarks(report), say)
     end = wrapped(say(advice(report.tasks)))
-    good = [task for task in report.tasks if task.verdict in GOOD and _reservations(task)]
+    good = [task for task in report.tasks if task.verdict in GOOD and reservations(task)]
     free = 0 if bad and height < ENDLESS else height - len(screen) - len(end) - 1
     for task in good:
         screen += _shorten(_summary(task, say, "  "), max(_COMPLAINT, free // len(good)))
@@ -94,21 +95,10 @@ def _grid(rows: Sequence[Sequence[str]], sides: str, size: int = _WIDEST) -> lis
     return [line.rstrip() for line in capture.get().splitlines()]
 
 
-def _reservations(task: TaskReport) -> list[Sentence]:
-    """Return each kind of the worst complaints about right answers, and the inferred behaviour."""
-    kinds: dict[tuple[str, str], Sentence] = {}
-    for judgement in task.judgements:
-        for complaint in judgement.complaints[:1] if judgement.verdict is task.verdict else ():
-            cause = complaint.values.get("cause")
-            kind = complaint.template, cause.template if isinstance(cause, Sentence) else ""
-            kinds.setdefault(kind, complaint)
-    return [*kinds.values(), *explanations(task)]
-
-
 def _summary(task: TaskReport, say: Say, indent: str = "") -> list[str]:
     """Return the name of a task and the sentences about its answers as one paragraph."""
     failure = task.smallest_failure
-    sentences = [*explanations(task), *failure.complaints] if failure else _reservations(task)
+    sentences = [*explanations(task), *failure.complaints] if failure else reservations(task)
     words = list(dict.fromkeys(map(say, sentences)))
     new = [text for text in words if not any(text != other and text in other for other in words)]
     return wrapped(f"{title(task)}: " + " ".join(new), indent)
@@ -130,7 +120,7 @@ def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:
     failure, command = task.smallest_failure, context.command(task)
     heading, why_limit = f"{title(task)}:", max(_EXPLANATION, room // 3)
     if failure is None:
-        return [heading, *_shorten(paragraphs(_reservations(task), say, "  "), why_limit)]
+        return [heading, *_shorten(paragraphs(reservations(task), say, "  "), why_limit)]
     failures = smallest_failures(task.judgements, task.diagnosis.explained)
     # what is BROKEN has no numbers: then those of the WRONG case stand below its complaint, last
     failures.sort(key=lambda other: other.verdict, reverse=True)

@@ -134,6 +134,17 @@ def explanations(report: TaskReport) -> Iterator[Sentence]:
     yield from filter(None, (diagnosis.first_broken, diagnosis.behaviour, *diagnosis.hints))
 
 
+def reservations(task: TaskReport) -> list[Sentence]:
+    """Return each kind of the worst complaints about right answers, and the inferred behaviour."""
+    kinds: dict[tuple[str, str], Sentence] = {}
+    for judgement in task.judgements:
+        for complaint in judgement.complaints[:1] if judgement.verdict is task.verdict else ():
+            cause = complaint.values.get("cause")
+            kind = complaint.template, cause.template if isinstance(cause, Sentence) else ""
+            kinds.setdefault(kind, complaint)
+    return [*kinds.values(), *explanations(task)]
+
+
 def advice(tasks: Sequence[TaskReport]) -> Sentence:
     """Return what to do next."""
     bad = [task for task in tasks if task.verdict not in GOOD]
