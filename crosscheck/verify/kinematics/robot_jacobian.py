@@ -17,10 +17,12 @@ from ..judgement import LEAST_SHARE, Diagnosis, Explanation, Finding, TaskReport
 from ..laws import digits, judge_case, not_finite, of_joints
 from ..sentence import Sentence, sentence
 from . import robot_models, rounding
+from .formulas import evaluate
 from .report import report
 from .robot_faults import FAULTS as POSE_FAULTS
 from .robot_faults import JACOBIAN_FAULTS, RobotFault
 from .robot_models import mechanism, tool_pose
+from .robot_textbook import RIGHT as RIGHT_RULES
 from .robot_textbook import Inputs
 from .skeletons import suits
 
@@ -159,9 +161,14 @@ def _share(fault: RobotFault, exchanges: Sequence[Exchange], greeting: Greeting)
             return 0.0
         inputs = exchange.case.inputs
         frames = fault.frames(inputs, inputs["q"])
-        jacobians = list(fault.jacobians(inputs, inputs["q"]))
+        rules = {**RIGHT_RULES, **fault.rules}
+        columns = fault._replace(rules={**fault.rules, "answer": "J"})
+        jacobians = list(columns.jacobians(inputs, inputs["q"]))
         for k, convention in enumerate(conventions):
-            predictions = (convention(J, frames.position, frames.rotation) for J in jacobians)
+            predictions = (
+                evaluate(rules["answer"], {"J": convention(J, frames.position, frames.rotation)})
+                for J in jacobians
+            )
             bound, error = (
                 _bound(exchange.case, greeting),
                 _gap(exchange, right_jacobian(inputs, convention)),

@@ -27,10 +27,11 @@ RIGHT: Rules = {
     # The rotation of a joint and what rotates its origin, a slide's direction and the tool's
     # position: R of the parent, the frame, the joint's motion and, from then on, the joint.
     "product": "P @ F @ M", "origin": "P", "slide": "P @ F @ a", "tool": "R",
-    # Jacobian: an axis; the coordinates, those that arms belong to, an arm, both parts and all.
+    # Jacobian: an axis; the coordinates, those that arms belong to, an arm, both parts, all, and
+    # how it is arranged in the end.
     "axis": "P @ F @ a", "coordinates": "q", "arms": "q", "arm": "tool - x",
     "linear": "where(slides, a, np.cross(a, arm))", "angular": "where(slides, 0, a)",
-    "jacobian": "J",
+    "jacobian": "J", "answer": "J",
 }  # fmt: skip
 # Rules whose faults make matrices that are no rotations.
 UNROTATED = {"cosine", "sine", "outer", "cross", "matrix"}
@@ -175,7 +176,8 @@ def geometric_jacobian(inputs: Inputs, q: FloatArray, rules: Rules) -> FloatArra
         J = np.concatenate([(tool @ to_tool @ part[..., None])[..., 0]
                             for part in np.split(J, 2, axis=-1)], axis=-1)  # fmt: skip
     J = np.swapaxes(J, -1, -2) * ancestors(inputs)
-    return np.asarray(evaluate(rules["jacobian"], names | {"J": J, "slides": slides}))
+    J = evaluate(rules["jacobian"], names | {"J": J, "slides": slides})
+    return np.asarray(evaluate(rules["answer"], {"J": J}))
 
 
 def ancestors(inputs: Inputs) -> FloatArray:

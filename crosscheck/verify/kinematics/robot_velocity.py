@@ -20,9 +20,11 @@ from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskRepo
 from ..laws import finding, judge_case, not_finite
 from ..sentence import Sentence, sentence
 from . import robot_jacobian, robot_models, rounding
-from .faults import sentences_of
+from .faults import TABLE, sentences_of
+from .formulas import evaluate
 from .report import report
-from .robot_jacobian import CONVENTIONS, right_jacobian
+from .robot_faults import RIGHT
+from .robot_jacobian import CONVENTIONS, Convention, right_jacobian
 from .robot_models import feature_of, mechanism
 from .robot_textbook import Inputs
 from .skeletons import suits
@@ -48,6 +50,15 @@ SHORTENED = ("transposed matrix", "damping too large")
 SENTENCES = dict(READING_FAULTS) | {
     key: fault.sentence for key, fault in robot_jacobian.FAULTS.items()
 }
+# Frames in which the singular values of a Jacobian differ.
+FRAMES = [CONVENTIONS[f"{frame}, linear part first"] for frame in ("world", "spatial")]
+# What speeds solve that are right at another point p than the tool's origin: formulas of a matrix
+# and of the parts of the velocity.
+POINTS = [
+    ["J", "v + np.cross(w, x - p)", "w"],
+    ["spatial", "v - np.cross(w, p)", "w"],
+    ["np.concatenate([J[:3] + np.cross(T(J[3:]), p - x).T, J[3:]])", "v", "w"],
+]
 # A Jacobian, and the velocity that the speeds give by it.
 Equation = tuple[FloatArray, FloatArray]
 
@@ -100,9 +111,11 @@ def _is_regular(values: FloatArray, rank: int) -> bool:
     return len(values) == rank and bool(values[0] <= CONDITION * values[-1])
 
 
-def _equation(inputs: Inputs) -> Equation:
+def _equation(inputs: Inputs, frame: Convention = FRAMES[0]) -> Equation:
+    """Return the equation that right speeds solve, in the world or for the point at its origin."""
     twist = np.concatenate([inputs["linear_velocity"], inputs["angular_velocity"]])
-    return jacobian(mechanism(inputs), inputs["q"], -1), twist
+    tool = RIGHT.frames(inputs, inputs["q"])
+    return right_jacobian(inputs, frame), frame(twist[:, None], tool.position, tool.rotation)[:, 0]
 
 
 def _shortest(equation: Equation) -> FloatArray:
@@ -203,23 +216,24 @@ def _behaviour(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Sente
     return sentence("Among the speeds that solve a request it gives those of least length.")
 
 
-def _readings(inputs: Inputs) -> Mapping[str, Equation]:
-    """Return the equations that speeds with a fault solve, by its key."""
+def _readings(key: str, inputs: Inputs) -> Iterator[Equation]:
+    """Yield the equations that speeds with a fault solve."""
     J, twist = _equation(inputs)
     tool, spatial = (right_jacobian(inputs, CONVENTIONS[f"{frame}, linear part first"])
                      for frame in ("tool", "spatial"))  # fmt: skip
-    return {
-        "transposed matrix": (np.eye(J.shape[1]), J.T @ twist),
-        "reversed": (J, -twist),
-        "angular part first": (J, np.roll(twist, 3)),
-        "along the tool's axes": (tool, twist),
-        "point at the origin": (spatial, twist),
-        "angular part ignored": (J[:3], twist[:3]),
-        "linear part ignored": (J[3:], twist[3:]),
-        "speeds in degrees": (np.radians(J), twist),
-        "velocity of length one": (J, twist / np.linalg.norm(twist)),
-        "damping too large": (J, twist),
-    }
+    frames = RIGHT.frames(inputs, inputs["q"])
+    zero = RIGHT.frames(inputs, 0.0 * inputs["q"])
+    names = {
+        "J": J, "tool": tool, "spatial": spatial, "v": twist[:3], "w": twist[3:],
+        "x": frames.position, "R": frames.rotation, "x0": zero.position, "R0": zero.rotation,
+        "joints": frames.origins,
+    }  # fmt: skip
+    entry = TABLE["robot_velocity"][key]
+    solved = [entry["solves"]] if "solves" in entry else POINTS
+    names["p"] = evaluate(entry.get("point", "x"), names)
+    for formulas in solved:
+        matrix, *parts = (evaluate(formula, names) for formula in formulas)
+        yield matrix, np.concatenate(parts)
 
 
 def _in_rows(J: FloatArray, speeds: FloatArray, rank: int) -> FloatArray:
@@ -242,6 +256,23 @@ def _truncated(equation: Equation, speeds: FloatArray) -> tuple[FloatArray, Floa
     return sums[count - 1], np.append(s, 0.0)[count - 1 : count + 1] / s[0]
 
 
+def _filtered(
+    factors: str, damping: str, equation: Equation, speeds: FloatArray, largest: float
+) -> FloatArray:
+    """Return speeds whose parts along singular vectors are those of the velocity times factors.
+
+    These are of the singular values s and of a damping d, which follows from the factor f of the
+    part that tells most.
+    """
+    J, twist = equation
+    U, s, V = np.linalg.svd(J, full_matrices=False)
+    rank = max(int(np.sum(s > RANK * s[0])), 1)
+    s, b, V = s[:rank], (twist @ U)[:rank], V[:rank]
+    i = int(np.argmax(np.abs(b) / s))
+    d = evaluate(damping, {"s": s[i], "f": (V @ speeds)[i] / b[i]})
+    return np.asarray((evaluate(factors, {"s": s, "d": d}) * b) @ V)
+
+
 # The speeds nearest to an answer that programs with a fault answer, given also the largest speed.
 ANSWERS: Mapping[str, Callable[[Equation, FloatArray, float], FloatArray]] = {
     CUT: lambda equation, speeds, largest: _truncated(equation, speeds)[0],
@@ -251,11 +282,12 @@ ANSWERS: Mapping[str, Callable[[Equation, FloatArray, float], FloatArray]] = {
     "speeds scaled down": lambda equation, speeds, largest: (
         min(1.0, largest / np.abs(_shortest(equation)).max()) * _shortest(equation)
     ),
+    **{
+        key: partial(_filtered, entry["filter"], entry.get("damping", "0.0"))
+        for key, entry in TABLE["robot_velocity"].items()
+        if "filter" in entry
+    },
 }
-
-
-def _reading(key: str, inputs: Inputs) -> Iterator[Equation]:
-    yield _readings(inputs)[key]
 
 
 def _by_jacobian(key: str, inputs: Inputs) -> Iterator[Equation]:
@@ -294,15 +326,15 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
     }
     largest = max((float(np.abs(speeds).max()) for speeds in answers.values()), default=0.0)
 
-    def answer(key: str, case: Case) -> dict[str, Any]:
+    def answer(key: str, frame: Convention, case: Case) -> dict[str, Any]:
         speeds = answers[case.name]
-        return {"velocities": ANSWERS[key](_equation(case.inputs), speeds, largest)}
+        return {"velocities": ANSWERS[key](_equation(case.inputs, frame), speeds, largest)}
 
     nearest = partial(_nearest, answers)
-    readings = [key for key in READING_FAULTS if key not in (TOO_FEW, TO_SPARE, *ANSWERS)]
+    readings = [key for key, entry in TABLE["robot_velocity"].items() if {"solves", "point"} & entry.keys()]
     variants = [
-        *(Variant((key,), partial(answer, key)) for key in ANSWERS),
-        *(Variant((key,), partial(nearest, partial(_reading, key),
+        *(Variant((key,), partial(answer, key, frame)) for key in ANSWERS for frame in FRAMES),
+        *(Variant((key,), partial(nearest, partial(_readings, key),
                                   1.0 if key in SHORTENED else LARGEST_LOSS)) for key in readings),
         *(Variant((key,), partial(nearest, partial(_by_jacobian, key), LARGEST_LOSS))
           for key in robot_jacobian.FAULTS if key != "angular part missing"),

@@ -78,6 +78,9 @@ def _operands(node: Any) -> Iterator[Change]:
         kind = kinds.get(type(node.op), "factor")
         yield from ((kind, operand) for operand in (node.left, node.right))
         yield "order", ast.BinOp(node.right, node.op, node.left)
+    elif isinstance(node, ast.List | ast.Tuple):
+        for elements in _exchanged(node.elts):
+            yield "order", type(node)(elements, ast.Load())
 
 
 def _other_operators(node: Any) -> Iterator[Change]:
@@ -112,8 +115,7 @@ def _bounds(node: Any, parent: ast.AST) -> Iterator[Change]:
 
 def _calls(node: ast.Call) -> Iterator[Change]:
     """Yield a call with two arguments exchanged, an argument alone, or another function."""
-    for i in range(len(node.args) - 1):
-        args = [*node.args[:i], node.args[i + 1], node.args[i], *node.args[i + 2 :]]
+    for args in _exchanged(node.args):
         yield "order", ast.Call(node.func, args, node.keywords)
     yield from (("call", arg) for arg in node.args)
     if isinstance(node.func, ast.Attribute):
@@ -127,6 +129,12 @@ def _calls(node: ast.Call) -> Iterator[Change]:
             other = names[names[0] == node.func.attr]
             func = ast.Attribute(node.func.value, other, ast.Load())
             yield "function", ast.Call(func, node.args, node.keywords)
+
+
+def _exchanged(nodes: list[ast.expr]) -> Iterator[list[ast.expr]]:
+    """Yield a list with each two neighbours exchanged."""
+    for i in range(len(nodes) - 1):
+        yield [*nodes[:i], nodes[i + 1], nodes[i], *nodes[i + 2 :]]
 
 
 def _numbers(value: object, parent: ast.AST) -> Iterator[Change]:
