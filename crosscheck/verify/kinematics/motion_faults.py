@@ -329,7 +329,7 @@ def _step_gap(motion: Trajectory, J: FloatArray, q: FloatArray, twists: FloatArr
     changes, dampings = (motion.q - q) * is_free, DAMPINGS
     lengths = np.maximum(np.linalg.norm(changes, axis=-1), 1e-300)
     for fine in (FINE, None):
-        steps = _damped_steps(J, twists, dampings) * is_free[:, None]
+        steps = damped_steps(J, twists, dampings) * is_free[:, None]
         gaps = _gaps(changes, steps, (0.0, np.inf)) / lengths[:, None]
         nearest = gaps.argmin(axis=-1)
         if fine is None or (gaps.min(axis=-1) > COARSE_STEP).all():
@@ -340,7 +340,7 @@ def _step_gap(motion: Trajectory, J: FloatArray, q: FloatArray, twists: FloatArr
     return np.asarray(gap)
 
 
-def _damped_steps(J: FloatArray, twists: FloatArray, dampings: FloatArray) -> FloatArray:
+def damped_steps(J: FloatArray, twists: FloatArray, dampings: FloatArray) -> FloatArray:
     """Return the steps J' (J J' + damping I)^-1 e along twists e, (frame, damping, joint)."""
     values, U = np.linalg.eigh(J @ np.swapaxes(J, 1, 2))
     parts = np.einsum("fij,fi->fj", U, twists)[:, None]
@@ -360,7 +360,7 @@ def _scaled(
 ) -> Evidence:
     """Return the frames that are right steps with some of these dampings, times a factor."""
     J, changes = motion.jacobians * ~motion.at_limits[:, None], motion.changes * ~motion.at_limits
-    steps = _damped_steps(J, motion.twists(motion.previous), dampings)
+    steps = damped_steps(J, motion.twists(motion.previous), dampings)
     lengths = np.linalg.norm(changes, axis=-1)
     is_single = motion.inputs["max_iterations"] == 1 and changes.shape[1] >= MIN_FREE
     is_close = _gaps(changes, steps, factors).min(axis=-1) <= SAME_SCALE * lengths
@@ -488,7 +488,7 @@ def _misplaced(motion: Trajectory, laws: set[str]) -> Evidence:
     is_first = np.arange(len(is_free)) < is_free.sum()
     is_as_meant = (is_moved == is_first) | motion.at_limits  # joints are clamped after the step
     steps = np.zeros((len(motion.q), len(DAMPINGS), len(is_free)))
-    steps[..., is_first] = _damped_steps(
+    steps[..., is_first] = damped_steps(
         motion.jacobians[..., is_free], motion.twists(motion.previous), DAMPINGS
     )
     changes, steps = motion.changes * ~motion.at_limits, steps * ~motion.at_limits[:, None]

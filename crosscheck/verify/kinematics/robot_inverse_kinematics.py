@@ -15,19 +15,23 @@ from plumbob.reference.judging import PoseJudgement
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
-from ..judgement import Finding, TaskReport, Verdict
+from ..judgement import Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from ..sentence import sentence
 from . import motion_faults, robot_targets, rounding
 from .motion_faults import is_falling_at
 from .report import report
 from .robot_models import FARTHEST, REDUNDANT, judgement_of, target_of
-from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, UNREACHED
+from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, FEW, MOST, UNREACHED
 from .trajectories import Trajectory, trajectories
 
 TASK = robot_targets.TASK
 # Coordinates that differ by less are the same answer [rad, m].
 SAME = 1e-9
+# Iterations agree with damped steps to this share, with one of these weights of the rotation and
+# squared dampings; a damping grows if it is so many times as large in the end.
+SAME_ITERATION, GROWTH = 0.1, 50.0
+WEIGHTS, DAMPINGS = np.geomspace(0.05, 10.0, 41), np.geomspace(1e-9, 1e4, 201)[:, None]
 cases = robot_targets.cases
 
 
@@ -52,6 +56,9 @@ def judge(
         for exchange in exchanges
     ]  # fmt: skip
     diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
+    stopped = [explanation.faults for explanation in diagnosis.explanations] == [("stopped early",)]
+    if stopped or (not diagnosis.explained and any(j.complaints for j in judgements)):
+        diagnosis = _with_iterations(diagnosis, motions.values())
     if not diagnosis.explained and _ignores_start(motions.values()):
         words = sentence("Its answers do not depend on start.")
         diagnosis = replace(diagnosis, behaviour=words)
@@ -80,6 +87,41 @@ def _ignores_start(motions: Iterable[Trajectory]) -> bool:
     return bool(groups) and all(np.ptp(q, axis=0).max() <= SAME for q in groups)
 
 
+def _with_iterations(diagnosis: Diagnosis, motions: Iterable[Trajectory]) -> Diagnosis:
+    """Return a diagnosis with what solves of one iteration, of two and so on show.
+
+    They are a motion whose frames are iterations.
+    """
+    solves = [motion for motion in motions if motion.case.family == FEW]
+    if len(solves) < MOST:
+        return diagnosis
+    motion = replace(solves[0], q=np.concatenate([solve.q for solve in solves]))
+    gaps, dampings = _fitted(motion, motion.jacobians)
+    frozen, _ = _fitted(motion, np.repeat(motion.jacobians[:1], MOST, axis=0))
+    if frozen.max() < SAME_ITERATION < gaps[1:].max():
+        words = sentence("Its iterations all use the Jacobian of the start. Compute it anew in "
+                         "each iteration, at the coordinates of that.")  # fmt: skip
+        return replace(diagnosis, hints=(*diagnosis.hints, words))
+    is_falling = (np.diff(np.linalg.norm(motion.twists(motion.q), axis=-1)) < 0.0).all()
+    is_growing = (np.diff(dampings) >= 0.0).all() and dampings[-1] > GROWTH * dampings[0]
+    if gaps.max() < SAME_ITERATION and is_falling and is_growing:
+        key = "damping grows"
+        return Diagnosis((Explanation((key,), motion_faults.SENTENCES[key], 1.0, 0.0),))
+    return diagnosis
+
+
+def _fitted(motion: Trajectory, J: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how far iterations are from damped steps, relative to them, and their dampings."""
+    e, lengths = motion.twists(motion.previous), np.linalg.norm(motion.changes, axis=-1)
+    fits = []
+    for weight in WEIGHTS:
+        rows = np.repeat([1.0, weight], 3)
+        steps = motion_faults.damped_steps(J * rows[:, None], e * rows, DAMPINGS)
+        gaps = np.linalg.norm(motion.changes[:, None] - steps, axis=-1) / (lengths[:, None] + SAME)
+        fits.append((gaps.min(axis=-1), DAMPINGS[gaps.argmin(axis=-1), 0]))
+    return min(fits, key=lambda fit: float(fit[0].max()))
+
+
 def trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
     """Return an answer as a motion of one frame."""
     q = np.clip(outputs["q"], -FARTHEST, FARTHEST)[None]
@@ -101,7 +143,9 @@ def _findings(
         return [not_finite("numbers, of a joint", q)]
     judgement = judgement_of(case.inputs, q)
     limits = _limits(judgement, q, case, greeting)
-    laws = [limits, *_target_laws(judgement, outputs, case, greeting, fails_at_zero)]
+    stays = any(law.verdict for motion in motions.values()
+                for law in motion_faults.limit_laws(motion, motions.values()))  # fmt: skip
+    laws = [limits, *_target_laws(judgement, outputs, case, greeting, fails_at_zero, stays)]
     if case.family == AT_A_LIMIT:
         laws.append(finding("limits in the solve", motions[case.name].is_clamped[0]))
     return [*laws, *motion_faults.limit_laws(motions[case.name], motions.values())]
@@ -122,11 +166,12 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
 
 def _target_laws(
     judgement: PoseJudgement, outputs: Mapping[str, Any], case: Case, greeting: Greeting,
-    fails_at_zero: bool,
+    fails_at_zero: bool, stays: bool,
 ) -> Iterator[Finding]:  # fmt: skip
     """Yield whether the target is reached; from any start another minimum may be found.
 
-    A single iteration need not reach it.
+    A single iteration need not reach it. Joints that stay at their limits, if any do, are a reason
+    for errors that could fall further.
     """
     distance, angle = judgement.distance, judgement.angle
     joints, size = len(case.inputs["parents"]), case.facts["size"]
@@ -137,7 +182,9 @@ def _target_laws(
     if case.family not in UNREACHED:
         is_hard = case.family in (ANYWHERE, AT_A_LIMIT)
         verdict = Verdict.RIGHT_EXCEPT if is_hard else None
-        is_falling = is_hard and error > 1.0 and is_falling_at(trajectory_of(case, outputs))
+        is_falling = (
+            is_hard and error > 1.0 and not stays and is_falling_at(trajectory_of(case, outputs))
+        )
         key = "target reached, still falling" if is_falling else "target reached"
         yield finding(key, distance, bound, verdict=verdict)
         yield finding("rotation reached", angle, angle_bound, verdict=verdict)

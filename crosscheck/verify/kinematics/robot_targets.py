@@ -41,10 +41,12 @@ AT_A_LIMIT = "at a limit"
 # iteration, without a joint at its limit and with one.
 TOLERANCE, TIGHT, STEP = "off by tolerances", "tight limits", "a single iteration"
 LIMIT_STEP = "a single iteration at a limit"
+# The same of one iteration and more, from one start; no target need be reached.
+FEW, MOST = "a few iterations", 5
 # Single iterations of tools that are rotated by nearly half a turn about x, y and z.
 HALF_TURNS = tuple(f"half a turn about {axis}" for axis in "xyz")
 # Requests whose targets need not be reached.
-UNREACHED = (BEYOND, STEP, TIGHT, LIMIT_STEP, *HALF_TURNS)
+UNREACHED = (BEYOND, STEP, TIGHT, FEW, LIMIT_STEP, *HALF_TURNS)
 # From a start so near to an answer [rad, m] no other minimum than the target's is nearer.
 NEAR = 0.1
 # How far single iterations and motions to a limit begin from an answer [rad, m]; of slides a share.
@@ -113,7 +115,7 @@ def _case(name: str, request: ToolRequest, tolerance: float) -> Case:
         **request.options,
     }
     about = sentence("A robot of {joints} joints.", joints=len(request.start))
-    is_reachable = np.array([request.family not in (BEYOND, TIGHT)])
+    is_reachable = np.array([request.family not in (BEYOND, TIGHT, FEW)])
     facts = {"size": _size(robot), "reachable": is_reachable, **request.facts}
     return Case(name, TASK, inputs, request.family, about, facts=facts)
 
@@ -144,7 +146,12 @@ def _requests(
         yield ToolRequest(ANYWHERE, robot, anywhere, tool)
         yield ToolRequest(BEYOND, robot, anywhere, unreachable, {"max_iterations": FEW_ITERATIONS})
     if joints >= REDUNDANT - 1 or not ancestors(robot).all():
-        yield from _single_steps(robot, rng)
+        steps = list(_single_steps(robot, rng))
+        yield from steps
+        if name == "seven hinges":
+            for k in range(1, MOST + 1):
+                options = {**steps[0].options, "max_iterations": k}
+                yield steps[0]._replace(family=FEW, options=options)
         yield from limited_steps(robot, rng)
     if joints >= REDUNDANT:
         draws = (_draw_limited(robot, rng) for _ in range(DRAWS))

@@ -134,7 +134,7 @@ def _on_target(
     key = "target followed, behind" if is_behind else "target followed"
     twin = motions.get(motion.case.name.replace(robot_motions.CURVE, robot_motions.STEPS))
     if is_behind and twin is not None and twin is not motion:
-        key += ", one iteration" * bool(np.abs(motion.q - twin.q).max() <= SAME)
+        key += ", one iteration" * np.array_equal(motion.q, twin.q)
     key = key if frame < facts["certain"] else "target followed, another"
     if motion.case.family == TOLERANCE and motion.changes.any():
         key = "target followed, behind"  # it does not take the start for near enough

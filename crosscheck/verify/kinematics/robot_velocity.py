@@ -41,13 +41,13 @@ LARGEST_LOSS = 0.25
 FACTOR = 1e3
 SINGULAR = "a singular pose"
 # Mistakes in reading the velocity or solving for the speeds, by their keys.
-READING_FAULTS = sentences_of("robot_velocity")
+READINGS = TABLE["robot_velocity"]
 # Those that invert a singular matrix, which is so for robots with too few joints or too many.
 TOO_FEW, TO_SPARE = "too few joints", "joints to spare"
 CUT = "cut too large"
 # Those whose speeds may be short by any share: with a factor of the transposed matrix, or damping.
 SHORTENED = ("transposed matrix", "damping too large")
-SENTENCES = dict(READING_FAULTS) | {
+SENTENCES = sentences_of("robot_velocity") | {
     key: fault.sentence for key, fault in robot_jacobian.FAULTS.items()
 }
 # Frames in which the singular values of a Jacobian differ.
@@ -228,7 +228,7 @@ def _readings(key: str, inputs: Inputs) -> Iterator[Equation]:
         "x": frames.position, "R": frames.rotation, "x0": zero.position, "R0": zero.rotation,
         "joints": frames.origins,
     }  # fmt: skip
-    entry = TABLE["robot_velocity"][key]
+    entry = READINGS[key]
     solved = [entry["solves"]] if "solves" in entry else POINTS
     names["p"] = evaluate(entry.get("point", "x"), names)
     for formulas in solved:
@@ -284,7 +284,7 @@ ANSWERS: Mapping[str, Callable[[Equation, FloatArray, float], FloatArray]] = {
     ),
     **{
         key: partial(_filtered, entry["filter"], entry.get("damping", "0.0"))
-        for key, entry in TABLE["robot_velocity"].items()
+        for key, entry in READINGS.items()
         if "filter" in entry
     },
 }
@@ -331,7 +331,7 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
         return {"velocities": ANSWERS[key](_equation(case.inputs, frame), speeds, largest)}
 
     nearest = partial(_nearest, answers)
-    readings = [key for key, entry in TABLE["robot_velocity"].items() if {"solves", "point"} & entry.keys()]
+    readings = [key for key, entry in READINGS.items() if {"solves", "point"} & entry.keys()]
     variants = [
         *(Variant((key,), partial(answer, key, frame)) for key in ANSWERS for frame in FRAMES),
         *(Variant((key,), partial(nearest, partial(_readings, key),

@@ -207,21 +207,39 @@ def _changed_answer(
 
 
 def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
-    """Return the sentence of the likeliest of some changes that no answer tells apart."""
-    mutant = min((mutants[key] for key in keys), key=lambda m: (KINDS.index(m.kind), len(m.wrong)))
+    """Return the sentence of the likeliest of some changes that no answer tells apart.
+
+    Another change of its kind is named as well if it is in another function.
+    """
+    ordered = sorted(
+        (mutants[key] for key in keys), key=lambda m: (KINDS.index(m.kind), len(m.wrong))
+    )
+    mutant = ordered[0]
     entry = FAULTS[mutant.kind]
+    what = Sentence(entry["sentence"], {})
     right, wrong = excerpts(mutant.right, mutant.wrong)
-    if wrong:
+    others = (m for m in ordered if m.kind == mutant.kind and m.function != mutant.function)
+    other = next(others, None) if wrong else None
+    if other is not None and other.wrong:
+        another_right, another_wrong = excerpts(other.right, other.wrong)
+        words = sentence(
+            "{what} Where a right program has `{right}`, your answers are as if yours had "
+            "`{wrong}`, or else, where it has `{another_right}`, as if yours had "
+            "`{another_wrong}`; names in it may differ.",
+            what=what, right=right, wrong=wrong, another_right=another_right,
+            another_wrong=another_wrong,
+        )  # fmt: skip
+    elif wrong:
         words = sentence(
             "{what} Where a right program has `{right}`, your answers are as if yours had "
             "`{wrong}`; names in it may differ.",
-            what=Sentence(entry["sentence"], {}), right=right, wrong=wrong,
+            what=what, right=right, wrong=wrong,
         )  # fmt: skip
     else:
         words = sentence(
             "{what} Your answers are as if the line `{right}` of a right program were missing in "
             "yours; names in it may differ.",
-            what=Sentence(entry["sentence"], {}), right=right,
+            what=what, right=right,
         )  # fmt: skip
     return with_code(entry["code"], words)
 
