@@ -311,6 +311,14 @@ def _speeds(speeds: str, motion: Trajectory, laws: set[str]) -> Evidence:
     return Evidence(scale > 0.0, gaps <= SAME_SPEED * np.maximum(scale, np.abs(expected).max(-1)))
 
 
+def _skipped(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the missed frames without movement, if these are those in which targets move least."""
+    distances = np.linalg.norm(motion.displacements[:, :3], axis=-1)
+    is_still = np.abs(motion.changes).max(axis=-1) <= EXACT
+    is_slow = distances <= distances[is_still].max(initial=-1.0)
+    return Evidence(_ends_off_target(motion), is_still & np.all((is_slow == is_still)[1:]))
+
+
 def _by_law(law: str, motion: Trajectory, laws: set[str]) -> Evidence:
     """Return all frames of a motion that breaks a law."""
     is_wrong = np.full(len(motion.q), law in laws)
@@ -624,6 +632,7 @@ APPARENT: Mapping[str, Signature] = {
 }
 # What explains whole poses comes before what explains steps, jumps and misses.
 POSES: Mapping[str, Signature] = {
+    "slow frames skipped": _skipped,  # rotations of the first target, if positions rest
     "angles from zero": _from_zero,
     "limits ignored": _limits_ignored,
     **_entries("target", lambda target, *motion: _reached(

@@ -15,7 +15,7 @@ from plumbob.reference.judging import PoseJudgement
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
-from ..judgement import Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from ..sentence import sentence
 from . import motion_faults, robot_targets, rounding
@@ -56,9 +56,8 @@ def judge(
         for exchange in exchanges
     ]  # fmt: skip
     diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
-    stopped = [explanation.faults for explanation in diagnosis.explanations] == [("stopped early",)]
-    if stopped or (not diagnosis.explained and any(j.complaints for j in judgements)):
-        diagnosis = _with_iterations(diagnosis, motions.values())
+    if [explanation.faults for explanation in diagnosis.explanations] in ([], [("stopped early",)]):
+        diagnosis = _with_iterations(diagnosis, motions.values(), judgements)
     if not diagnosis.explained and _ignores_start(motions.values()):
         words = sentence("Its answers do not depend on start.")
         diagnosis = replace(diagnosis, behaviour=words)
@@ -87,13 +86,16 @@ def _ignores_start(motions: Iterable[Trajectory]) -> bool:
     return bool(groups) and all(np.ptp(q, axis=0).max() <= SAME for q in groups)
 
 
-def _with_iterations(diagnosis: Diagnosis, motions: Iterable[Trajectory]) -> Diagnosis:
+def _with_iterations(
+    diagnosis: Diagnosis, motions: Iterable[Trajectory], judgements: Sequence[CaseJudgement]
+) -> Diagnosis:
     """Return a diagnosis with what solves of one iteration, of two and so on show.
 
     They are a motion whose frames are iterations.
     """
     solves = [motion for motion in motions if motion.case.family == FEW]
-    if len(solves) < MOST:
+    verdict = max(judgement.verdict for judgement in judgements)
+    if len(solves) < MOST or verdict == Verdict.RIGHT:
         return diagnosis
     motion = replace(solves[0], q=np.concatenate([solve.q for solve in solves]))
     gaps, dampings = _fitted(motion, motion.jacobians)
@@ -101,13 +103,13 @@ def _with_iterations(diagnosis: Diagnosis, motions: Iterable[Trajectory]) -> Dia
     if frozen.max() < SAME_ITERATION < gaps[1:].max():
         words = sentence("Its iterations all use the Jacobian of the start. Compute it anew in "
                          "each iteration, at the coordinates of that.")  # fmt: skip
-        return replace(diagnosis, hints=(*diagnosis.hints, words))
+        return replace(diagnosis, behaviour=words, hints=(*diagnosis.hints, words))
     is_falling = (np.diff(np.linalg.norm(motion.twists(motion.q), axis=-1)) < 0.0).all()
     is_growing = (np.diff(dampings) >= 0.0).all() and dampings[-1] > GROWTH * dampings[0]
-    if gaps.max() < SAME_ITERATION and is_falling and is_growing:
-        key = "damping grows"
-        return Diagnosis((Explanation((key,), motion_faults.SENTENCES[key], 1.0, 0.0),))
-    return diagnosis
+    if verdict < Verdict.WRONG or gaps.max() > SAME_ITERATION or not (is_falling and is_growing):
+        return diagnosis
+    key = "damping grows"
+    return Diagnosis((Explanation((key,), motion_faults.SENTENCES[key], 1.0, 0.0),))
 
 
 def _fitted(motion: Trajectory, J: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -170,8 +172,7 @@ def _target_laws(
 ) -> Iterator[Finding]:  # fmt: skip
     """Yield whether the target is reached; from any start another minimum may be found.
 
-    A single iteration need not reach it. Joints that stay at their limits, if any do, are a reason
-    for errors that could fall further.
+    A single iteration need not reach it, nor a solver of which joints stay at limits.
     """
     distance, angle = judgement.distance, judgement.angle
     joints, size = len(case.inputs["parents"]), case.facts["size"]

@@ -256,37 +256,29 @@ def _truncated(equation: Equation, speeds: FloatArray) -> tuple[FloatArray, Floa
     return sums[count - 1], np.append(s, 0.0)[count - 1 : count + 1] / s[0]
 
 
-def _filtered(
-    factors: str, damping: str, equation: Equation, speeds: FloatArray, largest: float
+def _answer(
+    entry: Mapping[str, str], equation: Equation, speeds: FloatArray, largest: float
 ) -> FloatArray:
-    """Return speeds whose parts along singular vectors are those of the velocity times factors.
+    """Return the speeds of a fault's formula.
 
-    These are of the singular values s and of a damping d, which follows from the factor f of the
-    part that tells most.
+    It is of the right speeds and the largest, or of the singular values s, the vectors V, the
+    velocity b along them and a damping d, which follows from the factor f of the part that tells
+    most.
     """
     J, twist = equation
     U, s, V = np.linalg.svd(J, full_matrices=False)
     rank = max(int(np.sum(s > RANK * s[0])), 1)
     s, b, V = s[:rank], (twist @ U)[:rank], V[:rank]
     i = int(np.argmax(np.abs(b) / s))
-    d = evaluate(damping, {"s": s[i], "f": (V @ speeds)[i] / b[i]})
-    return np.asarray((evaluate(factors, {"s": s, "d": d}) * b) @ V)
+    d = evaluate(entry.get("damping", "0"), {"s": s[i], "f": (V @ speeds)[i] / b[i]})
+    names = {"right": b / s @ V, "largest": largest, "s": s, "b": b, "V": V, "d": d}
+    return np.asarray(evaluate(entry["answer"], names))
 
 
 # The speeds nearest to an answer that programs with a fault answer, given also the largest speed.
 ANSWERS: Mapping[str, Callable[[Equation, FloatArray, float], FloatArray]] = {
     CUT: lambda equation, speeds, largest: _truncated(equation, speeds)[0],
-    "speeds clipped": lambda equation, speeds, largest: np.clip(
-        _shortest(equation), -largest, largest
-    ),
-    "speeds scaled down": lambda equation, speeds, largest: (
-        min(1.0, largest / np.abs(_shortest(equation)).max()) * _shortest(equation)
-    ),
-    **{
-        key: partial(_filtered, entry["filter"], entry.get("damping", "0.0"))
-        for key, entry in READINGS.items()
-        if "filter" in entry
-    },
+    **{key: partial(_answer, entry) for key, entry in READINGS.items() if "answer" in entry},
 }
 
 

@@ -174,10 +174,8 @@ def _comparable(exchange: Exchange) -> Exchange:
     """
     if exchange.case.task == "robot_jacobian":
         assert isinstance(exchange.answer, Answer)
-        J = exchange.answer.values["jacobian"]
-        halves = sorted((J[:3], J[3:]), key=np.linalg.norm)
-        answer = Answer({"jacobian": np.concatenate(halves)}, 0.0)
-        return replace(exchange, answer=answer)
+        parts = sorted(np.split(exchange.answer.values["jacobian"], 2), key=np.linalg.norm)
+        return replace(exchange, answer=Answer({"jacobian": np.concatenate(parts)}, 0.0))
     if exchange.case.task != "inverse_kinematics":
         return exchange
     return PoseTrial(exchange).comparable
@@ -209,38 +207,30 @@ def _changed_answer(
 def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
     """Return the sentence of the likeliest of some changes that no answer tells apart.
 
-    Another change of its kind is named as well if it is in another function.
+    Another of its kind in another function is named as well.
     """
-    ordered = sorted(
-        (mutants[key] for key in keys), key=lambda m: (KINDS.index(m.kind), len(m.wrong))
-    )
+    ordered = sorted((mutants[k] for k in keys), key=lambda m: (KINDS.index(m.kind), len(m.wrong)))
     mutant = ordered[0]
     entry = FAULTS[mutant.kind]
-    what = Sentence(entry["sentence"], {})
     right, wrong = excerpts(mutant.right, mutant.wrong)
-    others = (m for m in ordered if m.kind == mutant.kind and m.function != mutant.function)
-    other = next(others, None) if wrong else None
-    if other is not None and other.wrong:
-        another_right, another_wrong = excerpts(other.right, other.wrong)
-        words = sentence(
-            "{what} Where a right program has `{right}`, your answers are as if yours had "
-            "`{wrong}`, or else, where it has `{another_right}`, as if yours had "
-            "`{another_wrong}`; names in it may differ.",
-            what=what, right=right, wrong=wrong, another_right=another_right,
-            another_wrong=another_wrong,
-        )  # fmt: skip
-    elif wrong:
+    if wrong:
         words = sentence(
             "{what} Where a right program has `{right}`, your answers are as if yours had "
             "`{wrong}`; names in it may differ.",
-            what=what, right=right, wrong=wrong,
+            what=Sentence(entry["sentence"], {}), right=right, wrong=wrong,
         )  # fmt: skip
     else:
         words = sentence(
             "{what} Your answers are as if the line `{right}` of a right program were missing in "
             "yours; names in it may differ.",
-            what=what, right=right,
+            what=Sentence(entry["sentence"], {}), right=right,
         )  # fmt: skip
+    for other in ordered:
+        if wrong and other.kind == mutant.kind and other.function != mutant.function:
+            right, wrong = excerpts(other.right, other.wrong)
+            words = sentence("{one} Or, as well, `{wrong}` in the place of `{right}`.",
+                             one=words, right=right, wrong=wrong)  # fmt: skip
+            break
     return with_code(entry["code"], words)
 
 
