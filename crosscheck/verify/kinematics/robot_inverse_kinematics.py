@@ -31,7 +31,7 @@ SAME = 1e-9
 # Iterations agree with damped steps to this share, with one of these weights of the rotation and
 # squared dampings; a damping grows if it is so many times as large in the end.
 SAME_ITERATION, GROWTH = 0.1, 50.0
-WEIGHTS, DAMPINGS = np.geomspace(0.05, 10.0, 41), np.geomspace(1e-9, 1e4, 201)[:, None]
+WEIGHTS, DAMPINGS = np.geomspace(0.05, 10.0, 101), np.geomspace(1e-9, 1e4, 401)[:, None]
 cases = robot_targets.cases
 
 
@@ -119,7 +119,8 @@ def _fitted(motion: Trajectory, J: FloatArray) -> tuple[FloatArray, FloatArray]:
     for weight in WEIGHTS:
         rows = np.repeat([1.0, weight], 3)
         steps = motion_faults.damped_steps(J * rows[:, None], e * rows, DAMPINGS)
-        gaps = np.linalg.norm(motion.changes[:, None] - steps, axis=-1) / (lengths[:, None] + SAME)
+        gaps = np.linalg.norm(motion.changes[:, None] - steps, axis=-1) * (lengths > SAME)[:, None]
+        gaps /= np.maximum(lengths, SAME)[:, None]
         fits.append((gaps.min(axis=-1), DAMPINGS[gaps.argmin(axis=-1), 0]))
     return min(fits, key=lambda fit: float(fit[0].max()))
 
