@@ -122,7 +122,7 @@ def _known_faults(
     """
     if not task.startswith("robot"):
         return next(filter(None, map(faults.explaining, causes)), None)
-    if task not in (robot_inverse_kinematics.TASK, robot_track.TASK):
+    if task == robot_jacobian.TASK:
         return None
     wrong = [r for r in reports if r.task == robot_jacobian.TASK and r.verdict >= Verdict.WRONG]
     wrong += [cause for cause in causes if cause.task == robot_inverse_kinematics.TASK]

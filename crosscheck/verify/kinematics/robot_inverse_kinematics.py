@@ -89,15 +89,12 @@ def _ignores_start(motions: Iterable[Trajectory]) -> bool:
 def _with_iterations(
     diagnosis: Diagnosis, motions: Iterable[Trajectory], judgements: Sequence[CaseJudgement]
 ) -> Diagnosis:
-    """Return a diagnosis with what solves of one iteration, of two and so on show.
-
-    They are a motion whose frames are iterations.
-    """
+    """Return a diagnosis with what solves of one iteration, of two and so on show."""
     solves = [motion for motion in motions if motion.case.family == FEW]
     verdict = max(judgement.verdict for judgement in judgements)
     if len(solves) < MOST or verdict == Verdict.RIGHT:
         return diagnosis
-    motion = replace(solves[0], q=np.concatenate([solve.q for solve in solves]))
+    motion = replace(solves[0], q=np.concatenate([solve.q for solve in solves]))  # by iteration
     gaps, dampings = _fitted(motion, motion.jacobians)
     frozen, _ = _fitted(motion, np.repeat(motion.jacobians[:1], MOST, axis=0))
     if frozen.max() < SAME_ITERATION < gaps[1:].max():

@@ -45,8 +45,6 @@ READINGS = TABLE["robot_velocity"]
 # Those that invert a singular matrix, which is so for robots with too few joints or too many.
 TOO_FEW, TO_SPARE = "too few joints", "joints to spare"
 CUT = "cut too large"
-# Those whose speeds may be short by any share: with a factor of the transposed matrix, or damping.
-SHORTENED = ("transposed matrix", "damping too large")
 SENTENCES = sentences_of("robot_velocity") | {
     key: fault.sentence for key, fault in robot_jacobian.FAULTS.items()
 }
@@ -152,11 +150,23 @@ def solving(
     return speeds + (parts - c) @ V, float(np.sqrt(square))
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
-    """Judge speeds by the velocity that the tool has with them; name the faults."""
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    base: Sequence[str] | None = None,
+) -> TaskReport:
+    """Judge speeds by the velocity that the tool has with them; name the faults.
+
+    `base` are those of a wrong Jacobian: other faults then have to explain all answers.
+    """
     judgements = [_judgement(exchange, greeting) for exchange in exchanges]
     if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
         diagnosis = _diagnosis(judgements, greeting)
+        explanations = [e for e in diagnosis.explanations if base is None or e.share == 1.0
+                        or set(e.faults) & set(base)]  # fmt: skip
+        is_double = base is not None
+        diagnosis = replace(diagnosis, explanations=tuple(explanations), is_double=is_double)
     else:
         diagnosis = Diagnosis(behaviour=_behaviour(judgements, greeting))
     return report(TASK, method, judgements, diagnosis)
@@ -261,9 +271,8 @@ def _answer(
 ) -> FloatArray:
     """Return the speeds of a fault's formula.
 
-    It is of the right speeds and the largest, or of the singular values s, the vectors V, the
-    velocity b along them and a damping d, which follows from the factor f of the part that tells
-    most.
+    Of singular values s, vectors V, velocities b along them, and a damping d that follows from the
+    factor f of the part that tells most.
     """
     J, twist = equation
     U, s, V = np.linalg.svd(J, full_matrices=False)
@@ -327,7 +336,7 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
     variants = [
         *(Variant((key,), partial(answer, key, frame)) for key in ANSWERS for frame in FRAMES),
         *(Variant((key,), partial(nearest, partial(_readings, key),
-                                  1.0 if key in SHORTENED else LARGEST_LOSS)) for key in readings),
+                                  READINGS[key].get("loss", LARGEST_LOSS))) for key in readings),
         *(Variant((key,), partial(nearest, partial(_by_jacobian, key), LARGEST_LOSS))
           for key in robot_jacobian.FAULTS if key != "angular part missing"),
     ]  # fmt: skip
@@ -346,10 +355,17 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
 
 
 def _cut(judgements: Sequence[CaseJudgement], answers: Mapping[str, FloatArray]) -> Sentence:
-    """Return the shares of the largest singular value between which values are cut off."""
-    shares = [_truncated(_equation(judgement.case.inputs), answers[judgement.case.name])[1]
-              for judgement in judgements if judgement.case.name in answers]  # fmt: skip
-    retained, dropped = np.transpose(shares)
+    """Return the shares of the largest singular value between which values are cut off.
+
+    They are of the frame in which the answers are nearest to speeds without some values.
+    """
+    cases = [judgement.case for judgement in judgements if judgement.case.name in answers]
+    cuts = [[(_equation(case.inputs, frame), answers[case.name]) for case in cases]
+            for frame in FRAMES]  # fmt: skip
+    nearest = min(cuts, key=lambda pairs: sum(
+        float(np.abs(_truncated(*pair)[0] - pair[1]).max()) for pair in pairs
+    ))  # fmt: skip
+    retained, dropped = np.transpose([_truncated(*pair)[1] for pair in nearest])
     return sentence("You drop singular values up to {dropped:.2g} of the largest and use those "
                     "from {kept:.2g} of it.", dropped=dropped.max(),
                     kept=retained.min())  # fmt: skip

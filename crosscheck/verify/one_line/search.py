@@ -168,10 +168,7 @@ def _is_telling(case: Case, answer: Answer | Failure) -> bool:
 
 
 def _comparable(exchange: Exchange) -> Exchange:
-    """Return an exchange with the outputs that no choice of a program changes.
-
-    Of Jacobians either part may come first: the larger does.
-    """
+    """Return what no choice of a program changes of an exchange: the larger part of J last."""
     if exchange.case.task == "robot_jacobian":
         assert isinstance(exchange.answer, Answer)
         parts = sorted(np.split(exchange.answer.values["jacobian"], 2), key=np.linalg.norm)
@@ -205,10 +202,7 @@ def _changed_answer(
 
 
 def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
-    """Return the sentence of the likeliest of some changes that no answer tells apart.
-
-    Another of its kind in another function is named as well.
-    """
+    """Return the sentence of the likeliest changes, in up to two functions, of equal answers."""
     ordered = sorted((mutants[k] for k in keys), key=lambda m: (KINDS.index(m.kind), len(m.wrong)))
     mutant = ordered[0]
     entry = FAULTS[mutant.kind]
