@@ -22,7 +22,6 @@ from .report import report
 from .robot_faults import FAULTS as POSE_FAULTS
 from .robot_faults import JACOBIAN_FAULTS, RobotFault
 from .robot_models import mechanism, tool_pose
-from .robot_textbook import RIGHT as RIGHT_RULES
 from .robot_textbook import Inputs
 from .skeletons import suits
 
@@ -161,12 +160,12 @@ def _share(fault: RobotFault, exchanges: Sequence[Exchange], greeting: Greeting)
             return 0.0
         inputs = exchange.case.inputs
         frames = fault.frames(inputs, inputs["q"])
-        rules = {**RIGHT_RULES, **fault.rules}
+        answer = fault.rules.get("answer", "J")
         columns = fault._replace(rules={**fault.rules, "answer": "J"})
         jacobians = list(columns.jacobians(inputs, inputs["q"]))
         for k, convention in enumerate(conventions):
             predictions = (
-                evaluate(rules["answer"], {"J": convention(J, frames.position, frames.rotation)})
+                evaluate(answer, {"J": convention(J, frames.position, frames.rotation)})
                 for J in jacobians
             )
             bound, error = (

@@ -27,8 +27,7 @@ RIGHT: Rules = {
     # The rotation of a joint and what rotates its origin, a slide's direction and the tool's
     # position: R of the parent, the frame, the joint's motion and, from then on, the joint.
     "product": "P @ F @ M", "origin": "P", "slide": "P @ F @ a", "tool": "R",
-    # Jacobian: an axis; the coordinates, those that arms belong to, an arm, both parts, all, and
-    # how it is arranged in the end.
+    # Jacobian: an axis; the coordinates, those that arms belong to, an arm, both parts and all.
     "axis": "P @ F @ a", "coordinates": "q", "arms": "q", "arm": "tool - x",
     "linear": "where(slides, a, np.cross(a, arm))", "angular": "where(slides, 0, a)",
     "jacobian": "J", "answer": "J",

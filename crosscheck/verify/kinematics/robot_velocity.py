@@ -151,22 +151,16 @@ def solving(
 
 
 def judge(
-    exchanges: Sequence[Exchange],
-    greeting: Greeting,
-    method: str,
+    exchanges: Sequence[Exchange], greeting: Greeting, method: str,
     base: Sequence[str] | None = None,
-) -> TaskReport:
-    """Judge speeds by the velocity that the tool has with them; name the faults.
-
-    `base` are those of a wrong Jacobian: other faults then have to explain all answers.
-    """
+) -> TaskReport:  # fmt: skip
+    """Judge speeds by the tool's velocity; name the faults, likely the `base` of its Jacobian."""
     judgements = [_judgement(exchange, greeting) for exchange in exchanges]
     if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
         diagnosis = _diagnosis(judgements, greeting)
-        explanations = [e for e in diagnosis.explanations if base is None or e.share == 1.0
-                        or set(e.faults) & set(base)]  # fmt: skip
-        is_double = base is not None
-        diagnosis = replace(diagnosis, explanations=tuple(explanations), is_double=is_double)
+        likely = [e for e in diagnosis.explanations if base is None or e.share == 1.0
+                  or set(e.faults) & set(base)]  # fmt: skip
+        diagnosis = replace(diagnosis, explanations=tuple(likely), is_double=base is not None)
     else:
         diagnosis = Diagnosis(behaviour=_behaviour(judgements, greeting))
     return report(TASK, method, judgements, diagnosis)
@@ -355,10 +349,7 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
 
 
 def _cut(judgements: Sequence[CaseJudgement], answers: Mapping[str, FloatArray]) -> Sentence:
-    """Return the shares of the largest singular value between which values are cut off.
-
-    They are of the frame in which the answers are nearest to speeds without some values.
-    """
+    """Return the shares of the largest singular value, in the likelier frame, of the cut."""
     cases = [judgement.case for judgement in judgements if judgement.case.name in answers]
     cuts = [[(_equation(case.inputs, frame), answers[case.name]) for case in cases]
             for frame in FRAMES]  # fmt: skip
