@@ -316,7 +316,8 @@ def _skipped(motion: Trajectory, laws: set[str]) -> Evidence:
     distances = np.linalg.norm(motion.displacements[:, :3], axis=-1)
     is_still = np.abs(motion.changes).max(axis=-1) <= EXACT
     is_slow = distances <= distances[is_still].max(initial=-1.0)
-    return Evidence(_ends_off_target(motion), is_still & np.all((is_slow == is_still)[1:]))
+    is_told = (is_slow == is_still)[1:].all() and (distances.max() <= EXACT or not is_still.all())
+    return Evidence(_ends_off_target(motion) & (not motion.is_pose), is_still & is_told)
 
 
 def _by_law(law: str, motion: Trajectory, laws: set[str]) -> Evidence:

@@ -3,9 +3,12 @@
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 
+from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.fault_programs import coded_faults, contestant_of, source_of
+from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.one_line import search
 from plumbob.crosscheck.verify.one_line.mutants import Program
@@ -42,6 +45,49 @@ def test_a_changed_line_is_named(fault):
     (explanation,) = changed_lines(fault.wrong_program, fault.task)
     assert explanation.codes == (fault.code,)
     assert explanation.share == 1.0
+
+
+# Lines of programs of screws, and what is said of them.
+SCREWS = [
+    ("angular = np.zeros(3) if slides[j] else w", "angular = w", "`angular = w`"),
+    ("hat(p) @ R", "R @ hat(p)", "`A[3:, :3] = R @ hat(p)`"),
+    ("A[3:, :3] = hat(p) @ R", "A[:3, 3:] = hat(p) @ R", "`A[:3, 3:] = hat(p) @ R`"),
+    ("terms(1 - c, angle - s, K)", "terms(angle - s, 1 - c, K)", "terms(angle - s, 1 - c, K)`"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("right", "wrong", "words"), SCREWS)
+def test_a_line_of_screws_is_named_whichever_part_comes_first(right, wrong, words):
+    source = source_of("Jacobian of the tool by screws").replace(right, wrong)
+    source = source.replace('"jacobian": ', '"jacobian": np.roll(np.eye(6), 3, axis=0) @ ')
+    (explanation,) = changed_lines(source, "robot_jacobian")
+    assert words in str(explanation.sentence)
+    assert explanation.share == 1.0
+
+
+def test_jacobians_are_compared_whichever_part_comes_first():
+    case = DISCIPLINES["robot_jacobian"].cases(Greeting(PROTOCOL, ()), "", 0, False)[0]
+    J = np.arange(12.0).reshape(6, 2)
+    answers = [Answer({"jacobian": np.roll(J, shift, axis=0)}, 0.0) for shift in (0, 3)]
+    first, second = (search._comparable(Exchange(case, a, a)).answer.values for a in answers)
+    np.testing.assert_array_equal(first["jacobian"], second["jacobian"])
+
+
+def test_neighbours_in_a_list_change_places():
+    program = Program("def stack(a, b):\n    return [a, b]\n")
+    program.observe(partial(program.names["stack"], 1.0, 2.0))
+    assert "return [b, a]" in [mutant.wrong for mutant in program.mutants()]
+
+
+@pytest.mark.slow
+def test_another_line_that_gives_the_same_answers_is_named_as_well():
+    """The sign of all positions may be lost in the adjoint, or where exponentials are computed."""
+    source = source_of("Jacobian by screws").replace("hat(p) @ R", "-hat(p) @ R")
+    (explanation,) = changed_lines(source, "robot_jacobian")
+    text = str(explanation.sentence)
+    assert "`A[3:, :3] = -hat(p) @ R`" in text
+    assert "`return pose(R, -G @ v)`" in text
 
 
 @pytest.mark.parametrize("program", ["energy in loops", "forces term by term"])

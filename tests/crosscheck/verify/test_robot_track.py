@@ -192,3 +192,13 @@ def test_few_cases_are_asked_unless_speeds_are_limited():
     names = partial(map, lambda case: case.family)
     plain = robot_motions.cases(Greeting(PROTOCOL, (TASK,)), "", 0, False)
     assert set(CASES) - set(names(plain)) == {"jump, limited speeds"}
+
+
+def test_an_arm_that_never_moves_skips_more_than_slow_frames():
+    exchanges = []
+    for case in (CASES["curve"], CASES["singularity"], CASES["more than half a turn"]):
+        q = np.tile(case.inputs["start"], (len(case.inputs["target_positions"]), 1))
+        answer = Answer({"q": q}, 0.0)
+        exchanges.append(Exchange(case, answer, answer))
+    likely = judge(exchanges, GREETING, "").diagnosis.explanations
+    assert all("slow frames skipped" not in explanation.faults for explanation in likely)

@@ -274,3 +274,19 @@ def test_failure_at_the_target_alone_says_what_divides_by_zero():
     report = judge(exchanges, GREETING, "")
     assert report.verdict is Verdict.RIGHT_EXCEPT
     assert "0 / 0" in str([words for one in report.judgements for words in one.complaints])
+
+
+def test_a_jacobian_that_stays_that_of_the_start_is_told_by_solves_of_few_iterations():
+    def solve(start, max_iterations, **inputs):
+        q, J = start, next(RIGHT.jacobians(inputs, start))
+        for _ in range(min(max_iterations, robot_targets.MOST)):
+            here = tool_pose(inputs, q)
+            target = Pose(inputs["target_position"], inputs["target_rotation"])
+            q = q + J.T @ np.linalg.solve(J @ J.T + 1e-2 * np.eye(6), twists_between(here, target))
+        return {"q": np.clip(q, inputs["lower"], inputs["upper"])}
+
+    families = (robot_targets.FEW, CLOSE)
+    cases = [case for case in CASES if case.family in families and case.name.startswith("seven")]
+    report = judged(solve, cases)
+    assert report.verdict is Verdict.WRONG
+    assert any("Jacobian of the start" in str(hint) for hint in report.diagnosis.hints)
