@@ -66,6 +66,16 @@ def test_a_line_of_screws_is_named_whichever_part_comes_first(right, wrong, word
     assert explanation.share == 1.0
 
 
+@pytest.mark.parametrize(
+    "program",
+    ["Jacobian by screws", "Jacobian of the tool by screws",
+     "Jacobian of the tool's origin by screws"],
+)  # fmt: skip
+def test_programs_of_screws_are_right(program):
+    report, _ = report_on(source_of(program), "robot_jacobian")
+    assert report.verdict is Verdict.RIGHT
+
+
 def test_jacobians_are_compared_whichever_part_comes_first():
     case = DISCIPLINES["robot_jacobian"].cases(Greeting(PROTOCOL, ()), "", 0, False)[0]
     J = np.arange(12.0).reshape(6, 2)
