@@ -239,7 +239,8 @@ def _around_loop(
         return type(loop)(**values)
 
     single_pass = with_body([*loop.body, ast.Break()])
-    yield "loop", f"{header(loop)}  # once", [*before, single_pass, *after]
+    once = header(loop).replace("while", "if", 1) if isinstance(loop, ast.While) else ""
+    yield "loop", once or f"{header(loop)}  # once", [*before, single_pass, *after]
     for k in range(1, len(loop.body)):  # the first counts the passes
         line, rest = loop.body[k], with_body([*loop.body[:k], *loop.body[k + 1 :]])
         for place, lines in (("before", [line, rest]), ("after", [rest, line])):

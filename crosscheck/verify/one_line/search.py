@@ -74,7 +74,12 @@ def changed_lines(
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     best: tuple[Explanation, ...] = ()
-    programs = list(_programs(report, greeting.step))
+    has_limits = any("cones" in exchange.case.inputs for exchange in compared)
+    programs = [
+        program
+        for program in _programs(report, greeting.step)
+        if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
+    ]
     for i, program in enumerate(programs):
         notify(i, len(programs))
         explanations = _of_program(program, partial(_answer, program, report), compared, tolerance)
