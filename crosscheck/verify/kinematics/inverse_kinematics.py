@@ -106,6 +106,10 @@ def _judge_unlimited(
             trial.add([_equal_worlds(trial, original, comparison, greeting)])
     # what repeats its start is explained by chance by several faults at once
     diagnosis = _diagnosis(trials, comparison, greeting, 1 if idle else MAX_FAULTS, base)
+    if all(explanation.share < 1.0 for explanation in diagnosis.explanations):
+        idle = idle or sweeps.idle([t for t in sweep_trials if t.case.facts["sweeps"] == 1])
+        if idle:
+            diagnosis = replace(diagnosis, explanations=())
     points = lengths = None
     if not diagnosis.explained:
         points = sweeps.right_points(comparison, sweep_trials, greeting)

@@ -24,7 +24,7 @@ PATTERNS = tomllib.loads(Path(__file__).with_name("patterns.toml").read_text(enc
 # Numbers below are tolerances, in the place of which stand these.
 TOLERANCE, TOLERANCES = 1e-5, [10.0**-i for i in range(1, 11)]
 # The parts of a list that a wrong slice or loop goes through.
-PARTS = ("1:", ":-1", "::-1", ":2", ":3", ":4", ":5", ":10")
+PARTS = {"loop": ("1:", ":-1", ":2", ":3", ":4", ":5", ":10"), "direction": ("::-1",)}
 NUMBER, WORD = "()", re.compile(r"\w+(\.\d+)?")
 
 Change = tuple[str, ast.expr]  # the kind, and what an expression becomes
@@ -102,12 +102,15 @@ def _other_operators(node: Any) -> Iterator[Change]:
 
 def _bounds(node: Any, parent: ast.AST) -> Iterator[Change]:
     """Yield a slice without its bounds, with others, or a loop that is shorter or reversed."""
-    text = ast.unparse(node)
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
         yield "loop", node.value
-        yield from (("loop", parsed(f"({ast.unparse(node.value)})[{part}]")) for part in PARTS)
-    if isinstance(parent, ast.For):
-        yield from (("loop", parsed(f"list({text})[{part}]")) for part in PARTS)
+        items = f"({ast.unparse(node.value)})"
+    elif isinstance(parent, ast.For):
+        items = f"list({ast.unparse(node)})"
+    else:
+        return
+    for kind, parts in PARTS.items():
+        yield from ((kind, parsed(f"{items}[{part}]")) for part in parts)
 
 
 def _calls(node: ast.Call) -> Iterator[Change]:

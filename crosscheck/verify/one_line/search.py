@@ -18,7 +18,7 @@ from ..fault_programs import PROGRAMS, source_of
 from ..functions import call
 from ..greeting import Greeting, Step
 from ..judgement import Explanation, TaskReport, Verdict
-from ..kinematics.sweeps import PoseTrial
+from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..precision import judging_greeting
 from ..sentence import Sentence, sentence, with_code
 from ..task import TASKS
@@ -49,18 +49,21 @@ def with_changed_line(
 ) -> TaskReport:
     """Return a report on wrong answers with the changed line that explains them.
 
-    A line has to explain many more answers than the mistakes that are already named. `notify` is
-    called before each right program with the number of programs done, and of all.
+    A line has to explain many more answers than the mistakes that are already named, or all.
+    `notify` is called before each right program with the number of programs done, and of all.
     """
     named_share = max(
         (explanation.share for explanation in report.diagnosis.explanations), default=0.0
     )
-    if report.verdict <= Verdict.RIGHT_EXCEPT or named_share + MORE > 1.0:
+    if report.verdict <= Verdict.RIGHT_EXCEPT or named_share == 1.0:
         return report
     explanations = changed_lines(report, greeting, notify)
-    if not explanations or explanations[0].share < named_share + MORE:
+    if not explanations or explanations[0].share < min(named_share + MORE, 1.0):
         return report
-    diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None)
+    hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
+    diagnosis = replace(
+        report.diagnosis, explanations=explanations, first_broken=None, hints=hints
+    )
     return replace(report, diagnosis=diagnosis)
 
 
@@ -163,13 +166,20 @@ def _is_telling(case: Case, answer: Answer | Failure) -> bool:
     """Return whether an answer has numbers alone, and not only zeros and numbers of the request."""
     if not isinstance(answer, Answer):
         return False
-    outputs = [np.asarray(value, dtype=float) for value in answer.values.values()]
+    names = {"local_rotations"} & answer.values.keys() or answer.values.keys()
+    outputs = [np.asarray(answer.values[name], dtype=float) for name in names]
     inputs = [np.zeros(()), *(np.asarray(v) for v in case.inputs.values() if np.ndim(v) > 0)]
     is_new = (
-        not any(np.array_equal(output, array) for array in inputs) and output.any()
+        not any(_repeats(output, array) for array in inputs) and output.any()
         for output in outputs
     )
     return all(np.isfinite(output).all() for output in outputs) and any(is_new)
+
+
+def _repeats(output: Any, array: Any) -> bool:
+    """Return whether an output is an input, but for rounding and the signs of quaternions."""
+    is_alike = np.shape(output) == np.shape(array)
+    return is_alike and np.allclose(np.abs(output), np.abs(array), rtol=0.0, atol=ROUNDED)
 
 
 def _comparable(exchange: Exchange) -> Exchange:
