@@ -61,9 +61,7 @@ def with_changed_line(
     if not explanations or explanations[0].share < min(named_share + MORE, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
-    diagnosis = replace(
-        report.diagnosis, explanations=explanations, first_broken=None, hints=hints
-    )
+    diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
     return replace(report, diagnosis=diagnosis)
 
 
@@ -170,8 +168,7 @@ def _is_telling(case: Case, answer: Answer | Failure) -> bool:
     outputs = [np.asarray(answer.values[name], dtype=float) for name in names]
     inputs = [np.zeros(()), *(np.asarray(v) for v in case.inputs.values() if np.ndim(v) > 0)]
     is_new = (
-        not any(_repeats(output, array) for array in inputs) and output.any()
-        for output in outputs
+        not any(_repeats(output, array) for array in inputs) and output.any() for output in outputs
     )
     return all(np.isfinite(output).all() for output in outputs) and any(is_new)
 
