@@ -310,6 +310,18 @@ def _one_end(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, F
     yield limits._replace(lower=limits.upper), local
 
 
+def _reversed(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, FloatArray]]:
+    """Yield limits of twists in the other sense, and such of the joints alone that are beyond."""
+    limits = limits_of(inputs)
+    is_within = (margins(local, limits)[1:] >= 0.0).all(axis=0)
+    other = limits._replace(lower=-limits.upper, upper=-limits.lower)
+    yield other, local
+    lower, upper = (
+        np.where(is_within, getattr(limits, name), getattr(other, name)) for name in FIELDS[2:]
+    )
+    yield limits._replace(lower=lower, upper=upper), local
+
+
 def _changes(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, FloatArray]]:
     """Yield the changes from the start, in the joint's frame and in the parent's."""
     back = rotation.conjugate(inputs["local_rotations"])
@@ -341,9 +353,7 @@ READINGS: Mapping[str, Reading] = {
         lambda limits: limits._replace(lower=np.minimum(np.abs(limits.lower), limits.upper))
     ),
     "limits symmetric": _of_limits(lambda limits: limits._replace(lower=-limits.upper)),
-    "sense of rotation reversed": _of_limits(
-        lambda limits: limits._replace(lower=-limits.upper, upper=-limits.lower)
-    ),
+    "sense of rotation reversed": _reversed,
     "limits of the change": _changes,
     "axes in the world": _in_the_world,
     "limits of the next joint": _of_limits(partial(_shifted, -1)),

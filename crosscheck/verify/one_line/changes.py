@@ -48,7 +48,8 @@ class Scope(NamedTuple):
 
 def of_expression(node: Any, parent: ast.AST, scope: Scope) -> Iterator[Change]:
     """Yield the mistakes in an expression."""
-    yield from _operands(node)
+    is_index = isinstance(parent, ast.Subscript)
+    yield from (("index" if is_index else kind, new) for kind, new in _operands(node))
     yield from _other_operators(node)
     yield from _bounds(node, parent)
     if isinstance(node, ast.Call):

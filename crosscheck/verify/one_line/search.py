@@ -226,6 +226,9 @@ def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
             "yours; names in it may differ.",
             what=Sentence(entry["sentence"], {}), right=right,
         )  # fmt: skip
+    for note in PROGRAMS["notes"].values():
+        if any(text in mutant.right for text in note["texts"]):
+            words = sentence("{words} {note}", words=words, note=Sentence(note["sentence"], {}))
     return with_code(entry["code"], words)
 
 
