@@ -311,14 +311,14 @@ def _one_end(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, F
 
 
 def _reversed(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, FloatArray]]:
-    """Yield limits of twists in the other sense, and such of the joints alone that are beyond."""
+    """Yield limits of twists in the other sense, and ends of these where twists are beyond."""
     limits = limits_of(inputs)
-    is_within = (margins(local, limits)[1:] >= 0.0).all(axis=0)
-    other = limits._replace(lower=-limits.upper, upper=-limits.lower)
-    yield other, local
-    lower, upper = (
-        np.where(is_within, getattr(limits, name), getattr(other, name)) for name in FIELDS[2:]
-    )
+    twist, _ = twist_and_tilt(local, limits.axes)
+    is_within = (margins(local, limits)[1:] >= -rounding.DEAD_ANGLE["double"]).all(axis=0)
+    low, high = -limits.upper, -limits.lower
+    yield limits._replace(lower=low, upper=high), local
+    end = np.where(twist - low < high - twist, low, high)
+    lower, upper = (np.where(is_within, limit, end) for limit in (limits.lower, limits.upper))
     yield limits._replace(lower=lower, upper=upper), local
 
 

@@ -18,6 +18,7 @@ FUNCTIONS = (
 )  # fmt: skip
 # Functions whose second argument is the type of an array's numbers.
 ALLOCATIONS = ("zeros", "empty", "ones")
+MODULES = ("np", "np.linalg", "math")
 COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 # What values become, by the kind of change and their shape.
 PATTERNS = tomllib.loads(Path(__file__).with_name("patterns.toml").read_text(encoding="utf-8"))
@@ -121,7 +122,8 @@ def _calls(node: ast.Call) -> Iterator[Change]:
         yield "order", ast.Call(node.func, args, node.keywords)
     yield from (("call", arg) for arg in node.args)
     if isinstance(node.func, ast.Attribute):
-        yield "call", node.func.value
+        if ast.unparse(node.func.value) not in MODULES:
+            yield "call", node.func.value
         if node.func.attr == "arctan2":
             y, x = map(ast.unparse, node.args)
             yield "function", parsed(f"np.arctan({y} / {x})")
