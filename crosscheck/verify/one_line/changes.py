@@ -155,6 +155,8 @@ def _names(text: str, scope: Scope) -> Iterator[Change]:
     kind = "index" if scope.shapes[text] == "int" else "name"
     counted = [text, *(name for name in scope.alike(text) if name.isidentifier())]
     steps = [f"{name} {step} 1" for name in counted for step in "+-"]
+    if "parents" in scope.shapes and scope.shapes[text] == "int":
+        steps.append(f"max(parents[{text}], 0)")
     near = ("0", "-1", *steps) if kind == "index" else ()
     yield from ((kind, parsed(other)) for other in (*scope.alike(text), *near))
 

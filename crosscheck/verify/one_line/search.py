@@ -18,6 +18,7 @@ from ..fault_programs import PROGRAMS, source_of
 from ..functions import call
 from ..greeting import Greeting, Step
 from ..judgement import Explanation, TaskReport, Verdict
+from ..kinematics.claims import OF_POSES
 from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..precision import judging_greeting
 from ..sentence import Sentence, sentence, with_code
@@ -49,16 +50,18 @@ def with_changed_line(
 ) -> TaskReport:
     """Return a report on wrong answers with the changed line that explains them.
 
-    A line has to explain many more answers than the mistakes that are already named, or all.
-    `notify` is called before each right program with the number of programs done, and of all.
+    A line has to explain many more answers than the mistakes that are already named, and all where
+    these are of answered positions. `notify` is called before each right program with the number
+    of programs done, and of all.
     """
-    named_share = max(
-        (explanation.share for explanation in report.diagnosis.explanations), default=0.0
-    )
-    if report.verdict <= Verdict.RIGHT_EXCEPT or named_share == 1.0:
+    named = report.diagnosis.explanations
+    share = max((explanation.share for explanation in named), default=0.0) + MORE
+    if named and all(OF_POSES.issuperset(explanation.faults) for explanation in named):
+        share = 1.0 if named[0].share < 1.0 else share  # a line tells of rotations as well
+    if report.verdict <= Verdict.RIGHT_EXCEPT or share > 1.0:
         return report
     explanations = changed_lines(report, greeting, notify)
-    if not explanations or explanations[0].share < min(named_share + MORE, 1.0):
+    if not explanations or explanations[0].share < share:
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
     diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
