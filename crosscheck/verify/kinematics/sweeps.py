@@ -138,9 +138,9 @@ def idle(trials: Sequence[PoseTrial]) -> Sentence | None:
     pairs = zip(answers, signs, strict=True)
     if all((np.abs(sign * local - start) < ROUNDED).all() for (local, start), sign in pairs):
         return sentence(
-            "Its sweeps leave all local rotations as they were at the start: is the result written "
-            "into them? If rotations are made from new points, keep these apart from the positions "
-            "of the joints, as copies."
+            "Its sweeps repeat the local rotations of the start: is the result written into them? "
+            "If rotations are made from new points, keep these apart from the positions of the "
+            "joints, as copies."
         )
     return None
 

@@ -139,12 +139,14 @@ def _numbers(value: object, parent: ast.AST) -> Iterator[Change]:
     """Yield other numbers in the place of a number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return
-    is_power = isinstance(parent, ast.BinOp) and isinstance(parent.op, ast.Pow)
+    operator = getattr(parent, "op", None)
+    is_power = isinstance(operator, ast.Pow)
+    without = {0} if isinstance(operator, ast.Add | ast.Sub) else set()  # is an operand alone
     is_index = isinstance(parent, ast.Subscript | ast.Call)
     kind = "power" if is_power else "index" if is_index else "number"
     tolerances = TOLERANCES if 0 < value < TOLERANCE else ()
     for number in (0, 1, -value, 2 * value, value / 2, value + 1, value - 1, *tolerances):
-        if number != value:
+        if number not in {value, *without}:
             yield kind, parsed(repr(type(value)(number)))
 
 
