@@ -145,9 +145,10 @@ def _numbers(value: object, parent: ast.AST) -> Iterator[Change]:
     is_index = isinstance(parent, ast.Subscript | ast.Call)
     kind = "power" if is_power else "index" if is_index else "number"
     tolerances = TOLERANCES if 0 < value < TOLERANCE else ()
-    for number in (0, 1, -value, 2 * value, value / 2, value + 1, value - 1, *tolerances):
+    others = (0, 1, -value, 2 * value, value / 2, value + 1, value - 1, *tolerances)
+    for number in map(type(value), others):
         if number not in {value, *without}:
-            yield kind, parsed(repr(type(value)(number)))
+            yield kind, parsed(repr(number))
 
 
 def _names(text: str, scope: Scope) -> Iterator[Change]:

@@ -214,7 +214,10 @@ def _changed_answer(
 
 def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
     """Return the sentence of the likeliest of some changes that no answer tells apart."""
-    mutant = min((mutants[key] for key in keys), key=lambda m: (KINDS.index(m.kind), len(m.wrong)))
+    mutant = min(
+        (mutants[key] for key in keys),
+        key=lambda m: (KINDS.index(m.kind), abs(len(m.right) - len(m.wrong)), len(m.wrong)),
+    )
     entry = FAULTS[mutant.kind]
     right, wrong = excerpts(mutant.right, mutant.wrong)
     if wrong:
