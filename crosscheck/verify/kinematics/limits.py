@@ -310,18 +310,6 @@ def _one_end(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, F
     yield limits._replace(lower=limits.upper), local
 
 
-def _reversed(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, FloatArray]]:
-    """Yield limits of twists in the other sense, and ends of these where twists are beyond."""
-    limits = limits_of(inputs)
-    twist, _ = twist_and_tilt(local, limits.axes)
-    is_within = (margins(local, limits)[1:] >= -rounding.DEAD_ANGLE["double"]).all(axis=0)
-    low, high = -limits.upper, -limits.lower
-    yield limits._replace(lower=low, upper=high), local
-    end = np.where(twist - low < high - twist, low, high)
-    lower, upper = (np.where(is_within, limit, end) for limit in (limits.lower, limits.upper))
-    yield limits._replace(lower=lower, upper=upper), local
-
-
 def _changes(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, FloatArray]]:
     """Yield the changes from the start, in the joint's frame and in the parent's."""
     back = rotation.conjugate(inputs["local_rotations"])
@@ -353,7 +341,9 @@ READINGS: Mapping[str, Reading] = {
         lambda limits: limits._replace(lower=np.minimum(np.abs(limits.lower), limits.upper))
     ),
     "limits symmetric": _of_limits(lambda limits: limits._replace(lower=-limits.upper)),
-    "sense of rotation reversed": _reversed,
+    "sense of rotation reversed": _of_limits(
+        lambda limits: limits._replace(lower=-limits.upper, upper=-limits.lower)
+    ),
     "limits of the change": _changes,
     "axes in the world": _in_the_world,
     "limits of the next joint": _of_limits(partial(_shifted, -1)),
@@ -381,8 +371,10 @@ def _misreading(
 ) -> str:
     """Return the key of how limits are misread, "" if they are not or nobody knows."""
     bound, scores = rounding.DEAD_ANGLE[greeting.precision], dict[str, int]()
+    whole = [answer for answer in answers if not _is_sweep(answer[0])]
+    sweeps = [answer for answer in answers if _is_sweep(answer[0])]
     for key, reading in READINGS.items():
-        ends = [_ends(reading, case, local, bound) for case, local in answers]
+        ends = [_ends(reading, case, local, bound) for case, local in whole]
         if ends and min(ends) >= 0:
             scores[key] = sum(ends)
     key = max(scores, key=scores.__getitem__, default=IGNORED)
@@ -391,9 +383,8 @@ def _misreading(
         return IGNORED if is_far and not is_lost else ""
     if "" not in scores or scores[key] >= scores[""] + MORE_ENDS:
         return key
-    sweeps = [answer for answer in answers if _is_sweep(answer[0])]
     is_clamped = all(_is_clamped(*answer, bound) for answer in sweeps)
-    return CLAMPED if is_lost and is_clamped and _is_unfinished(answers, greeting) else ""
+    return CLAMPED if is_lost and is_clamped and _is_unfinished(whole, greeting) else ""
 
 
 def _is_clamped(case: Case, local: FloatArray, bound: float) -> bool:
@@ -413,6 +404,6 @@ def _is_unfinished(answers: Sequence[tuple[Case, FloatArray]], greeting: Greetin
         _miss(solve_within("ccd", {**case.inputs, "local_rotations": local}), case.inputs)
         <= _reach(case, greeting)
         for case, local in answers
-        if not _is_sweep(case) and _miss(local, case.inputs) > _reach(case, greeting)
+        if _miss(local, case.inputs) > _reach(case, greeting)
     ]
     return sum(gains) > MAX_MISSES * len(gains)
