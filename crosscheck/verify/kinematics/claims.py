@@ -67,6 +67,7 @@ def _load() -> Iterator[ClaimFault]:
 
 FAULTS = tuple(_load())
 OF_POSES = {fault.key for fault in FAULTS if fault.output in ("positions", "placed")}
+OF_RESIDUALS = {fault.key for fault in FAULTS if fault.output == "residual"}
 TRUTHS = {output: compile(formula, output, "eval") for output, formula in RIGHT.items()}
 
 
@@ -176,6 +177,17 @@ def _agrees(formula: CodeType, output: str, values: Mapping[str, Any]) -> bool |
     return None if np.isnan(gap) else gap <= AFTER_SWEEPS * values["same"]
 
 
+def _ends_by_residual(diagnosis: Diagnosis, answers: Sequence[Mapping[str, Any]]) -> bool:
+    """Return whether solves end by the residual that they report, where all else is right."""
+    faults = {key for explanation in diagnosis.explanations for key in explanation.faults}
+    return bool(faults) and faults <= TABLE["stop"].keys() and all(
+        values["residual"] <= values["tolerance"] + values["same"]
+        or values.get("iterations", values["limit"]) >= values["limit"]
+        for values in answers
+        if "residual" in values
+    )  # fmt: skip
+
+
 def with_claims(
     diagnosis: Diagnosis,
     judgements: Sequence[CaseJudgement],
@@ -189,8 +201,11 @@ def with_claims(
     """
     findings = itertools.chain.from_iterable(judgement.findings for judgement in judgements)
     broken = {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
-    is_certain = any(explanation.share == 1.0 for explanation in diagnosis.explanations)
     claims = explanations(answers) if broken & LAWS else []
+    if claims and claims[0].faults[0] in OF_RESIDUALS and _ends_by_residual(diagnosis, answers):
+        diagnosis = replace(diagnosis, explanations=tuple(claims[:1]))
+        claims = claims[1:]
+    is_certain = any(explanation.share == 1.0 for explanation in diagnosis.explanations)
     of_poses = [claim for claim in claims if claim.faults[0] in OF_POSES]
     claims = [claim for claim in claims if claim not in of_poses]
     if is_placed and not is_certain:

@@ -120,6 +120,22 @@ TESTS: Sequence[tuple[Quantity, float | None, Sentence]] = (
         None,
         sentence("a sweep lowers the distance by less than about {bound:.3g} of it"),
     ),
+    (
+        lambda s: s.lengths.sum() / np.full(len(s.gaps), s.root_distance),
+        None,
+        sentence(
+            "the links together are shorter than about {bound:.3g} times the distance of the "
+            "target from the root, wherever the effector is"
+        ),
+    ),
+    (
+        lambda s: np.full(len(s.gaps), s.root_distance) / s.lengths.sum(),
+        None,
+        sentence(
+            "the target is nearer to the root than about {bound:.3g} of the links together, "
+            "wherever the effector is"
+        ),
+    ),
 )
 
 

@@ -106,11 +106,7 @@ def _judge_unlimited(
             trial.add([_equal_worlds(trial, original, comparison, greeting)])
     # what repeats its start is explained by chance by several faults at once
     diagnosis = _diagnosis(trials, comparison, greeting, 1 if idle else MAX_FAULTS, base)
-    points = lengths = None
-    if not diagnosis.explained:
-        points = sweeps.right_points(comparison, sweep_trials, greeting)
-        lengths = sweeps.lengths(trials)
-    diagnosis = replace(diagnosis, hints=tuple(filter(None, [idle, points, lengths])))
+    diagnosis = _with_hints(diagnosis, trials, comparison, greeting)
     if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
             trial.correct(_aggravate)
@@ -121,6 +117,24 @@ def _judge_unlimited(
         if trial.pose.finite
     ]
     return judgements, claims.with_claims(diagnosis, judgements, answers, not base)
+
+
+def _with_hints(
+    diagnosis: Diagnosis,
+    trials: Sequence[PoseTrial],
+    comparison: SweepComparison,
+    greeting: Greeting,
+) -> Diagnosis:
+    """Return a diagnosis with what all answers show; sweeps that move nothing explain no fault."""
+    idle, points, lengths = sweeps.idle(trials), None, None
+    sweep_trials = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
+    if all(explanation.share < 1.0 for explanation in diagnosis.explanations):
+        idle = idle or sweeps.idle([t for t in sweep_trials if t.case.facts["sweeps"] == 1])
+        diagnosis = replace(diagnosis, explanations=()) if idle else diagnosis
+    if not diagnosis.explained:
+        points = sweeps.right_points(comparison, sweep_trials, greeting)
+        lengths = sweeps.lengths(trials)
+    return replace(diagnosis, hints=tuple(filter(None, [idle, points, lengths])))
 
 
 def _forgive(case: Case, broken: Finding) -> Finding:

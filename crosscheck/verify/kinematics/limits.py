@@ -13,6 +13,7 @@ import numpy as np
 
 from plumbob.reference import Articulation, Skeleton, rotation, solve_ik
 from plumbob.reference.arguments import FloatArray
+from plumbob.reference.articulation import clamp_ball
 
 from ..case import Case
 from ..contestant import Answer, Exchange
@@ -21,7 +22,7 @@ from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, Verdict
 from ..laws import finding, judge_case
 from . import pose_laws, problems, rounding, skeletons
 from .faults import sentences_of
-from .predictions import forward
+from .predictions import forward, solve
 from .problems import TargetProblem
 from .skeletons import CaseFamily
 
@@ -95,15 +96,23 @@ def solve_within(method: str, inputs: Inputs) -> FloatArray:
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
-    """Return chains with hinges and cones, if the greeting declares that it keeps limits."""
+    """Return chains with hinges and cones, if the greeting declares that it keeps limits.
+
+    Single sweeps of the textbook's methods follow, which show how limits are kept.
+    """
     if not greeting.limits or greeting.planar or not greeting.rotations:
         return []
-    drawn = skeletons.drawn("limits", _draw, seed, 5 if thorough else 1)
-    return [
-        _case(name, family, inputs | {"method": method})
-        for name, family, inputs in drawn
+    drawn = [
+        (name, family, inputs | {"method": method})
+        for name, family, inputs in skeletons.drawn("limits", _draw, seed, 5 if thorough else 1)
         if skeletons.suits(inputs["parents"], greeting, inputs["effector"])
     ]
+    single = [
+        (f"one sweep, {name}", family, inputs | {"max_iterations": 1})
+        for name, family, inputs in drawn
+        if method.lower() in SWEEPS and family.target[0] == "far"
+    ]
+    return [_case(*arguments) for arguments in (*drawn, *single)]
 
 
 def _case(name: str, family: CaseFamily, inputs: dict[str, Any]) -> Case:
@@ -191,7 +200,8 @@ def judge(
     """
     pairs = [(exchange.case, _local(exchange)) for exchange in exchanges]
     answers = [(case, local) for case, local in pairs if local is not None]
-    misses = [_miss(local, case.inputs) > _reach(case, greeting) for case, local in answers]
+    whole = [answer for answer in answers if not _is_sweep(answer[0])]
+    misses = [_miss(local, case.inputs) > _reach(case, greeting) for case, local in whole]
     is_lost = sum(misses) > MAX_MISSES * len(misses)
     key = _misreading(answers, is_lost, greeting)
     key = "" if key == CLAMPED and not is_sound else key
@@ -219,6 +229,10 @@ def _local(exchange: Exchange) -> FloatArray | None:
     return local / lengths if is_valid else None
 
 
+def _is_sweep(case: Case) -> bool:
+    return bool(case.inputs["max_iterations"] == 1)
+
+
 def _reach(case: Case, greeting: Greeting) -> float:
     """Return the distance from the target that counts as reached [m]."""
     joints, size = len(case.inputs["parents"]), case.facts["size"]
@@ -236,7 +250,8 @@ def _findings(
         return
     yield _limits_kept(local, case, greeting)
     distance, bound = _miss(local, case.inputs), _reach(case, greeting)
-    yield finding(miss, distance, bound)
+    if not _is_sweep(case):
+        yield finding(miss, distance, bound)
     yield from pose_laws.claims(distance, bound - case.inputs["tolerance"], outputs, case)
     if case.facts["before"] <= 1.001 * NEAR:
         yield finding("no jumps, of a rotation", _largest_rotation(local, case.inputs), JUMP)
@@ -317,6 +332,8 @@ def _in_the_world(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimi
 READINGS: Mapping[str, Reading] = {
     "": _of_limits(lambda limits: limits),
     "half angles": _of_limits(partial(_scaled, 2.0, FIELDS[1:])),
+    "half angles of cones": _of_limits(partial(_scaled, 2.0, FIELDS[1:2])),
+    "half angles of twists": _of_limits(partial(_scaled, 2.0, FIELDS[2:])),
     "cone as an opening": _of_limits(partial(_scaled, 0.5, FIELDS[1:2])),
     "limits in degrees": _of_limits(partial(_scaled, np.pi / 180.0, FIELDS[1:])),
     "limits exchanged": _one_end,
@@ -354,8 +371,10 @@ def _misreading(
 ) -> str:
     """Return the key of how limits are misread, "" if they are not or nobody knows."""
     bound, scores = rounding.DEAD_ANGLE[greeting.precision], dict[str, int]()
+    whole = [answer for answer in answers if not _is_sweep(answer[0])]
+    sweeps = [answer for answer in answers if _is_sweep(answer[0])]
     for key, reading in READINGS.items():
-        ends = [_ends(reading, case, local, bound) for case, local in answers]
+        ends = [_ends(reading, case, local, bound) for case, local in whole]
         if ends and min(ends) >= 0:
             scores[key] = sum(ends)
     key = max(scores, key=scores.__getitem__, default=IGNORED)
@@ -364,7 +383,19 @@ def _misreading(
         return IGNORED if is_far and not is_lost else ""
     if "" not in scores or scores[key] >= scores[""] + MORE_ENDS:
         return key
-    return CLAMPED if is_lost and _is_unfinished(answers, greeting) else ""
+    is_clamped = all(_is_clamped(*answer, bound) for answer in sweeps)
+    return CLAMPED if is_lost and is_clamped and _is_unfinished(whole, greeting) else ""
+
+
+def _is_clamped(case: Case, local: FloatArray, bound: float) -> bool:
+    """Return whether a pose is that after a sweep without limits, brought within them."""
+    axes, cones, lower, upper = limits_of(case.inputs)
+    free, _, _ = solve(case.inputs["method"].lower(), case.inputs)
+    clamped = [
+        clamp_ball(Q, *limits) for Q, *limits in zip(free, axes, lower, upper, cones, strict=True)
+    ]
+    joints = case.facts["path"][:-1]
+    return bool(rotation.angle(np.array(clamped)[joints], local[joints]).max() <= bound)
 
 
 def _is_unfinished(answers: Sequence[tuple[Case, FloatArray]], greeting: Greeting) -> bool:

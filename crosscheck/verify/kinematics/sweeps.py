@@ -134,10 +134,13 @@ def idle(trials: Sequence[PoseTrial]) -> Sentence | None:
         return sentence(
             "All local rotations of its answers are the identity: is the result written into them?"
         )
-    if all((np.abs(local - start) < ROUNDED).all() for local, start in answers):
+    signs = [np.sign(np.sum(local * start, axis=-1, keepdims=True)) for local, start in answers]
+    pairs = zip(answers, signs, strict=True)
+    if all((np.abs(sign * local - start) < ROUNDED).all() for (local, start), sign in pairs):
         return sentence(
-            "All its answers repeat the local rotations of the start: is the result written into "
-            "them?"
+            "Its sweeps repeat the local rotations of the start: is the result written into them? "
+            "If rotations are made from new points, keep these apart from the positions of the "
+            "joints, as copies."
         )
     return None
 

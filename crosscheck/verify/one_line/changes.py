@@ -18,13 +18,14 @@ FUNCTIONS = (
 )  # fmt: skip
 # Functions whose second argument is the type of an array's numbers.
 ALLOCATIONS = ("zeros", "empty", "ones")
+MODULES = ("np", "np.linalg", "math")
 COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 # What values become, by the kind of change and their shape.
 PATTERNS = tomllib.loads(Path(__file__).with_name("patterns.toml").read_text(encoding="utf-8"))
 # Numbers below are tolerances, in the place of which stand these.
 TOLERANCE, TOLERANCES = 1e-5, [10.0**-i for i in range(1, 11)]
 # The parts of a list that a wrong slice or loop goes through.
-PARTS = ("1:", ":-1", "::-1", ":2", ":3", ":4", ":5", ":10")
+PARTS = {"loop": ("1:", ":-1", ":2", ":3", ":4", ":5", ":10"), "direction": ("::-1",)}
 NUMBER, WORD = "()", re.compile(r"\w+(\.\d+)?")
 
 Change = tuple[str, ast.expr]  # the kind, and what an expression becomes
@@ -48,7 +49,8 @@ class Scope(NamedTuple):
 
 def of_expression(node: Any, parent: ast.AST, scope: Scope) -> Iterator[Change]:
     """Yield the mistakes in an expression."""
-    yield from _operands(node)
+    is_index = isinstance(parent, ast.Subscript)
+    yield from (("index" if is_index else kind, new) for kind, new in _operands(node))
     yield from _other_operators(node)
     yield from _bounds(node, parent)
     if isinstance(node, ast.Call):
@@ -105,12 +107,15 @@ def _other_operators(node: Any) -> Iterator[Change]:
 
 def _bounds(node: Any, parent: ast.AST) -> Iterator[Change]:
     """Yield a slice without its bounds, with others, or a loop that is shorter or reversed."""
-    text = ast.unparse(node)
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
         yield "loop", node.value
-        yield from (("loop", parsed(f"({ast.unparse(node.value)})[{part}]")) for part in PARTS)
-    if isinstance(parent, ast.For):
-        yield from (("loop", parsed(f"list({text})[{part}]")) for part in PARTS)
+        items = f"({ast.unparse(node.value)})"
+    elif isinstance(parent, ast.For):
+        items = f"list({ast.unparse(node)})"
+    else:
+        return
+    for kind, parts in PARTS.items():
+        yield from ((kind, parsed(f"{items}[{part}]")) for part in parts)
 
 
 def _calls(node: ast.Call) -> Iterator[Change]:
@@ -119,7 +124,8 @@ def _calls(node: ast.Call) -> Iterator[Change]:
         yield "order", ast.Call(node.func, args, node.keywords)
     yield from (("call", arg) for arg in node.args)
     if isinstance(node.func, ast.Attribute):
-        yield "call", node.func.value
+        if ast.unparse(node.func.value) not in MODULES:
+            yield "call", node.func.value
         if node.func.attr == "arctan2":
             y, x = map(ast.unparse, node.args)
             yield "function", parsed(f"np.arctan({y} / {x})")
@@ -141,13 +147,16 @@ def _numbers(value: object, parent: ast.AST) -> Iterator[Change]:
     """Yield other numbers in the place of a number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return
-    is_power = isinstance(parent, ast.BinOp) and isinstance(parent.op, ast.Pow)
+    operator = getattr(parent, "op", None)
+    is_power = isinstance(operator, ast.Pow)
+    without = {0} if isinstance(operator, ast.Add | ast.Sub) else set()  # is an operand alone
     is_index = isinstance(parent, ast.Subscript | ast.Call)
     kind = "power" if is_power else "index" if is_index else "number"
     tolerances = TOLERANCES if 0 < value < TOLERANCE else ()
-    for number in (0, 1, -value, 2 * value, value / 2, value + 1, value - 1, *tolerances):
-        if number != value:
-            yield kind, parsed(repr(type(value)(number)))
+    others = (0, 1, -value, 2 * value, value / 2, value + 1, value - 1, *tolerances)
+    for number in map(type(value), others):
+        if number not in {value, *without}:
+            yield kind, parsed(repr(number))
 
 
 def _names(text: str, scope: Scope) -> Iterator[Change]:
@@ -157,6 +166,8 @@ def _names(text: str, scope: Scope) -> Iterator[Change]:
     kind = "index" if scope.shapes[text] == "int" else "name"
     counted = [text, *(name for name in scope.alike(text) if name.isidentifier())]
     steps = [f"{name} {step} 1" for name in counted for step in "+-"]
+    if "parents" in scope.shapes and scope.shapes[text] == "int":
+        steps.append(f"max(parents[{text}], 0)")
     near = ("0", "-1", *steps) if kind == "index" else ()
     yield from ((kind, parsed(other)) for other in (*scope.alike(text), *near))
 
@@ -247,7 +258,8 @@ def _around_loop(
         return type(loop)(**values)
 
     single_pass = with_body([*loop.body, ast.Break()])
-    yield "loop", f"{header(loop)}  # once", [*before, single_pass, *after]
+    once = header(loop).replace("while", "if", 1) if isinstance(loop, ast.While) else ""
+    yield "loop", once or f"{header(loop)}  # once", [*before, single_pass, *after]
     for k in range(1, len(loop.body)):  # the first counts the passes
         line, rest = loop.body[k], with_body([*loop.body[:k], *loop.body[k + 1 :]])
         for place, lines in (("before", [line, rest]), ("after", [rest, line])):

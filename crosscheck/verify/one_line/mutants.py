@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..task import TASKS
-from .changes import Scope, header, is_idle, of_expression, of_statement, parsed
+from .changes import MODULES, Scope, header, is_idle, of_expression, of_statement, parsed
 
 T = TypeVar("T")
 FILE, PASS = "right program", "_pass"
@@ -24,7 +24,6 @@ MAX_PASSES = 5
 UNLIMITED = 10**9
 # The functions that are called with a request.
 ENTRIES = {*TASKS, "ccd", "fabrik"}
-MODULES = ("np", "np.linalg", "math")
 # What an expression raises whose names have no value yet, or not the usual one.
 NO_VALUE = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
 

@@ -18,7 +18,8 @@ from ..fault_programs import PROGRAMS, source_of
 from ..functions import call
 from ..greeting import Greeting, Step
 from ..judgement import Explanation, TaskReport, Verdict
-from ..kinematics.sweeps import PoseTrial
+from ..kinematics.claims import OF_POSES
+from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..precision import judging_greeting
 from ..sentence import Sentence, sentence, with_code
 from ..task import TASKS
@@ -49,18 +50,21 @@ def with_changed_line(
 ) -> TaskReport:
     """Return a report on wrong answers with the changed line that explains them.
 
-    A line has to explain many more answers than the mistakes that are already named. `notify` is
-    called before each right program with the number of programs done, and of all.
+    A line has to explain many more answers than the mistakes that are already named, and all where
+    these are of answered positions. `notify` is called before each right program with the number
+    of programs done, and of all.
     """
-    named_share = max(
-        (explanation.share for explanation in report.diagnosis.explanations), default=0.0
-    )
-    if report.verdict <= Verdict.RIGHT_EXCEPT or named_share + MORE > 1.0:
+    named = report.diagnosis.explanations
+    share = max((explanation.share for explanation in named), default=0.0) + MORE
+    if named and all(OF_POSES.issuperset(explanation.faults) for explanation in named):
+        share = 1.0 if named[0].share < 1.0 else share  # a line tells of rotations as well
+    if report.verdict <= Verdict.RIGHT_EXCEPT or share > 1.0:
         return report
     explanations = changed_lines(report, greeting, notify)
-    if not explanations or explanations[0].share < named_share + MORE:
+    if not explanations or explanations[0].share < share:
         return report
-    diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None)
+    hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
+    diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
     return replace(report, diagnosis=diagnosis)
 
 
@@ -74,7 +78,12 @@ def changed_lines(
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     best: tuple[Explanation, ...] = ()
-    programs = list(_programs(report, greeting.step))
+    has_limits = any("cones" in exchange.case.inputs for exchange in compared)
+    programs = [
+        program
+        for program in _programs(report, greeting.step)
+        if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
+    ]
     for i, program in enumerate(programs):
         notify(i, len(programs))
         explanations = _of_program(program, partial(_answer, program, report), compared, tolerance)
@@ -158,13 +167,19 @@ def _is_telling(case: Case, answer: Answer | Failure) -> bool:
     """Return whether an answer has numbers alone, and not only zeros and numbers of the request."""
     if not isinstance(answer, Answer):
         return False
-    outputs = [np.asarray(value, dtype=float) for value in answer.values.values()]
+    names = {"local_rotations"} & answer.values.keys() or answer.values.keys()
+    outputs = [np.asarray(answer.values[name], dtype=float) for name in names]
     inputs = [np.zeros(()), *(np.asarray(v) for v in case.inputs.values() if np.ndim(v) > 0)]
     is_new = (
-        not any(np.array_equal(output, array) for array in inputs) and output.any()
-        for output in outputs
+        not any(_repeats(output, array) for array in inputs) and output.any() for output in outputs
     )
     return all(np.isfinite(output).all() for output in outputs) and any(is_new)
+
+
+def _repeats(output: Any, array: Any) -> bool:
+    """Return whether an output is an input, but for rounding and the signs of quaternions."""
+    is_alike = np.shape(output) == np.shape(array)
+    return is_alike and np.allclose(np.abs(output), np.abs(array), rtol=0.0, atol=ROUNDED)
 
 
 def _comparable(exchange: Exchange) -> Exchange:
@@ -203,7 +218,10 @@ def _changed_answer(
 
 def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
     """Return the sentence of the likeliest changes, in up to two functions, of equal answers."""
-    ordered = sorted((mutants[k] for k in keys), key=lambda m: (KINDS.index(m.kind), len(m.wrong)))
+    ordered = sorted(
+        (mutants[key] for key in keys),
+        key=lambda m: (KINDS.index(m.kind), abs(len(m.right) - len(m.wrong)), len(m.wrong)),
+    )
     mutant = ordered[0]
     entry = FAULTS[mutant.kind]
     right, wrong = excerpts(mutant.right, mutant.wrong)
@@ -225,6 +243,9 @@ def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
             words = sentence("{one} Or, as well, `{wrong}` in the place of `{right}`.",
                              one=words, right=right, wrong=wrong)  # fmt: skip
             break
+    for note in PROGRAMS["notes"].values():
+        if any(text in mutant.right for text in note["texts"]):
+            words = sentence("{words} {note}", words=words, note=Sentence(note["sentence"], {}))
     return with_code(entry["code"], words)
 
 

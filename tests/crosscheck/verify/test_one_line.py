@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.verify.contestant import Answer, Exchange
-from plumbob.crosscheck.verify.fault_programs import coded_faults, contestant_of, source_of
+from plumbob.crosscheck.verify.fault_programs import (
+    PROGRAMS,
+    coded_faults,
+    contestant_of,
+    source_of,
+)
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.one_line import search
@@ -209,3 +214,44 @@ def test_poses_are_compared_as_the_laws_read_them():
     (explanation,) = changed_lines(source, "inverse_kinematics")
     assert "`P = R[parents[joint]] * [1, -1, -1, -1]`" in str(explanation.sentence)
     assert explanation.share == 1.0
+
+
+@pytest.mark.parametrize(
+    ("program", "method", "right", "wrong", "code"),
+    [
+        ("resample by arc lengths", "", "while k < len", "if k < len", "PB-LINE-010"),
+        pytest.param("forward kinematics by angles one after the other", "", "2 * (y * z - w * x)]",
+                     "2 * (y * z + w * x)]", "PB-LINE-005", marks=pytest.mark.slow),
+        pytest.param("scene graph", "ccd", "        descendants += children_of(parents, k)\n", "",
+                     "PB-LINE-001", marks=pytest.mark.slow),
+        pytest.param("scene graph", "fabrik", "offsets[path[k + 1]]", "offsets[path[k]]",
+                     "PB-LINE-012", marks=pytest.mark.slow),
+        pytest.param("hinges and cones", "ccd", "multiply(tilt, twist)", "multiply(twist, tilt)",
+                     "PB-LINE-004", marks=pytest.mark.slow),
+        pytest.param("ccd", "ccd", "between(x[effector] - x[joint]",
+                     "between(x[effector] - x[max(parents[joint], 0)]", "PB-LINE-012",
+                     marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_lines_of_kinematics_are_named(program, method, right, wrong, code):
+    """Positions kept by a scene graph, limits of joints, Euler angles and resampling in loops."""
+    source = source_of(program)
+    assert source.count(right) == 1
+    source = source.replace(right, wrong)
+    if method:
+        limits = "within" in source
+        source += f'\nPLUMBOB = {{"methods": ["{method}"], "limits": {limits}}}\n'
+    (explanation,) = changed_lines(source, PROGRAMS[program]["task"])
+    assert explanation.codes == (code,)
+
+
+def test_a_missing_placement_is_told_for_programs_that_keep_positions():
+    mutants = {"": search.Mutant("missing line", "ccd", "x, R = kinematics(p, o, q)", "", None)}
+    assert "mark all of them as out of date" in str(search._describe(mutants, [""]))
+
+
+def test_no_module_stands_for_a_value():
+    """NumPy in an array of numbers crashes Python."""
+    program = Program("import numpy as np\n\n\ndef energy(x):\n    return np.sin(x)\n")
+    program.observe(lambda: program.names["energy"](1.0))
+    assert "return np" not in {mutant.wrong for mutant in program.mutants()}
