@@ -215,7 +215,7 @@ STEP_FAULTS, OF_ENERGY = (
     tuple(fault for fault in faults_of("step", ASPECTS) if (fault.part == "energy") is is_energy)
     for is_energy in (False, True)
 )
-EARLY_END = _FAULTS["end"][0]
+EARLY_END, KEPT_DIRECTIONS = _FAULTS["end"]
 # Of iterations that are followed.
 FOLLOWED_FAULTS = (*faults_of("step", ("followed",)), *OF_ENERGY)
 

@@ -88,7 +88,9 @@ def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
         if not options:
             options = [(Option("", aspect, sentence("as it should be")), 0)]
         faults = (fault for fault in STEP_FAULTS if fault.aspect == aspect)
-        options += [(fault, 1) for fault in faults if fault.rare != "relation"]
+        # what a velocity is a combination of shows without a search, but not in several substeps
+        is_shown = step.substeps in (None, 1)
+        options += [(fault, 1) for fault in faults if fault.rare != "relation" or not is_shown]
         costs[aspect] = sorted(options, key=lambda pair: pair[1])
     return costs
 

@@ -18,8 +18,10 @@ from plumbob.reference.arguments import BoolArray, FloatArray
 from .formulas import evaluate
 from .problem import SpringProblem, accelerations, damper_forces, frames, spring_forces, stretches
 
+# Rows of the unknowns that are taken for those of particles, as if no particle were left out.
+ROW_MISTAKES = ("rows of the solution", "rows of the right-hand side", "rows of both")
 # Pins that a step does not move.
-ELIMINATED = ("eliminated", "unattached", "first", "origin", "dropped")
+ELIMINATED = ("eliminated", "unattached", "first", "origin", "dropped", *ROW_MISTAKES)
 # Newton's method ends in rounding long before this on systems of this size.
 MAX_ITERATIONS = 200
 # The usual share of the decrease promised by the slope that a line search demands.
@@ -65,7 +67,8 @@ class SystemMatrix(NamedTuple):
     stiffness: bool = True  # whether the springs' part has its factor k
     # what a spring adds to the rows of its first and of its second end, in the columns of both
     element: tuple[float, ...] = (1.0, -1.0, -1.0, 1.0)
-    accumulated: bool = True  # whether springs add up on the diagonal; else the last one stays
+    # what the diagonal has: sum, of all springs; last, spring of a particle; or last of each end
+    diagonal: str = "sum"
     filled: str = "A"  # a formula of what becomes of it if a triangle is not filled
     components: bool = True  # whether x, y and z are coupled
     damper_power: int = 0  # the power of h by which the dampers' part differs from h C
@@ -565,7 +568,9 @@ class StepEquation:
             rows = np.isin(np.arange(len(A)) * len(right) // len(A), self.start.p.pinned)
             A = np.where(rows[:, None], np.eye(len(A)), A)
         part = A if free.all() else A[np.ix_(free, free)]
-        solution, b = np.zeros_like(right).reshape(len(A), -1), right.reshape(len(A), -1)[free]
+        solution, b = np.zeros_like(right).reshape(len(A), -1), right.reshape(len(A), -1)
+        wrong_rows = self.start.model.pins if self.start.model.pins in ROW_MISTAKES else ""
+        b = b[free] if wrong_rows in ("", ROW_MISTAKES[0]) else b[: len(part)]
         kind, inverse = self.start.model.factorisation, self.start.model.matrix.inverse
         if inverse.startswith("factors"):
             lost, formula = inverse.removeprefix("factors ").split(" ", 1)
@@ -584,6 +589,9 @@ class StepEquation:
             solution[free] = np.linalg.solve(L @ L.T, b)
         else:
             solution[free] = np.linalg.solve(part, b)
+        if wrong_rows in (ROW_MISTAKES[0], ROW_MISTAKES[2]):
+            rows = np.vstack([solution[free], solution[~free]])  # of pins it is zero
+            solution = np.where(free[:, None], rows, 0.0)
         return solution.reshape(right.shape)
 
     def newton_step(self, A: FloatArray, right: FloatArray, drift: FloatArray) -> FloatArray:
@@ -751,9 +759,11 @@ def _assemble(
         right = (column[:, :, None, None] * blocks[:, None]).reshape(len(blocks), -1)
         total += row @ right
     sums = total.reshape(n, n, size, size)
-    if not rule.accumulated:
-        for (i, j), block in zip(p.springs, blocks, strict=True):
-            sums[i, i] = sums[j, j] = block
+    if rule.diagonal != "sum":
+        ends, at = np.zeros((2, n, size, size)), np.arange(n)
+        for number, block in zip(p.springs, blocks, strict=True):
+            ends[(0, 1) if rule.diagonal == "last of each end" else 0, number] = block
+        sums[at, at] = ends.sum(axis=0)
     return np.ascontiguousarray(sums.transpose(0, 2, 1, 3)).reshape(size * n, size * n)
 
 
@@ -818,12 +828,22 @@ def _local_global(equation: StepEquation, x: FloatArray) -> Iterator[FloatArray]
     inverse = equation.solve(A, np.eye(len(A))) if is_exact else A
     while True:
         yield x
-        length, u = frames(p, x)
-        rest = np.where(p.tension_only & (length < p.rest_lengths), length, p.rest_lengths)
-        rest = rest if p.normalised else rest * length
-        pull = (k * rest + c * equation.length_n)[:, None] * u
-        right = fixed + h * h * (p.pulled.T @ pull)
+        right = fixed + h * h * (p.pulled.T @ _projected(equation, k, c, x))
         x = np.where(free, inverse @ right if is_exact else equation.solve(A, right, x), x)
+
+
+def _projected(
+    equation: StepEquation, k: FloatArray, c: FloatArray, x: FloatArray
+) -> FloatArray:
+    """Return k and c, of springs and of dampers, times the vectors that the local step finds."""
+    p = equation.start.p
+    length, u = frames(p, x)
+    pull = k * stretches(p, length) if p.pull is None else p.pull(p, l=length, x=x)
+    size = (k * length - pull + c * equation.length_n) * (1.0 if p.normalised else length)
+    if p.damping == "all":
+        edges = c[:, None] * (p.incidence @ equation.start.x)
+        return edges + (k * length - pull)[:, None] * u
+    return size[:, None] * u
 
 
 def _descent(equation: StepEquation, x: FloatArray) -> Iterator[FloatArray]:

@@ -45,8 +45,8 @@ class SpringProblem:
     # whether forces of springs at one particle add up; else the last one stays, of those whose
     # first end it is and of those whose second
     accumulated: bool = True
-    # the velocity that dampers see: a key of RATES, the particle's own ("drag"), or its own along
-    # the spring ("own"); "one end": along the spring, but the first end alone feels the damper
+    # the velocity that dampers see: a key of RATES, the particle's own ("drag", "own whole"), or its
+    # own along the spring ("own"); "one end": along the spring, but the first end alone feels the damper
     damping: str = "along"
     normalised: bool = True  # whether a spring's direction is of length one
     # what takes the place of the length of springs, of their pull k (l - r), of the pull of dampers
@@ -209,9 +209,10 @@ def damper_forces(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
         return -p.dampings[0] * v
     c, (length, u) = p.dampings[:, None], frames(p, x)
     first, second = v[p.springs[:, 0]], v[p.springs[:, 1]]
-    if p.damping == "own":
-        own = np.maximum(p.pulled, 0.0).T @ (c * along(first, u))
-        return -own - np.maximum(-p.pulled, 0.0).T @ (c * along(second, u))
+    if p.damping in ("own", "own whole"):
+        parts = [along(w, u) if p.damping == "own" else w for w in (first, second)]
+        own = np.maximum(p.pulled, 0.0).T @ (c * parts[0])
+        return -own - np.maximum(-p.pulled, 0.0).T @ (c * parts[1])
     if p.damper_pull is not None:
         rate = ((first - second) * u).sum(axis=1)
         return -p.pulled.T @ (p.damper_pull(p, l=length, rate=rate)[:, None] * u)

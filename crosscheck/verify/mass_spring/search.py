@@ -692,6 +692,7 @@ def _acts_in_flight(option: Option) -> bool:
     """Return whether a matrix matters where no spring acts."""
     matrix = option.fields.get("matrix", RIGHT_MATRIX)
     is_other = matrix.masses != 1.0 or matrix.right_power or matrix.is_by_columns
+    is_other |= matrix.filled.startswith("A[")
     return bool(is_other or matrix.inverse.startswith("factors"))
 
 
