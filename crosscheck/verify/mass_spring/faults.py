@@ -156,6 +156,9 @@ def _in_parts(option: Option, entry: Mapping[str, Any]) -> Iterator[Option]:
         has_dampers = option.aspect == "damping" or "set" in entry
         if option.aspect != "damping" or part != "forces":
             yield alone
+        if part == "matrix":  # of local/global iterations that know the pins' part without it
+            right = RIGHT_MATRIX._replace(pins_element=RIGHT_MATRIX.element)
+            yield alone._replace(fields={**option.fields, "matrix": right})
         if (part == "forces" and has_dampers) or (part == "matrix" and option.aspect == "masses"):
             yield alone._replace(fields=in_dv)
 

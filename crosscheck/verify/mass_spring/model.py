@@ -19,7 +19,10 @@ from .formulas import evaluate
 from .problem import SpringProblem, accelerations, damper_forces, frames, spring_forces, stretches
 
 # Rows of the unknowns that are taken for those of particles, as if no particle were left out.
-ROW_MISTAKES = ("rows of the solution", "rows of the right-hand side", "rows of both")
+ROW_MISTAKES = (
+    "rows of the solution", "rows of the right-hand side",
+    "rows of the solution and right-hand side",
+)  # fmt: skip
 # Pins that a step does not move.
 ELIMINATED = ("eliminated", "unattached", "first", "origin", "dropped", *ROW_MISTAKES)
 # Newton's method ends in rounding long before this on systems of this size.
