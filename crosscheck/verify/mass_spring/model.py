@@ -16,7 +16,15 @@ import numpy as np
 from plumbob.reference.arguments import BoolArray, FloatArray
 
 from .formulas import evaluate
-from .problem import SpringProblem, accelerations, damper_forces, frames, spring_forces, stretches
+from .problem import (
+    SpringProblem,
+    accelerations,
+    all_forces,
+    damper_forces,
+    frames,
+    spring_forces,
+    stretches,
+)  # fmt: skip
 
 # Rows of the unknowns that are taken for those of particles, as if no particle were left out.
 ROW_MISTAKES = (
@@ -123,6 +131,8 @@ class StepModel(NamedTuple):
     # divided among substeps; undivided; one substep less: divided by a number that is one more;
     # before: of the last request, in the matrix only; or a formula of what stands for h
     time: str = "divided"
+    # whether forces of earlier substeps act again: all, or the dampers' of an implicit step
+    keeps_forces: bool = False
     # of a matrix that is not positive definite: LU; or Cholesky's, unchecked. Eigen's dense LLT
     # stops at a pivot and solves with what it has (LLT); its SimplicialLLT does not solve, so that
     # the unknown, a displacement or a change of velocity, stays zero or what memory held
@@ -287,11 +297,16 @@ def _step(
         h = float(evaluate(model.time, p))
     if model.time != "undivided":
         h /= model.substeps
-    pins = x[p.pinned]
+    pins, external = x[p.pinned], p.external
     if model.substeps > 1 and _falls_freely(p, model):
         return _free_fall(Substep(p, model, x, v, h))
     for _ in range(model.substeps - (model.time == "one substep less")):
-        x, v = substep(Substep(p, model, x, v, h, near))
+        now = p.changed(external=external)
+        if model.keeps_forces:
+            own = p.changed(positions=x, velocities=v)
+            is_explicit = model.integrator.explicit
+            external = external + (all_forces(own) if is_explicit else damper_forces(p, x, v))
+        x, v = substep(Substep(now, model, x, v, h, near))
     if model.pins == "at_the_end":
         x, v = x.copy(), v.copy()
         x[p.pinned], v[p.pinned] = pins, 0.0
@@ -301,7 +316,7 @@ def _step(
 def _falls_freely(p: SpringProblem, model: StepModel) -> bool:
     """Return whether the forces of all substeps of an explicit method are the same."""
     usual = (model.velocity, model.scaling) == ("separate", 1.0) and not model.update
-    usual &= model.time != "one substep less"
+    usual &= model.time != "one substep less" and not model.keeps_forces
     coupled = p.stiff or p.damped or p.pinned.size
     return bool(usual and not coupled and model.integrator.method in SHARES)
 
