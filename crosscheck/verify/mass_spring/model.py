@@ -19,7 +19,6 @@ from .formulas import evaluate
 from .problem import (
     SpringProblem,
     accelerations,
-    all_forces,
     damper_forces,
     frames,
     spring_forces,
@@ -88,6 +87,7 @@ class SystemMatrix(NamedTuple):
     drag: float = 1.0
     drag_power: int = 0
     right_power: int = 0
+    h: str = "h"  # a formula of what stands for h before the springs' part
     is_by_columns: bool = False  # the right-hand side: all x, then all y, in rows of x, y and z
     # exact; "first order": multiplied by 1 - h²/m K; a key of ITERATIONS with a number of them; or
     # "factors", the number of terms that their inner products lack, and a formula of L, D and b
@@ -297,16 +297,15 @@ def _step(
         h = float(evaluate(model.time, p))
     if model.time != "undivided":
         h /= model.substeps
-    pins, external = x[p.pinned], p.external
+    pins, q = x[p.pinned], p
     if model.substeps > 1 and _falls_freely(p, model):
         return _free_fall(Substep(p, model, x, v, h))
     for _ in range(model.substeps - (model.time == "one substep less")):
-        now = p.changed(external=external)
+        x, v, start = *substep(Substep(p, model, x, v, h, near)), (x, v)
         if model.keeps_forces:
-            own = p.changed(positions=x, velocities=v)
-            is_explicit = model.integrator.explicit
-            external = external + (all_forces(own) if is_explicit else damper_forces(p, x, v))
-        x, v = substep(Substep(now, model, x, v, h, near))
+            own, is_explicit = accelerations(q, *start) * q.inertia, model.integrator.explicit
+            kept = own if is_explicit else damper_forces(q, *start)
+            p = p.changed(external=p.external + kept)
     if model.pins == "at_the_end":
         x, v = x.copy(), v.copy()
         x[p.pinned], v[p.pinned] = pins, 0.0
@@ -556,6 +555,7 @@ class StepEquation:
         p, model = self.linear, self.start.model
         rule = model.matrix
         h = p.h_before / model.substeps if model.time == "before" else self.start.h
+        h = h if rule.h == "h" else float(self.start.value(rule.h))
         if not rule.components:
             springs = springs * np.eye(springs.shape[1])
             if dampers is not None and not model.dampers_apart:
@@ -857,7 +857,11 @@ def _projected(
     p = equation.start.p
     length, u = frames(p, x)
     pull = k * stretches(p, length) if p.pull is None else p.pull(p, l=length, x=x)
-    size = (k * length - pull + c * equation.length_n) * (1.0 if p.normalised else length)
+    rests = c * equation.length_n
+    if p.damper_pull is not None and equation.damped and p.normalised:
+        rate = (length - equation.length_n) / equation.start.h
+        rests = c * length - p.damper_pull(p, l=length, rate=rate)
+    size = (k * length - pull + rests) * (1.0 if p.normalised else length)
     if p.damping == "all":
         edges = c[:, None] * (p.incidence @ equation.start.x)
         return edges + (k * length - pull)[:, None] * u

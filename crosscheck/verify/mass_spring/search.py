@@ -464,7 +464,7 @@ class ModelSearch:
         ignored: tuple[str, ...] = ()
         if len(stage.answers) == 1 and relevant["substeps"].fields["substeps"] == 1:
             ignored = ("velocity", "scaling")  # neither enters the positions
-        key = (index, *sorted((k, id(o)) for k, o in relevant.items() if k not in ignored))
+        key = index, frozenset(id(o) for k, o in relevant.items() if k not in ignored)
         if key not in self._gaps:
             self.prediction_count += 1
             self._work += _effort(relevant) if stage.coupled else 1.0
