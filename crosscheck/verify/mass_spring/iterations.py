@@ -17,7 +17,15 @@ from plumbob.reference.arguments import FloatArray
 from ..explain import either, ending_test
 from ..judgement import LEAST_SHARE, Explanation
 from ..sentence import Sentence, sentence, with_code
-from .faults import EARLY_END, FOLLOWED_FAULTS, KEPT_DIRECTIONS, STEP_FAULTS, Option, apply, read_table
+from .faults import (
+    EARLY_END,
+    FOLLOWED_FAULTS,
+    KEPT_DIRECTIONS,
+    STEP_FAULTS,
+    Option,
+    apply,
+    read_table,
+)
 from .formulas import evaluate
 from .laws import (
     IMPRECISE,

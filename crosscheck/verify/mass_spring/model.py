@@ -850,9 +850,7 @@ def _local_global(equation: StepEquation, x: FloatArray) -> Iterator[FloatArray]
         x = np.where(free, inverse @ right if is_exact else equation.solve(A, right, x), x)
 
 
-def _projected(
-    equation: StepEquation, k: FloatArray, c: FloatArray, x: FloatArray
-) -> FloatArray:
+def _projected(equation: StepEquation, k: FloatArray, c: FloatArray, x: FloatArray) -> FloatArray:
     """Return k and c, of springs and of dampers, times the vectors that the local step finds."""
     p = equation.start.p
     length, u = frames(p, x)

@@ -44,8 +44,8 @@ class SpringProblem:
     # whether forces of springs at one particle add up; else the last one stays, of those whose
     # first end it is and of those whose second
     accumulated: bool = True
-    # the velocity that dampers see: a key of RATES, the particle's own ("drag", "own whole"), or its
-    # own along the spring ("own"); "one end": along the spring, but the first end alone feels the damper
+    # the velocity that dampers see: a key of RATES; the particle's own ("drag", "own whole"), or
+    # its part along the spring ("own"); "one end": along the spring, felt by the first end alone
     damping: str = "along"
     normalised: bool = True  # whether a spring's direction is of length one
     # what takes the place of the length of springs, of their pull k (l - r), of the pull of dampers
