@@ -609,7 +609,7 @@ class StepEquation:
             solution[free] = np.linalg.solve(part, b)
         if wrong_rows in (ROW_MISTAKES[0], ROW_MISTAKES[2]):
             rows = np.vstack([solution[free], solution[~free]])  # of pins it is zero
-            solution = np.where(free[:, None], rows, 0.0)
+            solution = np.where(np.reshape(free, (-1, 1)), rows, 0.0)
         return solution.reshape(right.shape)
 
     def newton_step(self, A: FloatArray, right: FloatArray, drift: FloatArray) -> FloatArray:
