@@ -28,6 +28,7 @@ from .kinematics import (
 from .kinematics.faults import SwitchFault
 from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
+from .mass_spring.search import Budget
 from .mass_spring.stepping import Stepping
 from .one_line.search import with_changed_line
 from .sentence import Sentence, sentence
@@ -100,9 +101,10 @@ def verify(
             task: str = task,
             method: str = method,
             known: Sequence[SwitchFault | str] | None = _known_faults(task, reports, causes),
+            budget: Budget = Budget(),  # noqa: B008, one for each task
         ) -> TaskReport:
             cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
-            return judge_cases(contestant, task, method, cases, notify, greeting, known)
+            return judge_cases(contestant, task, method, cases, notify, greeting, known, budget)
 
         report = inferred(contestant, judge(contestant.greeting), judge)
         report = with_kept_state(contestant, report)
@@ -181,17 +183,21 @@ def judge_cases(
     notify: Notify = lambda task, count, total: None,
     declared: Greeting | None = None,
     known_faults: Sequence[SwitchFault | str] | None = None,
+    budget: Budget | None = None,
 ) -> TaskReport:
     """Ask a solver some cases of a task and judge its answers; arguments as of `verify`.
 
     They are judged by what its greeting declares, or by another greeting. What the task builds upon
-    is known to have some faults; None if it is right, or they are not known.
+    is known to have some faults; None if it is right, or they are not known. The searches of a step
+    share a budget.
     """
+    budget = budget or Budget()
     exchanges = _ask(contestant, cases, partial(notify, task))
     judge: Callable[..., TaskReport] = DISCIPLINES[task].judge
     if known_faults is not None:
         judge = partial(judge, base=known_faults)
     if isinstance(discipline := DISCIPLINES[task], Stepping):
+        discipline = discipline._replace(budget=budget)
         judge = partial(discipline.judge, notify=partial(notify, task))
     greeting, reason = precision.judging_greeting(exchanges, declared or contestant.greeting)
     report = judge(exchanges, greeting, method)

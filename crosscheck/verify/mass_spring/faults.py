@@ -156,6 +156,9 @@ def _in_parts(option: Option, entry: Mapping[str, Any]) -> Iterator[Option]:
         has_dampers = option.aspect == "damping" or "set" in entry
         if option.aspect != "damping" or part != "forces":
             yield alone
+        if part == "matrix":  # of local/global iterations that know the pins' part without it
+            right = RIGHT_MATRIX._replace(pins_element=RIGHT_MATRIX.element)
+            yield alone._replace(fields={**option.fields, "matrix": right})
         if (part == "forces" and has_dampers) or (part == "matrix" and option.aspect == "masses"):
             yield alone._replace(fields=in_dv)
 
@@ -215,7 +218,7 @@ STEP_FAULTS, OF_ENERGY = (
     tuple(fault for fault in faults_of("step", ASPECTS) if (fault.part == "energy") is is_energy)
     for is_energy in (False, True)
 )
-EARLY_END = _FAULTS["end"][0]
+EARLY_END, KEPT_DIRECTIONS = _FAULTS["end"]
 # Of iterations that are followed.
 FOLLOWED_FAULTS = (*faults_of("step", ("followed",)), *OF_ENERGY)
 

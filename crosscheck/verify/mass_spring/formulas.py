@@ -73,6 +73,8 @@ NAMES: Mapping[str, Callable[[SpringProblem], Any]] = {
     "length_at": lambda p: lambda x: frames(p, x)[0],
     "forces_at": lambda p: lambda x, v: all_forces(p.changed(positions=x, velocities=v)),
     "limited": lambda p: lambda x, share: _limited(p, x, share),
+    # of the numbers of coordinates: all x, all y, all z
+    "by_axes": lambda p: np.arange(3 * p.count).reshape(-1, 3).T.ravel(),
     "late": lambda p: p.late,
     "slackable": lambda p: p.tension_only,
     "stiffnesses": lambda p: p.stiffnesses,

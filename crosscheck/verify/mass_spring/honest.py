@@ -88,7 +88,9 @@ def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
         if not options:
             options = [(Option("", aspect, sentence("as it should be")), 0)]
         faults = (fault for fault in STEP_FAULTS if fault.aspect == aspect)
-        options += [(fault, 1) for fault in faults if fault.rare != "relation"]
+        # what a velocity is a combination of shows without a search, but not in several substeps
+        is_shown = step.substeps in (None, 1)
+        options += [(fault, 1) for fault in faults if fault.rare != "relation" or not is_shown]
         costs[aspect] = sorted(options, key=lambda pair: pair[1])
     return costs
 
@@ -133,6 +135,7 @@ def _least_substeps(fields: Mapping[str, Any]) -> int:
     needs_several = (
         fields.get("pins") == "at_the_end"
         or fields.get("time") == "undivided"
+        or fields.get("keeps_forces")
         or fields.get("velocity") == "d / whole"
     )
     return 2 if needs_several else 1
@@ -144,6 +147,6 @@ def _are_few(fields: Mapping[str, Any], method: str) -> bool:
     if method not in ("explicit", "symplectic"):
         return bool(substeps <= (30 if method in EXPLICIT else 20))
     usual = {"velocity": "separate", "scaling": 1.0}
-    plain = "time" not in fields and "inertia" not in fields
+    plain = not fields.keys() & {"time", "keeps_forces"} and "inertia" not in fields
     plain &= all(fields.get(name, choice) == choice for name, choice in usual.items())
     return bool(substeps <= 30 or plain)

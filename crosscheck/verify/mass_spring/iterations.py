@@ -17,7 +17,15 @@ from plumbob.reference.arguments import FloatArray
 from ..explain import either, ending_test
 from ..judgement import LEAST_SHARE, Explanation
 from ..sentence import Sentence, sentence, with_code
-from .faults import EARLY_END, FOLLOWED_FAULTS, STEP_FAULTS, Option, apply, read_table
+from .faults import (
+    EARLY_END,
+    FOLLOWED_FAULTS,
+    KEPT_DIRECTIONS,
+    STEP_FAULTS,
+    Option,
+    apply,
+    read_table,
+)
 from .formulas import evaluate
 from .laws import (
     IMPRECISE,
@@ -206,6 +214,8 @@ def _words(course: FollowedMethod, tracks: Sequence[Track | None]) -> Sentence:
         test = sentence("after {low} to {high} iterations", low=min(ends), high=max(ends))
     name = NAMES[course.integrator.method]
     values = {"name": name, "test": test, "count": len(ends), "total": len(tracks)}
+    if course.integrator.method == "local_global" and set(ends) == {1}:
+        return with_code(KEPT_DIRECTIONS["code"], Sentence(KEPT_DIRECTIONS["sentence"], values))
     if course.fault is None:
         return with_code(EARLY_END["code"], Sentence(EARLY_END["sentence"], values))
     return sentence(

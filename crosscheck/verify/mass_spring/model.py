@@ -16,10 +16,22 @@ import numpy as np
 from plumbob.reference.arguments import BoolArray, FloatArray
 
 from .formulas import evaluate
-from .problem import SpringProblem, accelerations, damper_forces, frames, spring_forces, stretches
+from .problem import (
+    SpringProblem,
+    accelerations,
+    damper_forces,
+    frames,
+    spring_forces,
+    stretches,
+)  # fmt: skip
 
+# Rows of the unknowns that are taken for those of particles, as if no particle were left out.
+ROW_MISTAKES = (
+    "rows of the solution", "rows of the right-hand side",
+    "rows of the solution and right-hand side",
+)  # fmt: skip
 # Pins that a step does not move.
-ELIMINATED = ("eliminated", "unattached", "first", "origin", "dropped")
+ELIMINATED = ("eliminated", "unattached", "first", "origin", "dropped", *ROW_MISTAKES)
 # Newton's method ends in rounding long before this on systems of this size.
 MAX_ITERATIONS = 200
 # The usual share of the decrease promised by the slope that a line search demands.
@@ -65,7 +77,8 @@ class SystemMatrix(NamedTuple):
     stiffness: bool = True  # whether the springs' part has its factor k
     # what a spring adds to the rows of its first and of its second end, in the columns of both
     element: tuple[float, ...] = (1.0, -1.0, -1.0, 1.0)
-    accumulated: bool = True  # whether springs add up on the diagonal; else the last one stays
+    # what the diagonal has: sum, of all springs; last, spring of a particle; or last of each end
+    diagonal: str = "sum"
     filled: str = "A"  # a formula of what becomes of it if a triangle is not filled
     components: bool = True  # whether x, y and z are coupled
     damper_power: int = 0  # the power of h by which the dampers' part differs from h C
@@ -74,6 +87,7 @@ class SystemMatrix(NamedTuple):
     drag: float = 1.0
     drag_power: int = 0
     right_power: int = 0
+    h: str = "h"  # a formula of what stands for h before the springs' part
     is_by_columns: bool = False  # the right-hand side: all x, then all y, in rows of x, y and z
     # exact; "first order": multiplied by 1 - h²/m K; a key of ITERATIONS with a number of them; or
     # "factors", the number of terms that their inner products lack, and a formula of L, D and b
@@ -117,6 +131,8 @@ class StepModel(NamedTuple):
     # divided among substeps; undivided; one substep less: divided by a number that is one more;
     # before: of the last request, in the matrix only; or a formula of what stands for h
     time: str = "divided"
+    # whether forces of earlier substeps act again: all, or the dampers' of an implicit step
+    keeps_forces: bool = False
     # of a matrix that is not positive definite: LU; or Cholesky's, unchecked. Eigen's dense LLT
     # stops at a pivot and solves with what it has (LLT); its SimplicialLLT does not solve, so that
     # the unknown, a displacement or a change of velocity, stays zero or what memory held
@@ -281,11 +297,15 @@ def _step(
         h = float(evaluate(model.time, p))
     if model.time != "undivided":
         h /= model.substeps
-    pins = x[p.pinned]
+    pins, q = x[p.pinned], p
     if model.substeps > 1 and _falls_freely(p, model):
         return _free_fall(Substep(p, model, x, v, h))
     for _ in range(model.substeps - (model.time == "one substep less")):
-        x, v = substep(Substep(p, model, x, v, h, near))
+        x, v, start = *substep(Substep(p, model, x, v, h, near)), (x, v)
+        if model.keeps_forces:
+            own, is_explicit = accelerations(q, *start) * q.inertia, model.integrator.explicit
+            kept = own if is_explicit else damper_forces(q, *start)
+            p = p.changed(external=p.external + kept)
     if model.pins == "at_the_end":
         x, v = x.copy(), v.copy()
         x[p.pinned], v[p.pinned] = pins, 0.0
@@ -295,7 +315,7 @@ def _step(
 def _falls_freely(p: SpringProblem, model: StepModel) -> bool:
     """Return whether the forces of all substeps of an explicit method are the same."""
     usual = (model.velocity, model.scaling) == ("separate", 1.0) and not model.update
-    usual &= model.time != "one substep less"
+    usual &= model.time != "one substep less" and not model.keeps_forces
     coupled = p.stiff or p.damped or p.pinned.size
     return bool(usual and not coupled and model.integrator.method in SHARES)
 
@@ -535,6 +555,7 @@ class StepEquation:
         p, model = self.linear, self.start.model
         rule = model.matrix
         h = p.h_before / model.substeps if model.time == "before" else self.start.h
+        h = h if rule.h == "h" else float(self.start.value(rule.h))
         if not rule.components:
             springs = springs * np.eye(springs.shape[1])
             if dampers is not None and not model.dampers_apart:
@@ -565,7 +586,9 @@ class StepEquation:
             rows = np.isin(np.arange(len(A)) * len(right) // len(A), self.start.p.pinned)
             A = np.where(rows[:, None], np.eye(len(A)), A)
         part = A if free.all() else A[np.ix_(free, free)]
-        solution, b = np.zeros_like(right).reshape(len(A), -1), right.reshape(len(A), -1)[free]
+        solution, b = np.zeros_like(right).reshape(len(A), -1), right.reshape(len(A), -1)
+        wrong_rows = self.start.model.pins if self.start.model.pins in ROW_MISTAKES else ""
+        b = b[free] if wrong_rows in ("", ROW_MISTAKES[0]) else b[: len(part)]
         kind, inverse = self.start.model.factorisation, self.start.model.matrix.inverse
         if inverse.startswith("factors"):
             lost, formula = inverse.removeprefix("factors ").split(" ", 1)
@@ -584,6 +607,9 @@ class StepEquation:
             solution[free] = np.linalg.solve(L @ L.T, b)
         else:
             solution[free] = np.linalg.solve(part, b)
+        if wrong_rows in (ROW_MISTAKES[0], ROW_MISTAKES[2]):
+            rows = np.vstack([solution[free], solution[~free]])  # of pins it is zero
+            solution = np.where(np.reshape(free, (-1, 1)), rows, 0.0)
         return solution.reshape(right.shape)
 
     def newton_step(self, A: FloatArray, right: FloatArray, drift: FloatArray) -> FloatArray:
@@ -751,9 +777,11 @@ def _assemble(
         right = (column[:, :, None, None] * blocks[:, None]).reshape(len(blocks), -1)
         total += row @ right
     sums = total.reshape(n, n, size, size)
-    if not rule.accumulated:
-        for (i, j), block in zip(p.springs, blocks, strict=True):
-            sums[i, i] = sums[j, j] = block
+    if rule.diagonal != "sum":
+        ends, at = np.zeros((2, n, size, size)), np.arange(n)
+        for number, block in zip(p.springs, blocks, strict=True):
+            ends[(0, 1) if rule.diagonal == "last of each end" else 0, number] = block
+        sums[at, at] = ends.sum(axis=0)
     return np.ascontiguousarray(sums.transpose(0, 2, 1, 3)).reshape(size * n, size * n)
 
 
@@ -818,12 +846,24 @@ def _local_global(equation: StepEquation, x: FloatArray) -> Iterator[FloatArray]
     inverse = equation.solve(A, np.eye(len(A))) if is_exact else A
     while True:
         yield x
-        length, u = frames(p, x)
-        rest = np.where(p.tension_only & (length < p.rest_lengths), length, p.rest_lengths)
-        rest = rest if p.normalised else rest * length
-        pull = (k * rest + c * equation.length_n)[:, None] * u
-        right = fixed + h * h * (p.pulled.T @ pull)
+        right = fixed + h * h * (p.pulled.T @ _projected(equation, k, c, x))
         x = np.where(free, inverse @ right if is_exact else equation.solve(A, right, x), x)
+
+
+def _projected(equation: StepEquation, k: FloatArray, c: FloatArray, x: FloatArray) -> FloatArray:
+    """Return k and c, of springs and of dampers, times the vectors that the local step finds."""
+    p = equation.start.p
+    length, u = frames(p, x)
+    pull = k * stretches(p, length) if p.pull is None else p.pull(p, l=length, x=x)
+    rests = c * equation.length_n
+    if p.damper_pull is not None and equation.damped and p.normalised:
+        rate = (length - equation.length_n) / equation.start.h
+        rests = c * length - p.damper_pull(p, l=length, rate=rate)
+    size = (k * length - pull + rests) * (1.0 if p.normalised else length)
+    if p.damping == "all":
+        edges = c[:, None] * (p.incidence @ equation.start.x)
+        return edges + (k * length - pull)[:, None] * u
+    return size[:, None] * u
 
 
 def _descent(equation: StepEquation, x: FloatArray) -> Iterator[FloatArray]:

@@ -4,7 +4,6 @@ Its forces are written from the formulas, apart from `reference`: a spring pulls
 -(k (l - r) + c (v_i - v_j)·u) u. A field states each deviation of a faulty solver.
 """
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,8 +44,8 @@ class SpringProblem:
     # whether forces of springs at one particle add up; else the last one stays, of those whose
     # first end it is and of those whose second
     accumulated: bool = True
-    # the velocity that dampers see: a key of RATES, the particle's own ("drag"), or its own along
-    # the spring ("own"); "one end": along the spring, but the first end alone feels the damper
+    # the velocity that dampers see: a key of RATES; the particle's own ("drag", "own whole"), or
+    # its part along the spring ("own"); "one end": along the spring, felt by the first end alone
     damping: str = "along"
     normalised: bool = True  # whether a spring's direction is of length one
     # what takes the place of the length of springs, of their pull k (l - r), of the pull of dampers
@@ -108,8 +107,24 @@ class SpringProblem:
         return self.weights + self.external
 
     def changed(self, **fields: Any) -> "SpringProblem":
-        """Return the problem with other fields."""
-        return dataclasses.replace(self, **fields)
+        """Return the problem with other fields, and what follows from those that stay."""
+        problem = object.__new__(SpringProblem)
+        problem.__dict__.update(self.__dict__)
+        for name, sources in _DERIVED.items():
+            if not sources.isdisjoint(fields):
+                problem.__dict__.pop(name, None)
+        problem.__dict__.update(fields)
+        return problem
+
+
+# The fields that cached properties follow from.
+_DERIVED = {
+    "incidence": {"springs", "masses"},
+    "pulled": {"springs", "masses", "ends", "accumulated"},
+    "stiff": {"stiffnesses"},
+    "damped": {"dampings"},
+    "constant": {"weights", "external"},
+}
 
 
 # A formula of a problem, and of values by their names.
@@ -209,9 +224,10 @@ def damper_forces(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
         return -p.dampings[0] * v
     c, (length, u) = p.dampings[:, None], frames(p, x)
     first, second = v[p.springs[:, 0]], v[p.springs[:, 1]]
-    if p.damping == "own":
-        own = np.maximum(p.pulled, 0.0).T @ (c * along(first, u))
-        return -own - np.maximum(-p.pulled, 0.0).T @ (c * along(second, u))
+    if p.damping in ("own", "own whole"):
+        parts = [along(w, u) if p.damping == "own" else w for w in (first, second)]
+        own = np.maximum(p.pulled, 0.0).T @ (c * parts[0])
+        return -own - np.maximum(-p.pulled, 0.0).T @ (c * parts[1])
     if p.damper_pull is not None:
         rate = ((first - second) * u).sum(axis=1)
         return -p.pulled.T @ (p.damper_pull(p, l=length, rate=rate)[:, None] * u)

@@ -32,6 +32,9 @@ from .relations import Sample, fitted, relation_of
 # The number of iterations and substeps that predictions with single faults take at one stage, and
 # those with pairs: a few seconds each.
 WORK, WORK_OF_PAIRS = 40_000, 10_000
+# What all searches of the same answers take at most; a prediction takes a unit, and its iterations
+# a fifth of one.
+MAX_WORK, SHARE_OF_ITERATION = 20_000.0, 0.2
 # The number of hypotheses that are kept from one probe to the next, and of those to which a second
 # fault is added: the nearest.
 HYPOTHESES, NEAREST = 32, 40
@@ -135,6 +138,13 @@ class Probe(NamedTuple):
         return [self.positions(), self]
 
 
+class Budget:
+    """The work that is left for the searches of the same answers."""
+
+    def __init__(self) -> None:
+        self.left = MAX_WORK
+
+
 class ModelSearch:
     """The search of the choices that explain a solver's answers to the probes."""
 
@@ -144,9 +154,11 @@ class ModelSearch:
         step: Step,
         epsilon: float,
         faulty_aspects: Collection[str] | None = None,
+        budget: Budget | None = None,
     ) -> None:
         """Set up the domains of all choices, with faults of some aspects or of all."""
         self.probes, self.step, self.epsilon = probes, step, epsilon
+        self.budget = budget or Budget()
         self.stages = [stage for probe in probes for stage in probe.stages()]
         self.domains = {
             aspect: [
@@ -187,7 +199,7 @@ class ModelSearch:
 
     def with_probes(self, probes: Sequence[Probe]) -> "ModelSearch":
         """Return the search with more probes."""
-        return ModelSearch([*self.probes, *probes], self.step, self.epsilon)
+        return ModelSearch([*self.probes, *probes], self.step, self.epsilon, budget=self.budget)
 
     def run(
         self,
@@ -308,7 +320,7 @@ class ModelSearch:
 
     def _singles(self, branches: Sequence[Choices], index: int) -> Iterator[SingleFault]:
         """Yield each hypothesis that fails at a stage with each single fault."""
-        limit = self._work + (WORK_OF_PAIRS if self._skipped else WORK)
+        limit = self._limit(WORK_OF_PAIRS if self._skipped else WORK)
         branches = sorted(branches, key=_effort)
         trials = [
             (b, aspect, o) for b in branches for aspect, o in self._faults(b, index) if o.at is None
@@ -323,11 +335,11 @@ class ModelSearch:
 
     def _with_numbers(self, branches: Sequence[Choices], index: int) -> Iterator[Choices]:
         """Yield the simplest right hypotheses with each fault that answers tell a number of."""
-        stage, limit = self.stages[index], self._work + WORK_OF_PAIRS
+        stage, limit = self.stages[index], self._limit(WORK_OF_PAIRS)
         for branch in self._simplest_right(branches, index):
 
             def difference(fault: Option, branch: Choices = branch) -> FloatArray:
-                self._work += _effort(branch)
+                self._spend(_effort(branch))
                 options = tuple((branch | {fault.aspect: fault}).values())
                 problem, model = apply(options, stage.problem, StepModel(damper="none"))
                 prediction = predicted(problem, model, stage.answers.get("positions"))
@@ -400,7 +412,7 @@ class ModelSearch:
 
         Those of which the first brings it nearest come first.
         """
-        limit = self._work + WORK_OF_PAIRS
+        limit = self._limit(WORK_OF_PAIRS)
         singles = [
             single for single in singles if not (single.option.rare or _takes_long(single.option))
         ]
@@ -464,12 +476,20 @@ class ModelSearch:
         ignored: tuple[str, ...] = ()
         if len(stage.answers) == 1 and relevant["substeps"].fields["substeps"] == 1:
             ignored = ("velocity", "scaling")  # neither enters the positions
-        key = (index, *sorted((k, id(o)) for k, o in relevant.items() if k not in ignored))
+        key = index, frozenset(id(o) for k, o in relevant.items() if k not in ignored)
         if key not in self._gaps:
             self.prediction_count += 1
-            self._work += _effort(relevant) if stage.coupled else 1.0
+            self._spend(_effort(relevant) if stage.coupled else 1.0)
             self._gaps[key] = self._compare(tuple(relevant.values()), stage)
         return self._gaps[key]
+
+    def _spend(self, effort: float) -> None:
+        self._work += effort
+        self.budget.left -= 1.0 + SHARE_OF_ITERATION * effort
+
+    def _limit(self, work: float) -> float:
+        """Return the sum of work at which to stop after so much more, or none if none is left."""
+        return self._work + (work if self.budget.left > 0.0 else 0.0)
 
     def _rounding(self, probe: Probe, model: StepModel) -> Rounding:
         key = probe.name, model.substeps, model.integrator.explicit
@@ -510,11 +530,11 @@ def matches_of(
     probes, step, epsilon = search.probes, search.step, search.epsilon
     if not any(probe.problem.steps for probe in probes):
         return _step_matches(search, notify, cases)
-    matches = ModelSearch(probes, step, epsilon, ("frames",)).run(notify, cases)
+    matches = ModelSearch(probes, step, epsilon, ("frames",), search.budget).run(notify, cases)
     if matches:
         return matches
     firsts = [probe.first_step() for probe in probes]
-    matches = _step_matches(ModelSearch(firsts, step, epsilon), notify, ())
+    matches = _step_matches(ModelSearch(firsts, step, epsilon, budget=search.budget), notify, ())
     return _with_frames(matches, probes, epsilon)
 
 
@@ -526,13 +546,13 @@ def _step_matches(
     fault = velocity_fault(probes, epsilon)
     if fault is None:
         return search.run(notify, cases)
-    matches = ModelSearch(probes, step, epsilon, ()).run(notify, cases)
+    matches = ModelSearch(probes, step, epsilon, (), search.budget).run(notify, cases)
     if matches:
         return matches
     positions = [probe.positions() for probe in probes]
     matches = [
         _with_velocity(match, fault, probes, step, epsilon)
-        for match in ModelSearch(positions, step, epsilon).run(notify)
+        for match in ModelSearch(positions, step, epsilon, budget=search.budget).run(notify)
     ]
     fewest = min((match.complexity for match in matches), default=(MAX_FAULTS, 0))
     further = search.run(notify, cases) if fewest > ONE_FAULT else []
@@ -692,6 +712,7 @@ def _acts_in_flight(option: Option) -> bool:
     """Return whether a matrix matters where no spring acts."""
     matrix = option.fields.get("matrix", RIGHT_MATRIX)
     is_other = matrix.masses != 1.0 or matrix.right_power or matrix.is_by_columns
+    is_other |= matrix.filled.startswith("A[")
     return bool(is_other or matrix.inverse.startswith("factors"))
 
 

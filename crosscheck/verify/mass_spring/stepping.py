@@ -31,6 +31,7 @@ from .model import EXPLICIT, StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
 from .search import (
     UNEXPLAINED,
+    Budget,
     ModelMatch,
     ModelSearch,
     Probe,
@@ -42,6 +43,8 @@ from .search import (
 )  # fmt: skip
 
 MAX_EXPLANATIONS = 3
+# The number of small cases in which the nearest step is sought.
+COMPARED = 4
 # The number of larger cases in which faults are sought if all small ones are right.
 LARGER = 2
 # The least shares of the answers that several faults at once, or one, explain if not by chance.
@@ -56,6 +59,7 @@ class Stepping(NamedTuple):
     """The discipline of a task of a single step or of several."""
 
     task: str
+    budget: Budget | None = None  # of the searches of faults; one of its own if None
 
     def cases(self, greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
         """Return cases that suit the solver, the smallest first."""
@@ -75,7 +79,7 @@ class Stepping(NamedTuple):
         problems = problems_of(exchanges, greeting)
         is_constant = _repeats(exchanges, 0.0) or _repeats(exchanges, 1.0)  # no step to be found
         telling = [] if is_constant else probes_of(exchanges, problems)
-        search = ModelSearch(telling, greeting.step, greeting.epsilon)
+        search = ModelSearch(telling, greeting.step, greeting.epsilon, budget=self.budget)
         probes = probes_of(exchanges, problems, every=True)
         step, epsilon, matches = greeting.step, greeting.epsilon, list[ModelMatch]()
 
@@ -374,7 +378,7 @@ def _nearest(search: ModelSearch) -> Sentence:
         velocity = choices["velocity"][integrator.fields["integrator"].explicit]
         step = usual | {"integrator": integrator, "damper": damper, "velocity": velocity}
         if compatible(step):
-            gaps = gaps_of(tuple(step.values()), search.probes, search.epsilon)
+            gaps = gaps_of(tuple(step.values()), search.probes[:COMPARED], search.epsilon)
             steps.append((float(np.median(gaps)), max(gaps), tuple(step.values())))
     median, worst, options = min(steps, key=lambda step: step[0])
     return sentence(

@@ -71,6 +71,7 @@ class Program:
         ast.fix_missing_locations(self._tree)
         self.names: dict[str, Any] = {PASS: self._pass}
         self._passes, self._max_passes = 0, UNLIMITED
+        self.mutant_count = 0  # of those that were made
         self._scopes: dict[str, Scope] = {}  # of the functions that were observed
         self._lines = set[int]()  # that were executed
         exec(_compiled(self._tree), self.names)
@@ -175,6 +176,7 @@ class Program:
                 ast.fix_missing_locations(node)
         with _replaced(place[0], place[1], new), suppress(SyntaxError):
             exec(_compiled(ast.Module([function], [])), self.names, names)
+            self.mutant_count += 1
             yield Mutant(kind, function.name, right, wrong, names[function.name])
 
 

@@ -37,6 +37,8 @@ MIN_DIFFERENT = 3
 MIN_SHARE = 0.75
 # Cases for which a right program goes through its loops more often are left out: they take long.
 MAX_PASSES = 200
+# No further right program is changed after so many changes, of half a millisecond each.
+MAX_MUTANTS = 10_000
 # The input that asks for a single iteration of a solver.
 ITERATIONS = "max_iterations"
 # Longer lines are cut to what differs, with so many letters before and after.
@@ -88,7 +90,8 @@ def changed_lines(
         notify(i, len(programs))
         explanations = _of_program(program, partial(_answer, program, report), compared, tolerance)
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
-        if best and best[0].share == 1.0:
+        mutant_count = sum(other.mutant_count for other in programs)
+        if (best and best[0].share == 1.0) or mutant_count > MAX_MUTANTS:
             break
     return best if best and best[0].share >= MIN_SHARE else ()
 
