@@ -199,9 +199,10 @@ def with_claims(
     They come first if nothing else is wrong, and stand beside other mistakes if not. Positions say
     something unless what places the joints is known to be wrong (`is_placed`).
     """
-    findings = itertools.chain.from_iterable(judgement.findings for judgement in judgements)
+    findings = [finding for judgement in judgements for finding in judgement.findings]
     broken = {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
-    claims = explanations(answers) if broken & LAWS else []
+    is_false = broken & LAWS or any(entry.law == "claims" and entry.verdict for entry in findings)
+    claims = explanations(answers) if is_false else []
     if claims and claims[0].faults[0] in OF_RESIDUALS and _ends_by_residual(diagnosis, answers):
         diagnosis = replace(diagnosis, explanations=tuple(claims[:1]))
         claims = claims[1:]

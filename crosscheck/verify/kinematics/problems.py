@@ -29,7 +29,7 @@ MIN_ANGLE = 0.1
 MAX_AMPLIFICATION = 30.0
 # A target counts as easy if both textbook solvers reach it in EASY sweeps; ALLOWED are allowed.
 EASY, ALLOWED = 12, 60
-DRAWS = 1000
+DRAWS = 2000
 # The most iterations of a solve by an own method whose poses are asked one by one.
 CONTINUED = 7
 LOOSE = 1e-2
@@ -99,7 +99,7 @@ def _candidate(family: CaseFamily, rng: np.random.Generator) -> TargetProblem:
             direction = skeletons.onto_plane(direction) if family.planar else direction
             target = offsets[0] + arguments[0] * reach * direction
         case _:  # well within reach
-            effector = arguments[0] if arguments and kind != "stop test" else effector
+            effector = arguments[0] if arguments and kind in ("easy", "telling") else effector
             moved = skeleton._replace(local_rotations=rotation.random(rng, len(offsets)))
             moved = skeletons.in_plane(moved) if family.planar else moved
             target = forward(moved._asdict())[0][effector]
@@ -110,6 +110,10 @@ def _is_suitable(family: CaseFamily, problem: TargetProblem) -> bool:
     match family.target[0]:
         case "telling":
             return is_telling(family.sweeps, problem)
+        case "near miss":
+            _, least, most = family.target[1:]
+            low, high = misses(family.sweeps, problem)
+            return least < low and high < most and is_telling(family.sweeps, problem)
         case "easy" | "circle" | "behind":
             return is_easy(family.tolerance, problem)
         case "stop test":
@@ -131,6 +135,14 @@ def is_telling(sweeps: int, problem: TargetProblem) -> bool:
     x, _ = forward(inputs)
     nearest = np.linalg.norm(x[links] - problem.target, axis=-1).min()
     return bool(nearest > 0.2) and amplification(inputs) < MAX_AMPLIFICATION
+
+
+def misses(sweeps: int, problem: TargetProblem) -> tuple[float, float]:
+    """Return how far from the target sweeps of the solvers end, the smaller distance first [m]."""
+    inputs = request(problem, 0.0, sweeps, "")
+    ends = [solve(method, inputs)[1][problem.effector] for method in SOLVERS]
+    distances = np.linalg.norm(np.subtract(ends, problem.target), axis=-1)
+    return float(distances.min()), float(distances.max())
 
 
 def amplification(inputs: Mapping[str, Any]) -> float:
@@ -200,11 +212,13 @@ def _case(
     tolerance = family.tolerance
     if greeting.precision == "single" and family.name == "tight":
         tolerance = 3e-5
+    if family.target[0] == "near miss":
+        tolerance = float(f"{misses(family.sweeps, problem)[0] / family.target[1]:.2g}")
     if not greeting.rotations:
         problem = problem._replace(skeleton=skeletons.without_rotations(problem.skeleton))
     inputs = request(problem, tolerance, family.sweeps, method)
     geometry = facts(inputs)
-    if tolerance == 0.0:
+    if tolerance == 0.0 or family.sweeps == 1:
         geometry |= {"amplification": amplification(inputs), "sweeps": family.sweeps}
     return Case(name, TASK, inputs, family.name, family.about, facts=geometry,
                 requirement=family.requirement)  # fmt: skip

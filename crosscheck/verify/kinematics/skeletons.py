@@ -119,6 +119,12 @@ def arm(rng: np.random.Generator, angle: float = 1.2) -> PosedSkeleton:
     return PosedSkeleton(np.array(skeleton.parents), np.array(skeleton.offsets), np.array(local))
 
 
+def straight(rng: np.random.Generator) -> PosedSkeleton:
+    """Return a straight chain along x, its root at the origin."""
+    offsets = np.array([[0.0, 0.0, 0.0], [0.8, 0.0, 0.0], [0.6, 0.0, 0.0], [0.5, 0.0, 0.0]])
+    return PosedSkeleton(np.arange(-1, 3), offsets, rotation.identity(4))
+
+
 def quarter_turns(rng: np.random.Generator, joints: int) -> PosedSkeleton:
     """Return a chain along the axes with rotations by a right angle about them."""
     offsets = np.zeros((joints, 3))
@@ -188,6 +194,7 @@ SKELETONS: dict[str, Callable[..., PosedSkeleton]] = {
     "link of no length": link_of_no_length,
     "right angle": right_angle,
     "staircase": staircase,
+    "straight": straight,
 }
 
 

@@ -239,7 +239,9 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
 )
 def test_a_claim_is_about_the_position_and_the_rotation(robot, distance, angle, claim, verdicts):
     pose = SimpleNamespace(distance=distance, angle=angle, tolerance=1.0, tolerance_rotation=1.0)
-    found = robot_inverse_kinematics._target_laws(pose, {"converged": claim}, robot, ROBOTS, False)
+    found = robot_inverse_kinematics._target_laws(
+        pose, {"converged": claim}, robot, ROBOTS, False, False
+    )
     assert [finding.verdict for finding in found if finding.law == "claims"] == verdicts
 
 
