@@ -213,8 +213,8 @@ def judge_cases(
     is_double = diagnosis.is_double or precision.is_exact(report)
     if unexplained and greeting.precision == "double" and not is_double:
         single = judge(exchanges, msgspec.structs.replace(greeting, precision="single"), method)
-        is_right = single.verdict <= Verdict.RIGHT_EXCEPT and precision.is_off_by_single(report)
-        if is_right or single.diagnosis.explained:
+        is_right = single.verdict <= Verdict.RIGHT_EXCEPT
+        if precision.is_off_by_single(report) if is_right else single.diagnosis.explained:
             report, reason = single, precision.INEXACT
     if unsent := len(cases) - len(exchanges):
         hint = sentence(

@@ -245,7 +245,7 @@ def _from_zero(motion: Trajectory, laws: set[str]) -> Evidence:
 
 
 def _clamped(motion: Trajectory, laws: set[str]) -> Evidence:
-    return Evidence(motion.is_missed & motion.at_limits.any(axis=-1), motion.is_clamped)
+    return Evidence(_ends_off_target(motion) & motion.at_limits.any(axis=-1), motion.is_clamped)
 
 
 def _claimed(motion: Trajectory, laws: set[str]) -> Evidence:

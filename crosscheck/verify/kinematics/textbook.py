@@ -563,7 +563,7 @@ def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookP
     from the effector (6), or each link begins at the root (7) or has the next one's length (8). A
     right program has it (9) with the lengths of `lengths`; or it stretches away from the target
     (10), or leaves the chain as it is (11), or measures from the origin (12), or keeps each length
-    from the target (13).
+    from the target (13), or leaves the last (14) or the first link (15) as it is.
     """
     k = faults.stretch
     if k == 0:
@@ -583,8 +583,9 @@ def stretch(chain: TextbookChain, target: Any, faults: Switches, pose: TextbookP
     length = -norm(direction) if k == 10 else norm(direction)
     if length == 0.0 or k == 11:
         return k == 11
-    x = root
-    for m in range(last):
+    first = 1 if k == 15 else 0
+    x = load_vector(pose.positions, chain.path[first])
+    for m in range(first, last - 1 if k == 14 else last):
         stretched = link_length(chain, m, 8 if k == 8 else 0, pose.positions)
         if k == 13:
             x = pulled(target, x, stretched, 0)

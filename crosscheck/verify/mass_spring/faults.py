@@ -77,6 +77,9 @@ def options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
         matrix = option.fields.get("matrix")
         if matrix is not None and "dv" not in option.fields and matrix.masses == 1.0:
             yield option._replace(fields={**option.fields, "dv": True})
+            if matrix.element != RIGHT_MATRIX.element:
+                apart = matrix._replace(is_drag_right=True)
+                yield option._replace(fields={**option.fields, "dv": True, "matrix": apart})
         if matrix is not None and matrix.pins_element is None:
             right = matrix._replace(pins_element=RIGHT_MATRIX.element)
             yield option._replace(fields={**option.fields, "matrix": right})
@@ -159,7 +162,9 @@ def _in_parts(option: Option, entry: Mapping[str, Any]) -> Iterator[Option]:
         if part == "matrix":  # of local/global iterations that know the pins' part without it
             right = RIGHT_MATRIX._replace(pins_element=RIGHT_MATRIX.element)
             yield alone._replace(fields={**option.fields, "matrix": right})
-        if (part == "forces" and has_dampers) or (part == "matrix" and option.aspect == "masses"):
+        if (part == "forces" and has_dampers) or (
+            part == "matrix" and option.aspect in ("masses", "damping")
+        ):
             yield alone._replace(fields=in_dv)
 
 

@@ -86,6 +86,7 @@ class SystemMatrix(NamedTuple):
     # right-hand side differ
     drag: float = 1.0
     drag_power: int = 0
+    is_drag_right: bool = False  # whether K of h K v has no mistake of the matrix
     right_power: int = 0
     h: str = "h"  # a formula of what stands for h before the springs' part
     is_by_columns: bool = False  # the right-hand side: all x, then all y, in rows of x, y and z
@@ -637,7 +638,8 @@ class StepEquation:
         drift = np.zeros_like(right)
         if self.start.model.dv:
             drift = h * self.start.v
-            K = _assemble(p, springs * np.eye(3) if not rule.components else springs, rule)
+            K = _assemble(p, springs * np.eye(3) if not rule.components else springs,
+                          RIGHT_MATRIX if rule.is_drag_right else rule)  # fmt: skip
             drag = rule.drag * h ** (2 + rule.drag_power) * K @ drift.ravel()
             right = right - p.inertia * drift - drag.reshape(right.shape)
             right = right + h**2 * damper_forces(p, x, self.start.v) if self.damped else right

@@ -409,11 +409,16 @@ def _explanation(
 
 def _fault_sentence(option: Option) -> Sentence:
     """Return the sentence of a fault, or of an honest choice that the greeting denies."""
-    if any(option.key == choice.key for choice in honest(Step()).get(option.aspect, ())):
-        return sentence(
-            "It differs from the declared step and behaves like this: {what}.", what=option.sentence
-        )
-    return option.sentence
+    if not any(option.key == choice.key for choice in honest(Step()).get(option.aspect, ())):
+        return option.sentence
+    integrator = option.fields.get("integrator")
+    return sentence(
+        "It differs from the declared step and behaves like this: {what}. If it makes more "
+        "iterations, it finds directions once: find them again, at the new positions, in each."
+        if integrator and (integrator.method, integrator.iterations) == ("local_global", 1)
+        else "It differs from the declared step and behaves like this: {what}.",
+        what=option.sentence,
+    )
 
 
 def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
