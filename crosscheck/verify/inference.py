@@ -137,7 +137,8 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
                 sentence=sentence("If that is not meant: {what}", what=explanation.sentence),
             )
             for explanation in report.diagnosis.explanations
-        )
+            if not {code.split("-")[1] for code in explanation.codes} <= {"CLAIM"}
+        )  # what answers say of themselves is right where the restriction is meant
         best = replace(best, diagnosis=replace(best.diagnosis, explanations=explanations))
     return replace(best, assumptions=(*best.assumptions, *notes), is_asked=is_asked)
 

@@ -350,6 +350,8 @@ READINGS: Mapping[str, Reading] = {
     "limits of the joint before": _of_limits(partial(_shifted, 1)),
     "cones ignored": _of_limits(partial(_without_cones, False)),
     "hinges tilt": _of_limits(partial(_without_cones, True)),
+    "lower limits ignored": _of_limits(partial(_without, ("lower",))),
+    "upper limits ignored": _of_limits(partial(_without, ("upper",))),
     "twists ignored": _of_limits(partial(_without, FIELDS[2:])),
 }
 IGNORED, CLAMPED = "limits ignored", "clamped after the solve"
@@ -383,7 +385,7 @@ def _misreading(
         return IGNORED if is_far and not is_lost else ""
     if "" not in scores or scores[key] >= scores[""] + MORE_ENDS:
         return key
-    is_clamped = all(_is_clamped(*answer, bound) for answer in sweeps)
+    is_clamped = bool(sweeps) and all(_is_clamped(*answer, bound) for answer in sweeps)
     return CLAMPED if is_lost and is_clamped and _is_unfinished(whole, greeting) else ""
 
 
