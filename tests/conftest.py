@@ -141,9 +141,23 @@ LONG = (
     "test_robot_track.py::test_a_fault_is_named_by_its_code[limits ignored",
     "test_robot_jacobian.py::test_a_fault_is_named_in_another_convention",
     "test_anderson.py::test_no_sweep_raises_the_error[balls-numba",
+    "test_run.py::test_kills_at_random_moments_lose_nothing_finished_and_repeat_nothing",
+    "test_entrants.py::test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures",
+    "test_fault_codes.py::test_a_program_whose_answers_are_no_numbers_is_explained",
+    "test_mass_spring.py::test_one_iteration_is_not_taken_for_convergence",
 )
-# Tests that judge a program in each case, for seconds: the default run takes one case of so many.
+# Tests whose cases take seconds each: the default run takes one case of so many.
 SAMPLED = {
+    "test_worker_death.py::test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job": 3,
+    "test_worker_death.py::test_a_death_before_the_job_is_read_is_a_sentence": 2,
+    "test_worker_death.py::test_a_death_after_the_last_message_costs_nothing": 2,
+    "test_borders.py::test_every_public_function_keeps_the_law": 2,
+    "test_entry_point.py::test_a_closed_stream_costs_what_is_printed_there": 2,
+    "test_command_line.py::test_variables_of_numba_cost_no_traceback": 2,
+    "test_kinematics.py::test_law_of_inverse_kinematics_catches_a_lie": 2,
+    "test_kinematics.py::test_fault_of_tracking_is_caught_and_named": 2,
+    "test_kinematics.py::test_honest_variant_is_not_accused": 2,
+    "test_robot_velocity.py::test_a_fault_is_named_by_its_code": 2,
     "test_robot_track.py::test_a_fault_is_named_by_its_code": 5,
     "test_robot_jacobian.py::test_a_fault_is_named_by_its_code": 5,
     "test_fault_codes.py::test_a_wrong_program_is_named_by_its_code": 6,
