@@ -151,7 +151,6 @@ SAMPLED = {
     "test_worker_death.py::test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job": 3,
     "test_worker_death.py::test_a_death_before_the_job_is_read_is_a_sentence": 2,
     "test_worker_death.py::test_a_death_after_the_last_message_costs_nothing": 2,
-    "test_borders.py::test_every_public_function_keeps_the_law": 2,
     "test_entry_point.py::test_a_closed_stream_costs_what_is_printed_there": 2,
     "test_command_line.py::test_variables_of_numba_cost_no_traceback": 2,
     "test_kinematics.py::test_law_of_inverse_kinematics_catches_a_lie": 2,

@@ -73,7 +73,7 @@ def test_every_argument_of_numbers_has_some_in_a_call():
 
 
 # By default every so-manieth trial, of each function others; all of them are slow.
-STRIDES = {"arrays": 3, "bounds": 1, "magnitudes": 2, "objects": 5, "random": 1}
+STRIDES = {"arrays": 6, "bounds": 2, "magnitudes": 2, "objects": 10, "random": 1}
 
 
 @pytest.mark.parametrize("law", STRIDES)
