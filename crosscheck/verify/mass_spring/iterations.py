@@ -106,6 +106,11 @@ class Track(NamedTuple):
     is_early: bool  # whether the answer is wrong
     is_exhausted: bool  # whether there is no next iterate
 
+    @property
+    def is_moved(self) -> bool:
+        """Whether the answer is not the start: many other mistakes leave that."""
+        return len(self.moves) > 2
+
 
 def explanation(
     options: Sequence[Option],
@@ -132,7 +137,8 @@ def explanation(
         for course in group:
             key = course.fault.key if course.fault else EARLY_END["key"]
             is_tried = not is_hasty or course.fault in (None, *FOLLOWED_FAULTS)
-            if is_tried and all(_track(options, trial, course) for trial in wrong[:TRIALS]):
+            first = [_track(options, t, course) for t in wrong[:TRIALS]] if is_tried else []
+            if first and all(first) and any(track.is_moved for track in first if track):
                 matches.setdefault(key, course)
         if matches:
             tracks = {key: [_track(options, t, c) for t in trials] for key, c in matches.items()}

@@ -584,10 +584,14 @@ def velocity_fault(probes: Sequence[Probe], epsilon: float) -> Option | None:
         if not {"positions", "velocities"} <= probe.answers.keys():
             return None
         p, x = probe.problem, probe.answers["positions"]
-        d, v = x - p.positions, probe.answers["velocities"].copy()
-        v[p.pinned] = d[p.pinned] / p.h
-        value = partial(_start(p).value, d=d, x1=x)
-        samples.append(Sample(v, value, rounding(p, StepModel(), epsilon).velocities))
+        free = np.setdiff1d(np.arange(p.count), p.pinned)
+        start = partial(_start(p).value, d=x - p.positions, x1=x)
+
+        def value(formula: str, start: Any = start, free: Any = free, x: Any = x) -> Any:
+            return np.broadcast_to(start(formula), x.shape)[free]
+
+        allowed = rounding(p, StepModel(), epsilon).velocities
+        samples.append(Sample(probe.answers["velocities"][free], value, allowed))
     return relation_of("velocity", samples, VELOCITIES)
 
 
