@@ -34,7 +34,7 @@ from .relations import Sample, fitted, relation_of
 WORK, WORK_OF_PAIRS = 40_000, 10_000
 # What all searches of the same answers take at most; a prediction takes a unit, and its iterations
 # a fifth of one.
-MAX_WORK, SHARE_OF_ITERATION = 20_000.0, 0.2
+MAX_WORK, SHARE_OF_ITERATION = 30_000.0, 0.2
 # The number of hypotheses that are kept from one probe to the next, and of those to which a second
 # fault is added: the nearest.
 HYPOTHESES, NEAREST = 32, 40
