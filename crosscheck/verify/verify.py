@@ -96,12 +96,14 @@ def verify(
         causes = [r for r in reports if _builds_on(task, method, r)]
         causes.sort(key=lambda r: (not r.diagnosis.explained, BUILDS_ON[task].index(r.task)))
 
+        known, budget = _known_faults(task, reports, causes), Budget()
+
         def judge(
             greeting: Greeting,
             task: str = task,
             method: str = method,
-            known: Sequence[SwitchFault | str] | None = _known_faults(task, reports, causes),
-            budget: Budget = Budget(),  # noqa: B008, one for each task
+            known: Sequence[SwitchFault | str] | None = known,
+            budget: Budget = budget,
         ) -> TaskReport:
             cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
             return judge_cases(contestant, task, method, cases, notify, greeting, known, budget)
@@ -217,17 +219,20 @@ def judge_cases(
         if precision.is_off_by_single(report) if is_right else single.diagnosis.explained:
             report, reason = single, precision.INEXACT
     if unsent := len(cases) - len(exchanges):
-        hint = sentence(
-            "{hangs} requests got no answer in time, so the last {count} of {total} cases were not "
-            "sent. If your program is only slow, allow more time with --time-limit SECONDS; if "
-            "not, look for an endless loop in the case below.",
-            hangs=MAX_HANGS,
-            count=unsent,
-            total=len(cases),
-        )
-        hints = (*report.diagnosis.hints, hint)
+        hints = (*report.diagnosis.hints, _unsent(unsent, len(cases)))
         report = replace(report, diagnosis=replace(report.diagnosis, hints=hints))
     return replace(report, assumptions=(reason,) if reason else ())
+
+
+def _unsent(count: int, total: int) -> Sentence:
+    return sentence(
+        "{hangs} requests got no answer in time, so the last {count} of {total} cases were not "
+        "sent. If your program is only slow, allow more time with --time-limit SECONDS; if "
+        "not, look for an endless loop in the case below.",
+        hangs=MAX_HANGS,
+        count=count,
+        total=total,
+    )
 
 
 def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple[str, str]]:

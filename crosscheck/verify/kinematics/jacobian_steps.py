@@ -187,10 +187,9 @@ def iterations(trials: Sequence[PoseTrial], switched: Switches = RIGHT) -> Itera
     solves: dict[str, list[Mapping[str, FloatArray]]] = {}
     for trial in trials:
         inputs, facts, local = trial.case.inputs, trial.case.facts, trial.pose.local
-        is_end = inputs["tolerance"] > 0.0  # where different steps may be the same
-        if not trial.is_sweep or is_end or "like" in facts or local is None:
-            continue
-        if not trial.pose.finite:
+        # Where a sweep ends within a tolerance, different steps may be the same.
+        is_telling = trial.is_sweep and "like" not in facts and inputs["tolerance"] == 0.0
+        if not is_telling or local is None or not trial.pose.finite:
             continue
         name, path = facts.get("continues", trial.case.name), facts["path"]
         start = np.array(inputs["local_rotations"])

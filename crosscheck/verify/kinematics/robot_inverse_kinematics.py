@@ -97,15 +97,14 @@ def _with_iterations(
     motion = replace(solves[0], q=np.concatenate([solve.q for solve in solves]))  # by iteration
     gaps, dampings = _fitted(motion, motion.jacobians)
     frozen, _ = _fitted(motion, np.repeat(motion.jacobians[:1], MOST, axis=0))
-    if frozen.max() < SAME_ITERATION < gaps[1:].max():
-        words = sentence("Its iterations all use the Jacobian of the start. Compute it anew in "
-                         "each iteration, at the coordinates of that.")  # fmt: skip
-        return replace(diagnosis, behaviour=words, hints=(*diagnosis.hints, words))
     is_falling = (np.diff(np.linalg.norm(motion.twists(motion.q), axis=-1)) < 0.0).all()
     is_growing = (np.diff(dampings) >= 0.0).all() and dampings[-1] > GROWTH * dampings[0]
-    if verdict < Verdict.WRONG or gaps.max() > SAME_ITERATION or not (is_falling and is_growing):
+    if frozen.max() < SAME_ITERATION < gaps[1:].max():
+        key = "Jacobian kept"
+    elif verdict >= Verdict.WRONG and gaps.max() <= SAME_ITERATION and is_falling and is_growing:
+        key = "damping grows"
+    else:
         return diagnosis
-    key = "damping grows"
     return Diagnosis((Explanation((key,), motion_faults.SENTENCES[key], 1.0, 0.0),))
 
 

@@ -16,14 +16,7 @@ import numpy as np
 from plumbob.reference.arguments import BoolArray, FloatArray
 
 from .formulas import evaluate
-from .problem import (
-    SpringProblem,
-    accelerations,
-    damper_forces,
-    frames,
-    spring_forces,
-    stretches,
-)  # fmt: skip
+from .problem import SpringProblem, accelerations, damper_forces, frames, spring_forces, stretches
 
 # Rows of the unknowns that are taken for those of particles, as if no particle were left out.
 ROW_MISTAKES = (
@@ -298,14 +291,17 @@ def _step(
         h = float(evaluate(model.time, p))
     if model.time != "undivided":
         h /= model.substeps
-    pins, q = x[p.pinned], p
+    pins, first = x[p.pinned], p
     if model.substeps > 1 and _falls_freely(p, model):
         return _free_fall(Substep(p, model, x, v, h))
     for _ in range(model.substeps - (model.time == "one substep less")):
         x, v, start = *substep(Substep(p, model, x, v, h, near)), (x, v)
         if model.keeps_forces:
-            own, is_explicit = accelerations(q, *start) * q.inertia, model.integrator.explicit
-            kept = own if is_explicit else damper_forces(q, *start)
+            kept = (
+                accelerations(first, *start) * first.inertia
+                if model.integrator.explicit
+                else damper_forces(first, *start)
+            )
             p = p.changed(external=p.external + kept)
     if model.pins == "at_the_end":
         x, v = x.copy(), v.copy()

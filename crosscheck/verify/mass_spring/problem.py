@@ -4,6 +4,7 @@ Its forces are written from the formulas, apart from `reference`: a spring pulls
 -(k (l - r) + c (v_i - v_j)·u) u. A field states each deviation of a faulty solver.
 """
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -107,24 +108,8 @@ class SpringProblem:
         return self.weights + self.external
 
     def changed(self, **fields: Any) -> "SpringProblem":
-        """Return the problem with other fields, and what follows from those that stay."""
-        problem = object.__new__(SpringProblem)
-        problem.__dict__.update(self.__dict__)
-        for name, sources in _DERIVED.items():
-            if not sources.isdisjoint(fields):
-                problem.__dict__.pop(name, None)
-        problem.__dict__.update(fields)
-        return problem
-
-
-# The fields that cached properties follow from.
-_DERIVED = {
-    "incidence": {"springs", "masses"},
-    "pulled": {"springs", "masses", "ends", "accumulated"},
-    "stiff": {"stiffnesses"},
-    "damped": {"dampings"},
-    "constant": {"weights", "external"},
-}
+        """Return the problem with other fields."""
+        return dataclasses.replace(self, **fields)
 
 
 # A formula of a problem, and of values by their names.

@@ -158,7 +158,6 @@ class ModelSearch:
     ) -> None:
         """Set up the domains of all choices, with faults of some aspects or of all."""
         self.probes, self.step, self.epsilon = probes, step, epsilon
-        self.budget = budget or Budget()
         self.stages = [stage for probe in probes for stage in probe.stages()]
         self.domains = {
             aspect: [
@@ -190,7 +189,7 @@ class ModelSearch:
             *(["damper", "scaling"] if step.damper is not None else []),
             *(["substeps"] if step.substeps is not None else []),
         ]
-        self.prediction_count = 0  # number of predictions
+        self.budget, self.prediction_count = budget or Budget(), 0  # number of predictions
         self._work = 0.0  # iterations and substeps that they took
         self._skipped: set[int] = set()  # stages that no hypothesis explains
         self._roundings: dict[tuple[Any, ...], Rounding] = {}

@@ -563,6 +563,23 @@ def test_cases_suit_the_greeting_and_are_the_same_in_every_run(task):
         assert all(np.array_equal(a.inputs[key], b.inputs[key]) for key in a.inputs)
 
 
+@pytest.mark.parametrize("method", ["ccd", "fabrik"])
+@pytest.mark.parametrize("planar", [False, True])
+def test_one_sweep_ends_where_a_false_claim_of_success_shows(method, planar):
+    """Within the tolerance, or at so many tolerances that ten of them or a square root pass."""
+    greeting = Greeting(1, (INVERSE,), planar=planar)
+    for seed in range(3):
+        for case in DISCIPLINES[INVERSE].cases(greeting, method, seed, False):
+            if case.family in ("last sweep", "near miss", "miss"):
+                _, x, _ = solve(method, case.inputs)
+                tolerance = case.inputs["tolerance"]
+                distance = np.linalg.norm(x[case.inputs["effector"]] - case.inputs["target"])
+                assert (distance <= tolerance) == (case.family == "last sweep")
+                assert distance <= 10.0 * tolerance
+                if case.family != "last sweep":
+                    assert (distance**2 <= tolerance) == (case.family == "near miss")
+
+
 # ---- resampling
 
 
