@@ -155,7 +155,7 @@ def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
     )
     hint = Sentence(words.template, {"task": cause.task, "codes": ", ".join(codes)})
     others = [other for other in report.diagnosis.hints if other != NO_NUMBERS]
-    diagnosis = replace(report.diagnosis, hints=(hint, *others))
+    diagnosis = replace(report.diagnosis, explanations=(), hints=(hint, *others))
     return replace(report, diagnosis=diagnosis)
 
 
