@@ -166,7 +166,9 @@ def rotation_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Fi
     angles[pose.path[:-1]] = 0.0
     joint, key = int(np.argmax(angles)), "joints off the path"
     key += ", the effector" if joint == effector else ""
-    return [*findings, finding(key, angles[joint], bound, index=joint)]
+    # programs that turn whole branches by hand return the quotient of two global rotations
+    gathered = max(bound, min(bound * _repetitions(case), AGREEMENT))
+    return [*findings, finding(key, angles[joint], gathered, index=joint)]
 
 
 def position_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
