@@ -36,6 +36,22 @@ def with_code(code: str, words: Sentence) -> Sentence:
     return sentence("[{code}] {what}", code=code, what=words)
 
 
+def without_repetition(words: Sentence, told: set[str]) -> Sentence:
+    """Return a sentence with the faults in it that are told already named by their codes alone.
+
+    The texts of the others are added to what is told.
+    """
+    code = words.values.get("code")
+    if words.template == with_code("", words).template:
+        if words.text() in told:
+            return sentence("[{code}], as above.", code=code)
+        told.add(words.text())
+    return Sentence(words.template, {
+        name: without_repetition(value, told) if isinstance(value, Sentence) else value
+        for name, value in words.values.items()
+    })  # fmt: skip
+
+
 def codes_in(words: Sentence) -> tuple[str, ...]:
     """Return the codes of the faults that a sentence names, each once, in the order of the text."""
     codes = [code for key, code in words.values.items() if key == "code" and isinstance(code, str)]

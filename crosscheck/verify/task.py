@@ -14,6 +14,16 @@ import numpy as np
 
 Kind = Literal["number", "integer", "boolean", "text"]
 FILE = Path(__file__).with_name("tasks.toml")
+# The tasks that a task builds upon, the last step of the computation first.
+BUILDS_ON = {
+    "inverse_kinematics": ("forward_kinematics",),
+    "track": ("inverse_kinematics", "forward_kinematics"),
+    "mass_spring_step": ("mass_spring_forces",),
+    "mass_spring_motion": ("mass_spring_step", "mass_spring_forces"),
+    "robot_velocity": ("robot_jacobian",),
+    "robot_inverse_kinematics": ("robot_jacobian",),
+    "robot_track": ("robot_inverse_kinematics", "robot_jacobian"),
+}
 
 
 class Field(NamedTuple):

@@ -32,22 +32,13 @@ from .mass_spring.search import Budget
 from .mass_spring.stepping import Stepping
 from .one_line.search import with_changed_line
 from .sentence import Sentence, sentence
+from .task import BUILDS_ON
 from .timing import with_lesser_time
 
 # After so many timeouts in a task its other cases are not asked, nor are they asked again.
 MAX_HANGS = 2
 # Tasks that are tried once for every method that the greeting names.
 WITH_METHODS = ("inverse_kinematics", "track")
-# The tasks that a task builds upon, the last step of the computation first.
-BUILDS_ON = {
-    "inverse_kinematics": ("forward_kinematics",),
-    "track": ("inverse_kinematics", "forward_kinematics"),
-    "mass_spring_step": ("mass_spring_forces",),
-    "mass_spring_motion": ("mass_spring_step", "mass_spring_forces"),
-    "robot_velocity": ("robot_jacobian",),
-    "robot_inverse_kinematics": ("robot_jacobian",),
-    "robot_track": ("robot_inverse_kinematics", "robot_jacobian"),
-}
 Notify = Callable[[str, int, int], None]
 
 

@@ -75,7 +75,8 @@ def judge(
     judgements, diagnosis = _judge_unlimited(unlimited, greeting, method, base)
     is_sound = all(judgement.verdict <= Verdict.RIGHT_EXCEPT for judgement in judgements)
     limited_judgements, readings = limits.judge(limited, greeting, is_sound)
-    explanations = (*diagnosis.explanations, *readings.explanations)
+    is_read = not (base or diagnosis.explained)  # else what is wrong without limits is so with them
+    explanations = (*diagnosis.explanations, *(readings.explanations if is_read else ()))
     count = diagnosis.variant_count + readings.variant_count
     diagnosis = replace(diagnosis, explanations=explanations, variant_count=count)
     return report(TASK, method, [*judgements, *limited_judgements], diagnosis)

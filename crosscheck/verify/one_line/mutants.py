@@ -7,7 +7,7 @@ another, a line left out or in the wrong place.
 import ast
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar
@@ -60,6 +60,8 @@ class Program:
     """A right program that runs with any of its functions changed."""
 
     def __init__(self, source: str) -> None:
+        self.source = source
+        self._choices: Mapping[str, Any] = {}  # the values of constants that were chosen
         self._tree = ast.parse(source)
         for loop in ast.walk(self._tree):
             if isinstance(loop, ast.For | ast.While):
@@ -78,6 +80,20 @@ class Program:
         if "np" in self.names:
             self.names["np"] = FastNumpy()
 
+    def choose(self, constants: Mapping[str, Any]) -> None:
+        """Give constants of the program other values."""
+        self._choices = constants
+        self.names |= constants
+
+    def with_lines(self, lines: Sequence[tuple[str, str]]) -> "Program":
+        """Return the program with each first text, which it has once, replaced by the second."""
+        source = self.source
+        for right, wrong in lines:
+            source = source.replace(right, wrong)
+        program = Program(source)
+        program.choose(self._choices)
+        return program
+
     def _pass(self) -> None:
         self._passes += 1
         if self._passes > self._max_passes:
@@ -89,15 +105,24 @@ class Program:
         return run(), self._passes
 
     @contextmanager
-    def changed(self, mutant: Mutant, passes: int) -> Iterator[None]:
-        """Run the program with a change, given the passes that the right program takes."""
-        right = self.names[mutant.function]
+    def within(self, passes: int) -> Iterator[None]:
+        """Run the program, or stop it long after the passes that the right program takes."""
         self._passes, self._max_passes = 0, MAX_PASSES * (passes + 1)
-        self.names[mutant.function] = mutant.changed
         try:
             yield
         finally:
-            self.names[mutant.function], self._max_passes = right, UNLIMITED
+            self._max_passes = UNLIMITED
+
+    @contextmanager
+    def changed(self, mutant: Mutant, passes: int) -> Iterator[None]:
+        """Run the program with a change, given the passes that the right program takes."""
+        right = self.names[mutant.function]
+        self.names[mutant.function] = mutant.changed
+        try:
+            with self.within(passes):
+                yield
+        finally:
+            self.names[mutant.function] = right
 
     @property
     def _functions(self) -> list[ast.FunctionDef]:

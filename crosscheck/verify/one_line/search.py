@@ -1,4 +1,4 @@
-"""Search the right program with a changed line that gives a solver's wrong answers."""
+"""Search the right program with a known fault, or a changed line, that gives wrong answers."""
 
 import re
 import tomllib
@@ -14,15 +14,16 @@ import numpy as np
 from ..case import Case
 from ..contestant import Answer, Exchange, Failure
 from ..explain import MORE, Variant, difference, explain
-from ..fault_programs import PROGRAMS, source_of
+from ..fault_programs import PROGRAMS, CodedFault, coded_faults, source_of
 from ..functions import call
 from ..greeting import Greeting, Step
 from ..judgement import Explanation, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
+from ..kinematics.limits import READINGS
 from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..precision import judging_greeting
 from ..sentence import Sentence, sentence, with_code
-from ..task import TASKS
+from ..task import BUILDS_ON, TASKS
 from .mutants import Mutant, Program
 
 FAULTS = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))["line"]
@@ -41,6 +42,8 @@ MAX_PASSES = 200
 MAX_MUTANTS = 10_000
 # The input that asks for a single iteration of a solver.
 ITERATIONS = "max_iterations"
+# Faults of these families are named in other ways than by the lines of a program.
+SELF_NAMED = ("LINE", "STATE")
 # Longer lines are cut to what differs, with so many letters before and after.
 LINE, AROUND = 60, 20
 # Relative differences that rounding and the ends of iterations explain, by precision.
@@ -50,16 +53,18 @@ TOLERANCE = {"double": 1e-7, "single": 2e-4}
 def with_changed_line(
     report: TaskReport, greeting: Greeting, notify: Callable[[int, int], None]
 ) -> TaskReport:
-    """Return a report on wrong answers with the changed line that explains them.
+    """Return a report on wrong answers with the fault or changed line that explains them.
 
-    A line has to explain many more answers than the mistakes that are already named, and all where
-    these are of answered positions. `notify` is called before each right program with the number
-    of programs done, and of all.
+    A program has to explain many more answers than the mistakes that are already named, and all
+    where these are of answered positions or of how limits are read. `notify` is called before each
+    right program with the number of programs done, and of all.
     """
     named = report.diagnosis.explanations
     share = max((explanation.share for explanation in named), default=0.0) + MORE
     if named and all(OF_POSES.issuperset(explanation.faults) for explanation in named):
         share = 1.0 if named[0].share < 1.0 else share  # a line tells of rotations as well
+    if named and all(READINGS.keys() >= set(explanation.faults) for explanation in named):
+        share = 1.0  # a reading tells that limits are kept, a program which rotations it gives
     if report.verdict <= Verdict.RIGHT_EXCEPT or share > 1.0:
         return report
     explanations = changed_lines(report, greeting, notify)
@@ -88,7 +93,7 @@ def changed_lines(
     ]
     for i, program in enumerate(programs):
         notify(i, len(programs))
-        explanations = _of_program(program, partial(_answer, program, report), compared, tolerance)
+        explanations = _of_program(program, report, compared, tolerance)
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)
         if (best and best[0].share == 1.0) or mutant_count > MAX_MUTANTS:
@@ -97,16 +102,14 @@ def changed_lines(
 
 
 def _of_program(
-    program: Program,
-    run: Callable[[Case], Mapping[str, Any]],
-    compared: Sequence[Exchange],
-    tolerance: float,
+    program: Program, report: TaskReport, compared: Sequence[Exchange], tolerance: float
 ) -> tuple[Explanation, ...]:
-    """Return the changes of a line of a program that give answers, most answers first.
+    """Return the faults or changed lines of a program that give answers, most answers first.
 
     Answers that the program gives as it is come last, and no more of them than of the others: they
-    do not speak for a change.
+    do not speak for a change. Lines are changed where no known fault gives all answers.
     """
+    run = partial(_answer, program, report)
     passes, different, same = {}, list[Exchange](), list[Exchange]()
     for exchange in compared:
         assert isinstance(exchange.answer, Answer)
@@ -120,26 +123,55 @@ def _of_program(
     different = single if len(single) >= MIN_DIFFERENT else different
     if len(different) < MIN_DIFFERENT:
         return ()
-    program.observe(partial(run, different[0].case))
-    mutants = {str(number): mutant for number, mutant in enumerate(program.mutants())}
-    variants = (
-        Variant((key,), partial(_changed_answer, program, mutant, passes, run))
-        for key, mutant in mutants.items()
-    )
+    faults, mutants = dict[str, CodedFault](), dict[str, Mutant]()
+
+    def variants() -> Iterator[Variant]:
+        for fault in _faults_in(program.source, report.task, report.method):
+            faults[fault.name] = fault
+            predict = partial(_faulty_answer, program.with_lines(fault.lines), report, passes)
+            yield Variant((fault.name,), predict)
+        program.observe(partial(run, different[0].case))
+        for number, mutant in enumerate(program.mutants()):
+            mutants[str(number)] = mutant
+            predict = partial(_changed_answer, program, mutant, passes, run)
+            yield Variant((str(number),), predict, is_special=True)
+
+    def describe(keys: Sequence[str]) -> Sentence:
+        known = [faults[key] for key in keys if key in faults]
+        return with_code(known[0].code, known[0].sentence) if known else _describe(mutants, keys)
+
     telling = [*different, *same[: len(different)]]
-    return explain(variants, telling, lambda _: tolerance, partial(_describe, mutants), TRIAL)[0]
+    return explain(variants(), telling, lambda _: tolerance, describe, TRIAL)[0]
+
+
+def _faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
+    """Return the known faults of a task, and of those it builds upon, whose lines a program has."""
+    return [
+        fault
+        for fault in coded_faults().values()
+        if fault.family not in SELF_NAMED
+        and (fault.task in BUILDS_ON.get(task, ()) or _is_of(fault.program, task, method))
+        and fault.lines
+        and all(source.count(right) == 1 for right, _ in fault.lines)
+    ]
+
+
+def _is_of(program: str, task: str, method: str) -> bool:
+    """Return whether a right program has a task, and a method of it."""
+    entry = PROGRAMS[program]
+    return entry.get("task") == task and f"def {method}" in entry["text"]
 
 
 def _programs(report: TaskReport, step: Step) -> Iterator[Program]:
     """Yield the right programs of a task that have its method and the declared step."""
     for name, entry in PROGRAMS.items():
-        if entry.get("task") != report.task or f"def {report.method}" not in entry["text"]:
+        if not _is_of(name, report.task, report.method):
             continue
         program = Program(source_of(name))
         own = program.names.get("PLUMBOB", {}).get("step", {})
         choices = {field.upper() for field in own} & program.names.keys()
         declared = {field: getattr(step, field) for field in own}
-        program.names |= {c: v for c in choices if (v := declared[c.lower()]) is not None}
+        program.choose({c: v for c in choices if (v := declared[c.lower()]) is not None})
         if entry.get("searched", True) and all(
             value in (None, own[field]) or field.upper() in choices
             for field, value in declared.items()
@@ -217,6 +249,13 @@ def _changed_answer(
 ) -> Mapping[str, Any]:
     with program.changed(mutant, passes[case.name]):
         return run(case)
+
+
+def _faulty_answer(
+    program: Program, report: TaskReport, passes: Mapping[str, int], case: Case
+) -> Mapping[str, Any]:
+    with program.within(passes[case.name]):
+        return _answer(program, report, case)
 
 
 def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict, smallest_failures
-from ..sentence import Sentence, sentence, visible
+from ..sentence import Sentence, sentence, visible, without_repetition
 from . import comparison
 from .words import (
     GOOD,
@@ -105,18 +105,23 @@ def _summary(task: TaskReport, say: Say, indent: str = "") -> list[str]:
 
 
 def _all_details(tasks: Sequence[TaskReport], context: Presentation, room: int) -> list[str]:
-    """Return the details of tasks, once for neighbours of which the same is said."""
-    screen = list[str]()
-    details = [(title(task), _details(task, context, room)[1:]) for task in tasks]
-    for text, group in groupby(details, key=lambda pair: pair[1]):
-        heading = ", ".join(name for name, _ in group)
-        screen += ["", *wrapped(f"{heading}:"), *text]
+    """Return the details of tasks, once for neighbours of which the same is said.
+
+    What was said of a fault is not said again.
+    """
+    screen, told = list[str](), set[str]()
+    for _, group in groupby(tasks, key=lambda task: _details(task, context, room)[1:]):
+        same = list(group)
+        heading = ", ".join(map(title, same))
+        screen += ["", *wrapped(f"{heading}:"), *_details(same[0], context, room, told)[1:]]
     return screen
 
 
-def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:
+def _details(
+    task: TaskReport, context: Presentation, room: int, told: set[str] | None = None
+) -> list[str]:
     """Return the mistakes of a task and its smallest failing case, in so many lines if possible."""
-    say = context.say
+    say, told = context.say, set[str]() if told is None else told
     failure, command = task.smallest_failure, context.command(task)
     heading, why_limit = f"{title(task)}:", max(_EXPLANATION, room // 3)
     if failure is None:
@@ -134,7 +139,8 @@ def _details(task: TaskReport, context: Presentation, room: int) -> list[str]:
         saved = sentence('The case "{name}" is saved. To run it again:', name=failure.case.name)
         rerun = [*wrapped(say(saved), "  "), f"    {say(command)}"]
     room -= 1 + len(case) + len(rerun)
-    why = paragraphs(explanations(task), say, "  ")
+    words = [without_repetition(words, told) for words in explanations(task)]
+    why = paragraphs(words, say, "  ")
     why = _shorten(why, max(2, min(why_limit, room - 3)))
     rows = numbers(failures[-1], say, room - len(why) - 1)
     return [heading, *why, *case, *rows, *rerun]

@@ -8,6 +8,7 @@ import pytest
 
 from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.fault_programs import (
+    FAMILIES,
     PROGRAMS,
     coded_faults,
     contestant_of,
@@ -46,8 +47,18 @@ def changed_lines(source, task):
         if fault.family == "LINE"
     ],
 )
-def test_a_changed_line_is_named(fault):
+def test_a_changed_line_is_named(fault, monkeypatch):
+    monkeypatch.setattr(search, "SELF_NAMED", FAMILIES)  # lines that are known faults as well
     (explanation,) = changed_lines(fault.wrong_program, fault.task)
+    assert explanation.codes == (fault.code,)
+    assert explanation.share == 1.0
+
+
+def test_a_known_fault_of_another_program_is_named():
+    fault = coded_faults()["PB-LIMIT-010"]
+    source = source_of("hinges and cones").replace(*fault.lines[0])
+    explanation = changed_lines(source, fault.task)[0]
+    assert fault.program != "hinges and cones"
     assert explanation.codes == (fault.code,)
     assert explanation.share == 1.0
 
