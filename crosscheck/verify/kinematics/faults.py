@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from ..explain import either
 from ..judgement import LEAST_SHARE, TaskReport
-from ..sentence import Sentence, sentence, with_code
+from ..sentence import Sentence, codes_in, sentence, with_code
 from .algebra import FIRST_CROSS_TERM, FIRST_ELEMENT, FIRST_TERM, SIGNED, UNEQUAL
 from .switches import Switches
 from .textbook import (
@@ -278,8 +278,11 @@ def describe(method: str, keys: Sequence[str]) -> Sentence:
     faults = by_key(method)
     sentences = {key: fault.sentence for key, fault in faults.items()} | {"": AS_THE_TEXTBOOK}
     names = [key.split(" + ") for key in keys]
-    covered = {key for group in names for name in group if name for key in faults[name].covers}
-    names = [group for group in names if not covered.intersection(group)]
+    names = [group for group in names if not _covered(names, faults).intersection(group)]
+    # of faults that differ in a number alone the first is enough
+    names = list(
+        {tuple(codes_in(sentences[n]) for n in group): group for group in names[::-1]}.values()
+    )[::-1]
     mistakes = either([[sentences[name] for name in group] for group in names])
     parts = {faults[name].part for group in names for name in group if name}
     if method == "forward" or parts != {"forward"}:
@@ -293,7 +296,15 @@ def explaining(report: TaskReport) -> tuple[SwitchFault, ...]:
     """Return the faults that explain most answers of a report, () if none do."""
     by_name = by_key("ccd") | by_key("fabrik")
     for explanation in report.diagnosis.explanations[:1]:
-        keys = explanation.faults[0].split(" + ")
-        if explanation.share >= LEAST_SHARE and all(key in by_name for key in keys):
+        groups = [keys.split(" + ") for keys in explanation.faults]
+        if explanation.share >= LEAST_SHARE and by_name.keys() >= set(itertools.chain(*groups)):
+            keys = min(
+                groups, key=lambda group: bool(_covered(groups, by_name).intersection(group))
+            )
             return tuple(by_name[key] for key in keys)
     return ()
+
+
+def _covered(groups: Sequence[Sequence[str]], faults: Mapping[str, SwitchFault]) -> set[str]:
+    """Return the keys of faults that are in the sentences of others."""
+    return {key for group in groups for name in group if name for key in faults[name].covers}

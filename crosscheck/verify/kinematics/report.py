@@ -11,6 +11,7 @@ from ..judgement import (
     LEAST_SHARE,
     CaseJudgement,
     Diagnosis,
+    Explanation,
     TaskReport,
     Verdict,
     smallest_failures,
@@ -51,8 +52,23 @@ def diagnosis_of(
     # of the answers that are wrong, as many as of all answers to an unknown solver
     right_share = sum(exchange not in wrong for exchange in compared) / len(compared)
     least_share = right_share + LEAST_SHARE * (1.0 - right_share)
-    faulty = tuple(e for e in explanations if e.faults != ("",) and e.share >= least_share)
+    faulty = tuple(
+        explanation
+        for explanation in explanations
+        if explanation.faults != ("",)
+        and explanation.share >= least_share
+        and (explanation.share == 1.0 or not _adds(explanation, base))
+    )
     return Diagnosis(faulty, behaviour, variant_count=count)
+
+
+def _adds(explanation: Explanation, base: Sequence[SwitchFault]) -> bool:
+    """Return whether an explanation adds faults to those of what the task builds upon.
+
+    What these alone do to a program of another structure is more likely than one more fault.
+    """
+    keys = {fault.key for fault in base}
+    return bool(keys) and not keys.issuperset(explanation.faults[0].split(" + "))
 
 
 def report(

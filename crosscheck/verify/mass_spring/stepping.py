@@ -416,6 +416,9 @@ def _fault_sentence(option: Option) -> Sentence:
         "It differs from the declared step and behaves like this: {what}. If it makes more "
         "iterations, it finds directions once: find them again, at the new positions, in each."
         if integrator and (integrator.method, integrator.iterations) == ("local_global", 1)
+        else "It differs from the declared step and behaves like this: {what}. If dampers are "
+        "meant to be implicit, their part h c u u' of the system matrix is missing."
+        if option.fields.get("damper") == "explicit"
         else "It differs from the declared step and behaves like this: {what}.",
         what=option.sentence,
     )

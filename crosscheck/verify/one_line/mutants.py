@@ -155,10 +155,15 @@ class Program:
             plain = frozenset(text for text, is_plain in texts[function].items() if is_plain)
             self._scopes[function] = Scope(shapes_here, plain)
 
-    def mutants(self) -> Iterator[Mutant]:
-        """Yield each change of a line of the functions that were observed."""
+    def mutants(self, tried: set[str]) -> Iterator[Mutant]:
+        """Yield each change of a line of the functions that were observed.
+
+        Functions that are tried already, in programs that share them, are left out.
+        """
         for function in self._functions:
-            if function.name in self._scopes:
+            text = ast.unparse(function)
+            if function.name in self._scopes and text not in tried:
+                tried.add(text)
                 yield from self._of_block(function, function)
 
     def _of_block(self, function: ast.FunctionDef, block: Any) -> Iterator[Mutant]:

@@ -17,7 +17,7 @@ from ..explain import MORE, Variant, difference, explain
 from ..fault_programs import PROGRAMS, CodedFault, coded_faults, source_of
 from ..functions import call
 from ..greeting import Greeting, Step
-from ..judgement import Explanation, TaskReport, Verdict
+from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
 from ..kinematics.limits import READINGS
 from ..kinematics.sweeps import ROUNDED, PoseTrial
@@ -32,7 +32,8 @@ KINDS = list(FAULTS)
 # The most small and large wrong answers, and small right ones, that are compared with programs; a
 # program has to give the first of them.
 SMALL, LARGE, TRIAL = 9, 3, 1
-# So many answers a right program has to miss: fewer would be met by many changes by chance.
+# So many answers a right program has to miss before its lines are changed: fewer would be met by
+# many changes by chance.
 MIN_DIFFERENT = 3
 # The share of the answers that a program has to give.
 MIN_SHARE = 0.75
@@ -65,7 +66,12 @@ def with_changed_line(
         share = 1.0 if named[0].share < 1.0 else share  # a line tells of rotations as well
     if named and all(READINGS.keys() >= set(explanation.faults) for explanation in named):
         share = 1.0  # a reading tells that limits are kept, a program which rotations it gives
-    if report.verdict <= Verdict.RIGHT_EXCEPT or share > 1.0:
+    misses = report.verdict is Verdict.RIGHT_EXCEPT and any(
+        finding.verdict and finding.law == "target reached"
+        for judgement in report.judgements
+        for finding in (judgement.findings if "cones" in judgement.case.inputs else ())
+    )
+    if not (misses or report.verdict > Verdict.RIGHT_EXCEPT) or share > 1.0:
         return report
     explanations = changed_lines(report, greeting, notify)
     if not explanations or explanations[0].share < share:
@@ -84,7 +90,7 @@ def changed_lines(
     if not compared:
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
-    best: tuple[Explanation, ...] = ()
+    best, tried = tuple[Explanation, ...](), set[str]()
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
     programs = [
         program
@@ -93,7 +99,7 @@ def changed_lines(
     ]
     for i, program in enumerate(programs):
         notify(i, len(programs))
-        explanations = _of_program(program, report, compared, tolerance)
+        explanations = _of_program(program, report, compared, tolerance, tried)
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)
         if (best and best[0].share == 1.0) or mutant_count > MAX_MUTANTS:
@@ -102,12 +108,17 @@ def changed_lines(
 
 
 def _of_program(
-    program: Program, report: TaskReport, compared: Sequence[Exchange], tolerance: float
+    program: Program,
+    report: TaskReport,
+    compared: Sequence[Exchange],
+    tolerance: float,
+    tried: set[str],
 ) -> tuple[Explanation, ...]:
     """Return the faults or changed lines of a program that give answers, most answers first.
 
     Answers that the program gives as it is come last, and no more of them than of the others: they
-    do not speak for a change. Lines are changed where no known fault gives all answers.
+    do not speak for a change. Lines are changed where no known fault gives all answers, except in
+    functions that are tried already.
     """
     run = partial(_answer, program, report)
     passes, different, same = {}, list[Exchange](), list[Exchange]()
@@ -121,7 +132,7 @@ def _of_program(
     # Single iterations of another solver differ everywhere: they decide soon.
     single = [exchange for exchange in different if exchange.case.inputs.get(ITERATIONS) == 1]
     different = single if len(single) >= MIN_DIFFERENT else different
-    if len(different) < MIN_DIFFERENT:
+    if not different:
         return ()
     faults, mutants = dict[str, CodedFault](), dict[str, Mutant]()
 
@@ -130,8 +141,10 @@ def _of_program(
             faults[fault.name] = fault
             predict = partial(_faulty_answer, program.with_lines(fault.lines), report, passes)
             yield Variant((fault.name,), predict)
+        if len(different) < MIN_DIFFERENT:
+            return
         program.observe(partial(run, different[0].case))
-        for number, mutant in enumerate(program.mutants()):
+        for number, mutant in enumerate(program.mutants(tried)):
             mutants[str(number)] = mutant
             predict = partial(_changed_answer, program, mutant, passes, run)
             yield Variant((str(number),), predict, is_special=True)
@@ -140,7 +153,7 @@ def _of_program(
         known = [faults[key] for key in keys if key in faults]
         return with_code(known[0].code, known[0].sentence) if known else _describe(mutants, keys)
 
-    telling = [*different, *same[: len(different)]]
+    telling = [*different, *same[: max(len(different), MIN_DIFFERENT)]]
     return explain(variants(), telling, lambda _: tolerance, describe, TRIAL)[0]
 
 
@@ -192,10 +205,16 @@ def _compared(report: TaskReport) -> list[Exchange]:
     judgements.sort(key=lambda j: j.case.size)
     wrong = [j for j in judgements if j.verdict >= Verdict.UNDECIDED]
     right = [j for j in judgements if j.verdict < Verdict.UNDECIDED]
+    if not wrong:  # targets are missed within limits: single sweeps tell why
+        right, wrong = [], [j for j in judgements if "cones" in j.case.inputs and _is_single(j)]
     telling = [*wrong[:SMALL], *wrong[SMALL:][-LARGE:], *right[:SMALL]]
-    single = [j for j in right if j.case.inputs.get(ITERATIONS) == 1 and j not in telling]
+    single = [j for j in right if _is_single(j) and j not in telling]
     telling += single if judgements is not is_sweep else []
     return [_comparable(Exchange(j.case, j.answer, j.answer)) for j in telling if wrong]
+
+
+def _is_single(judgement: CaseJudgement) -> bool:
+    return bool(judgement.case.inputs.get(ITERATIONS) == 1)
 
 
 def _is_telling(case: Case, answer: Answer | Failure) -> bool:

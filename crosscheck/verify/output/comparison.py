@@ -96,7 +96,8 @@ def rows(judgement: CaseJudgement, count: int = 3) -> list[NumberRow]:
         for row in differing
     ]
     wrong = [row for row, gap in zip(differing, gaps, strict=True) if gap >= _ROUNDED * max(gaps)]
-    return (wrong or _effector(judgement.case.inputs, judgement.answer.values))[:count]
+    inputs, outputs = judgement.case.inputs, judgement.answer.values
+    return (wrong or _disagreeing(inputs, outputs, count) or _effector(inputs, outputs))[:count]
 
 
 def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[NumberRow]:
@@ -120,13 +121,26 @@ def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[Number
     ]  # fmt: skip
 
 
+def _disagreeing(inputs: Outputs, outputs: Outputs, count: int) -> list[NumberRow]:
+    """Return the answered positions that are not where the answered rotations put them."""
+    if "target" not in inputs or not {"positions", "local_rotations"} <= outputs.keys():
+        return []
+    placed = _positions(inputs, {"local_rotations": outputs["local_rotations"]})
+    gaps = np.abs(np.subtract(outputs["positions"], placed if placed is not None else 0.0))
+    if placed is None or gaps.max() <= _ROUNDED * np.abs(placed).max():
+        return []
+    return _of_output("positions", outputs["positions"], placed, count)
+
+
 def _effector(inputs: Outputs, outputs: Outputs) -> list[NumberRow]:
-    """Return the position of the effector beside its target, if the case has one."""
+    """Return the position of the effector beside its target, if the case has one that it misses."""
     positions = _positions(inputs, outputs) if "target" in inputs else None
     if positions is None:
         return []
-    reached = positions[int(inputs["effector"])]
-    return [NumberRow("effector", reached.tolist(), np.asarray(inputs["target"]).tolist())]
+    reached, target = positions[int(inputs["effector"])], np.asarray(inputs["target"])
+    if np.linalg.norm(reached - target) <= inputs.get("tolerance", 0.0):
+        return []
+    return [NumberRow("effector", reached.tolist(), target.tolist())]
 
 
 def texts(row: NumberRow) -> tuple[str, str]:
