@@ -18,6 +18,7 @@ from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.kinematics.predictions import forward
 from plumbob.crosscheck.verify.kinematics.switches import Switches
+from plumbob.crosscheck.verify.one_line import search
 from plumbob.crosscheck.verify.output import json_file, junit, page, terminal
 from plumbob.crosscheck.verify.output.fault_text import cause_and_remedy, explained, failure_of
 from plumbob.crosscheck.verify.output.words import Presentation, advice, speaker
@@ -117,9 +118,14 @@ def reports(program, task):
     return report
 
 
+# These no switch of the reference makes: the lines of a program alone show them.
+BY_LINES = ("PB-LIMIT-024", "PB-LIMIT-025", "PB-STEP-193", "PB-CCD-064", "PB-FABRIK-092")
+
+
 def samples():
-    faults = [fault for fault in coded_faults().values() if fault.family != "LINE"]
-    for number, fault in enumerate(faults):  # changed lines have tests of their own
+    own_tests = [f for f in coded_faults().values() if f.family == "LINE" or f.code in BY_LINES]
+    faults = [fault for fault in coded_faults().values() if fault not in own_tests]
+    for number, fault in enumerate(faults):
         is_quick = number % QUICK == 0 and fault.family not in ("LIMIT", "ROBOT", "STEP")
         marks = () if is_quick else pytest.mark.slow
         yield pytest.param(fault, id=fault.code, marks=marks)
@@ -156,6 +162,16 @@ HIDDEN = ("PB-CLAIM-024", "PB-CLAIM-032", "PB-STEP-080", "PB-STEP-082")
 
 @pytest.mark.parametrize("code", HIDDEN)
 def test_a_mistake_that_few_answers_show_is_named_by_its_code(code):
+    test_a_wrong_program_is_named_by_its_code(coded_faults()[code])
+
+
+@pytest.mark.parametrize(
+    "code", [pytest.param(code, marks=() if code in BY_LINES[:1] else pytest.mark.slow)
+             for code in BY_LINES]
+)  # fmt: skip
+def test_a_mistake_that_lines_alone_show_is_named_by_its_code(code, monkeypatch):
+    module = sys.modules["plumbob.crosscheck.verify.verify"]
+    monkeypatch.setattr(module, "with_changed_line", search.with_changed_line)
     test_a_wrong_program_is_named_by_its_code(coded_faults()[code])
 
 
