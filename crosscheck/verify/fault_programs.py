@@ -65,7 +65,10 @@ def source_of(program: str) -> str:
     """Return the source of a right program, given its name."""
     entry = PROGRAMS[program]
     texts = [*(PROGRAMS["parts"][part] for part in entry["parts"]), entry["text"]]
-    return "\n\n\n".join(text.strip("\n") for text in texts) + "\n"
+    source = "\n\n\n".join(text.strip("\n") for text in texts) + "\n"
+    for old, new in entry.get("replaced", ()):
+        source = source.replace(old, new)
+    return source
 
 
 @cache

@@ -128,9 +128,10 @@ def _known_faults(
 
 
 def _builds_on(task: str, method: str, report: TaskReport) -> bool:
-    """Return whether a task builds upon that of a report, which is wrong."""
+    """Return whether a task builds upon that of a report, which is wrong or may be."""
     is_earlier = report.task in BUILDS_ON.get(task, ()) and report.method in ("", method)
-    return is_earlier and report.verdict >= Verdict.WRONG
+    is_assumed = bool(report.assumptions and report.diagnosis.explanations)
+    return is_earlier and (report.verdict >= Verdict.WRONG or is_assumed)
 
 
 def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:

@@ -214,6 +214,6 @@ def with_claims(
         if claims and (of_poses or broken <= LAWS):
             diagnosis = replace(diagnosis, explanations=tuple(claims[:1]))
             claims = claims[1:]
-    if diagnosis.explanations or len(claims) > 1:
+    if diagnosis.explanations or len(claims) > 1 or broken - LAWS - {"claims"}:
         claims = [claim for claim in claims if claim.faults[0] != FOLLOWS]
     return replace(diagnosis, hints=(*(claim.sentence for claim in claims), *diagnosis.hints))

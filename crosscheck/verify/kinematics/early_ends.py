@@ -15,11 +15,13 @@ from ..explain import ending_test
 from ..greeting import Greeting
 from ..judgement import Explanation
 from ..sentence import Sentence, sentence, with_code
-from .faults import TABLE, by_key
+from .faults import TABLE, by_key, sentences_of
 from .predictions import solve
 from .sweeps import PoseTrial
 
-KEY = "early by another test"
+KEY, SQUARED = "early by another test", "tolerance against the squared distance"
+# So many solves end early, at least, if squared distances end them.
+LEAST_EARLY = 3
 # A pose is that after a sweep up to this share of the skeleton's size, by precision.
 SAME_POSE = {"double": 1e-7, "single": 1e-5}
 
@@ -182,3 +184,27 @@ def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> FollowedSolve |
     lengths = np.linalg.norm(inputs["offsets"][path[1:]], axis=1)
     root_distance = float(np.linalg.norm(inputs["target"] - poses[0][path[0]]))
     return FollowedSolve(gaps, float(inputs["tolerance"]), count < needed, lengths, root_distance)
+
+
+def by_squares(trials: Sequence[PoseTrial]) -> tuple[Explanation, ...]:
+    """Return that squared distances end solves, if these end early and no other distance does."""
+    solves = [
+        (trial.pose.distance, trial.case.inputs, trial.outputs["iterations"])
+        for trial in trials
+        if "iterations" in trial.outputs
+        and not trial.is_sweep
+        and trial.case.requirement == "must"
+        and trial.case.facts["least"] == 0.0
+        and trial.case.facts["before"] ** 2 > trial.case.inputs["tolerance"]
+    ]
+    early = [
+        (inputs, count)
+        for distance, inputs, count in solves
+        if distance > 1.01 * inputs["tolerance"]
+    ]
+    ends_so = all(distance**2 <= inputs["tolerance"] for distance, inputs, _ in solves)
+    if len(early) < LEAST_EARLY or not ends_so:
+        return ()
+    if any(count >= inputs["max_iterations"] for inputs, count in early):
+        return ()
+    return (Explanation((SQUARED,), sentences_of("stop")[SQUARED], 1.0, 0.0),)

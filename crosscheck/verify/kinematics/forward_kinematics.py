@@ -1,6 +1,7 @@
 """Forward kinematics: where all joints are, and how they are rotated."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -44,8 +45,20 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         for exchange, judgement in zip(exchanges, judgements, strict=True)
         if judgement.verdict > Verdict.RIGHT_EXCEPT
     ]
-    diagnosis = diagnosis_of("forward", exchanges, wrong, partial(_prediction_bound, greeting))
+    bound = partial(_prediction_bound, greeting)
+    diagnosis = diagnosis_of("forward", exchanges, wrong, bound)
+    if wrong and not diagnosis.explained:  # matrices that are no rotations become any quaternion
+        alone = {id(exchange): _positions_alone(exchange) for exchange in exchanges}
+        of_wrong = [alone[id(exchange)] for exchange in wrong]
+        diagnosis = diagnosis_of("forward", list(alone.values()), of_wrong, bound)
     return report(TASK, method, judgements, diagnosis)
+
+
+def _positions_alone(exchange: Exchange) -> Exchange:
+    outputs = exchange.answer.values if isinstance(exchange.answer, Answer) else {}
+    if "positions" not in outputs:
+        return exchange
+    return replace(exchange, answer=Answer({"positions": outputs["positions"]}, 0.0))
 
 
 def _prediction_bound(greeting: Greeting, case: Case) -> float:

@@ -35,7 +35,7 @@ from .report import diagnosis_of, report
 from .sweeps import PoseTrial, SweepComparison
 
 TASK = "inverse_kinematics"
-STOPS, SLOW = "sweeps made", "target reached, slow"
+STOPS, SLOW, ENDED = "sweeps made", "target reached, slow", "target reached, ended"
 # The methods of the textbook.
 METHODS = ("ccd", "fabrik")
 MAX_FAULTS = 3
@@ -75,8 +75,8 @@ def judge(
     judgements, diagnosis = _judge_unlimited(unlimited, greeting, method, base)
     is_sound = all(judgement.verdict <= Verdict.RIGHT_EXCEPT for judgement in judgements)
     limited_judgements, readings = limits.judge(limited, greeting, is_sound)
-    is_read = not (base or diagnosis.explained)  # else what is wrong without limits is so with them
-    explanations = (*diagnosis.explanations, *(readings.explanations if is_read else ()))
+    # what is wrong without limits is so with them
+    explanations = (*diagnosis.explanations, *(readings.explanations if is_sound else ()))
     count = diagnosis.variant_count + readings.variant_count
     diagnosis = replace(diagnosis, explanations=explanations, variant_count=count)
     return report(TASK, method, [*judgements, *limited_judgements], diagnosis)
@@ -194,7 +194,7 @@ def target_laws(
     slack = rounding.positions(greeting.epsilon, len(pose.positions), size, pose.drift)
     findings = []
     if "sweeps" not in case.facts:
-        findings.append(reached(distance, slack, case, method, greeting))
+        findings.append(reached(distance, slack, case, method, greeting, outputs))
         if method and case.inputs["tolerance"] == problems.LOOSE:
             findings += in_time(pose, case, method, greeting)
     elif method:
@@ -202,7 +202,14 @@ def target_laws(
     return [*findings, *pose_laws.claims(distance, slack, outputs, case)]
 
 
-def reached(distance: float, slack: float, case: Case, method: str, greeting: Greeting) -> Finding:
+def reached(
+    distance: float,
+    slack: float,
+    case: Case,
+    method: str,
+    greeting: Greeting,
+    outputs: Mapping[str, Any],
+) -> Finding:
     """Return whether the effector is as near as possible, within the tolerance."""
     nearest, inputs = case.facts["least"], case.inputs
     tolerance, excess = inputs["tolerance"] + slack, distance - nearest
@@ -211,7 +218,10 @@ def reached(distance: float, slack: float, case: Case, method: str, greeting: Gr
         closest = float(np.linalg.norm(x[inputs["effector"]] - inputs["target"]))
         tolerance += AS_SLOW * max(0.0, closest - nearest)
     law = "target reached" if nearest == 0.0 else "nearest point"
-    return finding(_miss(excess, case, method, greeting), excess, tolerance, law=law)
+    key, limit = _miss(excess, case, method, greeting), inputs["max_iterations"]
+    count = outputs.get("iterations", limit)
+    key = ENDED if key == SLOW and count < limit else key
+    return finding(key, excess, tolerance, law=law, count=count, limit=limit)
 
 
 def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> str:
@@ -303,6 +313,6 @@ def _diagnosis(
         return replace(diagnosis, explanations=(early,)) if early else diagnosis
     is_right = all(trial.judgement.verdict is Verdict.RIGHT for trial in trials)
     if not (comparison.method or is_right or diagnosis.explained):
-        steps = jacobian_steps.explanations(trials, greeting, base)
+        steps = jacobian_steps.explanations(trials, greeting, base) or early_ends.by_squares(trials)
         return replace(diagnosis, explanations=steps or diagnosis.explanations)
     return diagnosis

@@ -29,15 +29,15 @@ from .switches import Switches
 # Relative differences that rounding explains, and the least rotation of an iteration [rad].
 SAME = {"double": 1e-6, "single": 1e-2}
 LEAST_ANGLE = {"double": 1e-4, "single": 1e-2}
-# The share of the iterations that a model explains, the least number of iterations, and how many of
-# the first a model may miss.
-MIN_SHARE, MIN_COUNT, TRIAL = 0.75, 3, 4
+# The share of the iterations that a model explains, of which rotations beyond half a turn show
+# nothing; the least number of iterations, and how many of the first a model may miss.
+MIN_SHARE, MIN_COUNT, TRIAL = 0.6, 3, 4
 # Steps along the error, as the transpose's, do not show the damping: the sine of their angle.
 ALONG = 1e-3
 # A bound of all rotations below this is too small for most solves [rad].
 SMALL_BOUND = 0.1
 MAX_ALTERNATIVES = 3
-UNMOVED = "iterations that change nothing"
+UNMOVED, UNSOLVED = "iterations that change nothing", "wrong solution of the equation"
 # Formulas of a right program, which those in the `models` of a fault replace. Of the path's joints
 # but the effector there are the global rotations R, those of the parents P and the local ones Q as
 # matrices, and as quaternions those before an iteration, g, p and q, and after it, g1, p1 and q1;
@@ -242,6 +242,7 @@ def _mistake(steps: Sequence[Iteration], same: float) -> tuple[list[str], Mappin
     solutions = list[Solution]()
     if keys == [""]:
         keys, solutions = _best(solve, [*HONEST_STEPS, *of_steps], fits, same)
+        keys = keys or [UNSOLVED]
     for key, numbers in NUMBERS.items() if keys == [""] else ():
         values = numbers(solutions, same)
         if values is not None:

@@ -303,6 +303,15 @@ def _without_cones(is_hinge: bool, limits: JointLimits) -> JointLimits:
     return limits._replace(cones=np.where((limits.cones == 0.0) == is_hinge, np.pi, limits.cones))
 
 
+def _without_twists(is_hinge: bool, limits: JointLimits) -> JointLimits:
+    """Return limits without the twists of hinges, or of joints with cones."""
+    is_left, free = (limits.cones == 0.0) == is_hinge, _without(FIELDS[2:], limits)
+    return limits._replace(
+        lower=np.where(is_left, free.lower, limits.lower),
+        upper=np.where(is_left, free.upper, limits.upper),
+    )
+
+
 def _one_end(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimits, FloatArray]]:
     """Yield limits that leave their lower or their upper end only."""
     limits = limits_of(inputs)
@@ -331,9 +340,9 @@ def _in_the_world(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimi
 # answers keep, that which most joints are at an end of explains them; the earlier of equals.
 READINGS: Mapping[str, Reading] = {
     "": _of_limits(lambda limits: limits),
-    "half angles": _of_limits(partial(_scaled, 2.0, FIELDS[1:])),
     "half angles of cones": _of_limits(partial(_scaled, 2.0, FIELDS[1:2])),
     "half angles of twists": _of_limits(partial(_scaled, 2.0, FIELDS[2:])),
+    "half angles": _of_limits(partial(_scaled, 2.0, FIELDS[1:])),
     "cone as an opening": _of_limits(partial(_scaled, 0.5, FIELDS[1:2])),
     "limits in degrees": _of_limits(partial(_scaled, np.pi / 180.0, FIELDS[1:])),
     "limits exchanged": _one_end,
@@ -348,6 +357,8 @@ READINGS: Mapping[str, Reading] = {
     "axes in the world": _in_the_world,
     "limits of the next joint": _of_limits(partial(_shifted, -1)),
     "limits of the joint before": _of_limits(partial(_shifted, 1)),
+    "hinges leave their limits": _of_limits(partial(_without_twists, True)),
+    "twists of cones ignored": _of_limits(partial(_without_twists, False)),
     "cones ignored": _of_limits(partial(_without_cones, False)),
     "hinges tilt": _of_limits(partial(_without_cones, True)),
     "lower limits ignored": _of_limits(partial(_without, ("lower",))),

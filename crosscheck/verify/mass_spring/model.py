@@ -136,7 +136,8 @@ class StepModel(NamedTuple):
     right_start: bool = False  # whether iterations begin at x + h v, whatever stands for y
     # formulas of a motion: problem, fields of the problem of each step; end, the state that a step
     # ends with; state, that which the next one starts from; answer, of the positions X and the
-    # velocities V of the start and of all frames; matrix: that of the first step is kept
+    # velocities V of the start and of all frames; matrix: that of the first step is kept, if it is
+    # not empty on the left-hand side alone
     frames: Mapping[str, Mapping[str, str]] = {}
 
     @property
@@ -634,6 +635,8 @@ class StepEquation:
         drift = np.zeros_like(right)
         if self.start.model.dv:
             drift = h * self.start.v
+            if self.start.model.frames.get("matrix"):  # the right-hand side is of this step
+                springs = self.blocks(x, kind)[0]
             K = _assemble(p, springs * np.eye(3) if not rule.components else springs,
                           RIGHT_MATRIX if rule.is_drag_right else rule)  # fmt: skip
             drag = rule.drag * h ** (2 + rule.drag_power) * K @ drift.ravel()

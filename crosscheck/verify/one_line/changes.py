@@ -92,7 +92,8 @@ def _other_operators(node: Any) -> Iterator[Change]:
     }  # fmt: skip
     if isinstance(node, ast.Compare):
         for comparison in COMPARISONS:
-            yield "condition", ast.Compare(node.left, [comparison()], node.comparators)
+            others = [comparison(), *node.ops[1:]]
+            yield "condition", ast.Compare(node.left, others, node.comparators)
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
         yield from (("condition", ast.Constant(value)) for value in (True, False))
     elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):

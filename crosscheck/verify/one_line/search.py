@@ -32,6 +32,8 @@ KINDS = list(FAULTS)
 # The most small and large wrong answers, and small right ones, that are compared with programs; a
 # program has to give the first of them.
 SMALL, LARGE, TRIAL = 9, 3, 1
+# Of quarter turns rounding decides which of equal components a quaternion is made of.
+TRIAL_OF_QUARTERS = 6
 # So many answers a right program has to miss before its lines are changed: fewer would be met by
 # many changes by chance.
 MIN_DIFFERENT = 3
@@ -40,7 +42,7 @@ MIN_SHARE = 0.75
 # Cases for which a right program goes through its loops more often are left out: they take long.
 MAX_PASSES = 200
 # No further right program is changed after so many changes, of half a millisecond each.
-MAX_MUTANTS = 10_000
+MAX_MUTANTS = 16_000
 # The input that asks for a single iteration of a solver.
 ITERATIONS = "max_iterations"
 # Faults of these families are named in other ways than by the lines of a program.
@@ -56,36 +58,57 @@ def with_changed_line(
 ) -> TaskReport:
     """Return a report on wrong answers with the fault or changed line that explains them.
 
-    A program has to explain many more answers than the mistakes that are already named, and all
-    where these are of answered positions or of how limits are read. `notify` is called before each
-    right program with the number of programs done, and of all.
+    Beside a mistake that explains most answers only known faults are looked for, which have to
+    explain all. `notify` is called before each right program with the number of programs done, and
+    of all.
     """
     named = report.diagnosis.explanations
-    share = max((explanation.share for explanation in named), default=0.0) + MORE
-    if named and all(OF_POSES.issuperset(explanation.faults) for explanation in named):
-        share = 1.0 if named[0].share < 1.0 else share  # a line tells of rotations as well
-    if named and all(READINGS.keys() >= set(explanation.faults) for explanation in named):
-        share = 1.0  # a reading tells that limits are kept, a program which rotations it gives
-    misses = report.verdict is Verdict.RIGHT_EXCEPT and any(
-        finding.verdict and finding.law == "target reached"
-        for judgement in report.judgements
-        for finding in (judgement.findings if "cones" in judgement.case.inputs else ())
-    )
-    if not (misses or report.verdict > Verdict.RIGHT_EXCEPT) or share > 1.0:
+    share = _least_share(report)
+    if report.verdict <= Verdict.RIGHT_EXCEPT and not _misses_within_limits(report):
         return report
-    explanations = changed_lines(report, greeting, notify)
-    if not explanations or explanations[0].share < share:
+    if share > 1.0 and named[0].share == 1.0:
+        return report
+    explanations = changed_lines(report, greeting, notify, is_known=share > 1.0)
+    if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
     diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
     return replace(report, diagnosis=diagnosis)
 
 
+def _least_share(report: TaskReport) -> float:
+    """Return the share of answers that a program has to explain: many more than what is named.
+
+    It has to explain all where answered positions are named, or how limits are read: a program
+    tells of rotations as well.
+    """
+    named = report.diagnosis.explanations
+    faults = {fault for explanation in named for fault in explanation.faults}
+    if named and (READINGS.keys() >= faults or (faults <= OF_POSES and named[0].share < 1.0)):
+        return 1.0
+    return max((explanation.share for explanation in named), default=0.0) + MORE
+
+
+def _misses_within_limits(report: TaskReport) -> bool:
+    """Return whether targets are missed where joints have limits, which a mistake may explain."""
+    return any(
+        finding.verdict and finding.law == "target reached"
+        for judgement in report.judgements
+        for finding in (judgement.findings if "cones" in judgement.case.inputs else ())
+    )
+
+
 @np.errstate(all="ignore")  # changed programs divide by zero
 def changed_lines(
-    report: TaskReport, greeting: Greeting, notify: Callable[[int, int], None]
+    report: TaskReport,
+    greeting: Greeting,
+    notify: Callable[[int, int], None],
+    is_known: bool = False,
 ) -> tuple[Explanation, ...]:
-    """Return the change of a line that gives most of the answers, () if none gives enough."""
+    """Return the change of a line that gives most of the answers, () if none gives enough.
+
+    If `is_known`, only known faults are looked for.
+    """
     compared = _compared(report)
     if not compared:
         return ()
@@ -99,7 +122,9 @@ def changed_lines(
     ]
     for i, program in enumerate(programs):
         notify(i, len(programs))
-        explanations = _of_program(program, report, compared, tolerance, tried)
+        explanations = _of_program(
+            program, report, compared, tolerance, None if is_known else tried
+        )
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)
         if (best and best[0].share == 1.0) or mutant_count > MAX_MUTANTS:
@@ -112,13 +137,13 @@ def _of_program(
     report: TaskReport,
     compared: Sequence[Exchange],
     tolerance: float,
-    tried: set[str],
+    tried: set[str] | None,
 ) -> tuple[Explanation, ...]:
     """Return the faults or changed lines of a program that give answers, most answers first.
 
     Answers that the program gives as it is come last, and no more of them than of the others: they
     do not speak for a change. Lines are changed where no known fault gives all answers, except in
-    functions that are tried already.
+    functions that are tried already, or in none.
     """
     run = partial(_answer, program, report)
     passes, different, same = {}, list[Exchange](), list[Exchange]()
@@ -141,7 +166,7 @@ def _of_program(
             faults[fault.name] = fault
             predict = partial(_faulty_answer, program.with_lines(fault.lines), report, passes)
             yield Variant((fault.name,), predict)
-        if len(different) < MIN_DIFFERENT:
+        if len(different) < MIN_DIFFERENT or tried is None:
             return
         program.observe(partial(run, different[0].case))
         for number, mutant in enumerate(program.mutants(tried)):
@@ -154,7 +179,8 @@ def _of_program(
         return with_code(known[0].code, known[0].sentence) if known else _describe(mutants, keys)
 
     telling = [*different, *same[: max(len(different), MIN_DIFFERENT)]]
-    return explain(variants(), telling, lambda _: tolerance, describe, TRIAL)[0]
+    trial = TRIAL_OF_QUARTERS if report.task == "forward_kinematics" else TRIAL
+    return explain(variants(), telling, lambda _: tolerance, describe, trial)[0]
 
 
 def _faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
@@ -237,7 +263,17 @@ def _repeats(output: Any, array: Any) -> bool:
 
 
 def _comparable(exchange: Exchange) -> Exchange:
-    """Return what no choice of a program changes of an exchange: the larger part of J last."""
+    """Return what no choice of a program changes of an exchange.
+
+    The larger part of a Jacobian comes last, and global rotations are normalised.
+    """
+    if exchange.case.task == "forward_kinematics":
+        assert isinstance(exchange.answer, Answer)
+        values = dict(exchange.answer.values)
+        if "rotations" in values:
+            lengths = np.linalg.norm(values["rotations"], axis=-1, keepdims=True)
+            values["rotations"] = values["rotations"] / np.where(lengths > 0.0, lengths, 1.0)
+        return replace(exchange, answer=Answer(values, 0.0))
     if exchange.case.task == "robot_jacobian":
         assert isinstance(exchange.answer, Answer)
         parts = sorted(np.split(exchange.answer.values["jacobian"], 2), key=np.linalg.norm)

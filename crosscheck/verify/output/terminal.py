@@ -58,14 +58,17 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
     end = wrapped(say(advice(report.tasks)))
     good = [task for task in report.tasks if task.verdict in GOOD and reservations(task)]
     free = 0 if bad and height < ENDLESS else height - len(screen) - len(end) - 1
+    told = set[str]()
     for task in good:
-        screen += _shorten(_summary(task, say, "  "), max(_COMPLAINT, free // len(good)))
+        known = told if height == ENDLESS else set[str]()  # else it may be cut
+        text = _summary(task, say, "  ", known)
+        screen += _shorten(text, max(_COMPLAINT, free // len(good)))
     if bad and height < ENDLESS:
         brief = [line for task in bad[1:] for line in _shorten(_summary(task, say), 2)]
         room = height - len(screen) - len(end) - len(brief) - 2
         screen += ["", *_details(bad[0], context, room), *brief]
     else:
-        screen += _all_details(bad, context, height)
+        screen += _all_details(bad, context, height, told)
     if any(line.endswith(_ELLIPSIS) for line in screen):
         hint = sentence("Cut at …: use --html FILE or | cat to see all of it.")
         end = [*wrapped(say(hint)), *end]
@@ -95,21 +98,25 @@ def _grid(rows: Sequence[Sequence[str]], sides: str, size: int = _WIDEST) -> lis
     return [line.rstrip() for line in capture.get().splitlines()]
 
 
-def _summary(task: TaskReport, say: Say, indent: str = "") -> list[str]:
+def _summary(
+    task: TaskReport, say: Say, indent: str = "", told: set[str] | None = None
+) -> list[str]:
     """Return the name of a task and the sentences about its answers as one paragraph."""
-    failure = task.smallest_failure
+    failure, told = task.smallest_failure, set[str]() if told is None else told
     sentences = [*explanations(task), *failure.complaints] if failure else reservations(task)
-    words = list(dict.fromkeys(map(say, sentences)))
+    words = list(dict.fromkeys(say(without_repetition(words, told)) for words in sentences))
     new = [text for text in words if not any(text != other and text in other for other in words)]
     return wrapped(f"{title(task)}: " + " ".join(new), indent)
 
 
-def _all_details(tasks: Sequence[TaskReport], context: Presentation, room: int) -> list[str]:
+def _all_details(
+    tasks: Sequence[TaskReport], context: Presentation, room: int, told: set[str]
+) -> list[str]:
     """Return the details of tasks, once for neighbours of which the same is said.
 
-    What was said of a fault is not said again.
+    What was said of a fault, in `told`, is not said again.
     """
-    screen, told = list[str](), set[str]()
+    screen = list[str]()
     for _, group in groupby(tasks, key=lambda task: _details(task, context, room)[1:]):
         same = list(group)
         heading = ", ".join(map(title, same))

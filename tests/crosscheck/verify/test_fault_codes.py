@@ -119,7 +119,9 @@ def reports(program, task):
 
 
 # These no switch of the reference makes: the lines of a program alone show them.
-BY_LINES = ("PB-LIMIT-024", "PB-LIMIT-025", "PB-STEP-193", "PB-CCD-064", "PB-FABRIK-092")
+BY_LINES = (
+    "PB-LIMIT-024", "PB-LIMIT-025", "PB-STEP-193", "PB-CCD-064", "PB-FABRIK-092", "PB-FABRIK-093",
+)  # fmt: skip
 
 
 def samples():
@@ -182,7 +184,9 @@ STEPS = (
     "Newton's method with a line search", "implicit step", "implicit motion", "linearised motion",
 )  # fmt: skip
 SLOW = ("limited ccd", "robot", "robot_track", "newton step", *STEPS[2:])
-RESERVED = ("robot", "robot_track", "conjugate gradients", *STEPS[2:6])
+RESERVED = (
+    "robot", "robot_track", "conjugate gradients", "local-global step by a factor", *STEPS[2:6]
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
