@@ -237,15 +237,13 @@ def combinations(
 ) -> Iterator[tuple[SwitchFault, ...]]:
     """Yield no fault, single faults, pairs and likely triples, no two of the same switch.
 
-    With a `base`, yield it alone, and with each of the method's own faults; of those that follow a
-    curve only the faults of that.
+    With a `base`, yield it alone, and with each of the method's own faults, unless it follows a
+    curve: that takes long, and more will show when the base is corrected.
     """
     faults = FAULTS[method]
     if base:
-        is_track = method.startswith("track ")
         own = [(fault,) for fault in faults if fault.part not in ("forward", "quaternion")]
-        own = [(fault,) for (fault,) in own if fault.part == "follow" or not is_track]
-        yield from ((*base, *extra) for extra in ((), *own))
+        yield from ((*base, *extra) for extra in ((), *(() if "track" in method else own)))
         return
     yield ()
     yield from ((fault,) for fault in faults)

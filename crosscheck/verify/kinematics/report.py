@@ -6,7 +6,7 @@ from functools import partial
 
 from ..case import Case
 from ..contestant import Answer, Exchange
-from ..explain import explain, first_broken
+from ..explain import TRIAL, explain, first_broken
 from ..judgement import (
     LEAST_SHARE,
     CaseJudgement,
@@ -23,6 +23,8 @@ from .predictions import variants
 
 # The most cases that are compared with every variant, small and wrong ones first.
 COMPARED = 20
+# A track takes hundreds of sweeps: with faults that are known it has to be reproduced at once.
+TRIAL_OF_TRACKS = 1
 
 
 def diagnosis_of(
@@ -43,11 +45,9 @@ def diagnosis_of(
             return Diagnosis(behaviour=behaviour)
         compared += sorted(with_answers, key=lambda exchange: exchange.case.size)
     compared = compared[:COMPARED]
+    trial = TRIAL_OF_TRACKS if base and method.startswith("track") else TRIAL
     explanations, count = explain(
-        variants(method, max_faults, base),
-        compared,
-        tolerance,
-        partial(describe, method),
+        variants(method, max_faults, base), compared, tolerance, partial(describe, method), trial
     )
     # of the answers that are wrong, as many as of all answers to an unknown solver
     right_share = sum(exchange not in wrong for exchange in compared) / len(compared)

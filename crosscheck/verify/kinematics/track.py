@@ -17,7 +17,7 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import HOLDS, finding, judge_case
 from ..sentence import Sentence, sentence, with_code
 from . import claims, pose_laws, problems, rounding, skeletons, sweeps
@@ -141,9 +141,11 @@ def judge(
     bound = partial(_prediction_bound, greeting)
     diagnoses = [
         diagnosis_of(f"track {textbook}", list(comparable.values()), wrong, bound, base=base)
-        for textbook in ((method,) if method in METHODS else METHODS)
+        for textbook in METHODS
+        if method in ("", textbook)
     ]
-    best = max(diagnoses, key=lambda d: max((e.share for e in d.explanations), default=0.0))
+    shares = [max((e.share for e in d.explanations), default=0.0) for d in diagnoses]
+    best = diagnoses[int(np.argmax(shares))] if diagnoses else Diagnosis()
     explanations = tuple(_of_solves(explanation, base) for explanation in best.explanations)
     if wrong and not any(explanation.share == 1.0 for explanation in explanations):
         blended = _blended([frames_of(exchange) for exchange in exchanges])
