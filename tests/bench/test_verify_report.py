@@ -29,7 +29,7 @@ from plumbob.crosscheck.verify.judgement import (
 from plumbob.crosscheck.verify.language import translator
 from plumbob.crosscheck.verify.output import comparison, drawing, json_file, junit, page, terminal
 from plumbob.crosscheck.verify.output.words import GOOD, Presentation, digits, explanations, speaker
-from plumbob.crosscheck.verify.sentence import Sentence, sentence
+from plumbob.crosscheck.verify.sentence import Sentence, sentence, with_code
 from plumbob.reference import Skeleton, forward_kinematics
 
 HOSTILE = '<script>alert(1)</script>\x1b[31m\u202e & "quotes" \' ]]>'
@@ -125,6 +125,31 @@ def test_screen_has_explanations_complaints_numbers_and_advice(wrong, right):
     assert re.search(r"forward_kinematics  RIGHT +1\d\.\d +4/4", screen)
     assert "Next: --junit FILE for your CI" in screen
     assert "saved" not in screen
+
+
+def test_a_fault_is_told_once_a_screen(wrong):
+    fault = Explanation(("mend",), with_code("PB-FK-003", MEND), 1.0, 0.0)
+    twice = replace(wrong, tasks=[
+        replace(task, diagnosis=replace(task.diagnosis, explanations=(fault,)))
+        for task in wrong.tasks[:2]
+    ])  # fmt: skip
+    screen = normal("\n".join(terminal.lines(twice, shown(), height=terminal.ENDLESS)))
+    assert screen.count(f"[PB-FK-003] {MEND}") == 1
+    assert screen.count("[PB-FK-003], as above.") == 1
+
+
+def test_positions_that_rotations_do_not_give_stand_beside_those_that_they_give():
+    inputs = {
+        "parents": np.array([-1, 0]), "offsets": np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]),
+        "effector": 1, "target": np.array([1.0, 0.0, 0.0]), "tolerance": 1e-4,
+    }  # fmt: skip
+    rotations = np.array([[1.0, 0.0, 0.0, 0.0]] * 2)
+    for place, labels in ((1.0, []), (2.0, ["positions[1]"])):
+        outputs = {"local_rotations": rotations, "positions": np.array([[0.0] * 3, [place, 0, 0]])}
+        case = Case("", "inverse_kinematics", inputs, "", sentence("An arm."))
+        rows = comparison.rows(CaseJudgement(case, Answer(outputs, 0.0), (), {}))
+        assert [row.label for row in rows] == labels
+        assert [row.expected for row in rows] == [[1.0, 0.0, 0.0]] * len(labels)
 
 
 def test_nothing_is_cut_in_a_pipe(wrong, capsys):

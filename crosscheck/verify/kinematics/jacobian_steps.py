@@ -218,6 +218,8 @@ def explanations(
     all_iterations = list(iterations(trials, switches(base)))
     steps = [step for step in all_iterations if step.angle >= least]
     keys, values, count = _mistake(steps, same)
+    if keys == [UNSOLVED] and not any(trial.is_wrong for trial in trials):
+        keys = []  # there are other honest methods
     if len(all_iterations) >= MIN_COUNT and not steps:
         keys, count = [UNMOVED], 1
     if keys == [""] and base:

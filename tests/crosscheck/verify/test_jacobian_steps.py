@@ -8,6 +8,7 @@ from plumbob.crosscheck.verify.contestant import Exchange
 from plumbob.crosscheck.verify.fault_programs import contestant_of, source_of
 from plumbob.crosscheck.verify.kinematics import jacobian_steps, problems
 from plumbob.crosscheck.verify.kinematics.sweeps import PoseTrial
+from plumbob.crosscheck.verify.verify import verify
 
 SOLVE, JOINT_UPDATE = "J.T @ np.linalg.solve(A, pull)", "multiply(q[j], exponential(w))"
 ARM, BOUND = "arm = x[effector] - x[j]", "1.0 / max(np.linalg.norm(step, axis=1).max(), 1e-300)"
@@ -96,3 +97,17 @@ def test_neighbour_of_a_mistake_is_named(key):
     (explanation,) = explanations(NEIGHBOURS[key])
     assert explanation.faults == (key,)
     assert explanation.share == 1.0
+
+
+def test_squared_distances_end_the_solves_of_any_method():
+    right, wrong = (
+        "np.linalg.norm(target - x[effector]) <= tolerance",
+        "np.linalg.norm(target - x[effector]) ** 2 <= tolerance",
+    )
+    counted = source_of("jacobian").replace("for _ in range", "for count in range").replace(
+        '"positions": x}', '"positions": x, "iterations": count}'
+    )  # fmt: skip
+    for source, codes in ((counted, set()), (counted.replace(right, wrong), {"PB-STOP-001"})):
+        report = verify(contestant_of(source), ["inverse_kinematics"]).tasks[0]
+        named = report.diagnosis.explanations
+        assert {code for explanation in named for code in explanation.codes} == codes

@@ -160,9 +160,17 @@ STALL = {"double": 1e-5, "single": 4e-3}
 )
 def test_target_is_reached_to_the_tolerance(case, method, distance, verdict):
     """A solver of an unknown method that has come more than half the way is slow."""
-    finding = inverse_kinematics.reached(distance, 1e-12, case, method, GREETING)
+    finding = inverse_kinematics.reached(distance, 1e-12, case, method, GREETING, {})
     assert (finding.law, finding.verdict) == ("target reached", verdict)
     assert finding.error == distance
+
+
+@pytest.mark.parametrize(
+    ("iterations", "words"), [(4, "ends after 4 of 10 iterations"), (10, "converges slowly")]
+)
+def test_only_what_uses_all_iterations_converges_slowly(case, iterations, words):
+    finding = inverse_kinematics.reached(0.1, 1e-12, case, "", GREETING, {"iterations": iterations})
+    assert words in str(finding.sentence)
 
 
 @pytest.mark.parametrize("precision", STALL)
@@ -171,7 +179,7 @@ def test_stall_near_the_target_is_right_with_a_reservation(case, precision):
     case.inputs["tolerance"] = 0.0
     for factor, verdict in ((0.9, RIGHT_EXCEPT), (1.1, WRONG)):
         excess = factor * STALL[precision] * REACH
-        finding = inverse_kinematics.reached(excess, 1e-12, case, "ccd", greeting)
+        finding = inverse_kinematics.reached(excess, 1e-12, case, "ccd", greeting, {})
         assert finding.verdict is verdict
 
 
