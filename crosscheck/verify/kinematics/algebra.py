@@ -26,9 +26,9 @@ from plumbob.reference.quaternion import (
 
 from .switches import UNCAPPED, Switches
 
-# Of `multiply`, from this number on each of the 16 terms a_i b_j has the wrong sign; of `cross`,
-# from that one each of the six.
-FIRST_TERM, FIRST_CROSS_TERM = 5, 5
+# Of `multiply`, from these numbers on each of the 16 terms a_i b_j has the wrong sign, and each
+# component of a x b; of `cross`, from the last on each of the six terms.
+FIRST_TERM, FIRST_COMPONENT, FIRST_CROSS_TERM = 5, 21, 5
 # Of `rotate`, the first number of an element of a matrix that has the wrong sign.
 FIRST_ELEMENT = 4
 # Up to this number `angle` changes the angle of the right arc.
@@ -52,6 +52,10 @@ def product(a: Any, b: Any, faults: Switches) -> Any:
     w, x, y, z = multiply(a, b)
     if k == 2:
         return 2.0 * a[0] * b[0] - w, x, y, z
+    if k >= FIRST_COMPONENT:
+        c = k - FIRST_COMPONENT
+        p, q, r = cross((a[1], a[2], a[3]), (b[1], b[2], b[3]))
+        return w, x - 2.0 * p * (c == 0), y - 2.0 * q * (c == 1), z - 2.0 * r * (c == 2)
     if k >= FIRST_TERM:
         i, j = (k - FIRST_TERM) // 4, (k - FIRST_TERM) % 4
         is_negative = i > 0 and j > 0 and (i == j or (i - j) % 3 == 1)

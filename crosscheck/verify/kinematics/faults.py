@@ -10,7 +10,14 @@ from typing import Any, NamedTuple
 from ..explain import either
 from ..judgement import LEAST_SHARE, TaskReport
 from ..sentence import Sentence, codes_in, sentence, with_code
-from .algebra import FIRST_CROSS_TERM, FIRST_ELEMENT, FIRST_TERM, SIGNED, UNEQUAL
+from .algebra import (
+    FIRST_COMPONENT,
+    FIRST_CROSS_TERM,
+    FIRST_ELEMENT,
+    FIRST_TERM,
+    SIGNED,
+    UNEQUAL,
+)
 from .switches import Switches
 from .textbook import (
     DROPPED,
@@ -155,7 +162,9 @@ DIRECTIONS = (
 
 
 def _term(number: int) -> tuple[str, str]:
-    """Return a term of the product of two quaternions, and the component that has it."""
+    """Return a term of the product of two quaternions, or none, and the component that has it."""
+    if number >= FIRST_COMPONENT:
+        return "", "xyz"[number - FIRST_COMPONENT]
     i, j = divmod(number - FIRST_TERM, 4)
     return f"a.{'wxyz'[i]} b.{'wxyz'[j]}", "wxyz"[i ^ j]
 

@@ -203,6 +203,7 @@ def _pose(
     inputs: Mapping[str, Any], path: Any, local: FloatArray, switched: Switches
 ) -> Mapping[str, FloatArray]:
     x, R = (part[path] for part in forward({**inputs, "local_rotations": local}, switched))
+    R, _ = rotation.normalise(R)  # wrong products are not unit
     parents = np.concatenate([rotation.identity(1), R[:-2]])
     return {"x": x, "q": local[path[:-1]], "p": parents, "g": R[:-1]}
 
@@ -226,6 +227,8 @@ def explanations(
         keys = [" + ".join(fault.key for fault in base)]
         words = describe("ccd", keys)
     elif any(keys):
+        covered = {key for other in keys for key in ENTRIES[other].get("covers", ())}
+        keys = [key for key in keys if key not in covered]
         sentences = [Sentence(ENTRIES[key]["sentence"], values) for key in keys]
         words = either(
             [[with_code(ENTRIES[k]["code"], s)] for k, s in zip(keys, sentences, strict=True)]

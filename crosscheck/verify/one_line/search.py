@@ -20,7 +20,8 @@ from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
 from ..kinematics.limits import READINGS
-from ..kinematics.sweeps import ROUNDED, PoseTrial
+from ..kinematics.sweeps import LAW, ROUNDED, PoseTrial
+from ..laws import finding
 from ..precision import judging_greeting
 from ..sentence import Sentence, sentence, with_code
 from ..task import BUILDS_ON, TASKS
@@ -58,22 +59,31 @@ def with_changed_line(
 ) -> TaskReport:
     """Return a report on wrong answers with the fault or changed line that explains them.
 
-    Beside a mistake that explains most answers only known faults are looked for, which have to
-    explain all. `notify` is called before each right program with the number of programs done, and
-    of all.
+    Beside a mistake that explains most answers, or where no target is missed, only known faults are
+    looked for; they have to explain all. `notify` is called before each right program with the
+    number of programs done, and of all.
     """
-    named = report.diagnosis.explanations
-    share = _least_share(report)
-    if report.verdict <= Verdict.RIGHT_EXCEPT and not _misses_within_limits(report):
-        return report
-    if share > 1.0 and named[0].share == 1.0:
-        return report
-    explanations = changed_lines(report, greeting, notify, is_known=share > 1.0)
+    named, share = report.diagnosis.explanations, _least_share(report)
+    if report.verdict > Verdict.RIGHT_EXCEPT:
+        if share > 1.0 and named[0].share == 1.0:
+            return report
+        doubtful, is_known = list[CaseJudgement](), share > 1.0
+    else:
+        doubtful, is_known = _doubtful(report)
+        if named or not doubtful:
+            return report
+        share = 1.0
+    explanations = changed_lines(report, greeting, notify, doubtful, is_known)
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
     diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
-    return replace(report, diagnosis=diagnosis)
+    remark = finding("one sweep, of a mistake", 1.0)
+    judgements = [
+        replace(j, findings=(*j.findings, remark)) if j in doubtful else j
+        for j in report.judgements
+    ]
+    return replace(report, judgements=judgements, diagnosis=diagnosis)
 
 
 def _least_share(report: TaskReport) -> float:
@@ -89,13 +99,23 @@ def _least_share(report: TaskReport) -> float:
     return max((explanation.share for explanation in named), default=0.0) + MORE
 
 
-def _misses_within_limits(report: TaskReport) -> bool:
-    """Return whether targets are missed where joints have limits, which a mistake may explain."""
-    return any(
-        finding.verdict and finding.law == "target reached"
-        for judgement in report.judgements
-        for finding in (judgement.findings if "cones" in judgement.case.inputs else ())
-    )
+def _doubtful(report: TaskReport) -> tuple[list[CaseJudgement], bool]:
+    """Return sweeps that no law calls wrong, and whether there is no other reason to doubt them.
+
+    They are those that differ from the textbook's, or else those within limits, beside which
+    targets may be missed.
+    """
+
+    def has(law: str, judgement: CaseJudgement) -> bool:
+        return any(entry.verdict and entry.law == law for entry in judgement.findings)
+
+    sweeps = [j for j in report.judgements if j.case.requirement == "must" and _is_single(j)]
+    differing = [j for j in sweeps if has(LAW, j)]
+    if differing:
+        return differing, False
+    limited = [j for j in report.judgements if "cones" in j.case.inputs]
+    is_missed = any(has("target reached", judgement) for judgement in limited)
+    return [j for j in sweeps if j in limited], not is_missed
 
 
 @np.errstate(all="ignore")  # changed programs divide by zero
@@ -103,13 +123,14 @@ def changed_lines(
     report: TaskReport,
     greeting: Greeting,
     notify: Callable[[int, int], None],
+    doubtful: Sequence[CaseJudgement] = (),
     is_known: bool = False,
 ) -> tuple[Explanation, ...]:
     """Return the change of a line that gives most of the answers, () if none gives enough.
 
-    If `is_known`, only known faults are looked for.
+    These are the wrong ones, or the doubtful ones. If `is_known`, only known faults are looked for.
     """
-    compared = _compared(report)
+    compared = _compared(report, doubtful)
     if not compared:
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
@@ -120,6 +141,8 @@ def changed_lines(
         for program in _programs(report, greeting.step)
         if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
     ]
+    if doubtful and any(_gives(program, report, compared, tolerance) for program in programs):
+        return ()
     for i, program in enumerate(programs):
         notify(i, len(programs))
         explanations = _of_program(
@@ -130,6 +153,17 @@ def changed_lines(
         if (best and best[0].share == 1.0) or mutant_count > MAX_MUTANTS:
             break
     return best if best and best[0].share >= MIN_SHARE else ()
+
+
+def _gives(
+    program: Program, report: TaskReport, compared: Sequence[Exchange], tolerance: float
+) -> bool:
+    """Return whether a right program gives all answers."""
+    pairs = ((_answer(program, report, one.case), one.answer) for one in compared)
+    return all(
+        isinstance(answer, Answer) and difference(right, answer.values) <= tolerance
+        for right, answer in pairs
+    )
 
 
 def _of_program(
@@ -218,8 +252,8 @@ def _programs(report: TaskReport, step: Step) -> Iterator[Program]:
             yield program
 
 
-def _compared(report: TaskReport) -> list[Exchange]:
-    """Return small and large answers, the wrong answers first."""
+def _compared(report: TaskReport, doubtful: Sequence[CaseJudgement]) -> list[Exchange]:
+    """Return small and large answers, the wrong or doubtful answers first."""
     judgements = [
         judgement
         for judgement in report.judgements
@@ -229,10 +263,8 @@ def _compared(report: TaskReport) -> list[Exchange]:
     if any(j.verdict >= Verdict.UNDECIDED for j in is_sweep):
         judgements = is_sweep
     judgements.sort(key=lambda j: j.case.size)
-    wrong = [j for j in judgements if j.verdict >= Verdict.UNDECIDED]
-    right = [j for j in judgements if j.verdict < Verdict.UNDECIDED]
-    if not wrong:  # targets are missed within limits: single sweeps tell why
-        right, wrong = [], [j for j in judgements if "cones" in j.case.inputs and _is_single(j)]
+    wrong = [j for j in judgements if j.verdict >= Verdict.UNDECIDED or j in doubtful]
+    right = [j for j in judgements if j not in wrong and not doubtful]
     telling = [*wrong[:SMALL], *wrong[SMALL:][-LARGE:], *right[:SMALL]]
     single = [j for j in right if _is_single(j) and j not in telling]
     telling += single if judgements is not is_sweep else []
