@@ -169,10 +169,8 @@ def test_a_mistake_that_few_answers_show_is_named_by_its_code(code):
     test_a_wrong_program_is_named_by_its_code(coded_faults()[code])
 
 
-@pytest.mark.parametrize(
-    "code", [pytest.param(code, marks=() if code in BY_LINES[:1] else pytest.mark.slow)
-             for code in BY_LINES]
-)  # fmt: skip
+@pytest.mark.slow
+@pytest.mark.parametrize("code", BY_LINES)
 def test_a_mistake_that_lines_alone_show_is_named_by_its_code(code, monkeypatch):
     module = sys.modules["plumbob.crosscheck.verify.verify"]
     monkeypatch.setattr(module, "with_changed_line", search.with_changed_line)

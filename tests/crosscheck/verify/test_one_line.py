@@ -149,7 +149,7 @@ def test_answers_of_a_right_program_speak_for_no_change():
     broken = replace(judgement.findings[0], verdict=Verdict.WRONG)
     judgements = [replace(each, findings=(broken,)) for each in report.judgements]
     report = replace(report, judgements=judgements)
-    assert search._compared(report)
+    assert search._compared(report, [])
     assert search.changed_lines(report, greeting, lambda done, total: None) == ()
 
 
