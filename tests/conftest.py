@@ -145,6 +145,16 @@ LONG = (
     "test_entrants.py::test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures",
     "test_fault_codes.py::test_a_program_whose_answers_are_no_numbers_is_explained",
     "test_mass_spring.py::test_one_iteration_is_not_taken_for_convergence",
+    "test_user_files.py::test_a_file_without_end_is_refused_in_a_sentence[verify solver.py --rerun",
+    "test_disk_cache.py::test_damaged_files_are_compiled_anew_and_whole_ones_used",
+    "test_fault_codes.py::test_a_mistake_that_few_answers_show_is_named_by_its_code[PB-STEP-080",
+    "test_entrants.py::test_a_changed_file_is_measured_again_and_a_part_forgets_nothing",
+    "test_verify_command.py::test_full_disk_behind_the_screen_costs_no_file[right.py",
+    "test_hostile_programs.py::test_each_has_its_sentence_and_the_next_case_works[closes all",
+    "test_hostile_programs.py::test_each_has_its_sentence_and_the_next_case_works[forks and ends",
+    "test_shared_quaternions.py::test_a_fault_of_fabrik_is_named_by_another_rule[other lengths",
+    "test_command_line.py::test_variables_of_numba_cost_no_traceback[no compiler, check",
+    "test_show.py::test_a_still_shows_the_whole_curve_by_each_solver_and_what_its_colours_mean",
 )
 # Tests whose cases take seconds each: the default run takes one case of so many.
 SAMPLED = {
