@@ -36,18 +36,18 @@ def with_code(code: str, words: Sentence) -> Sentence:
     return sentence("[{code}] {what}", code=code, what=words)
 
 
-def without_repetition(words: Sentence, told: set[str]) -> Sentence:
-    """Return a sentence with the faults in it that are told already named by their codes alone.
+def without_repetition(words: Sentence, texts: set[str]) -> Sentence:
+    """Return a sentence in which faults whose texts stand in `texts` are named by their codes alone.
 
-    The texts of the others are added to what is told.
+    The texts of the others are added to `texts`.
     """
     code = words.values.get("code")
     if words.template == with_code("", words).template:
-        if words.text() in told:
+        if words.text() in texts:
             return sentence("[{code}], as above.", code=code)
-        told.add(words.text())
+        texts.add(words.text())
     return Sentence(words.template, {
-        name: without_repetition(value, told) if isinstance(value, Sentence) else value
+        name: without_repetition(value, texts) if isinstance(value, Sentence) else value
         for name, value in words.values.items()
     })  # fmt: skip
 

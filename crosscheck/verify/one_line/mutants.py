@@ -155,15 +155,15 @@ class Program:
             plain = frozenset(text for text, is_plain in texts[function].items() if is_plain)
             self._scopes[function] = Scope(shapes_here, plain)
 
-    def mutants(self, tried: set[str]) -> Iterator[Mutant]:
+    def mutants(self, functions: set[str]) -> Iterator[Mutant]:
         """Yield each change of a line of the functions that were observed.
 
-        Functions that are tried already, in programs that share them, are left out.
+        `functions` are those changed already, in programs that share them: they are left out.
         """
         for function in self._functions:
             text = ast.unparse(function)
-            if function.name in self._scopes and text not in tried:
-                tried.add(text)
+            if function.name in self._scopes and text not in functions:
+                functions.add(text)
                 yield from self._of_block(function, function)
 
     def _of_block(self, function: ast.FunctionDef, block: Any) -> Iterator[Mutant]:

@@ -134,7 +134,7 @@ def changed_lines(
     if not compared:
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
-    best, tried = tuple[Explanation, ...](), set[str]()
+    best, functions = tuple[Explanation, ...](), set[str]()
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
     programs = [
         program
@@ -146,7 +146,7 @@ def changed_lines(
     for i, program in enumerate(programs):
         notify(i, len(programs))
         explanations = _of_program(
-            program, report, compared, tolerance, None if is_known else tried
+            program, report, compared, tolerance, None if is_known else functions
         )
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)
@@ -171,26 +171,16 @@ def _of_program(
     report: TaskReport,
     compared: Sequence[Exchange],
     tolerance: float,
-    tried: set[str] | None,
+    functions: set[str] | None,
 ) -> tuple[Explanation, ...]:
     """Return the faults or changed lines of a program that give answers, most answers first.
 
     Answers that the program gives as it is come last, and no more of them than of the others: they
     do not speak for a change. Lines are changed where no known fault gives all answers, except in
-    functions that are tried already, or in none.
+    `functions` that are changed already, or in none.
     """
     run = partial(_answer, program, report)
-    passes, different, same = {}, list[Exchange](), list[Exchange]()
-    for exchange in compared:
-        assert isinstance(exchange.answer, Answer)
-        right, count = program.count_passes(partial(run, exchange.case))
-        if count <= MAX_PASSES:
-            passes[exchange.case.name] = count
-            is_same = difference(right, exchange.answer.values) <= tolerance
-            (same if is_same else different).append(exchange)
-    # Single iterations of another solver differ everywhere: they decide soon.
-    single = [exchange for exchange in different if exchange.case.inputs.get(ITERATIONS) == 1]
-    different = single if len(single) >= MIN_DIFFERENT else different
+    different, same, passes = _compare(program, run, compared, tolerance)
     if not different:
         return ()
     faults, mutants = dict[str, CodedFault](), dict[str, Mutant]()
@@ -200,21 +190,48 @@ def _of_program(
             faults[fault.name] = fault
             predict = partial(_faulty_answer, program.with_lines(fault.lines), report, passes)
             yield Variant((fault.name,), predict)
-        if len(different) < MIN_DIFFERENT or tried is None:
+        if len(different) < MIN_DIFFERENT or functions is None:
             return
         program.observe(partial(run, different[0].case))
-        for number, mutant in enumerate(program.mutants(tried)):
+        for number, mutant in enumerate(program.mutants(functions)):
             mutants[str(number)] = mutant
             predict = partial(_changed_answer, program, mutant, passes, run)
             yield Variant((str(number),), predict, is_special=True)
 
     def describe(keys: Sequence[str]) -> Sentence:
-        known = [faults[key] for key in keys if key in faults]
-        return with_code(known[0].code, known[0].sentence) if known else _describe(mutants, keys)
+        catalogue = [faults[key] for key in keys if key in faults]
+        return (
+            with_code(catalogue[0].code, catalogue[0].sentence)
+            if catalogue
+            else _describe(mutants, keys)
+        )
 
     telling = [*different, *same[: max(len(different), MIN_DIFFERENT)]]
     trial = TRIAL_OF_QUARTERS if report.task == "forward_kinematics" else TRIAL
     return explain(variants(), telling, lambda _: tolerance, describe, trial)[0]
+
+
+def _compare(
+    program: Program,
+    run: Callable[[Case], Mapping[str, Any]],
+    compared: Sequence[Exchange],
+    tolerance: float,
+) -> tuple[list[Exchange], list[Exchange], dict[str, int]]:
+    """Return the answers that a right program does not give, those that it gives, and its passes.
+
+    The passes through its loops are by the names of cases; answers that take too many are left out.
+    """
+    passes, different, same = dict[str, int](), list[Exchange](), list[Exchange]()
+    for exchange in compared:
+        assert isinstance(exchange.answer, Answer)
+        right, count = program.count_passes(partial(run, exchange.case))
+        if count <= MAX_PASSES:
+            passes[exchange.case.name] = count
+            is_same = difference(right, exchange.answer.values) <= tolerance
+            (same if is_same else different).append(exchange)
+    # Single iterations of another solver differ everywhere: they decide soon.
+    single = [exchange for exchange in different if exchange.case.inputs.get(ITERATIONS) == 1]
+    return (single if len(single) >= MIN_DIFFERENT else different), same, passes
 
 
 def _faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:

@@ -58,17 +58,16 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
     end = wrapped(say(advice(report.tasks)))
     good = [task for task in report.tasks if task.verdict in GOOD and reservations(task)]
     free = 0 if bad and height < ENDLESS else height - len(screen) - len(end) - 1
-    told = set[str]()
+    texts = set[str]()  # of the faults that are explained on the screen
     for task in good:
-        known = told if height == ENDLESS else set[str]()  # else it may be cut
-        text = _summary(task, say, "  ", known)
+        text = _summary(task, say, "  ", texts if height == ENDLESS else None)  # else it may be cut
         screen += _shorten(text, max(_COMPLAINT, free // len(good)))
     if bad and height < ENDLESS:
         brief = [line for task in bad[1:] for line in _shorten(_summary(task, say), 2)]
         room = height - len(screen) - len(end) - len(brief) - 2
         screen += ["", *_details(bad[0], context, room), *brief]
     else:
-        screen += _all_details(bad, context, height, told)
+        screen += _all_details(bad, context, height, texts)
     if any(line.endswith(_ELLIPSIS) for line in screen):
         hint = sentence("Cut at …: use --html FILE or | cat to see all of it.")
         end = [*wrapped(say(hint)), *end]
@@ -99,36 +98,36 @@ def _grid(rows: Sequence[Sequence[str]], sides: str, size: int = _WIDEST) -> lis
 
 
 def _summary(
-    task: TaskReport, say: Say, indent: str = "", told: set[str] | None = None
+    task: TaskReport, say: Say, indent: str = "", texts: set[str] | None = None
 ) -> list[str]:
     """Return the name of a task and the sentences about its answers as one paragraph."""
-    failure, told = task.smallest_failure, set[str]() if told is None else told
+    failure, texts = task.smallest_failure, set[str]() if texts is None else texts
     sentences = [*explanations(task), *failure.complaints] if failure else reservations(task)
-    words = list(dict.fromkeys(say(without_repetition(words, told)) for words in sentences))
+    words = list(dict.fromkeys(say(without_repetition(words, texts)) for words in sentences))
     new = [text for text in words if not any(text != other and text in other for other in words)]
     return wrapped(f"{title(task)}: " + " ".join(new), indent)
 
 
 def _all_details(
-    tasks: Sequence[TaskReport], context: Presentation, room: int, told: set[str]
+    tasks: Sequence[TaskReport], context: Presentation, room: int, texts: set[str]
 ) -> list[str]:
     """Return the details of tasks, once for neighbours of which the same is said.
 
-    What was said of a fault, in `told`, is not said again.
+    Faults whose texts stand on the screen are named by their codes.
     """
     screen = list[str]()
     for _, group in groupby(tasks, key=lambda task: _details(task, context, room)[1:]):
         same = list(group)
         heading = ", ".join(map(title, same))
-        screen += ["", *wrapped(f"{heading}:"), *_details(same[0], context, room, told)[1:]]
+        screen += ["", *wrapped(f"{heading}:"), *_details(same[0], context, room, texts)[1:]]
     return screen
 
 
 def _details(
-    task: TaskReport, context: Presentation, room: int, told: set[str] | None = None
+    task: TaskReport, context: Presentation, room: int, texts: set[str] | None = None
 ) -> list[str]:
     """Return the mistakes of a task and its smallest failing case, in so many lines if possible."""
-    say, told = context.say, set[str]() if told is None else told
+    say, texts = context.say, set[str]() if texts is None else texts
     failure, command = task.smallest_failure, context.command(task)
     heading, why_limit = f"{title(task)}:", max(_EXPLANATION, room // 3)
     if failure is None:
@@ -146,7 +145,7 @@ def _details(
         saved = sentence('The case "{name}" is saved. To run it again:', name=failure.case.name)
         rerun = [*wrapped(say(saved), "  "), f"    {say(command)}"]
     room -= 1 + len(case) + len(rerun)
-    words = [without_repetition(words, told) for words in explanations(task)]
+    words = [without_repetition(words, texts) for words in explanations(task)]
     why = paragraphs(words, say, "  ")
     why = _shorten(why, max(2, min(why_limit, room - 3)))
     rows = numbers(failures[-1], say, room - len(why) - 1)
