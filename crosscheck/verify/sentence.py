@@ -37,9 +37,9 @@ def with_code(code: str, words: Sentence) -> Sentence:
 
 
 def without_repetition(words: Sentence, texts: set[str]) -> Sentence:
-    """Return a sentence in which faults whose texts stand in `texts` are named by their codes alone.
+    """Return a sentence in which faults with their sentence in `texts` have their code alone.
 
-    The texts of the others are added to `texts`.
+    New sentences are added to `texts`.
     """
     code = words.values.get("code")
     if words.template == with_code("", words).template:

@@ -59,9 +59,9 @@ def with_changed_line(
 ) -> TaskReport:
     """Return a report on wrong answers with the fault or changed line that explains them.
 
-    Beside a mistake that explains most answers, or where no target is missed, only known faults are
-    looked for; they have to explain all. `notify` is called before each right program with the
-    number of programs done, and of all.
+    Beside a mistake that explains most answers, or where all targets are reached, the search is for
+    known faults that explain all. `notify` is called before each right program with the number of
+    programs done, and of all.
     """
     named, share = report.diagnosis.explanations, _least_share(report)
     if report.verdict > Verdict.RIGHT_EXCEPT:
@@ -100,10 +100,9 @@ def _least_share(report: TaskReport) -> float:
 
 
 def _doubtful(report: TaskReport) -> tuple[list[CaseJudgement], bool]:
-    """Return sweeps that no law calls wrong, and whether there is no other reason to doubt them.
+    """Return sweeps that keep all laws but may be a mistake's, and whether all targets are reached.
 
-    They are those that differ from the textbook's, or else those within limits, beside which
-    targets may be missed.
+    These are sweeps that differ from the textbook's, or else all sweeps within limits.
     """
 
     def has(law: str, judgement: CaseJudgement) -> bool:
@@ -126,9 +125,9 @@ def changed_lines(
     doubtful: Sequence[CaseJudgement] = (),
     is_known: bool = False,
 ) -> tuple[Explanation, ...]:
-    """Return the change of a line that gives most of the answers, () if none gives enough.
+    """Return the change of a line that gives most wrong or doubtful answers, () if too few.
 
-    These are the wrong ones, or the doubtful ones. If `is_known`, only known faults are looked for.
+    If `is_known`, the search is for known faults alone.
     """
     compared = _compared(report, doubtful)
     if not compared:
@@ -217,9 +216,9 @@ def _compare(
     compared: Sequence[Exchange],
     tolerance: float,
 ) -> tuple[list[Exchange], list[Exchange], dict[str, int]]:
-    """Return the answers that a right program does not give, those that it gives, and its passes.
+    """Return the answers that a right program does not give, the answers that it gives, and passes.
 
-    The passes through its loops are by the names of cases; answers that take too many are left out.
+    The passes through its loops are by the names of cases; answers of too many are left out.
     """
     passes, different, same = dict[str, int](), list[Exchange](), list[Exchange]()
     for exchange in compared:
