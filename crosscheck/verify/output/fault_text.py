@@ -83,7 +83,7 @@ def _symptom(fault: CodedFault, say: Say) -> Iterator[str]:
     """Yield the smallest failing case of the wrong program."""
     failure = failure_of(fault)
     if failure is None:
-        text = sentence("No law breaks: a program may do this on purpose.")
+        text = sentence("No case breaks a law: it may be on purpose, or show in other cases only.")
         yield from wrapped(say(text), "  ")
     else:
         (complaint, *_), name = failure.complaints, f'"{failure.case.name}"'
