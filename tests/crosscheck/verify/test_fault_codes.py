@@ -185,7 +185,8 @@ STEPS = (
 )  # fmt: skip
 SLOW = ("limited ccd", "robot", "robot_track", "newton step", *STEPS[2:])
 RESERVED = (
-    "robot", "robot_track", "conjugate gradients", "local-global step by a factor", *STEPS[2:6]
+    "robot", "robot_track", "conjugate gradients", "local-global step by a factor",
+    "step by conjugate gradients", *STEPS[2:6],
 )  # fmt: skip
 
 
