@@ -1,5 +1,7 @@
 """Solvers of kinematics for the tests: the textbook with chosen faults, and the reference."""
 
+import conformance_students as students
+
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting
@@ -14,6 +16,23 @@ FORWARD, INVERSE = "forward_kinematics", "inverse_kinematics"
 TRACK, RESAMPLE = "track", "resample"
 METHODS = ("ccd", "fabrik")
 LIMITS = ("effector", "tolerance", "max_iterations")
+
+
+# Honest programs that make other choices than the textbook: the method, a solver and its options.
+HONEST = {
+    "half-way vector": ("ccd", students.ccd, {}),
+    "axis and angle": ("ccd", students.ccd, {"kind": students.axis_angle}),
+    "not normalised": ("ccd", students.ccd, {"normalises": False}),
+    "small angles dropped": ("ccd", students.ccd, {"dead": 1e-6}),
+    "root to tip": ("ccd", students.ccd, {"up": False}),
+    "effector rotated": ("ccd", students.ccd, {"rotates_tip": True}),
+    "capped": ("ccd", students.ccd, {"kind": students.axis_angle, "most": 0.3}),
+    "damped": ("ccd", students.ccd, {"kind": students.axis_angle, "share": 0.7}),
+    "FABRIK": ("fabrik", students.fabrik, {}),
+    "straight beyond reach": ("fabrik", students.fabrik, {"stretches": True}),
+    "tests after a sweep": ("fabrik", students.fabrik, {"tests_last": True}),
+    "rotations from rest": ("fabrik", students.fabrik, {"from_rest": True}),
+}
 
 
 def judged(task, function, method="", seed=0, **greeting):

@@ -286,10 +286,10 @@ def describe(method: str, keys: Sequence[str]) -> Sentence:
     sentences = {key: fault.sentence for key, fault in faults.items()} | {"": AS_THE_TEXTBOOK}
     names = [key.split(" + ") for key in keys]
     names = [group for group in names if not _covered(names, faults).intersection(group)]
-    # of faults that differ in a number alone the first is enough
-    names = list(
-        {tuple(codes_in(sentences[n]) for n in group): group for group in names[::-1]}.values()
-    )[::-1]
+    by_codes = dict[object, list[str]]()  # of faults that differ in a number alone the first
+    for group in names:
+        by_codes.setdefault(tuple(codes_in(sentences[name]) for name in group), group)
+    names = list(by_codes.values())
     mistakes = either([[sentences[name] for name in group] for group in names])
     parts = {faults[name].part for group in names for name in group if name}
     if method == "forward" or parts != {"forward"}:

@@ -136,8 +136,8 @@ class StepModel(NamedTuple):
     right_start: bool = False  # whether iterations begin at x + h v, whatever stands for y
     # formulas of a motion: problem, fields of the problem of each step; end, the state that a step
     # ends with; state, that which the next one starts from; answer, of the positions X and the
-    # velocities V of the start and of all frames; matrix: that of the first step is kept, if it is
-    # not empty on the left-hand side alone
+    # velocities V of the start and of all frames; matrix: that of the first step is kept, on
+    # both sides of the equation if this is empty, else on the left
     frames: Mapping[str, Mapping[str, str]] = {}
 
     @property

@@ -17,11 +17,11 @@ from ..explain import MORE, Variant, difference, explain
 from ..fault_programs import PROGRAMS, CodedFault, coded_faults, source_of
 from ..functions import call
 from ..greeting import Greeting, Step
-from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
+from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
 from ..kinematics.limits import READINGS
-from ..kinematics.sweeps import LAW, ROUNDED, PoseTrial
-from ..laws import finding
+from ..kinematics.sweeps import ROUNDED, PoseTrial
+from ..laws import LAWS, finding
 from ..precision import judging_greeting
 from ..sentence import Sentence, sentence, with_code
 from ..task import BUILDS_ON, TASKS
@@ -44,6 +44,8 @@ MIN_SHARE = 0.75
 MAX_PASSES = 200
 # No further right program is changed after so many changes, of half a millisecond each.
 MAX_MUTANTS = 16_000
+# The law of sweeps that are neither the textbook's nor those of a known honest program.
+ANOTHER = "one sweep, another"
 # The input that asks for a single iteration of a solver.
 ITERATIONS = "max_iterations"
 # Faults of these families are named in other ways than by the lines of a program.
@@ -104,17 +106,20 @@ def _doubtful(report: TaskReport) -> tuple[list[CaseJudgement], bool]:
 
     These are sweeps that differ from the textbook's, or else all sweeps within limits.
     """
-
-    def has(law: str, judgement: CaseJudgement) -> bool:
-        return any(entry.verdict and entry.law == law for entry in judgement.findings)
-
     sweeps = [j for j in report.judgements if j.case.requirement == "must" and _is_single(j)]
-    differing = [j for j in sweeps if has(LAW, j)]
+    differing = [j for j in sweeps if any(map(_is_of_another, j.findings))]
     if differing:
         return differing, False
     limited = [j for j in report.judgements if "cones" in j.case.inputs]
-    is_missed = any(has("target reached", judgement) for judgement in limited)
+    is_missed = any(
+        entry.verdict and entry.law == "target reached" for j in limited for entry in j.findings
+    )
     return [j for j in sweeps if j in limited], not is_missed
+
+
+def _is_of_another(entry: Finding) -> bool:
+    """Return whether a sweep is not the textbook's, nor that of a known honest program."""
+    return bool(entry.verdict) and entry.sentence.template == LAWS[ANOTHER]["sentence"]
 
 
 @np.errstate(all="ignore")  # changed programs divide by zero

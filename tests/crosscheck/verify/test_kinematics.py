@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from kinematics_solvers import (
     FORWARD,
+    HONEST,
     INVERSE,
     METHODS,
     RESAMPLE,
@@ -229,22 +230,6 @@ def test_undeclared_reference_is_not_accused(solver):
     assert not report.diagnosis.explanations
     if solver in METHODS:
         assert "sweeps are those of" in str(report.diagnosis.behaviour)
-
-
-HONEST = {
-    "half-way vector": ("ccd", students.ccd, {}),
-    "axis and angle": ("ccd", students.ccd, {"kind": students.axis_angle}),
-    "not normalised": ("ccd", students.ccd, {"normalises": False}),
-    "small angles dropped": ("ccd", students.ccd, {"dead": 1e-6}),
-    "root to tip": ("ccd", students.ccd, {"up": False}),
-    "effector rotated": ("ccd", students.ccd, {"rotates_tip": True}),
-    "capped": ("ccd", students.ccd, {"kind": students.axis_angle, "most": 0.3}),
-    "damped": ("ccd", students.ccd, {"kind": students.axis_angle, "share": 0.7}),
-    "FABRIK": ("fabrik", students.fabrik, {}),
-    "straight beyond reach": ("fabrik", students.fabrik, {"stretches": True}),
-    "tests after a sweep": ("fabrik", students.fabrik, {"tests_last": True}),
-    "rotations from rest": ("fabrik", students.fabrik, {"from_rest": True}),
-}
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -3,8 +3,10 @@
 from dataclasses import replace
 from functools import partial
 
+import conformance_students as students
 import numpy as np
 import pytest
+from kinematics_solvers import HONEST, judged, reference
 
 from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.fault_programs import (
@@ -16,6 +18,7 @@ from plumbob.crosscheck.verify.fault_programs import (
 )
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
+from plumbob.crosscheck.verify.kinematics.limits import solve_within
 from plumbob.crosscheck.verify.one_line import search
 from plumbob.crosscheck.verify.one_line.mutants import Program
 from plumbob.crosscheck.verify.output import terminal
@@ -61,6 +64,32 @@ def test_a_known_fault_of_another_program_is_named():
     assert fault.program != "hinges and cones"
     assert explanation.codes == (fault.code,)
     assert explanation.share == 1.0
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in ("root to tip", "capped") else pytest.mark.slow)
+     for name in HONEST],
+)  # fmt: skip
+def test_another_honest_choice_is_no_mistake_of_a_program(name):
+    method, function, options = HONEST[name]
+    report = judged("inverse_kinematics", students.with_options(function, **options), method)
+    assert all(e.faults == ("root to tip",) for e in report.diagnosis.explanations)
+
+
+@pytest.mark.parametrize("method", ["ccd", pytest.param("fabrik", marks=pytest.mark.slow)])
+def test_another_honest_way_to_keep_limits_is_no_mistake(method):
+    without_limits = reference("inverse_kinematics", method)
+
+    def solver(**inputs):
+        if inputs.get("cones") is not None:
+            return {"local_rotations": solve_within(method, inputs)}
+        return without_limits(**inputs)
+
+    report = judged("inverse_kinematics", solver, method, limits=True)
+    assert report.verdict <= Verdict.RIGHT_EXCEPT
+    assert not report.diagnosis.explanations
 
 
 # Lines of programs of screws, and what is said of them.
