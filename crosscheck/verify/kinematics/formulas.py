@@ -47,6 +47,11 @@ def _through_quaternions(R: FloatArray, branch: int, component: int) -> FloatArr
     return rotation.to_matrix(q)
 
 
+def _solve(A: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the solutions of A x = b, (..., n)."""
+    return np.asarray(np.linalg.solve(A, b[..., None])[..., 0])
+
+
 # What formulas may use: T transposes, `product` rotates vectors by matrices.
 _GLOBALS: dict[str, Any] = {
     "np": np,
@@ -59,8 +64,12 @@ _GLOBALS: dict[str, Any] = {
     "roll": np.roll,
     "rotate": rotation.rotate,
     "T": lambda A: np.swapaxes(A, -1, -2),
+    "diagonal": lambda A: A * np.eye(A.shape[-1]),
+    "lower_of": np.tril,
+    "solve": _solve,
     "through_quaternions": _through_quaternions,
     "up": UPRIGHT,
+    "upper_of": np.triu,
     "where": np.where,
 }
 

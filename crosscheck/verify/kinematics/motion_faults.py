@@ -26,6 +26,7 @@ from .trajectories import AT_LIMIT, LENIENT, Trajectory, twists_between
 # finer ones are tried where they differ by less than the second; without joints, by the third.
 SAME_STEP, COARSE_STEP, MISPLACED = 0.02, 0.2, 0.1
 DAMPINGS, FINE = np.geomspace(1e-9, 1.0, 37)[:, None], np.geomspace(0.5, 2.0, 41)[:, None]
+FINE_DAMPINGS = np.geomspace(1e-9, 1.0, 401)[:, None, None]
 # The right step is preferred if its gap is below the former, or the smallest times the latter.
 EQUAL_STEP, NEARER, TIE = 3e-3, 1.5, 1e-6
 # Singular values below this share of the largest are small.
@@ -357,6 +358,27 @@ def damped_steps(J: FloatArray, twists: FloatArray, dampings: FloatArray) -> Flo
     return np.asarray(np.einsum("fij,fik,fdk->fdj", J, U, parts))
 
 
+def _wrongly_solved(solutions: Sequence[str], motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the single iterations that solve the equation of their step in the way of a fault.
+
+    The equation A p = b is that of the tool's freedoms or that of the joints; A = L L^T.
+    """
+    J, e, changes = motion.jacobians, motion.twists(motion.previous), motion.changes
+    is_single = np.abs(changes).max(axis=-1) > AT_LIMIT
+    is_single &= (motion.inputs["max_iterations"] == 1) & ~motion.at_limits.any(axis=-1)
+    transposed, pull = np.swapaxes(J, 1, 2), np.einsum("fij,fi->fj", J, e)
+    gaps = [np.full(len(changes), np.inf)]
+    for M, b in ((J @ transposed, e), (transposed @ J, pull)) if is_single.any() else ():
+        A = M[:, None] + FINE_DAMPINGS * np.eye(M.shape[-1])
+        names = {"A": A, "L": np.linalg.cholesky(A), "b": np.broadcast_to(b[:, None], A.shape[:-1])}
+        for solution in solutions:
+            p = evaluate(solution, names)
+            steps = p if b is pull else np.einsum("fij,fdi->fdj", J, p)
+            gaps.append(_gaps(changes, steps, (0.0, np.inf)).min(axis=-1))
+    is_near = np.min(gaps, axis=0) <= SAME_STEP * np.linalg.norm(changes, axis=-1)
+    return Evidence(is_single & (changes.shape[-1] >= MIN_FREE), is_near)
+
+
 def _gaps(changes: FloatArray, steps: FloatArray, factors: tuple[float, float]) -> FloatArray:
     """Return distances of changes from steps times a factor in a range, (frame, damping)."""
     lengths = np.maximum((steps * steps).sum(axis=-1), 1e-300)
@@ -409,8 +431,9 @@ def _step_gaps(motion: Trajectory) -> dict[str, FloatArray]:
     )
     is_right = (gaps[""] <= EQUAL_STEP).all()
     if motion.inputs["max_iterations"] == 1 and not is_right:
+        is_half_turn = motion.case.family.startswith(HALF_TURNS)
         for key, fault in STEP_FAULTS.items():
-            if ("seen" in fault.rules) == motion.case.family.startswith(HALF_TURNS):
+            if fault.rules.keys() & {"end", "seen"} if is_half_turn else "seen" not in fault.rules:
                 gaps[key] = np.minimum.reduce(list(_fault_gaps(fault, motion)))
     if len(q) > 1:
         first, start = np.repeat(J[:1], len(q), axis=0), np.tile(q[0], (len(q), 1))
@@ -675,6 +698,7 @@ TIERS: Sequence[Tier] = (
     Tier(_entries("test", _accepted), least_share=0.97, is_of_all=True, steps=True),
     Tier(POSES),
     Tier(STEPS, by_family=True),
+    Tier(_entries("solution", _wrongly_solved), least_share=0.9, steps=False),
     Tier(_entries("branch", _in_branch), least_share=0.97, is_of_all=True),
     Tier(STUCK, by_family=True, least_share=0.65, is_vague=True, steps=False),
     Tier({"rotation missed": APPARENT[POSITION_ONLY]}, is_vague=True, steps=False),

@@ -28,6 +28,8 @@ from .robot_textbook import (
 )
 
 POSITION_ONLY = "position only"
+# Kinematics that differ by less than this are the same [m, rad].
+SAME = 1e-9
 
 
 class RobotFault(NamedTuple):
@@ -57,9 +59,15 @@ class RobotFault(NamedTuple):
     def changes(self, inputs: Inputs) -> bool:
         """Return whether a solver with the fault may differ from a right one on a request."""
         read = self.read(inputs)
-        return not self.change or not all(
-            name in inputs and np.array_equal(read[name], inputs[name]) for name in self.change
+        if not all(name in inputs and np.array_equal(read[name], inputs[name]) for name in read):
+            return True
+        wrong, right = (
+            (*fault.frames(inputs, inputs["start"]), *fault.jacobians(inputs, inputs["start"]))
+            for fault in (self, RIGHT)
         )
+        is_like = [one.shape == other.shape and np.allclose(one, other, atol=SAME)
+                   for one, other in zip(wrong, right, strict=False)]  # fmt: skip
+        return len(wrong) != len(right) or not all(is_like)
 
     def coordinates(self, inputs: Inputs, q: FloatArray) -> FloatArray:
         """Return the coordinates that an answer q stands for."""

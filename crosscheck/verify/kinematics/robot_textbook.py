@@ -27,6 +27,7 @@ RIGHT: Rules = {
     # The rotation of a joint and what rotates its origin, a slide's direction and the tool's
     # position: R of the parent, the frame, the joint's motion and, from then on, the joint.
     "product": "P @ F @ M", "origin": "P", "slide": "P @ F @ a", "tool": "R",
+    "end": "R @ T",  # the tool's rotation, of the last joint's and that in its frame
     # Jacobian: an axis; the coordinates, those that arms belong to, an arm, both parts and all.
     "axis": "P @ F @ a", "coordinates": "q", "arms": "q", "arm": "tool - x",
     "linear": "where(slides, a, np.cross(a, arm))", "angular": "where(slides, 0, a)",
@@ -66,7 +67,7 @@ def hinge_matrix(axis: FloatArray, angle: FloatArray, rules: Rules) -> FloatArra
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     names = {"q": q, "c": np.cos(angle)[..., None, None], "s": np.sin(angle)[..., None, None]}
     a, b, outer = (evaluate(rules[name], names) for name in ("cosine", "sine", "outer"))
-    cross = evaluate(rules["cross"], {"K": K})
+    cross = evaluate(rules["cross"], names | {"K": K})
     return np.asarray(a * np.eye(3) + b * cross + outer * axis[:, None] * axis)
 
 
@@ -102,7 +103,8 @@ def frames_at(inputs: Inputs, q: FloatArray, rules: Rules) -> RobotFrames:
     columns = ([x for x, _ in places], before, directions)
     origins, starts, axes = (np.stack(vectors, axis=-2) for vectors in columns)
     rotations = np.stack([R for _, R in places], axis=-3)
-    return RobotFrames(origins, starts, axes, rotations, position, R @ tool_frame)
+    end = evaluate(rules["end"], {"R": R, "T": tool_frame})
+    return RobotFrames(origins, starts, axes, rotations, position, end)
 
 
 def _composed(R: FloatArray, rules: Rules) -> FloatArray:

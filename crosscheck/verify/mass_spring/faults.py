@@ -114,7 +114,7 @@ def _option(aspect: str, entry: Mapping[str, Any], values: Mapping[str, Any]) ->
     message = Sentence(entry["sentence"], values)
     rare = entry.get("rare", False)
     return Option(
-        key=entry.get("key", name).format(**values),
+        key=entry.get("key", name).format(**values).replace(" + ", "+"),  # which joins keys
         aspect=aspect,
         sentence=with_code(entry["code"], message) if "code" in entry else message,
         change=_change(entry, values),

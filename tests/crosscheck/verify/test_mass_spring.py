@@ -146,6 +146,12 @@ def test_a_solution_is_reproduced_from_itself_and_others_are_told_apart(task):
     assert compared > 10
 
 
+def test_no_key_has_what_joins_keys():
+    assert not [
+        f.key for f in (*FORCE_FAULTS, *energy.ENERGY_FAULTS, *STEP_FAULTS) if " + " in f.key
+    ]
+
+
 PAIRS = [
     (first, second)
     for i, first in enumerate(BY_KEY)
