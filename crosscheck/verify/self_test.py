@@ -36,6 +36,7 @@ from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
 from .mass_spring.forces import forces_with
 from .mass_spring.model import Integrator, StepModel, simulate
 from .mass_spring.problem import problem_of, state_of, system_of
+from .one_line.search import BY_LINES
 from .sentence import sentence
 from .verify import verify
 
@@ -156,7 +157,8 @@ def _limits() -> Iterator[Subject]:
 
 def _robots() -> Iterator[Subject]:
     for task in (ROBOTS, ROBOT_TRACK, ROBOT_JACOBIAN, ROBOT_VELOCITY):
-        programs = [fault for fault in coded_faults().values() if fault.task == task]
+        faults = [fault for fault in coded_faults().values() if fault.task == task]
+        programs = [fault for fault in faults if fault.name not in BY_LINES]
         for fault in programs:
             function = _function(task, fault.wrong_program)
             greeting = contestant_of(fault.wrong_program).greeting

@@ -208,7 +208,9 @@ def judge_cases(
     if unexplained and greeting.precision == "double" and not is_double:
         single = judge(exchanges, msgspec.structs.replace(greeting, precision="single"), method)
         is_right = single.verdict <= Verdict.RIGHT_EXCEPT
-        if precision.is_off_by_single(report) if is_right else single.diagnosis.explained:
+        if not is_right and single.diagnosis.explained and precision.has_double(report):
+            report = replace(report, diagnosis=single.diagnosis)
+        elif precision.is_off_by_single(report) if is_right else single.diagnosis.explained:
             report, reason = single, precision.INEXACT
     if unsent := len(cases) - len(exchanges):
         hints = (*report.diagnosis.hints, _unsent(unsent, len(cases)))

@@ -38,6 +38,8 @@ DEGREE = math.pi / 180.0
 # component of the axis, the first of a rotation in a plane, and the first with a sine or a cosine
 # of directions that are not unit.
 QUARTER_TURN, SIGNED, IN_PLANE, UNEQUAL = 19, 21, 24, 27
+# The first with the length of a cross product in it, as of a rotation vector's axis.
+OF_VECTORS = 33
 
 
 def product(a: Any, b: Any, faults: Switches) -> Any:
@@ -190,8 +192,12 @@ def other_arc(a: Any, b: Any, axis: Any, angle: float, k: int) -> Any:
 
     The sign is that of the axis' x, y or z (21 to 23); about z, x or y alone (24 to 26) the angle
     is the difference of two polar angles. The sine (27 to 29) or the cosine (30 to 32) has in it
-    the length of the first vector, of the second or of both.
+    the length of the first vector, of the second or of both. Or the angle is multiplied by the sine
+    (33), or by the length of the cross product (34).
     """
+    if k >= OF_VECTORS:
+        length = norm(a) * norm(b) if k > OF_VECTORS else 1.0
+        return rotation_about(axis, angle * math.sin(angle) * length)
     if k >= UNEQUAL:
         lengths = (norm(a), norm(b), norm(a) * norm(b))
         length, is_sine = lengths[(k - UNEQUAL) % 3], k < UNEQUAL + 3

@@ -31,8 +31,9 @@ RIGHT = {
     "positions": "placed",
     "placed": "positions",
 }
-# The claim that follows from a false residual.
+# Claims that follow from a false residual, and those of a solver that believes to be at its target.
 FOLLOWS = "success by the reported residual"
+BELIEVED = {FOLLOWS, "success where it gave up", "success where sweeps are left"}
 # The laws that false outputs break, beside any that a pose breaks.
 LAWS = {"claims", "root in place", "link lengths", "branches", "rotations agree with positions"}
 # The least number of answers that a formula is compared with, and the share that it has to give.
@@ -214,6 +215,8 @@ def with_claims(
         if claims and (of_poses or broken <= LAWS):
             diagnosis = replace(diagnosis, explanations=tuple(claims[:1]))
             claims = claims[1:]
+    faults = {key for explanation in diagnosis.explanations for key in explanation.faults}
+    follow = BELIEVED if is_certain and not faults & TABLE["stop"].keys() else {FOLLOWS}
     if diagnosis.explanations or len(claims) > 1 or broken - LAWS - {"claims"}:
-        claims = [claim for claim in claims if claim.faults[0] != FOLLOWS]
+        claims = [claim for claim in claims if claim.faults[0] not in follow]
     return replace(diagnosis, hints=(*(claim.sentence for claim in claims), *diagnosis.hints))

@@ -213,7 +213,7 @@ VALUES: Mapping[str, Callable[[int], Mapping[str, Any]]] = {
     },
     "angle": lambda number: {
         "axis": "xyzzxy"[min(number - SIGNED, 5)],
-        "function": FUNCTIONS[max(0, number - UNEQUAL) // 3],
+        "function": FUNCTIONS[max(0, number - UNEQUAL) // 3 % 2],
         "direction": DIRECTIONS[(number - UNEQUAL) % 3],
     },
     "aim": lambda number: _frames(FRAMES[number - MIXED_FRAMES]),

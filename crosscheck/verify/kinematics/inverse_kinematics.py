@@ -36,6 +36,7 @@ from .sweeps import PoseTrial, SweepComparison
 
 TASK = "inverse_kinematics"
 STOPS, SLOW, ENDED = "sweeps made", "target reached, slow", "target reached, ended"
+OF_A_MISTAKE = "one sweep, of a mistake"
 # The methods of the textbook.
 METHODS = ("ccd", "fabrik")
 MAX_FAULTS = 3
@@ -312,7 +313,10 @@ def _diagnosis(
         early = early_ends.explanation(solves, failures, comparison.method, greeting)
         return replace(diagnosis, explanations=(early,)) if early else diagnosis
     is_right = all(trial.judgement.verdict is Verdict.RIGHT for trial in trials)
-    if not (comparison.method or is_right or diagnosis.explained):
-        steps = jacobian_steps.explanations(trials, greeting, base) or early_ends.by_squares(trials)
+    if not (comparison.method or diagnosis.explained):
+        steps = jacobian_steps.explanations(trials, greeting, base, is_right)
+        for trial in sweep_trials if is_right and steps else ():
+            trial.add([finding(OF_A_MISTAKE, 1.0)])
+        steps = steps if steps or is_right else early_ends.by_squares(trials)
         return replace(diagnosis, explanations=steps or diagnosis.explanations)
     return diagnosis

@@ -19,7 +19,7 @@ from plumbob.reference.arguments import FloatArray
 from ..explain import either
 from ..formulas import value_of
 from ..greeting import Greeting
-from ..judgement import Explanation
+from ..judgement import Explanation, Verdict
 from ..sentence import Sentence, with_code
 from .faults import TABLE, SwitchFault, describe, switches
 from .predictions import RIGHT, forward
@@ -71,7 +71,19 @@ HONEST: Sequence[Model] = (
 )
 HONEST_STEPS: Sequence[Model] = (("", {}), ("", {"equation": ["p", "e"]}))
 OF_STEPS = {"error", "equation"}
-FUNCTIONS = {"np": np, "mul": rotation.multiply, "inv": rotation.conjugate, "I": np.eye(3)}
+
+
+def _with_entry(M: FloatArray, i: int, j: int, value: float) -> FloatArray:
+    """Return a symmetric matrix with another number at i, j and at j, i."""
+    M = M.copy()
+    M[i, j] = M[j, i] = value
+    return M
+
+
+FUNCTIONS = {
+    "np": np, "mul": rotation.multiply, "inv": rotation.conjugate, "I": np.eye(3),
+    "with_entry": _with_entry,
+}  # fmt: skip
 ENTRIES: Mapping[str, Any] = TABLE["jacobian"]
 
 
@@ -209,18 +221,24 @@ def _pose(
 
 
 def explanations(
-    trials: Sequence[PoseTrial], greeting: Greeting, base: Sequence[SwitchFault] = ()
+    trials: Sequence[PoseTrial],
+    greeting: Greeting,
+    base: Sequence[SwitchFault] = (),
+    is_right: bool = False,
 ) -> tuple[Explanation, ...]:
     """Return the mistake that explains most iterations, () if none does or they are right.
 
-    The solver's forward kinematics is known to have the faults in `base`.
+    The solver's forward kinematics is known to have the faults in `base`. Where all answers are
+    right, small steps may be a choice, other formulas are not.
     """
     least, same = LEAST_ANGLE[greeting.precision], SAME[greeting.precision]
     all_iterations = list(iterations(trials, switches(base)))
     steps = [step for step in all_iterations if step.angle >= least]
     keys, values, count = _mistake(steps, same)
-    if keys == [UNSOLVED] and not any(trial.is_wrong for trial in trials):
+    if keys == [UNSOLVED] and all(t.judgement.verdict < Verdict.UNDECIDED for t in trials):
         keys = []  # there are other honest methods
+    if is_right and not all("models" in ENTRIES.get(key, ()) for key in keys):
+        keys = []
     if len(all_iterations) >= MIN_COUNT and not steps:
         keys, count = [UNMOVED], 1
     if keys == [""] and base:

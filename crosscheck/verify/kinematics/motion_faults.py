@@ -102,7 +102,9 @@ def diagnosis_of(
             continue
         concerned = every if tier.is_of_all else wrong
         shares = {
-            key: _share(rule, concerned, tier.by_family) for key, rule in tier.signatures.items()
+            key: _share(rule, concerned, tier.by_family)
+            for key, rule in tier.signatures.items()
+            if known is None or key != SYMPTOM
         }
         key = max(shares, key=shares.__getitem__)
         if shares[key] >= tier.least_share:
@@ -655,8 +657,9 @@ APPARENT: Mapping[str, Signature] = {
     for key, fault in POSE_FAULTS.items()
 }
 # What explains whole poses comes before what explains steps, jumps and misses.
+SYMPTOM = "slow frames skipped"  # wrong Jacobians may leave frames as they are as well
 POSES: Mapping[str, Signature] = {
-    "slow frames skipped": _skipped,  # rotations of the first target, if positions rest
+    SYMPTOM: _skipped,  # rotations of the first target, if positions rest
     "angles from zero": _from_zero,
     "limits ignored": _limits_ignored,
     **_entries("target", lambda target, *motion: _reached(

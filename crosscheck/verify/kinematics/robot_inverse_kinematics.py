@@ -49,7 +49,8 @@ def judge(
     motions = trajectories(exchanges, trajectory_of)
     judgements = [
         judge_case(
-            exchange, partial(_findings, exchange.case, motions, greeting, fails_at_zero),
+            exchange,
+            partial(_findings, exchange.case, motions, greeting, fails_at_zero, base is None),
             rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
             robot_targets.timed_solve(exchange.case.inputs),
         )
@@ -133,6 +134,7 @@ def _findings(
     motions: Mapping[str, Trajectory],
     greeting: Greeting,
     fails_at_zero: bool,
+    has_right_jacobian: bool,
     outputs: Mapping[str, Any],
 ) -> list[Finding]:
     q = outputs.get("q")
@@ -142,7 +144,7 @@ def _findings(
         return [not_finite("numbers, of a joint", q)]
     judgement = judgement_of(case.inputs, q)
     limits = _limits(judgement, q, case, greeting)
-    stays = any(law.verdict for motion in motions.values()
+    stays = not has_right_jacobian or any(law.verdict for motion in motions.values()
                 for law in motion_faults.limit_laws(motion, motions.values()))  # fmt: skip
     laws = [limits, *_target_laws(judgement, outputs, case, greeting, fails_at_zero, stays)]
     if case.family == AT_A_LIMIT:

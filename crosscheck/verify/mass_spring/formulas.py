@@ -38,6 +38,13 @@ def _limited(p: SpringProblem, x: FloatArray, share: float) -> FloatArray:
     return x
 
 
+def _inertial_positions(p: SpringProblem) -> FloatArray:
+    """Return x + h v + h² f/m with the forces that springs have no part in, and the pins at x."""
+    moved = p.h * p.velocities + p.h**2 * (p.weights + p.external) / p.inertia
+    moved[p.pinned] = 0.0
+    return np.asarray(p.positions + moved)
+
+
 # What the names in a formula stand for.
 NAMES: Mapping[str, Callable[[SpringProblem], Any]] = {
     "n": lambda p: p.count,
@@ -50,6 +57,7 @@ NAMES: Mapping[str, Callable[[SpringProblem], Any]] = {
     "v": lambda p: p.velocities,
     "x_before": lambda p: p.before[0] if p.before else p.positions,
     "v_before": lambda p: p.before[1] if p.before else p.velocities,
+    "s_n": _inertial_positions,
     "h": lambda p: p.h,
     "pins": lambda p: p.pinned,
     "r": lambda p: p.rest_lengths,

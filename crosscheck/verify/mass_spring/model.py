@@ -75,6 +75,7 @@ class SystemMatrix(NamedTuple):
     filled: str = "A"  # a formula of what becomes of it if a triangle is not filled
     components: bool = True  # whether x, y and z are coupled
     damper_power: int = 0  # the power of h by which the dampers' part differs from h C
+    dampers: str = "D"  # a formula of what stands for their part of the matrix
     # of the equation for dv: the factor of h K v, and the powers of h by which that and the
     # right-hand side differ
     drag: float = 1.0
@@ -558,11 +559,13 @@ class StepEquation:
             springs = springs * np.eye(springs.shape[1])
             if dampers is not None and not model.dampers_apart:
                 dampers = dampers * np.eye(springs.shape[1])
-        if dampers is not None and not (model.dampers_apart or rule.damper_power):
+        is_apart = model.dampers_apart or rule.damper_power or rule.dampers != "D"
+        if dampers is not None and not is_apart:
             springs, dampers = springs + dampers, None
         A = rule.sign * h**rule.power * _assemble(p, springs, rule)
         if dampers is not None:
-            A += h ** (2 + rule.damper_power) * _assemble(p, dampers)
+            D = evaluate(rule.dampers, p, {"D": _assemble(p, dampers)})
+            A += h ** (2 + rule.damper_power) * D
         size = springs.shape[1]
         A.flat[:: len(A) + 1] += rule.masses * np.broadcast_to(p.inertia, (p.count, size)).ravel()
         if rule.filled != "A":

@@ -19,6 +19,7 @@ from ..functions import call
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
+from ..kinematics.inverse_kinematics import OF_A_MISTAKE
 from ..kinematics.limits import READINGS
 from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..laws import LAWS, finding
@@ -27,7 +28,10 @@ from ..sentence import Sentence, sentence, with_code
 from ..task import BUILDS_ON, TASKS
 from .mutants import Mutant, Program
 
-FAULTS = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))["line"]
+_TABLE = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))
+FAULTS = _TABLE["line"]
+# The names of all faults that only the lines of programs tell.
+BY_LINES = {*FAULTS, *_TABLE["known"]}
 # Of changes that no answer tells apart the first of these kinds is named.
 KINDS = list(FAULTS)
 # The most small and large wrong answers, and small right ones, that are compared with programs; a
@@ -44,6 +48,8 @@ MIN_SHARE = 0.75
 MAX_PASSES = 200
 # No further right program is changed after so many changes, of half a millisecond each.
 MAX_MUTANTS = 16_000
+# Programs of these answer in conventions of their own: what they share is changed in each.
+IN_CONVENTIONS = ("robot_jacobian",)
 # The law of sweeps that are neither the textbook's nor those of a known honest program.
 ANOTHER = "one sweep, another"
 # The input that asks for a single iteration of a solver.
@@ -80,7 +86,7 @@ def with_changed_line(
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
     diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
-    remark = finding("one sweep, of a mistake", 1.0)
+    remark = finding(OF_A_MISTAKE, 1.0)
     judgements = [
         replace(j, findings=(*j.findings, remark)) if j in doubtful else j
         for j in report.judgements
@@ -149,6 +155,8 @@ def changed_lines(
         return ()
     for i, program in enumerate(programs):
         notify(i, len(programs))
+        if report.task in IN_CONVENTIONS:
+            functions.clear()
         explanations = _of_program(
             program, report, compared, tolerance, None if is_known else functions
         )
