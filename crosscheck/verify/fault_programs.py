@@ -19,7 +19,10 @@ from .solvers.host import PythonSolver
 FOLDER = Path(__file__).parent
 # The files with faults, those of kinematics first.
 FILES = sorted(FOLDER.rglob("faults.toml"))
-PROGRAMS: Mapping[str, Any] = tomllib.loads((FOLDER / "programs.toml").read_text(encoding="utf-8"))
+_TABLE = tomllib.loads((FOLDER / "programs.toml").read_text(encoding="utf-8"))
+PROGRAMS: Mapping[str, Any] = {
+    name: {**_TABLE.get(entry.get("like"), {}), **entry} for name, entry in _TABLE.items()
+}
 FAMILIES: Mapping[str, Any] = PROGRAMS["families"]
 
 

@@ -25,13 +25,14 @@ from .kinematics import (
     robot_velocity,
     track,
 )
+from .kinematics.claims import OF_WRONG_POSES
 from .kinematics.faults import SwitchFault
 from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
 from .mass_spring.search import Budget
 from .mass_spring.stepping import Stepping
 from .one_line.search import with_changed_line
-from .sentence import Sentence, sentence
+from .sentence import Sentence, codes_in, sentence
 from .task import BUILDS_ON
 from .timing import with_lesser_time
 
@@ -135,10 +136,21 @@ def _builds_on(task: str, method: str, report: TaskReport) -> bool:
 
 
 def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
-    """Return a report on unexplained answers that names the mistakes of the task it builds upon."""
-    if report.verdict < Verdict.WRONG or report.diagnosis.explained or not causes:
+    """Return a report on unexplained answers that names the mistakes of the task it builds upon.
+
+    Claims that wrong poses may lead to explain nothing.
+    """
+    if report.verdict < Verdict.WRONG or not causes:
         return report
-    cause = causes[0]
+    diagnosis, cause = report.diagnosis, causes[0]
+    diagnosis = replace(
+        diagnosis,
+        explanations=tuple(e for e in diagnosis.explanations if not OF_WRONG_POSES & {*e.codes}),
+        hints=tuple(hint for hint in diagnosis.hints if not OF_WRONG_POSES & {*codes_in(hint)}),
+    )
+    report = replace(report, diagnosis=diagnosis)
+    if diagnosis.explained:
+        return report
     codes = [code for explanation in cause.diagnosis.explanations[:1] for code in explanation.codes]
     words = sentence(
         "Its {task} is wrong as well ({codes}): correct that first, since this may build upon it."
@@ -146,8 +158,8 @@ def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
         else "Its {task} is wrong as well: correct that first, since this may build upon it."
     )
     hint = Sentence(words.template, {"task": cause.task, "codes": ", ".join(codes)})
-    others = [other for other in report.diagnosis.hints if other != NO_NUMBERS]
-    diagnosis = replace(report.diagnosis, explanations=(), hints=(hint, *others))
+    others = [other for other in diagnosis.hints if other != NO_NUMBERS]
+    diagnosis = replace(diagnosis, explanations=(), hints=(hint, *others))
     return replace(report, diagnosis=diagnosis)
 
 

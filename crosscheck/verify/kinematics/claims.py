@@ -17,7 +17,7 @@ from plumbob.reference import Skeleton, forward_kinematics, local_from_global, r
 from ..case import Case
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
-from ..sentence import Sentence, with_code
+from ..sentence import Sentence, codes_in, with_code
 from .faults import TABLE
 from .pose_laws import AnsweredPose
 from .predictions import path_to, solve
@@ -68,6 +68,13 @@ def _load() -> Iterator[ClaimFault]:
 
 FAULTS = tuple(_load())
 OF_POSES = {fault.key for fault in FAULTS if fault.output in ("positions", "placed")}
+# The codes of claims that wrong poses may lead to.
+OF_WRONG_POSES = {
+    code
+    for fault in FAULTS
+    if fault.output in ("residual", "converged")
+    for code in codes_in(fault.sentence)
+}
 OF_RESIDUALS = {fault.key for fault in FAULTS if fault.output == "residual"}
 TRUTHS = {output: compile(formula, output, "eval") for output, formula in RIGHT.items()}
 

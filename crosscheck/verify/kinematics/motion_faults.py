@@ -323,6 +323,13 @@ def _skipped(motion: Trajectory, laws: set[str]) -> Evidence:
     return Evidence(_ends_off_target(motion) & (not motion.is_pose), is_still & is_told)
 
 
+def _rejected(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames off targets without movement, where all that move are on their targets."""
+    is_still = np.abs(motion.changes).max(axis=-1) <= EXACT
+    is_told = not (motion.is_off_target & ~is_still).any() and motion.is_off_target.any()
+    return Evidence(motion.is_off_target & (not motion.is_pose), is_still & is_told)
+
+
 def _by_law(law: str, motion: Trajectory, laws: set[str]) -> Evidence:
     """Return all frames of a motion that breaks a law."""
     is_wrong = np.full(len(motion.q), law in laws)
@@ -660,6 +667,7 @@ APPARENT: Mapping[str, Signature] = {
 SYMPTOM = "slow frames skipped"  # wrong Jacobians may leave frames as they are as well
 POSES: Mapping[str, Signature] = {
     SYMPTOM: _skipped,  # rotations of the first target, if positions rest
+    "missed frames kept": _rejected,
     "angles from zero": _from_zero,
     "limits ignored": _limits_ignored,
     **_entries("target", lambda target, *motion: _reached(

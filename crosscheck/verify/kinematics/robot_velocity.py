@@ -158,12 +158,20 @@ def judge(
     judgements = [_judgement(exchange, greeting) for exchange in exchanges]
     if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
         diagnosis = _diagnosis(judgements, greeting)
-        likely = [e for e in diagnosis.explanations if base is None or e.share == 1.0
-                  or set(e.faults) & set(base)]  # fmt: skip
+        likely = [_of_base(e, base or ()) for e in diagnosis.explanations
+                  if base is None or e.share == 1.0 or set(e.faults) & set(base)]  # fmt: skip
         diagnosis = replace(diagnosis, explanations=tuple(likely), is_double=base is not None)
     else:
         diagnosis = Diagnosis(behaviour=_behaviour(judgements, greeting))
     return report(TASK, method, judgements, diagnosis)
+
+
+def _of_base(explanation: Explanation, base: Sequence[str]) -> Explanation:
+    """Return an explanation with the faults of the Jacobian alone, if it has any of them."""
+    shared = tuple(fault for fault in explanation.faults if fault in base)
+    if not shared:
+        return explanation
+    return replace(explanation, faults=shared, sentence=either([[SENTENCES[k]] for k in shared]))
 
 
 def _judgement(exchange: Exchange, greeting: Greeting) -> CaseJudgement:

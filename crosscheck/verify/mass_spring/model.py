@@ -112,8 +112,9 @@ class StepModel(NamedTuple):
     # eliminated, overwritten; with a number: penalty (weight), springs (stiffness), heavy or
     # falling (mass); at_the_end: free through the substeps; free; unattached: no springs to them;
     # first: only one is held; origin: their columns dropped, so that springs end at the origin;
-    # dropped: eliminated, then moved by gravity; identity rows: of the matrix, but the right-hand
-    # side is not zero; coordinates: those with the numbers of a formula are held
+    # dropped: eliminated, then moved by gravity; held on the right: on that side of the equation
+    # alone; identity rows: of the matrix, but the right-hand side is not zero; coordinates: those
+    # with the numbers of a formula are held
     pins: str = "eliminated"
     # displacement, separate; or a formula with d = x' - x (for names see `Substep.value`)
     velocity: str = "displacement"
@@ -583,6 +584,9 @@ class StepEquation:
         Iterative solvers begin at a guess, by default zero.
         """
         free = self.free.ravel() if len(A) == 3 * len(right) else self.free.all(axis=1)
+        if self.start.model.pins == "held on the right":
+            right = right.copy()
+            right[self.start.p.pinned] = 0.0
         if self.start.model.pins == "identity rows":
             rows = np.isin(np.arange(len(A)) * len(right) // len(A), self.start.p.pinned)
             A = np.where(rows[:, None], np.eye(len(A)), A)

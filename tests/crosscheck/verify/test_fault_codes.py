@@ -120,8 +120,10 @@ def reports(program, task):
 
 # These no switch of the reference makes: the lines of a program alone show them.
 BY_LINES = (
-    "PB-LIMIT-024", "PB-LIMIT-025", "PB-STEP-193", "PB-CCD-064", "PB-FABRIK-092", "PB-FABRIK-093",
-    "PB-FABRIK-094", "PB-LIMIT-028", "PB-LIMIT-029", "PB-LIMIT-030", "PB-ROBOT-184", "PB-ROBOT-185",
+    "PB-LIMIT-024", "PB-LIMIT-025", "PB-CCD-064", "PB-FABRIK-092", "PB-FABRIK-093",
+    "PB-FABRIK-094", "PB-LIMIT-028", "PB-LIMIT-029", "PB-LIMIT-030",
+    "PB-ROBOT-184", "PB-ROBOT-185", "PB-QUAT-039", "PB-QUAT-040", "PB-QUAT-041", "PB-CCD-065",
+    "PB-FABRIK-095",
 )  # fmt: skip
 
 
