@@ -12,7 +12,12 @@ from pathlib import Path
 import pytest
 
 from plumbob.crosscheck import verify as package
-from plumbob.crosscheck.verify.fault_programs import coded_faults, contestant_of
+from plumbob.crosscheck.verify.fault_programs import (
+    PROGRAMS,
+    coded_faults,
+    contestant_of,
+    source_of,
+)
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
@@ -106,6 +111,12 @@ def test_the_code_stands_on_screen_on_the_page_in_json_and_in_junit(switches, co
     assert all(f"[{code}]" in text for code in codes for text in texts)
 
 
+@pytest.mark.parametrize(("switches", "is_open"), [({}, True), ({"frame": 1}, False)])
+def test_cases_are_folded_where_a_mistake_is_shown(switches, is_open):
+    text = page.render(report_of(**switches), Presentation(speaker("en"), "en", ["solver.py"]))
+    assert ("<details open>" in text) is is_open
+
+
 # ---- the short programs of each code
 
 
@@ -179,7 +190,7 @@ def test_a_mistake_that_lines_alone_show_is_named_by_its_code(code, monkeypatch)
     test_a_wrong_program_is_named_by_its_code(coded_faults()[code])
 
 
-RIGHT_PROGRAMS = sorted({fault.program for fault in coded_faults().values()})
+RIGHT_PROGRAMS = {name: entry["task"] for name, entry in PROGRAMS.items() if "task" in entry}
 STEPS = (
     "step", "substeps", "local-global step", "Newton iterations", "change of velocity",
     "damped change of velocity", "particle by particle", "motion", "conjugate gradients",
@@ -197,8 +208,7 @@ RESERVED = (
     [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in RIGHT_PROGRAMS],
 )
 def test_a_right_program_is_right(name):
-    fault = next(fault for fault in coded_faults().values() if fault.program == name)
-    report = reports(fault.right_program, fault.task)
+    report = reports(source_of(name), RIGHT_PROGRAMS[name])
     # Another model than converged implicit Euler, a start from which a robot finds no solution, or
     # a single iteration in each frame.
     has_reservation = name in RESERVED

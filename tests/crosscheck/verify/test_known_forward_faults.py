@@ -84,3 +84,15 @@ def test_a_step_points_to_wrong_forces(codes):
     (hint,) = map(str, _with_cause(step, [forces]).diagnosis.hints)
     assert "Its mass_spring_forces is wrong as well" in hint
     assert ("PB-FORCE-001" in hint) == bool(codes)
+
+
+@pytest.mark.parametrize(("code", "is_kept"), [("PB-CLAIM-020", False), ("PB-CCD-016", True)])
+def test_claims_of_wrong_poses_are_no_mistakes_beside_wrong_forward_kinematics(code, is_kept):
+    case = Case("one", INVERSE, {}, "x", sentence("It is all."))
+    wrong = [CaseJudgement(case, Answer({}, 0.0), (finding("nearest point", 1.0),), {}, None, 0.0)]
+    words = Sentence("[{code}] {what}", {"code": code, "what": ""})
+    known = Diagnosis((Explanation(("it",), words, 1.0, 0.0),), hints=(words,))
+    forward, inverse = (TaskReport(task, "", wrong, known) for task in (FORWARD, INVERSE))
+    diagnosis = _with_cause(inverse, [forward]).diagnosis
+    assert (words in diagnosis.hints) is is_kept
+    assert [one.sentence for one in diagnosis.explanations] == [words] * is_kept

@@ -8,9 +8,17 @@ import numpy as np
 import pytest
 from kinematics_solvers import textbook
 
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting
-from plumbob.crosscheck.verify.judgement import Report, Verdict
+from plumbob.crosscheck.verify.judgement import (
+    CaseJudgement,
+    Diagnosis,
+    Report,
+    TaskReport,
+    Verdict,
+)
 from plumbob.crosscheck.verify.kinematics import report as kinematics_report
 from plumbob.crosscheck.verify.kinematics.faults import FAULTS
 from plumbob.crosscheck.verify.mass_spring import forces as force_report
@@ -20,7 +28,9 @@ from plumbob.crosscheck.verify.mass_spring.model import StepModel
 from plumbob.crosscheck.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.crosscheck.verify.output import json_file, junit, page, terminal
 from plumbob.crosscheck.verify.output.words import Presentation, speaker
+from plumbob.crosscheck.verify.precision import has_double
 from plumbob.crosscheck.verify.self_test import DECLARED, Stepper
+from plumbob.crosscheck.verify.sentence import sentence
 from plumbob.crosscheck.verify.verify import DISCIPLINES, judge_cases, verify
 
 
@@ -210,6 +220,15 @@ def test_declared_single_precision_is_right_without_a_word(task):
     assert not report.assumptions
     assert report.verdict <= Verdict.RIGHT_EXCEPT
     assert judged(task, TASKS[task][0](None), printed("%g"), precision="single").assumptions
+
+
+@pytest.mark.parametrize(("digits", "is_double"), [
+    ([15.0, 14.0, 12.0, 1.0], True), ([15.0, 14.0, 1.0, None], False), ([7.0, 8.0, 6.0], False),
+])  # fmt: skip
+def test_several_answers_of_many_digits_are_in_double_precision(digits, is_double):
+    case = Case("one", "mass_spring_step", {}, "x", sentence("It is all."))
+    judgements = [CaseJudgement(case, Answer({}, 0.0), (), {}, count, 0.0) for count in digits]
+    assert has_double(TaskReport("mass_spring_step", "", judgements, Diagnosis())) is is_double
 
 
 def test_residual_in_single_precision_is_no_evidence():

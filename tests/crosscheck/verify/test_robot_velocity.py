@@ -125,6 +125,19 @@ def test_a_wrong_jacobian_is_named(key):
     assert any(key in one.faults for one in report.diagnosis.explanations)
 
 
+def test_of_equal_explanations_that_of_the_jacobian_alone_is_named():
+    fault = robot_jacobian.FAULTS["arms to the last joint"]
+    exchanges = []
+    for case in CASES[::4]:
+        J = next(iter(fault.jacobians(case.inputs, case.inputs["q"])))
+        answer = Answer({"velocities": shortest(J, equation(case.inputs)[1])}, 0.0)
+        exchanges.append(Exchange(case, answer, answer))
+    (alone,) = judge(exchanges, GREETING, "").diagnosis.explanations
+    assert len(alone.faults) > 1
+    (known,) = judge(exchanges, GREETING, "", ["arms to the last joint"]).diagnosis.explanations
+    assert known.faults == ("arms to the last joint",)
+
+
 @pytest.mark.slow
 def test_an_unknown_mistake_is_wrong_but_has_no_name():
     report = report_of(lambda J, twist: 1.3 * shortest(J, twist))
