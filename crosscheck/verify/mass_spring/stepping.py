@@ -430,10 +430,12 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
     Each case adds an aspect to the cases before it.
     """
     law = first_broken(judgements)
-    case = next((j.case for j in judgements if j.verdict > Verdict.RIGHT_EXCEPT), None)
-    if law is None or case is None or case.name != law.values["case"]:
+    cases = [j.case for j in judgements if j.verdict > Verdict.RIGHT_EXCEPT]
+    if law is None or not cases or cases[0].name != law.values["case"]:
         return law
-    return sentence("{law} {trace}", law=law, trace=trace_of(case.family))
+    is_pinned = all(len(case.inputs["pinned"]) for case in cases)
+    family = "later cases" if cases[0].family == "pins" and not is_pinned else cases[0].family
+    return sentence("{law} {trace}", law=law, trace=trace_of(family))
 
 
 def _with_wrong_step(judgement: CaseJudgement) -> CaseJudgement:

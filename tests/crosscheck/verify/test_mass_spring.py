@@ -610,3 +610,17 @@ def test_substeps_of_free_fall_are_taken_at_once(method):
         p = p.changed(**state)
     np.testing.assert_allclose(at_once["positions"], p.positions, rtol=0, atol=1e-14)
     np.testing.assert_allclose(at_once["velocities"], p.velocities, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("pins", "words"),
+    [([0], "Without pins all is right"), ([], "others with pins and without are not")],
+)
+def test_pins_are_looked_at_where_nothing_else_is_wrong(pins, words):
+    judgements = []
+    for name, family, pinned in (("rope", "pins", [0]), ("small h", "small h", pins)):
+        inputs = {"pinned": np.array(pinned, dtype=int)}
+        case = Case(name, "mass_spring_step", inputs, family, sentence("It is all."))
+        broken = Finding("law", Verdict.WRONG, 1.0, 0.0, "m", sentence("Off."))
+        judgements.append(CaseJudgement(case, Answer({}, 0.0), (broken,), {}, None, 0.0))
+    assert words in str(stepping._first_broken(judgements))
