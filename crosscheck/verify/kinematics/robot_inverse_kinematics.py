@@ -50,7 +50,8 @@ def judge(
     judgements = [
         judge_case(
             exchange,
-            partial(_findings, exchange.case, motions, greeting, fails_at_zero, base is None),
+            partial(_findings, exchange.case, motions, greeting, fails_at_zero,
+                    has_right_jacobian=base is None),
             rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
             robot_targets.timed_solve(exchange.case.inputs),
         )
@@ -134,8 +135,8 @@ def _findings(
     motions: Mapping[str, Trajectory],
     greeting: Greeting,
     fails_at_zero: bool,
-    has_right_jacobian: bool,
     outputs: Mapping[str, Any],
+    has_right_jacobian: bool = True,
 ) -> list[Finding]:
     q = outputs.get("q")
     if q is None:

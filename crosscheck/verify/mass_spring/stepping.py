@@ -433,7 +433,7 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
     cases = [j.case for j in judgements if j.verdict > Verdict.RIGHT_EXCEPT]
     if law is None or not cases or cases[0].name != law.values["case"]:
         return law
-    is_pinned = all(len(case.inputs["pinned"]) for case in cases)
+    is_pinned = all(len(case.inputs.get("pinned", [0])) for case in cases)
     family = "later cases" if cases[0].family == "pins" and not is_pinned else cases[0].family
     return sentence("{law} {trace}", law=law, trace=trace_of(family))
 
