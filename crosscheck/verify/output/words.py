@@ -7,7 +7,7 @@ from typing import NamedTuple
 from ..contestant import Failure
 from ..judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
 from ..language import translator
-from ..sentence import Sentence, sentence, visible
+from ..sentence import Sentence, codes_in, sentence, visible
 from . import saved
 
 Say = Callable[[Sentence], str]
@@ -135,14 +135,16 @@ def explanations(report: TaskReport) -> Iterator[Sentence]:
 
 
 def reservations(task: TaskReport) -> list[Sentence]:
-    """Return each kind of the worst complaints about right answers, and the inferred behaviour."""
+    """Return mistakes, each kind of the worst complaints about right answers, and the behaviour."""
     kinds: dict[tuple[str, str], Sentence] = {}
     for judgement in task.judgements:
         for complaint in judgement.complaints[:1] if judgement.verdict is task.verdict else ():
             cause = complaint.values.get("cause")
             kind = complaint.template, cause.template if isinstance(cause, Sentence) else ""
             kinds.setdefault(kind, complaint)
-    return [*kinds.values(), *explanations(task)]
+    mistakes = [words for words in explanations(task) if codes_in(words)]
+    others = [words for words in explanations(task) if words not in mistakes]
+    return [*mistakes, *kinds.values(), *others]
 
 
 def advice(tasks: Sequence[TaskReport]) -> Sentence:

@@ -26,7 +26,7 @@ from plumbob.crosscheck.verify.kinematics.switches import Switches
 from plumbob.crosscheck.verify.one_line import search
 from plumbob.crosscheck.verify.output import json_file, junit, page, terminal
 from plumbob.crosscheck.verify.output.fault_text import cause_and_remedy, explained, failure_of
-from plumbob.crosscheck.verify.output.words import Presentation, advice, speaker
+from plumbob.crosscheck.verify.output.words import Presentation, advice, reservations, speaker
 from plumbob.crosscheck.verify.sentence import codes_in, sentence
 from plumbob.crosscheck.verify.verify import verify
 
@@ -214,6 +214,13 @@ def test_a_right_program_is_right(name):
     expected = Verdict.RIGHT_EXCEPT if name in RESERVED else Verdict.RIGHT
     assert {report.verdict for report in tasks} == {expected}
     assert not any(report.diagnosis.explanations for report in tasks)
+
+
+def test_a_mistake_in_right_answers_is_said_before_all_else():
+    fault = coded_faults()["PB-JACOBIAN-035"]
+    report = reports(fault.wrong_program, fault.task)
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    assert [codes_in(words) for words in reservations(report)] == [(fault.code,), ()]
 
 
 def test_a_line_that_the_program_lacks_is_refused():
