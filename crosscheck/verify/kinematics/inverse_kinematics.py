@@ -40,7 +40,7 @@ OF_A_MISTAKE = "one sweep, of a mistake"
 # The methods of the textbook.
 METHODS = ("ccd", "fabrik")
 MAX_FAULTS = 3
-# Sweeps that reduce the distance by a smaller share of the reach than this have stalled.
+# Sweeps that change the distance by a smaller share of the reach than this have stalled.
 STALLED = 1e-9
 # The verdict on a solver of its own method that answers otherwise in another world: the origin is
 # arbitrary, angles about fixed axes and dampings with a unit are choices.
@@ -236,7 +236,7 @@ def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> str:
         return "target reached, stalled" if method else SLOW
     if is_beyond and is_nearer:
         return "nearest point, approached"
-    if is_nearer and method and is_degenerate and _stalls(case, method):
+    if is_nearer and method and is_degenerate and _stalls(excess + nearest, case, method):
         return "target reached, undetermined"
     if is_nearer and (not method or is_degenerate):
         return SLOW
@@ -245,14 +245,14 @@ def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> str:
     return "nearest point" if is_beyond else "target reached"
 
 
-def _stalls(case: Case, method: str) -> bool:
-    """Return whether twice as many sweeps of the textbook come no nearer to the target."""
+def _stalls(distance: float, case: Case, method: str) -> bool:
+    """Return whether the textbook's sweeps end at a distance [m] too, and as many more do."""
     inputs, limit = case.inputs, case.inputs["max_iterations"]
-    once, twice = (
-        float(np.linalg.norm(x[inputs["effector"]] - inputs["target"]))
+    distances = [
+        np.linalg.norm(x[inputs["effector"]] - inputs["target"])
         for x in (solve(method, {**inputs, "max_iterations": k * limit})[1] for k in (1, 2))
-    )
-    return twice > inputs["tolerance"] and once - twice <= STALLED * case.facts["reach"]
+    ]
+    return bool(np.abs(np.subtract(distances, distance)).max() <= STALLED * case.facts["reach"])
 
 
 def in_time(pose: AnsweredPose, case: Case, method: str, greeting: Greeting) -> list[Finding]:
