@@ -104,7 +104,7 @@ def diagnosis_of(
         shares = {
             key: _share(rule, concerned, tier.by_family)
             for key, rule in tier.signatures.items()
-            if known is None or key != SYMPTOM
+            if known is None or key not in (SYMPTOM, *(JACOBIAN_FAULTS if known else ()))
         }
         key = max(shares, key=shares.__getitem__)
         if shares[key] >= tier.least_share:

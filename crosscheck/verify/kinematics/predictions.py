@@ -180,7 +180,7 @@ def programs(
         (globals_, "global_rotations", range(3)),
         (is_fabrik and parts & {"fabrik", "forward", "arc"}, "converted", range(2)),
         (method == "ccd" and tips > 1, "tip", range(tips)),
-        ("lengths" in names, "stretch", (0, 9)),
+        (is_fabrik and ("lengths" in names or "forward" in parts), "stretch", (0, 9)),
     )  # fmt: skip
     numbers = {name: values for is_shown, name, values in table if is_shown}
     choices = [

@@ -135,7 +135,7 @@ class StepModel(NamedTuple):
     factorisation: str = "LU"
     # formulas of what is made of positions and velocities, x1 and v1, after each solution
     update: Mapping[str, str] = {}
-    right_start: bool = False  # whether iterations begin at x + h v, whatever stands for y
+    right_start: bool = False  # whether iterations begin as if y were x + h v, whatever it is
     # formulas of a motion: problem, fields of the problem of each step; end, the state that a step
     # ends with; state, that which the next one starts from; answer, of the positions X and the
     # velocities V of the start and of all frames; matrix: that of the first step is kept, on
@@ -468,8 +468,12 @@ class StepEquation:
         """Where iterations may begin; s_n = y + h² M⁻¹ f_ext (Bouaziz et al. 2014, Algorithm 1)."""
         start = self.start
         y = start.x + start.h * start.v if start.model.right_start else self.y
-        s_n = self.y + start.h**2 * self.constant / start.p.inertia
-        return {"x_n": start.x, "y": y, "s_n": s_n}
+        return {"x_n": start.x, "y": y, "s_n": y + self.fall}
+
+    @property
+    def fall(self) -> FloatArray:
+        """The displacement by the forces that stay through the step."""
+        return np.asarray(self.start.h**2 * self.constant / self.start.p.inertia)
 
     @property
     def uncoupled(self) -> bool:
@@ -478,13 +482,19 @@ class StepEquation:
         usual = model.matrix == RIGHT_MATRIX and self.linear.masses is p.masses
         return not (p.stiff or self.damped or len(self.pins)) and usual
 
+    def damper_rests(self, length: FloatArray) -> FloatArray:
+        """Return the lengths at which dampers are at rest: those of the springs at the start.
+
+        Those of a fault may depend on the present lengths.
+        """
+        p, x, v, h = self.start.p, self.start.x, self.start.v, self.start.h
+        if p.damper_rest is None:
+            return self._lengths
+        return p.damper_rest(p, l=length, x=x, v=v, h=h, x0=p.positions, y=self.y)
+
     @cached_property
-    def length_n(self) -> FloatArray:
-        """Length of each spring at the start, at which dampers are at rest."""
-        p, start = self.start.p, self.start
-        if p.damper_rest is not None:
-            return p.damper_rest(p, x=start.x, v=start.v, h=start.h, x0=p.positions, y=self.y)
-        return frames(p, start.x)[0]
+    def _lengths(self) -> FloatArray:
+        return frames(self.start.p, self.start.x)[0]
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return M (x - y) - h² f(x), shape (particle, 3)."""
@@ -492,7 +502,7 @@ class StepEquation:
         f = self.constant + spring_forces(p, x)
         if self.damped and self.by_length:
             length, u = frames(p, x)
-            rate = (length - self.length_n) / h
+            rate = (length - self.damper_rests(length)) / h
             pull = p.damper_pull(p, l=length, rate=rate) if p.damper_pull else p.dampings * rate
             f = f - p.pulled.T @ (pull[:, None] * u)
         elif self.damped:
@@ -511,7 +521,7 @@ class StepEquation:
         length, _ = frames(p, x)
         energy = 0.5 * (p.stiffnesses * stretches(p, length) ** 2).sum()
         if self.damped:
-            energy += 0.5 / h * (p.dampings * (length - self.length_n) ** 2).sum()
+            energy += 0.5 / h * (p.dampings * (length - self.damper_rests(length)) ** 2).sum()
         penalty = 0.5 * self.hold * ((x - p.positions)[self.pins] ** 2).sum()
         inertia = 0.5 * (p.inertia * (x - self.y) ** 2).sum()
         return float(inertia + h * h * (energy - (self.constant * x).sum()) + penalty)
@@ -534,7 +544,7 @@ class StepEquation:
         p = self.linear
         c = (p.dampings / self.start.h)[:, None, None]
         if self.by_length:
-            _, across = HESSIANS[kind](self.length_n / length, np.ones_like(length))
+            _, across = HESSIANS[kind](self.damper_rests(length) / length, np.ones_like(length))
             return c * (_isotropic(across) + (1.0 - across)[:, None, None] * uu)
         if p.damping != "along":
             return c * np.tile(np.eye(3), (len(u), 1, 1))
@@ -799,7 +809,7 @@ def _implicit(equation: StepEquation) -> FloatArray:
     integrator = start.model.integrator
     x = np.where(free, equation.starts[integrator.start], start.x)
     if equation.uncoupled:  # g is quadratic: each iteration leaves the same share of the way
-        minimum = equation.starts["s_n"]
+        minimum = equation.y + equation.fall
         scale = start.p.inertia if integrator.method == "descent" else 1.0
         remainder = (1.0 - integrator.rate * scale) ** integrator.iterations
         return np.where(free, minimum + remainder * (x - minimum), x)
@@ -863,9 +873,10 @@ def _projected(equation: StepEquation, k: FloatArray, c: FloatArray, x: FloatArr
     p = equation.start.p
     length, u = frames(p, x)
     pull = k * stretches(p, length) if p.pull is None else p.pull(p, l=length, x=x)
-    rests = c * equation.length_n
+    lengths_at_rest = equation.damper_rests(length)
+    rests = c * lengths_at_rest
     if p.damper_pull is not None and equation.damped and p.normalised:
-        rate = (length - equation.length_n) / equation.start.h
+        rate = (length - lengths_at_rest) / equation.start.h
         rests = c * length - p.damper_pull(p, l=length, rate=rate)
     size = (k * length - pull + rests) * (1.0 if p.normalised else length)
     if p.damping == "all":

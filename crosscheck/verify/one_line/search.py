@@ -49,7 +49,7 @@ MAX_PASSES = 200
 # No further right program is changed after so many changes, of half a millisecond each.
 MAX_MUTANTS = 16_000
 # Programs of these answer in conventions of their own: what they share is changed in each.
-IN_CONVENTIONS = ("robot_jacobian",)
+IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics")
 # The law of sweeps that are neither the textbook's nor those of a known honest program.
 ANOTHER = "one sweep, another"
 # The input that asks for a single iteration of a solver.
@@ -252,10 +252,15 @@ def _faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
         fault
         for fault in coded_faults().values()
         if fault.family not in SELF_NAMED
-        and (fault.task in BUILDS_ON.get(task, ()) or _is_of(fault.program, task, method))
+        and (fault.task in BUILDS_ON.get(task, ()) or _is_shared(fault, task, method))
         and fault.lines
         and all(source.count(right) == 1 for right, _ in fault.lines)
     ]
+
+
+def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
+    """Return whether a program of a task and method may have a fault: those of QUAT, of any."""
+    return _is_of(fault.program, task, "" if fault.family == "QUAT" else method)
 
 
 def _is_of(program: str, task: str, method: str) -> bool:
