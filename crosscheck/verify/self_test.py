@@ -4,6 +4,7 @@ A fault is caught if a law calls an answer wrong, or if the solver is judged by 
 sent; a mere reservation (RIGHT EXCEPT) does not count.
 """
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -104,10 +105,13 @@ def attempt(subject: Subject) -> Trial:
     covered = {
         key for faults in FAULTS.values() for f in faults if f.key in keys for key in f.covers
     }
-    is_named = subject.fault in {*keys, *covered} if subject.fault else not keys
+    known = {*keys, *covered, *(NUMBER.sub("", key) for key in keys)}
+    is_named = subject.fault in known if subject.fault else not keys
     return Trial(subject, report.verdict, laws, is_named)
 
 
+# The number of one of several rules of a robot's fault, at the end of its key.
+NUMBER = re.compile(r" \d+$")
 # Faults that show only in programs of another form, which the lines of their code make.
 ELSEWHERE = {
     "positions before the last rotation", "positions before the last sweep",

@@ -37,6 +37,8 @@ ALONG = 1e-3
 # A bound of all rotations below this is too small for most solves [rad].
 SMALL_BOUND = 0.1
 MAX_ALTERNATIVES = 3
+# Joints whose rotations are not cut off, of which a step is computed; two show any.
+MIN_FREE = 2
 UNMOVED, UNSOLVED = "iterations that change nothing", "wrong solution of the equation"
 # Formulas of a right program, which those in the `models` of a fault replace. Of the path's joints
 # but the effector there are the global rotations R, those of the parents P and the local ones Q as
@@ -95,6 +97,7 @@ class Iteration(NamedTuple):
     # positions and rotations of the path's joints in all poses from the start to its end, by names
     # in formulas
     poses: Sequence[Mapping[str, FloatArray]]
+    cap: float = np.inf  # the angle at which some joints' rotations end [rad]
 
     @property
     def values(self) -> dict[str, FloatArray]:
@@ -114,10 +117,15 @@ class Iteration(NamedTuple):
         return float(before - after)
 
     @property
+    def angles(self) -> FloatArray:
+        """The rotations of the joints [rad]."""
+        before, after = (self.pose(i)["q"] for i in (-2, -1))
+        return rotation.angle(before, after)
+
+    @property
     def angle(self) -> float:
         """The largest rotation of a joint [rad]."""
-        before, after = (self.pose(i)["q"] for i in (-2, -1))
-        return float(rotation.angle(before, after).max(initial=0.0))
+        return float(self.angles.max(initial=0.0))
 
 
 class Fit(NamedTuple):
@@ -170,7 +178,12 @@ def fit(change: Mapping[str, Any], iteration: Iteration) -> Fit:
     J = np.cross(axes, arms[:, None]).reshape(-1, 3).T
     columns = np.ravel(_value(model["columns"], {"k": np.arange(J.shape[1]).reshape(-1, 3)}))
     step = _numbers(model["rule"], _value(model["increments"], values)).ravel()
-    return Fit(iteration, J, *_least_squares(np.where(columns >= 0, J[:, columns], 0.0).T, step))
+    A = np.where(columns >= 0, J[:, columns], 0.0).T
+    whole, is_free = _least_squares(A, step), np.repeat(iteration.angles < iteration.cap, 3)
+    if is_free.all() or is_free.sum() < 3 * MIN_FREE:
+        return Fit(iteration, J, *whole)
+    part = _least_squares(A[is_free], step[is_free])
+    return Fit(iteration, J, *min(whole, part, key=lambda solution: solution[1]))
 
 
 def _numbers(rule: str, increments: FloatArray) -> FloatArray:
@@ -234,6 +247,8 @@ def explanations(
     least, same = LEAST_ANGLE[greeting.precision], SAME[greeting.precision]
     all_iterations = list(iterations(trials, switches(base)))
     steps = [step for step in all_iterations if step.angle >= least]
+    cap = _largest([angle for step in steps for angle in step.angles.tolist()], same) * (1.0 - same)
+    steps = [step._replace(cap=cap or np.inf) for step in steps]
     keys, values, count = _mistake(steps, same)
     if keys == [UNSOLVED] and all(t.judgement.verdict < Verdict.UNDECIDED for t in trials):
         keys = []  # there are other honest methods

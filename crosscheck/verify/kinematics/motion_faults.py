@@ -314,6 +314,19 @@ def _speeds(speeds: str, motion: Trajectory, laws: set[str]) -> Evidence:
     return Evidence(scale > 0.0, gaps <= SAME_SPEED * np.maximum(scale, np.abs(expected).max(-1)))
 
 
+def _of_other_step(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return all frames of a motion whose velocities are its changes times one factor."""
+    evidence, d, v = (
+        _by_law("velocities and coordinates", motion, laws),
+        motion.changes,
+        motion.velocities,
+    )
+    if v is None or not d.any():
+        return evidence
+    gaps = np.abs(v - (v * d).sum() / (d * d).sum() * d).max(axis=-1)
+    return evidence._replace(explained=evidence.explained & (gaps <= SAME_SPEED * np.abs(v).max()))
+
+
 def _skipped(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the missed frames without movement, if these are those in which targets move least."""
     distances = np.linalg.norm(motion.displacements[:, :3], axis=-1)
@@ -674,7 +687,7 @@ POSES: Mapping[str, Signature] = {
         partial(_from_other_target, target), *motion)),
     "long way round": partial(_by_law, "both signs of a quaternion"),
     **_entries("speeds", _speeds),
-    "wrong time step": partial(_by_law, "velocities and coordinates"),
+    "wrong time step": _of_other_step,
     "clamped after the solve": _clamped,
     **{key: signature for key, signature in APPARENT.items() if key != POSITION_ONLY},
 }  # fmt: skip
