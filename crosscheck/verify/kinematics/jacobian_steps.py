@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from plumbob.reference import rotation
-from plumbob.reference.arguments import FloatArray
+from plumbob.reference.arguments import BoolArray, FloatArray
 
 from ..explain import either
 from ..formulas import value_of
@@ -37,8 +37,6 @@ ALONG = 1e-3
 # A bound of all rotations below this is too small for most solves [rad].
 SMALL_BOUND = 0.1
 MAX_ALTERNATIVES = 3
-# Joints whose rotations are not cut off, of which a step is computed; two show any.
-MIN_FREE = 2
 UNMOVED, UNSOLVED = "iterations that change nothing", "wrong solution of the equation"
 # Formulas of a right program, which those in the `models` of a fault replace. Of the path's joints
 # but the effector there are the global rotations R, those of the parents P and the local ones Q as
@@ -179,11 +177,22 @@ def fit(change: Mapping[str, Any], iteration: Iteration) -> Fit:
     columns = np.ravel(_value(model["columns"], {"k": np.arange(J.shape[1]).reshape(-1, 3)}))
     step = _numbers(model["rule"], _value(model["increments"], values)).ravel()
     A = np.where(columns >= 0, J[:, columns], 0.0).T
-    whole, is_free = _least_squares(A, step), np.repeat(iteration.angles < iteration.cap, 3)
-    if is_free.all() or is_free.sum() < 3 * MIN_FREE:
+    whole, is_cut = _least_squares(A, step), iteration.angles >= iteration.cap
+    if not is_cut.any() or is_cut.all():
         return Fit(iteration, J, *whole)
-    part = _least_squares(A[is_free], step[is_free])
+    part = _least_squares(*_without_lengths(A, step, is_cut))
     return Fit(iteration, J, *min(whole, part, key=lambda solution: solution[1]))
+
+
+def _without_lengths(
+    A: FloatArray, step: FloatArray, is_cut: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return A p = step in which some joints' rotation vectors show only their directions."""
+    A, step = A.reshape(-1, 3, A.shape[1]).copy(), step.reshape(-1, 3).copy()
+    axes = step[is_cut] / np.linalg.norm(step[is_cut], axis=1, keepdims=True)
+    A[is_cut] -= axes[:, :, None] * np.einsum("ji,jik->jk", axes, A[is_cut])[:, None]
+    step[is_cut] = 0.0
+    return A.reshape(step.size, -1), step.ravel()
 
 
 def _numbers(rule: str, increments: FloatArray) -> FloatArray:
