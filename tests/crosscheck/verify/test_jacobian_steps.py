@@ -102,9 +102,8 @@ def test_mistake_shows_its_number(key):
 def test_neighbour_of_a_mistake_is_named(key):
     (explanation,) = explanations(NEIGHBOURS[key])
     assert explanation.faults == (key,)
-    assert explanation.share >= (
-        0.8 if "left" in key else 1.0
-    )  # where all are cut off no step shows
+    # where the rotations of all joints are cut off no step shows
+    assert explanation.share >= (0.8 if "left" in key else 1.0)
 
 
 def test_squared_distances_end_the_solves_of_any_method():
