@@ -32,6 +32,7 @@ from .skeletons import suits
 TASK = "robot_track"
 CURVE, FLIPPED, STEPS = "curve", "opposite quaternions", "single steps"
 BOUNDARY = "boundary of the reach"
+JUMP, LIMITED_JUMP = "jump", "jump, limited speeds"
 FRAMES, ITERATIONS, H = 24, 40, 0.02
 # The last joint of this robot may rotate so far [rad]: further than half a turn.
 WRIST = 5.0
@@ -103,8 +104,8 @@ def _motions(
         STEPS: ToolMotion(start, tool),
         "long time step": few,
         "rest": few,
-        "jump": leap,
-        "jump, limited speeds": leap,
+        JUMP: leap,
+        LIMITED_JUMP: leap,
         "laps": ToolMotion(start, Pose(*(np.tile(part, (3, 1)) for part in tool))),
         "start beyond a limit": ToolMotion(beyond, tool),
         "more than half a turn": ToolMotion(start, tool_pose(arm, wrist)),

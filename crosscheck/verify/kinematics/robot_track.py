@@ -12,7 +12,7 @@ from plumbob.reference.arguments import FloatArray
 from ..case import Case
 from ..contestant import Exchange
 from ..greeting import Greeting
-from ..judgement import Finding, TaskReport
+from ..judgement import Explanation, Finding, TaskReport
 from ..laws import finding, judge_case, not_finite
 from ..sentence import sentence
 from . import motion_faults, robot_motions, rounding
@@ -35,6 +35,8 @@ REMAINDER = 0.3
 AT_REST = 1e-4
 # Joint angles that differ by less after a lap have not drifted [rad].
 NO_DRIFT = 1e-2
+# A limit of speeds that is kept in some way is exceeded by more than this.
+SPEEDING = 1.1
 # Answers to equal targets whose quaternions have another sign may differ so much [rad].
 SAME = 1e-2
 # The joints of a start beyond its limits are to be within after so many frames.
@@ -66,7 +68,29 @@ def judge(
         )
         for exchange in exchanges
     ]  # fmt: skip
-    return report(TASK, method, judgements, motion_faults.diagnosis_of(judgements, motions, base))
+    diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
+    if not diagnosis.explanations and (keys := _too_fast(motions)):
+        explanation = Explanation(keys, motion_faults.SENTENCES[keys[0]], 1.0, 0.0)
+        diagnosis = replace(diagnosis, explanations=(explanation,))
+    return report(TASK, method, judgements, diagnosis)
+
+
+def _too_fast(motions: Mapping[str, Trajectory]) -> tuple[str, ...]:
+    """Return how greatest speeds come to be exceeded: by no limit at all, or by one too weak."""
+    for name, motion in motions.items():
+        twin = motions.get(name.replace(robot_motions.LIMITED_JUMP, robot_motions.JUMP))
+        if twin is None or twin is motion or _speed_ratios(motion).max() <= SPEEDING:
+            continue
+        count = min(len(motion.q), len(twin.q))
+        is_same = np.abs(motion.q[:count] - twin.q[:count]).max() <= NO_DRIFT
+        return ("speed limits ignored" if is_same else "speed limits of iterations",)
+    return ()
+
+
+def _speed_ratios(motion: Trajectory) -> FloatArray:
+    """Return speeds as multiples of the greatest ones, (frame, joint)."""
+    speeds = np.abs(motion.changes) / motion.inputs["h"]
+    return np.asarray(speeds / motion.inputs["velocity_limits"])
 
 
 def _findings(
@@ -235,7 +259,7 @@ def _velocities(motion: Trajectory) -> Iterator[Finding]:
     """Yield whether joints keep their greatest speeds, and whether reported speeds are theirs."""
     h, changes, velocities = motion.inputs["h"], motion.changes, motion.velocities
     if "velocity_limits" in motion.inputs:
-        ratios = np.abs(changes / h) / motion.inputs["velocity_limits"]
+        ratios = _speed_ratios(motion)
         frame, joint = divmod(int(np.argmax(ratios)), ratios.shape[1])
         speed = float(np.abs(changes[frame, joint]) / h)
         yield _at(frame, finding("velocity limits kept", ratios.max(), 1.0 + 1e-6, index=joint,

@@ -105,6 +105,7 @@ class Track(NamedTuple):
     energies: FloatArray
     is_early: bool  # whether the answer is wrong
     is_exhausted: bool  # whether there is no next iterate
+    h: float  # [s]
 
     @property
     def is_moved(self) -> bool:
@@ -118,16 +119,18 @@ def explanation(
     start: str | None,
     epsilon: float,
     is_hasty: bool = False,
+    least_error: float = IMPRECISE,
 ) -> Explanation | None:
     """Return the mistake of the iteration that leaves the wrong answers, None if none is known.
 
+    It is None where no error is larger than `least_error` of the displacement.
     In haste, where few answers are right, none of the many mistakes of Newton's method is sought.
     Iterations without a mistake that end by no known test give way to those with one.
     """
     trials = trials_of(options, probes, epsilon)
     wrong = [trial for trial in trials if trial.error > SOLVED]
     wrong.sort(key=lambda trial: (is_indefinite(trial.problem), trial.problem.count))
-    if not any(trial.error > IMPRECISE for trial in wrong):
+    if not any(trial.error > least_error for trial in wrong):
         return None
     is_hasty &= len(wrong) > (1.0 - LEAST_SHARE) * len(trials)
     _, model = apply(options, trials[0].problem, StepModel(damper="none"))
@@ -312,6 +315,7 @@ def _track(options: Sequence[Option], trial: StepAnswer, course: FollowedMethod)
             np.array([equation.value(x) for x in xs]),
             trial.error > SOLVED,
             following is None,
+            equation.start.h,
         )
     return None
 
@@ -343,14 +347,20 @@ def _iteration(
     usual = StepEquation(equation.start._replace(model=model._replace(matrix=RIGHT_MATRIX)))
     diagonal = usual.matrix(x_n, integrator.hessian).diagonal()[free]
     A, b = A[np.ix_(free, free)], right.reshape(-1, 1)[free]
-    diagonals = {"A": A, "M": p.inertia_diagonal[free], "diagonal": diagonal}
-    scale = evaluate(integrator.scale, p, diagonals)[:, None]
+    particle = np.arange(len(free))[free] // 3
+    diagonals = {"A": A, "M": p.inertia_diagonal[free], "diagonal": diagonal,
+                 "blocks": A * (particle[:, None] == particle)}  # fmt: skip
+    scale = evaluate(integrator.scale, p, diagonals)
+    is_matrix = scale.ndim == 2
+    scale = scale if is_matrix else scale[:, None]
+    root = np.linalg.cholesky(scale) if is_matrix else scale**0.5
 
     def beta(before: FloatArray, after: FloatArray) -> Any:
         return evaluate(integrator.beta, p, {"before": before, "after": after})
 
     def residual(x: FloatArray) -> FloatArray:
-        return (b - A @ (x - base).reshape(-1, 1)[free]) / scale**0.5
+        left = b - A @ (x - base).reshape(-1, 1)[free]
+        return np.linalg.solve(root, left) if is_matrix else left / root
 
     def placed(solution: FloatArray) -> FloatArray:
         step = np.zeros(len(free))

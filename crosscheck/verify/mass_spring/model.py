@@ -732,14 +732,15 @@ def conjugate_gradients(
     scale: FloatArray | float = 1.0,
     beta: Callable[[FloatArray, FloatArray], FloatArray] = lambda before, after: after / before,
 ) -> Iterator[FloatArray]:
-    """Yield the iterates, preconditioned by a diagonal; each column is solved on its own.
+    """Yield the iterates, preconditioned by a diagonal, or a matrix; each column on its own.
 
     β follows from r·z before and after a step.
     """
+    is_matrix = np.shape(scale) == A.shape
     residual, direction, before = b - A @ x, 0.0 * b, np.ones(b.shape[1])
     while True:
         yield x
-        z = residual / scale
+        z = np.linalg.solve(scale, residual) if is_matrix else residual / scale
         after = (residual * z).sum(0)
         direction = z + beta(before, after) * direction if direction.any() else z
         image = A @ direction

@@ -26,7 +26,7 @@ from . import iterations, laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
 from .honest import compatible, domains, honest
-from .laws import SOLVED, StepContext, rounding
+from .laws import IMPRECISE, SOLVED, StepContext, rounding
 from .model import EXPLICIT, StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
 from .search import (
@@ -83,9 +83,9 @@ class Stepping(NamedTuple):
         probes = probes_of(exchanges, problems, every=True)
         step, epsilon, matches = greeting.step, greeting.epsilon, list[ModelMatch]()
 
-        def iteration_of(is_hasty: bool) -> Explanation | None:
+        def iteration_of(is_hasty: bool, least: float = IMPRECISE) -> Explanation | None:
             options = honest_options(matches, step)
-            return iterations.explanation(options, probes, step.start, epsilon, is_hasty)
+            return iterations.explanation(options, probes, step.start, epsilon, is_hasty, least)
 
         is_iterative = step.method in ("converged", "linearised") or step.iterations is not None
         iteration = iteration_of(is_hasty=True) if is_iterative else None
@@ -100,6 +100,9 @@ class Stepping(NamedTuple):
             matches = larger
             judgements, recognised = _judge_all(exchanges, problems, greeting, matches)
         diagnosis = _diagnose(judgements, search, matches, probes)
+        is_broken = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
+        if iteration is None and not diagnosis.explained and is_broken:
+            iteration = iteration_of(is_hasty=False, least=SOLVED)  # small errors break laws
         if iteration is not None and iteration.share > diagnosis.share:
             diagnosis = replace(diagnosis, explanations=(iteration,), first_broken=None, hints=())
         elif not diagnosis.explained:
