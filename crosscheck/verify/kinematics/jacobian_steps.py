@@ -37,6 +37,10 @@ ALONG = 1e-3
 # A bound of all rotations below this is too small for most solves [rad].
 SMALL_BOUND = 0.1
 MAX_ALTERNATIVES = 3
+BISECTIONS = 60
+# Positions are those before an iteration up to this share of their change.
+LATE = 1e-3
+EARLIER = "positions of the iteration before"
 UNMOVED, UNSOLVED = "iterations that change nothing", "wrong solution of the equation"
 # Formulas of a right program, which those in the `models` of a fault replace. Of the path's joints
 # but the effector there are the global rotations R, those of the parents P and the local ones Q as
@@ -95,6 +99,7 @@ class Iteration(NamedTuple):
     # positions and rotations of the path's joints in all poses from the start to its end, by names
     # in formulas
     poses: Sequence[Mapping[str, FloatArray]]
+    answered: FloatArray | None = None  # the answer's positions of the path's joints
     cap: float = np.inf  # the angle at which some joints' rotations end [rad]
 
     @property
@@ -113,6 +118,15 @@ class Iteration(NamedTuple):
         """How much nearer the effector comes to its target [m]."""
         before, after = (np.linalg.norm(self.pose(i)["x"][-1] - self.target) for i in (-2, -1))
         return float(before - after)
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the answer's positions are those before the iteration, which changes them."""
+        if self.answered is None:
+            return False
+        before, after = (self.pose(i)["x"] for i in (-2, -1))
+        gap, change = (np.abs(x - before).max() for x in (self.answered, after))
+        return bool(gap <= LATE * change)
 
     @property
     def angles(self) -> FloatArray:
@@ -201,9 +215,23 @@ def _numbers(rule: str, increments: FloatArray) -> FloatArray:
         return rotation.logarithm(increments)
     if rule == "first order":
         return np.asarray(2.0 * increments[:, 1:] / increments[:, :1])
+    if rule == "axis not unit":
+        return _of_long_axes(increments)
     rotations = Rotation.from_quat(increments, scalar_first=True)
     angles = rotations.as_euler(rule, suppress_warnings=True)
     return np.asarray(angles[:, [rule.index(axis) for axis in "XYZ"]])
+
+
+def _of_long_axes(increments: FloatArray) -> FloatArray:
+    """Return the vectors w of which (cos |w|/2, sin |w|/2 w) are made, for |w| tan |w|/2."""
+    w, lengths = increments[:, 1:], np.linalg.norm(increments[:, 1:], axis=1)
+    low, high = np.zeros(len(w)), np.full(len(w), np.pi)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_low = middle * np.tan(0.5 * middle) * np.abs(increments[:, 0]) < lengths
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+    sign = np.where(increments[:, 0] < 0.0, -1.0, 1.0)
+    return np.asarray((sign * low / np.maximum(lengths, 1e-300))[:, None] * w)
 
 
 def solve(change: Mapping[str, Any], step: Fit) -> Solution:
@@ -230,7 +258,8 @@ def iterations(trials: Sequence[PoseTrial], switched: Switches = RIGHT) -> Itera
         poses = solves.setdefault(name, [_pose(inputs, path, start, switched)])
         if facts["sweeps"] == len(poses):
             poses.append(_pose(inputs, path, local, switched))
-            yield Iteration(name, inputs["target"], tuple(poses))
+            x = trial.pose.answered_positions
+            yield Iteration(name, inputs["target"], tuple(poses), None if x is None else x[path])
 
 
 def _pose(
@@ -258,6 +287,7 @@ def explanations(
     steps = [step for step in all_iterations if step.angle >= least]
     cap = _largest([angle for step in steps for angle in step.angles.tolist()], same) * (1.0 - same)
     steps = [step._replace(cap=cap or np.inf) for step in steps]
+    steps = [step for step in steps if (step.angles < step.cap).any()] or steps
     keys, values, count = _mistake(steps, same)
     if keys == [UNSOLVED] and all(t.judgement.verdict < Verdict.UNDECIDED for t in trials):
         keys = []  # there are other honest methods
@@ -265,6 +295,8 @@ def explanations(
         keys = []
     if len(all_iterations) >= MIN_COUNT and not steps:
         keys, count = [UNMOVED], 1
+    if len(steps) >= MIN_COUNT and all(step.is_late for step in steps):
+        keys, count = [EARLIER], len(steps)
     if keys == [""] and base:
         keys = [" + ".join(fault.key for fault in base)]
         words = describe("ccd", keys)

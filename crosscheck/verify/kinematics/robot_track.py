@@ -28,6 +28,8 @@ cases = robot_motions.cases
 TRAIL = 5.0
 # Errors and movements of joints die out if less than this share remains in the second half of rest.
 DECAY = 0.8
+# Errors of so many tolerances come from another test, or measure, rather than from moving targets.
+FEW_TOLERANCES = 10.0
 # At rest a tool may be off by this share of the target's largest displacement in a frame, as where
 # a posture task pulls at it.
 REMAINDER = 0.3
@@ -159,6 +161,8 @@ def _on_target(
     twin = motions.get(motion.case.name.replace(robot_motions.CURVE, robot_motions.STEPS))
     if is_behind and twin is not None and twin is not motion:
         key += ", one iteration" * np.array_equal(motion.q, twin.q)
+    if is_behind and errors[frame] <= FEW_TOLERANCES:
+        key = "target followed, within a few tolerances"
     key = key if frame < facts["certain"] else "target followed, another"
     if motion.case.family == TOLERANCE and motion.changes.any():
         key = "target followed, behind"  # it does not take the start for near enough

@@ -47,7 +47,7 @@ MIN_SHARE = 0.75
 # Cases for which a right program goes through its loops more often are left out: they take long.
 MAX_PASSES = 200
 # No further right program is changed after so many changes, of half a millisecond each.
-MAX_MUTANTS = 16_000
+MAX_MUTANTS = 24_000
 # Programs of these answer in conventions of their own: what they share is changed in each.
 IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics")
 # The law of sweeps that are neither the textbook's nor those of a known honest program.
