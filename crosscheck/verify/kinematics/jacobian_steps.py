@@ -38,6 +38,8 @@ ALONG = 1e-3
 SMALL_BOUND = 0.1
 MAX_ALTERNATIVES = 3
 BISECTIONS = 60
+# Iterations change nothing if fewer than this share of them do.
+FEW_MOVED = 0.1
 # Positions are those before an iteration up to this share of their change.
 LATE = 1e-3
 EARLIER = "positions of the iteration before"
@@ -293,8 +295,8 @@ def explanations(
         keys = []  # there are other honest methods
     if is_right and not all("models" in ENTRIES.get(key, ()) for key in keys):
         keys = []
-    if len(all_iterations) >= MIN_COUNT and not steps:
-        keys, count = [UNMOVED], 1
+    if len(all_iterations) >= MIN_COUNT and len(steps) < FEW_MOVED * len(all_iterations):
+        keys, count = [UNMOVED], max(len(steps), 1)
     if len(steps) >= MIN_COUNT and all(step.is_late for step in steps):
         keys, count = [EARLIER], len(steps)
     if keys == [""] and base:

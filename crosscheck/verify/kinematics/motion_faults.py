@@ -37,6 +37,8 @@ MIN_FREE, POSE_FREEDOMS = 5, 6
 STATIONARY = 0.01
 # Frames that a fault has to explain before it is named, and the least share of those it concerns.
 MIN_FRAMES, MIN_SHARE = 3, 0.5
+# The least share of the missed frames that rest where frames are skipped.
+MOSTLY = 0.9
 # A rotation by about 2 pi: by how much it may differ [rad].
 WHOLE_TURN = 0.7
 # Errors that fall to less than this share have been reduced.
@@ -108,7 +110,10 @@ def diagnosis_of(
         }
         key = max(shares, key=shares.__getitem__)
         if shares[key] >= tier.least_share:
-            explanation = Explanation((key,), SENTENCES[key], shares[key], 0.0)
+            step, deeper = DEEPER.get(key, ("", key))
+            if step and _share(STEPS[step], every, True) >= MIN_SHARE:
+                key = deeper
+            explanation = Explanation((key,), SENTENCES[key], max(shares.values()), 0.0)
             return Diagnosis((explanation,), variant_count=len(FAULTS))
     hints = feature_of(judgements) if known is None else ()
     return Diagnosis(hints=hints, variant_count=len(FAULTS))
@@ -328,12 +333,17 @@ def _of_other_step(motion: Trajectory, laws: set[str]) -> Evidence:
 
 
 def _skipped(motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return the missed frames without movement, if these are those in which targets move least."""
+    """Return the missed frames without movement, if these are those in which targets move least.
+
+    Frames that move reach their targets.
+    """
     distances = np.linalg.norm(motion.displacements[:, :3], axis=-1)
     is_still = np.abs(motion.changes).max(axis=-1) <= EXACT
     is_slow = distances <= distances[is_still].max(initial=-1.0)
     is_told = (is_slow == is_still)[1:].all() and (distances.max() <= EXACT or not is_still.all())
-    return Evidence(_ends_off_target(motion) & (not motion.is_pose), is_still & is_told)
+    is_missed = _ends_off_target(motion) & (not motion.is_pose)
+    is_told &= bool(is_still[is_missed].mean() >= MOSTLY) if is_missed.any() else False
+    return Evidence(is_missed, is_still & is_told)
 
 
 def _rejected(motion: Trajectory, laws: set[str]) -> Evidence:
@@ -676,6 +686,8 @@ APPARENT: Mapping[str, Signature] = {
     key: partial(_reached, partial(_errors, fault, _sine_if_near))
     for key, fault in POSE_FAULTS.items()
 }
+TARGETS = _entries("target", lambda target, *motion: _reached(
+    partial(_from_other_target, target), *motion))  # fmt: skip
 # What explains whole poses comes before what explains steps, jumps and misses.
 SYMPTOM = "slow frames skipped"  # wrong Jacobians may leave frames as they are as well
 POSES: Mapping[str, Signature] = {
@@ -683,8 +695,7 @@ POSES: Mapping[str, Signature] = {
     "missed frames kept": _rejected,
     "angles from zero": _from_zero,
     "limits ignored": _limits_ignored,
-    **_entries("target", lambda target, *motion: _reached(
-        partial(_from_other_target, target), *motion)),
+    **TARGETS,
     "long way round": partial(_by_law, "both signs of a quaternion"),
     **_entries("speeds", _speeds),
     "wrong time step": _of_other_step,
@@ -716,10 +727,13 @@ STUCK: Mapping[str, Signature] = {
 }  # fmt: skip
 # Joints in another order leave their limits, but reach their targets.
 ORDERS: Mapping[str, Signature] = {k: POSES[k] for k, fault in POSE_FAULTS.items() if fault.order}
+# Faults that steps show to be part of another: the key of the steps, and that of the other.
+DEEPER = {"velocities from the start": ("frames start anew", "coordinates not kept")}
 TIERS: Sequence[Tier] = (
     Tier(ORDERS, least_share=0.95),
     Tier(_entries("limits", _within) | _entries("speed_limits", _within_speeds), False, 0.97),
     Tier(_entries("test", _accepted), least_share=0.97, is_of_all=True, steps=True),
+    Tier({SYMPTOM: _skipped} | TARGETS, least_share=0.9),  # other targets make other velocities
     Tier(POSES),
     Tier(STEPS, by_family=True),
     Tier(_entries("solution", _wrongly_solved), least_share=0.9, steps=False),
