@@ -740,7 +740,7 @@ def conjugate_gradients(
     residual, direction, before = b - A @ x, 0.0 * b, np.ones(b.shape[1])
     while True:
         yield x
-        z = np.linalg.solve(scale, residual) if is_matrix else residual / scale
+        z = np.asarray(np.linalg.solve(scale, residual) if is_matrix else residual / scale)
         after = (residual * z).sum(0)
         direction = z + beta(before, after) * direction if direction.any() else z
         image = A @ direction
