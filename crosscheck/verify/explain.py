@@ -193,8 +193,9 @@ def ending_test(
 
     Its quantity has a number for each iterate, those at early ends smaller than any before an end,
     and smaller than the constant of a test that has one. The first test is of the number of
-    iterations, which a single run does not show.
+    iterations, which a single run does not show; of the others one with a round bound is likelier.
     """
+    candidates = list[tuple[bool, Sentence]]()
     for quantity, constant, words in tests:
         with np.errstate(divide="ignore", invalid="ignore"):
             values = [quantity(run) for run in runs]
@@ -204,12 +205,19 @@ def ending_test(
         if constant is not None and not largest < constant <= least:
             continue
         bound = separating_bound(largest, least)
-        if bound is not None and (len(last) > 1 or quantity is not tests[0][0]):
+        is_count = quantity is tests[0][0]
+        if bound is not None and (len(last) > 1 or not is_count):
             count = -round(max(last))
-            return Sentence(words.template, {
+            candidates.append((is_count or is_round(bound), Sentence(words.template, {
                 **words.values, "bound": bound, "sweeps": count, "iterations": count,
-            })  # fmt: skip
-    return None
+            })))  # fmt: skip
+    return max(candidates, key=lambda candidate: candidate[0], default=(False, None))[1]
+
+
+def is_round(number: float) -> bool:
+    """Return whether a number is 1, 2 or 5 times a power of ten."""
+    mantissa = number / 10.0 ** math.floor(math.log10(number)) if number > 0.0 else 0.0
+    return any(math.isclose(mantissa, digit) for digit in (1.0, 2.0, 5.0, 10.0))
 
 
 def separating_bound(last: float, before: float) -> float | None:

@@ -10,6 +10,7 @@ import pytest
 from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer, Failure, FailureKind
+from plumbob.crosscheck.verify.fault_programs import contestant_of, source_of
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting, Step, System
 from plumbob.crosscheck.verify.judgement import CaseJudgement, Finding, Report, Verdict
@@ -624,3 +625,30 @@ def test_pins_are_looked_at_where_nothing_else_is_wrong(pins, words):
         broken = Finding("law", Verdict.WRONG, 1.0, 0.0, "m", sentence("Off."))
         judgements.append(CaseJudgement(case, Answer({}, 0.0), (broken,), {}, None, 0.0))
     assert words in str(stepping._first_broken(judgements))
+
+
+GRADIENTS = """
+def conjugate_gradients(A, b, goal=1e-6):
+    blocks = A * (np.arange(len(b))[:, None] // 3 == np.arange(len(b)) // 3)
+    x, r = np.zeros(len(b)), b.copy()
+    p = z = np.linalg.solve(blocks, r)
+    while r @ z > goal:
+        rate = (r @ z) / (p @ A @ p)
+        x, rest = x + rate * p, r - rate * A @ p
+        after = np.linalg.solve(blocks, rest)
+        p, r, z = after + (rest @ after) / (r @ z) * p, rest, after
+    return x
+"""
+
+
+def test_conjugate_gradients_with_blocks_that_end_at_a_constant_are_named():
+    """The errors are small, but springs move the centre of mass."""
+    right = "np.linalg.solve(A[np.ix_(free, free)], b[free])"
+    source = source_of("change of velocity")
+    wrong = source.replace(right, "conjugate_gradients(A[np.ix_(free, free)], b[free])")
+    assert wrong != source
+    report = verify(contestant_of(wrong + GRADIENTS), ["mass_spring_step"]).tasks[0]
+    assert report.verdict is Verdict.WRONG
+    (explanation,) = report.diagnosis.explanations
+    assert explanation.codes == ("PB-STEP-168",)
+    assert "change of velocity is below about 0.001" in str(explanation.sentence)

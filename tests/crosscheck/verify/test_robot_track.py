@@ -82,10 +82,14 @@ HONEST = {
 }  # fmt: skip
 
 
+# Faults that other ones resemble.
+QUICK = ("frames start anew", "coordinates not kept", "speed limits of iterations")
+
+
 def some(names, stride):
     """Names of which only some are tried quickly: each takes seconds."""
     return [
-        pytest.param(name, marks=() if i % stride == 0 else pytest.mark.slow)
+        pytest.param(name, marks=() if i % stride == 0 or name in QUICK else pytest.mark.slow)
         for i, name in enumerate(names)
     ]
 
