@@ -193,7 +193,7 @@ def ending_test(
 
     Its quantity has a number for each iterate, those at early ends smaller than any before an end,
     and smaller than the constant of a test that has one. The first test is of the number of
-    iterations, which a single run does not show; of the others one with a round bound is likelier.
+    iterations, which a single run does not show; of the others round bounds are likelier.
     """
     candidates = list[tuple[bool, Sentence]]()
     for quantity, constant, words in tests:

@@ -123,7 +123,7 @@ class Iteration(NamedTuple):
 
     @property
     def is_late(self) -> bool:
-        """Whether the answer's positions are those before the iteration, which changes them."""
+        """Whether the answer has the positions before the iteration, which changes them."""
         if self.answered is None:
             return False
         before, after = (self.pose(i)["x"] for i in (-2, -1))

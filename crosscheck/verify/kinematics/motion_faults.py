@@ -320,7 +320,7 @@ def _speeds(speeds: str, motion: Trajectory, laws: set[str]) -> Evidence:
 
 
 def _of_other_step(motion: Trajectory, laws: set[str]) -> Evidence:
-    """Return all frames of a motion whose velocities are its changes times one factor."""
+    """Return all frames of a motion with velocities that are its changes times a single factor."""
     evidence, d, v = (
         _by_law("velocities and coordinates", motion, laws),
         motion.changes,

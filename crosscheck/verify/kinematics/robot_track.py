@@ -78,7 +78,7 @@ def judge(
 
 
 def _too_fast(motions: Mapping[str, Trajectory]) -> tuple[str, ...]:
-    """Return how greatest speeds come to be exceeded: by no limit at all, or by one too weak."""
+    """Return the fault by which joints exceed their greatest speeds, () if they keep them."""
     for name, motion in motions.items():
         twin = motions.get(name.replace(robot_motions.LIMITED_JUMP, robot_motions.JUMP))
         if twin is None or twin is motion or _speed_ratios(motion).max() <= SPEEDING:

@@ -483,7 +483,7 @@ class StepEquation:
         return not (p.stiff or self.damped or len(self.pins)) and usual
 
     def damper_rests(self, length: FloatArray) -> FloatArray:
-        """Return the lengths at which dampers are at rest: those of the springs at the start.
+        """Return the lengths at which dampers are at rest, as the springs have them at the start.
 
         Those of a fault may depend on the present lengths.
         """

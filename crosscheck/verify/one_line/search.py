@@ -259,7 +259,7 @@ def _faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
 
 
 def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
-    """Return whether a program of a task and method may have a fault: those of QUAT, of any."""
+    """Return whether a program of a task and method may have a fault; any program may have faults of QUAT."""
     return _is_of(fault.program, task, "" if fault.family == "QUAT" else method)
 
 
