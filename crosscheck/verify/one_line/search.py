@@ -259,7 +259,7 @@ def _faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
 
 
 def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
-    """Return whether a program of a task and method may have a fault; any program may have faults of QUAT."""
+    """Return whether a program of a task may have a fault: of its method, or of all methods."""
     return _is_of(fault.program, task, "" if fault.family == "QUAT" else method)
 
 
