@@ -35,6 +35,8 @@ SINGULAR = 0.05
 MIN_FREE, POSE_FREEDOMS = 5, 6
 # An error is least where its gradient is this small, relative to error and Jacobian.
 STATIONARY = 0.01
+# The squares of the weights that solvers give rotations [m^2].
+SQUARED_WEIGHTS = (1e-3, 1e2)
 # Frames that a fault has to explain before it is named, and the least share of those it concerns.
 MIN_FRAMES, MIN_SHARE = 3, 0.5
 # The least share of the missed frames that rest where frames are skipped.
@@ -230,12 +232,24 @@ def _in_branch(branch: int, motion: Trajectory, laws: set[str]) -> Evidence:
 
 
 def _is_at_minimum(motion: Trajectory) -> BoolArray:
-    """Return whether no joint off its limits would reduce the error, (frame)."""
+    """Return whether no joint off its limits would reduce the error, (frame).
+
+    Solvers weigh rotations as they like: some weight may make it the least.
+    """
     e, J = motion.twists(motion.q), next(RIGHT.jacobians(motion.inputs, motion.q))
     J = J * ~motion.at_limits[:, None, :]
-    gradient = np.linalg.norm(np.einsum("fij,fi->fj", J, e), axis=-1)
-    scale = np.linalg.norm(J, axis=(1, 2)) * np.linalg.norm(e, axis=-1)
-    return np.asarray(gradient <= STATIONARY * scale)
+    linear, angular = (
+        np.einsum("fij,fi->fj", J[:, part], e[:, part]) for part in (slice(3), slice(3, 6))
+    )
+    lengths = np.maximum((angular * angular).sum(axis=-1), 1e-300)
+    balance = np.clip(-(linear * angular).sum(axis=-1) / lengths, *SQUARED_WEIGHTS)
+    is_least = np.zeros(len(e), dtype=bool)
+    for square in (np.ones(len(e)), balance):
+        rows = np.repeat(np.stack([np.ones(len(e)), np.sqrt(square)], axis=-1), 3, axis=-1)
+        gradient = np.linalg.norm(linear + square[:, None] * angular, axis=-1)
+        size = np.linalg.norm(J * rows[..., None], axis=(1, 2))
+        is_least |= gradient <= STATIONARY * size * np.linalg.norm(e * rows, axis=-1)
+    return is_least
 
 
 def _limits_ignored(motion: Trajectory, laws: set[str]) -> Evidence:

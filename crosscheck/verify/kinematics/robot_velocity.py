@@ -18,7 +18,7 @@ from ..explain import Variant, either, explain
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from ..sentence import Sentence, sentence
+from ..sentence import Sentence, sentence, with_code
 from . import robot_jacobian, robot_models, rounding
 from .faults import TABLE, sentences_of
 from .formulas import evaluate
@@ -39,12 +39,17 @@ CONDITION, DRAWS = 60.0, 400
 LARGEST_LOSS = 0.25
 # Speeds beyond so many times those of least length come from a division by almost zero.
 FACTOR = 1e3
+# Beyond so many times from a division by a rounded zero.
+ENDLESS = 1e9
 SINGULAR = "a singular pose"
 # Mistakes in reading the velocity or solving for the speeds, by their keys.
 READINGS = TABLE["robot_velocity"]
 # Those that invert a singular matrix, which is so for robots with too few joints or too many.
 TOO_FEW, TO_SPARE = "too few joints", "joints to spare"
 CUT = "cut too large"
+DIVIDED = "singular values of zero inverted"
+# A factor of the linear, and one of the angular part of the tool's velocity; ratios agree so well.
+WEIGHTS, SAME_WEIGHT = ("linear part weighted", "angular part weighted"), 1e-6
 SENTENCES = sentences_of("robot_velocity") | {
     key: fault.sentence for key, fault in robot_jacobian.FAULTS.items()
 }
@@ -318,14 +323,14 @@ def _nearest(
 
 def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagnosis:
     """Return the faults that explain most answers, of wrong answers first."""
-    key = _inverted(judgements)
+    key = _without_number(judgements) or _inverted(judgements)
     if key:
         return Diagnosis((Explanation((key,), SENTENCES[key], 1.0, 0.0),))
     ordered = sorted(judgements, key=lambda judgement: (-judgement.verdict, -judgement.case.size))
     answers = {
-        judgement.case.name: judgement.answer.values["velocities"]
+        judgement.case.name: _velocities(judgement)
         for judgement in ordered
-        if isinstance(judgement.answer, Answer) and judgement.case.family != SINGULAR
+        if _is_number(judgement) and judgement.case.family != SINGULAR
     }
     largest = max((float(np.abs(speeds).max()) for speeds in answers.values()), default=0.0)
 
@@ -350,6 +355,9 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
         lambda keys: either([[SENTENCES[key]] for key in keys]),
         trial=2,
     )  # fmt: skip
+    is_certain = bool(explanations) and explanations[0].share == 1.0
+    if not is_certain and (weighted := _weighted(judgements)):
+        return Diagnosis((weighted,), variant_count=count)
     hints = feature_of(judgements) if not explanations else ()
     if explanations and explanations[0].faults == (CUT,):
         hints = (_cut(judgements, answers),)
@@ -368,6 +376,59 @@ def _cut(judgements: Sequence[CaseJudgement], answers: Mapping[str, FloatArray])
     return sentence("You drop singular values up to {dropped:.2g} of the largest and use those "
                     "from {kept:.2g} of it.", dropped=dropped.max(),
                     kept=retained.min())  # fmt: skip
+
+
+def _velocities(judgement: CaseJudgement) -> FloatArray:
+    assert isinstance(judgement.answer, Answer)
+    return np.asarray(judgement.answer.values["velocities"])
+
+
+def _is_number(judgement: CaseJudgement) -> bool:
+    """Return whether a case has an answer of numbers."""
+    return isinstance(judgement.answer, Answer) and bool(np.isfinite(_velocities(judgement)).all())
+
+
+def _is_endless(judgement: CaseJudgement) -> bool:
+    """Return whether speeds are no numbers, or far beyond those of least length."""
+    least = np.abs(_shortest(_equation(judgement.case.inputs))).max()
+    return not np.abs(_velocities(judgement)).max() <= ENDLESS * least
+
+
+def _without_number(judgements: Sequence[CaseJudgement]) -> str:
+    """Return the fault of which wrong answers are no numbers in poses that lack a rank, or ""."""
+    wrong = [judgement for judgement in judgements if judgement.verdict >= Verdict.WRONG]
+    answered = [judgement for judgement in wrong if isinstance(judgement.answer, Answer)]
+    is_divided = [
+        _is_endless(judgement)
+        and len(_singular_values(judgement.case.inputs, judgement.case.inputs["q"]))
+        < min(6, len(judgement.case.inputs["q"]))
+        for judgement in answered
+    ]
+    return DIVIDED if len(answered) == len(wrong) and all(is_divided) else ""
+
+
+def _weighted(judgements: Sequence[CaseJudgement]) -> Explanation | None:
+    """Return the factor that one part of the tool's velocity has in all answers of six freedoms."""
+    ratios = dict[str, list[float]]()
+    for judgement in judgements:
+        J, twist = _equation(judgement.case.inputs)
+        is_whole = _is_number(judgement) and np.linalg.matrix_rank(J, RANK * np.abs(J).max()) == 6
+        if judgement.case.family == SINGULAR or not is_whole:
+            continue
+        given, asked = (J @ _velocities(judgement)).reshape(2, 3), twist.reshape(2, 3)
+        factors = (given * asked).sum(axis=1) / (asked * asked).sum(axis=1)
+        gaps = np.abs(given - factors[:, None] * asked).max(axis=1)
+        is_told = (gaps <= SAME_WEIGHT * np.abs(asked).max(axis=1)).all()
+        for key, factor, other in zip(WEIGHTS, factors, factors[::-1], strict=True):
+            is_alone = is_told and abs(other - 1.0) <= SAME_WEIGHT
+            ratios.setdefault(key, []).append(float(factor) if is_alone else np.nan)
+    for key, values in ratios.items():
+        factor = values[0]
+        is_same = np.abs(np.array(values) - factor) <= SAME_WEIGHT * abs(factor)
+        if len(values) > 2 and is_same.all() and abs(factor - 1.0) > SAME_WEIGHT:
+            words = Sentence(READINGS[key]["sentence"], {"factor": factor})
+            return Explanation((key,), with_code(READINGS[key]["code"], words), 1.0, 0.0)
+    return None
 
 
 def _inverted(judgements: Sequence[CaseJudgement]) -> str:
