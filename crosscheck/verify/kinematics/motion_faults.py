@@ -1,6 +1,7 @@
 """Faults of robots that reach and follow targets: the frames that they explain."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, lru_cache, partial
 from itertools import islice
 from typing import NamedTuple
@@ -551,6 +552,32 @@ def _single_step(motion: Trajectory, laws: set[str]) -> Evidence:
     return Evidence(concerned, is_moved & (gaps <= EQUAL_STEP))
 
 
+def _posture_added(motion: Trajectory, laws: set[str]) -> Evidence:
+    """Return the frames that are right steps plus a pull to a posture that moves the tool.
+
+    In the null space of the Jacobian, N, steps show the pull alone: N' dq = a N' (c - q), which
+    gives its gain a and the posture c, but for joints that the null space does not move.
+    """
+    is_free = ~motion.at_limits.any(axis=-1) & (np.abs(motion.changes).max(axis=-1) > AT_LIMIT)
+    is_redundant = motion.q.shape[1] > POSE_FREEDOMS and motion.inputs["max_iterations"] == 1
+    nothing = np.zeros(len(motion.q), dtype=bool)
+    if not is_redundant or is_free.sum() < 2 * motion.q.shape[1]:
+        return Evidence(nothing, nothing)
+    N = np.linalg.svd(motion.jacobians)[2][:, POSE_FREEDOMS:]
+    columns = np.concatenate([N, -np.einsum("fnj,fj->fn", N, motion.previous)[..., None]], axis=-1)
+    moves = np.einsum("fnj,fj->fn", N, motion.changes)
+    A, b = columns[is_free].reshape(-1, columns.shape[-1]), moves[is_free].ravel()
+    pull, gain = np.split(np.linalg.lstsq(A, b, rcond=None)[0], [-1])
+    J, q, e = motion.jacobians, motion.previous, motion.twists(motion.previous)
+    is_shown, gaps = np.abs(A[:, :-1]).max(axis=0) > AT_LIMIT, np.full(len(q), np.inf)
+    middle = 0.5 * (motion.inputs["lower"] + motion.inputs["upper"])
+    for posture in (middle, np.zeros_like(middle), motion.inputs["start"]):
+        pulls = np.where(is_shown, pull, gain * posture) - gain * q
+        gaps = np.minimum(gaps, _step_gap(replace(motion, q=motion.q - pulls), J, q, e))
+    is_right = _step_gap(motion, J, q, e) <= SAME_STEP
+    return Evidence(is_free & ~is_right, gaps <= SAME_STEP)
+
+
 def _misplaced(motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the single iterations that a shorter step, without some joints, explains.
 
@@ -722,6 +749,7 @@ STEPS: Mapping[str, Signature] = {
     "transposed Jacobian": _transposed,  # as with small columns and large damping
     **{key: partial(_is_step, key) for key in STEP_KEYS},
     "steps of other joints": _misplaced,
+    "posture added": _posture_added,
     "single step": _single_step,
     "gain too high": _overshoot,
 }
