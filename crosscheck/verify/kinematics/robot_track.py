@@ -12,7 +12,7 @@ from plumbob.reference.arguments import FloatArray
 from ..case import Case
 from ..contestant import Exchange
 from ..greeting import Greeting
-from ..judgement import Explanation, Finding, TaskReport
+from ..judgement import Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from ..sentence import sentence
 from . import motion_faults, robot_motions, rounding
@@ -166,7 +166,10 @@ def _on_target(
     key = key if frame < facts["certain"] else "target followed, another"
     if motion.case.family == TOLERANCE and motion.changes.any():
         key = "target followed, behind"  # it does not take the start for near enough
-    return _at(frame, finding(key, errors[frame], bound, distance=distance, angle=angle))
+    # Greatest speeds leave no other choice than to come later.
+    verdict = Verdict.RIGHT if is_behind and "velocity_limits" in motion.inputs else None
+    law = finding(key, errors[frame], bound, verdict=verdict, distance=distance, angle=angle)
+    return _at(frame, law)
 
 
 def _dies_out(values: np.ndarray, facts: Mapping[str, Any], bound: float) -> bool:

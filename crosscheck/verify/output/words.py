@@ -135,16 +135,27 @@ def explanations(report: TaskReport) -> Iterator[Sentence]:
 
 
 def reservations(task: TaskReport) -> list[Sentence]:
-    """Return mistakes, each kind of the worst complaints about right answers, and the behaviour."""
+    """Return mistakes, each kind of the worst complaints about right answers, and the behaviour.
+
+    Of each kind it is the complaint with the largest error.
+    """
     kinds: dict[tuple[str, str], Sentence] = {}
     for judgement in task.judgements:
         for complaint in judgement.complaints[:1] if judgement.verdict is task.verdict else ():
             cause = complaint.values.get("cause")
             kind = complaint.template, cause.template if isinstance(cause, Sentence) else ""
-            kinds.setdefault(kind, complaint)
+            if kind not in kinds or _error_in(complaint) > _error_in(kinds[kind]):
+                kinds[kind] = complaint
     mistakes = [words for words in explanations(task) if codes_in(words)]
     others = [words for words in explanations(task) if words not in mistakes]
     return [*mistakes, *kinds.values(), *others]
+
+
+def _error_in(words: Sentence) -> float:
+    """Return the error that a complaint names, or the part of it after the frame, else 0."""
+    parts = [words, *(part for part in words.values.values() if isinstance(part, Sentence))]
+    errors = [part.values.get("error") for part in parts]
+    return max((float(error) for error in errors if isinstance(error, int | float)), default=0.0)
 
 
 def advice(tasks: Sequence[TaskReport]) -> Sentence:
