@@ -113,10 +113,9 @@ def diagnosis_of(
         }
         key = max(shares, key=shares.__getitem__)
         if shares[key] >= tier.least_share:
-            step, deeper = DEEPER.get(key, ("", key))
-            if step and _share(STEPS[step], every, True) >= MIN_SHARE:
-                key = deeper
-            explanation = Explanation((key,), SENTENCES[key], max(shares.values()), 0.0)
+            step, whole = DEEPER.get(key, ("", key))
+            named = whole if step and _share(STEPS[step], every, True) >= MIN_SHARE else key
+            explanation = Explanation((named,), SENTENCES[named], shares[key], 0.0)
             return Diagnosis((explanation,), variant_count=len(FAULTS))
     hints = feature_of(judgements) if known is None else ()
     return Diagnosis(hints=hints, variant_count=len(FAULTS))

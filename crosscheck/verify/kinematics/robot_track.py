@@ -39,6 +39,8 @@ AT_REST = 1e-4
 NO_DRIFT = 1e-2
 # A limit of speeds that is kept in some way is exceeded by more than this.
 SPEEDING = 1.1
+# The share of the largest speed from which on speeds are alike.
+ALIKE = 1.0 - 1e-6
 # Answers to equal targets whose quaternions have another sign may differ so much [rad].
 SAME = 1e-2
 # The joints of a start beyond its limits are to be within after so many frames.
@@ -78,10 +80,17 @@ def judge(
 
 
 def _too_fast(motions: Mapping[str, Trajectory]) -> tuple[str, ...]:
-    """Return the fault by which joints exceed their greatest speeds, () if they keep them."""
+    """Return the fault by which joints exceed their greatest speeds, () if none is known.
+
+    Of limits with another factor the largest speeds of several frames are alike.
+    """
     for name, motion in motions.items():
         twin = motions.get(name.replace(robot_motions.LIMITED_JUMP, robot_motions.JUMP))
-        if twin is None or twin is motion or _speed_ratios(motion).max() <= SPEEDING:
+        if twin is None or twin is motion:
+            continue
+        fastest = _speed_ratios(motion).max(axis=1)
+        is_capped = (fastest >= ALIKE * fastest.max()).sum() > 1
+        if fastest.max() <= SPEEDING or is_capped:
             continue
         count = min(len(motion.q), len(twin.q))
         is_same = np.abs(motion.q[:count] - twin.q[:count]).max() <= NO_DRIFT

@@ -206,3 +206,13 @@ def test_an_arm_that_never_moves_skips_more_than_slow_frames():
         exchanges.append(Exchange(case, answer, answer))
     likely = judge(exchanges, GREETING, "").diagnosis.explanations
     assert all("slow frames skipped" not in explanation.faults for explanation in likely)
+
+
+def test_another_constant_limit_of_speeds_is_not_taken_for_one_of_iterations():
+    right = "np.clip(q - last, -limits, limits)"
+    source = PROGRAMS["speed limits as steps"].wrong_program
+    assert source.count(right) == 1
+    source = source.replace(right, "np.clip(q - last, -2.0 * h * limits, 2.0 * h * limits)")
+    report = verify(contestant_of(source), [TASK]).tasks[0]
+    assert report.verdict is Verdict.WRONG
+    assert not report.diagnosis.explanations
