@@ -23,6 +23,7 @@ MAX_SMALL = 1e3
 RIGHT: Rules = {
     # A hinge by Rodrigues' formula: R = cosine 1 + sine K + outer a a^T, where c, s = cos q, sin q
     "cosine": "c", "sine": "s", "outer": "1 - c", "cross": "K",
+    "skew": "K",  # the matrix of the cross product with a
     "matrix": "Q", "seen": "R",  # of a quaternion, from its rotation matrix; where the tool seems
     # The rotation of a joint and what rotates its origin, a slide's direction and the tool's
     # position: R of the parent, the frame, the joint's motion and, from then on, the joint.
@@ -34,7 +35,7 @@ RIGHT: Rules = {
     "jacobian": "J", "answer": "J",
 }  # fmt: skip
 # Rules whose faults make matrices that are no rotations.
-UNROTATED = {"cosine", "sine", "outer", "cross", "matrix"}
+UNROTATED = {"cosine", "sine", "outer", "cross", "skew", "matrix"}
 
 
 def roll_pitch_yaw(R: FloatArray) -> tuple[float, float, float]:
@@ -64,7 +65,7 @@ def hinge_matrix(axis: FloatArray, angle: FloatArray, rules: Rules) -> FloatArra
     """Return the rotations about an axis by Rodrigues' formula, (..., 3, 3)."""
     q = np.clip(angle, -MAX_SMALL, MAX_SMALL)[..., None, None]
     x, y, z = axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    K = evaluate(rules["skew"], {"K": np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])})
     names = {"q": q, "c": np.cos(angle)[..., None, None], "s": np.sin(angle)[..., None, None]}
     a, b, outer = (evaluate(rules[name], names) for name in ("cosine", "sine", "outer"))
     cross = evaluate(rules["cross"], names | {"K": K})
