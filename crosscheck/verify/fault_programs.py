@@ -53,15 +53,40 @@ class CodedFault(NamedTuple):
     @property
     def wrong_program(self) -> str:
         """The source of the program with the fault; raise ValueError if a line is not replaced."""
-        text = self.right_program
+        return self.planted_in(self.right_program)
+
+    def planted_in(self, program: str) -> str:
+        """Return a right program with the fault; raise ValueError if it has not each line once.
+
+        A replaced line may stand deeper than in the fault's own program: its replacement is
+        indented likewise.
+        """
+        own = self.right_program
         for right, wrong in self.lines:
-            if text.count(right) != 1:
+            if program.count(right) != 1:
                 raise ValueError(
-                    f"{self.code}: expected {right!r} once in the program {self.program}, "
-                    f"got it {text.count(right)} times"
+                    f"{self.code}: expected {right!r} once in the program, "
+                    f"got it {program.count(right)} times"
                 )
-            text = text.replace(right, wrong)
-        return text
+            depth = _indentation(program, right) - _indentation(own, right)
+            program = _replaced(program, right, wrong, " " * depth)
+            own = own.replace(right, wrong)
+        return program
+
+
+def _indentation(program: str, text: str) -> int:
+    """Return the number of spaces before the line that a text begins in."""
+    line = program[: program.index(text)].rpartition("\n")[2] + text
+    return len(line) - len(line.lstrip(" "))
+
+
+def _replaced(program: str, right: str, wrong: str, margin: str) -> str:
+    """Return a program with a text replaced by one whose lines get a further margin."""
+    before, after = program.split(right)
+    first, *others = wrong.splitlines(keepends=True) or [""]
+    if right.startswith(" "):  # whole lines, whose margin stands before them
+        before, first = before.removesuffix(margin), first and margin + first
+    return before + first + "".join(margin + line for line in others) + after
 
 
 def source_of(program: str) -> str:

@@ -7,7 +7,7 @@ another, a line left out or in the wrong place.
 import ast
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar
@@ -85,11 +85,8 @@ class Program:
         self._choices = constants
         self.names |= constants
 
-    def with_lines(self, lines: Sequence[tuple[str, str]]) -> "Program":
-        """Return the program with each first text, which it has once, replaced by the second."""
-        source = self.source
-        for right, wrong in lines:
-            source = source.replace(right, wrong)
+    def with_source(self, source: str) -> "Program":
+        """Return another program with the same choices; raise SyntaxError if it is none."""
         program = Program(source)
         program.choose(self._choices)
         return program

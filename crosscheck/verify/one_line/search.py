@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import takewhile
@@ -200,8 +201,9 @@ def _of_program(
     def variants() -> Iterator[Variant]:
         for fault in _faults_in(program.source, report.task, report.method):
             faults[fault.name] = fault
-            predict = partial(_faulty_answer, program.with_lines(fault.lines), report, passes)
-            yield Variant((fault.name,), predict)
+            with suppress(SyntaxError):
+                wrong = program.with_source(fault.planted_in(program.source))
+                yield Variant((fault.name,), partial(_faulty_answer, wrong, report, passes))
         if len(different) < MIN_DIFFERENT or functions is None:
             return
         program.observe(partial(run, different[0].case))

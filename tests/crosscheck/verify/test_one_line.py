@@ -66,6 +66,33 @@ def test_a_known_fault_of_another_program_is_named():
     assert explanation.share == 1.0
 
 
+def test_every_known_fault_of_every_program_compiles():
+    sources = {name: source_of(name) for name in PROGRAMS if "task" in PROGRAMS[name]}
+    planted = {
+        fault.planted_in(source): f"{fault.code} in {name}"
+        for name, source in sources.items()
+        for method in ("", "ccd", "fabrik")
+        if f"def {method}" in source
+        for fault in search._faults_in(source, PROGRAMS[name]["task"], method)
+    }
+    assert len(planted) > 3_000
+    for program, name in planted.items():
+        compile(program, name, "exec")
+
+
+def test_a_fault_is_indented_as_the_line_that_it_replaces():
+    fault = coded_faults()["PB-STEP-053"]  # two lines in place of a line
+    depths = {
+        name: {
+            len(line) - len(line.lstrip())
+            for line in fault.planted_in(source_of(name)).splitlines()
+            if "masses, h = " in line or "forces = masses[:, None] * gravity" in line
+        }
+        for name in ("step", "motion")
+    }
+    assert depths == {"step": {4}, "motion": {8}}
+
+
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize(
     "name",
