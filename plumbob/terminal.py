@@ -123,8 +123,14 @@ def progress() -> Any:
     from rich.table import Column
     from rich.text import Text
 
+    class Count(MofNCompleteColumn):
+        def render(self, task: Any) -> Text:
+            return Text("") if task.total is None else super().render(task)
+
     class TimeLeft(ProgressColumn):
         def render(self, task: Any) -> Text:
+            if task.total is None:
+                return Text(f"{task.elapsed or 0.0:.0f} s")
             return Text(time_left(task.elapsed, task.completed, task.total, task.fields))
 
     console = Console(stderr=True)
@@ -132,7 +138,7 @@ def progress() -> Any:
     flexible = Column(no_wrap=True, overflow="ellipsis", ratio=1)
     return Progress(
         BarColumn(max(4, min(24, console.width // 6 - 1)), table_column=rigid.copy()),
-        MofNCompleteColumn(table_column=rigid.copy()),
+        Count(table_column=rigid.copy()),
         TimeLeft(table_column=rigid.copy()),
         TextColumn("{task.description}", markup=False, table_column=flexible),
         console=console,
@@ -144,18 +150,18 @@ def progress() -> Any:
 
 
 @contextlib.contextmanager
-def lines_in_a_pipe(bar: Any) -> Iterator[None]:
+def lines_in_a_pipe(
+    bar: Any, first_pause: float = PAUSE, longest_pause: float = LONGEST_PAUSE
+) -> Iterator[None]:
     """Print the state of a progress bar now and then, where standard error is no terminal."""
     end = threading.Event()
 
     def report() -> None:
-        pause = PAUSE
+        pause = first_pause
         while not end.wait(pause):
-            pause = min(1.5 * pause, LONGEST_PAUSE)
+            pause = min(1.5 * pause, longest_pause)
             for task in bar.tasks:
-                left = time_left(task.elapsed, task.completed, task.total, task.fields)
-                line = f"{task.completed:g}/{task.total:g}, {left}: {task.description}"
-                print(line, file=sys.stderr, flush=True)
+                print(_progress_line(task), file=sys.stderr, flush=True)
 
     if not sys.stderr.isatty():
         threading.Thread(target=report, daemon=True).start()
@@ -163,6 +169,14 @@ def lines_in_a_pipe(bar: Any) -> Iterator[None]:
         yield
     finally:
         end.set()
+
+
+def _progress_line(task: Any) -> str:
+    """Return the state of a bar's task: how far it is, the time left, and what it is."""
+    if task.total is None:
+        return f"{task.elapsed or 0.0:.0f} s: {task.description}"
+    left = time_left(task.elapsed, task.completed, task.total, task.fields)
+    return f"{task.completed:g}/{task.total:g}, {left}: {task.description}"
 
 
 def time_left(

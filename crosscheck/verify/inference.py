@@ -75,29 +75,54 @@ _REPLACEMENTS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
 _ADDED = ("rest_positions", "previous_positions")
 
 
-def inferred(
-    contestant: Contestant, report: TaskReport, judge: Callable[[Greeting], TaskReport]
-) -> TaskReport:
-    """Return the report on what a solver takes, the same report if it takes all or is wrong in it.
+class Inference(NamedTuple):
+    """What the answers of a solver show of the inputs that it takes."""
 
-    `judge` returns the report by another greeting. A report on a restricted solver says so in its
-    assumptions, and keeps the faults that explain the other answers.
+    evidence: Evidence  # () if it takes all, or nothing is known
+    is_right: bool = False  # whether a solver of such restrictions answers so
+
+
+def infer(
+    contestant: Contestant, report: TaskReport, judge: Callable[[Greeting], TaskReport]
+) -> Inference:
+    """Return the restrictions of a solver whose answers are wrong, the fewest that make it right.
+
+    `judge` returns the report by another greeting.
     """
     greeting = contestant.greeting
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
     if report.verdict <= Verdict.RIGHT_EXCEPT or greeting.system.continues or is_stuck:
-        return report
+        return Inference(())
     evidence = [(r, why) for r in RESTRICTIONS if (why := _evidence(contestant, report, r))]
-    if not evidence:
-        return report
-    best = judge(restricted(greeting, evidence))
-    if best.verdict > Verdict.RIGHT_EXCEPT and _share(best) <= _share(report):
-        return report
-    for item in tuple(evidence) if best.verdict <= Verdict.RIGHT_EXCEPT else ():
+
+    def is_right(items: Evidence) -> bool:
+        return judge(restricted(greeting, items)).verdict <= Verdict.RIGHT_EXCEPT
+
+    if not evidence or not is_right(evidence):
+        return Inference(evidence)
+    for item in tuple(evidence):
         fewer = [other for other in evidence if other is not item]
-        if fewer and (trial := judge(restricted(greeting, fewer))).verdict <= Verdict.RIGHT_EXCEPT:
-            evidence, best = fewer, trial
-    return _restricted_report(report, best, evidence)
+        evidence = fewer if fewer and is_right(fewer) else evidence
+    return Inference(evidence, is_right=True)
+
+
+def inferred(
+    report: TaskReport,
+    greeting: Greeting,
+    inference: Inference,
+    judge: Callable[[Greeting], TaskReport],
+) -> TaskReport:
+    """Return the report on what a solver takes, the same report if it takes all or is wrong in it.
+
+    A report on a restricted solver says so in its assumptions, and keeps the faults that explain
+    the other answers.
+    """
+    if not inference.evidence:
+        return report
+    best = judge(restricted(greeting, inference.evidence))
+    if not inference.is_right and _share(best) <= _share(report):
+        return report
+    return _restricted_report(report, best, inference.evidence)
 
 
 def restricted(greeting: Greeting, evidence: Evidence) -> Greeting:

@@ -196,6 +196,7 @@ class Report:
     tasks: Sequence[TaskReport]
     seed: int
     remarks: tuple[Sentence, ...] = ()
+    unjudged: tuple[str, ...] = ()  # the tasks without a verdict, since the judge itself failed
 
     @property
     def verdict(self) -> Verdict:

@@ -3,15 +3,16 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import msgspec
 
 from . import precision
 from .case import Case
-from .contestant import Contestant, Exchange, Failure, is_hung
+from .cause_search import SECONDS, CauseSearch, NoSearch
+from .contestant import Contestant, Exchange, Failure, NoGreetingError, is_hung
 from .greeting import Greeting
-from .inference import inferred, methods_of
+from .inference import Inference, infer, inferred, methods_of
 from .judgement import Diagnosis, Report, TaskReport, Verdict
 from .kept_state import with_kept_state
 from .kinematics import (
@@ -29,7 +30,6 @@ from .kinematics.claims import OF_WRONG_POSES
 from .kinematics.faults import SwitchFault
 from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
-from .mass_spring.search import Budget
 from .mass_spring.stepping import Stepping
 from .one_line.search import with_changed_line
 from .sentence import Sentence, codes_in, sentence
@@ -40,7 +40,8 @@ from .timing import with_lesser_time
 MAX_HANGS = 2
 # Tasks that are tried once for every method that the greeting names.
 WITH_METHODS = ("inverse_kinematics", "track")
-Notify = Callable[[str, int, int], None]
+# Called with what is done, and the number of requests sent, and of all; None if they are not known.
+Notify = Callable[[Sentence, int, int | None], None]
 
 
 class Discipline(Protocol):
@@ -49,7 +50,14 @@ class Discipline(Protocol):
     def cases(self, greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
         """Return cases that suit the solver, from trivial to hostile, the smallest first."""
 
-    def judge(self, exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+    def judge(
+        self,
+        exchanges: Sequence[Exchange],
+        greeting: Greeting,
+        method: str,
+        *,
+        cause_search: CauseSearch | None = None,
+    ) -> TaskReport:
         """Judge answers by laws, the reference and the declaration; name the faults."""
 
 
@@ -74,38 +82,165 @@ def verify(
     tasks: Sequence[str] | None = None,
     seed: int = 0,
     thorough: bool = False,
-    notify: Notify = lambda task, count, total: None,
+    notify: Notify = lambda work, count, total: None,
+    publish: Callable[[Report], None] = lambda report: None,
 ) -> Report:
     """Try a solver at its tasks, by default all that it offers, and return the report.
 
-    The cases are random by the seed; there are more if `thorough`. `notify` is called before each
-    with the task, the number of cases done, and of all, and likewise before each stage of a search
-    of faults. Raise ValueError if a task is not offered.
+    The cases are random by the seed; there are more if `thorough`. All tasks are judged before the
+    cause of any wrong answer is sought: after each, `publish` is called with the verdicts so far.
+    `notify` is called before each request, judgement and search.
+
+    Raises:
+        ValueError: if a task is not offered.
     """
     greeting, remarks = _with_methods(contestant, tasks, seed)
-    reports = list[TaskReport]()
-    for task, method in trials(greeting, tasks):
-        causes = [r for r in reports if _builds_on(task, method, r)]
-        causes.sort(key=lambda r: (not r.diagnosis.explained, BUILDS_ON[task].index(r.task)))
+    attempts, reports, unjudged = list[Attempt](), list[TaskReport](), list[str]()
+    pairs = trials(greeting, tasks)
+    for task, method in pairs:
+        attempt = Attempt(contestant, task, method, seed, thorough, notify)
+        try:
+            reports.append(attempt.judge(reports))
+            attempts.append(attempt)
+        except NoGreetingError:
+            raise
+        except Exception as error:
+            unjudged.append(task)
+            remarks += (sentence("{task}: {why}", task=task, why=failed(error)),)
+        report = Report(contestant.greeting, tuple(reports), seed, remarks, tuple(unjudged))
+        publish(replace(report, remarks=(*remarks, _unfinished(len(reports), len(pairs)))))
+    explained, is_interrupted = list[TaskReport](), False
+    for attempt, verdict in zip(attempts, reports, strict=True):
+        cause_search = CauseSearch(is_interrupted)
+        explained.append(attempt.explain(verdict, explained, cause_search))
+        is_interrupted |= cause_search.is_interrupted
+    return Report(contestant.greeting, explained, seed, remarks, tuple(unjudged))
 
-        known, budget = _known_faults(task, reports, causes), Budget()
 
-        def judge(
-            greeting: Greeting,
-            task: str = task,
-            method: str = method,
-            known: Sequence[SwitchFault | str] | None = known,
-            budget: Budget = budget,
-        ) -> TaskReport:
-            cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
-            return judge_cases(contestant, task, method, cases, notify, greeting, known, budget)
+def failed(error: Exception) -> Sentence:
+    """Return why there is no verdict."""
+    return sentence(
+        "No verdict: the judge itself failed ({error}). Please report this as a mistake of "
+        "Plumbob.",
+        error=f"{type(error).__name__}: {error}",
+    )
 
-        report = inferred(contestant, judge(contestant.greeting), judge)
-        report = with_kept_state(contestant, report)
+
+def _unfinished(count: int, total: int) -> Sentence:
+    return sentence(
+        "This was written before the end: {count} of {total} tasks are judged, and no cause of "
+        "wrong answers has been sought.",
+        count=count,
+        total=total,
+    )
+
+
+class Answers(NamedTuple):
+    """The exchanges of a solver with the judge, and the cases that they are of."""
+
+    cases: Sequence[Case]
+    exchanges: Sequence[Exchange]  # fewer than the cases if too many hang
+
+
+class Attempt:
+    """A solver at a task: it is asked and judged, then its wrong answers are explained."""
+
+    def __init__(
+        self,
+        contestant: Contestant,
+        task: str,
+        method: str,
+        seed: int,
+        thorough: bool,
+        notify: Notify,
+    ) -> None:
+        self.task, self._contestant, self._method = task, contestant, method
+        self._seed, self._thorough, self._notify = seed, thorough, notify
+        self._answers: dict[Greeting, Answers] = {}  # by the greeting that the cases suit
+        self._inference = Inference(())
+
+    def _answers_to(self, greeting: Greeting) -> Answers:
+        """Return the answers to the cases that suit a greeting, which are asked once."""
+        if greeting not in self._answers:
+            discipline = DISCIPLINES[self.task]
+            cases = discipline.cases(greeting, self._method, self._seed, self._thorough)
+            exchanges = _ask(self._contestant, cases, self._notify)
+            self._answers[greeting] = Answers(cases, exchanges)
+        return self._answers[greeting]
+
+    def judge(self, reports: Sequence[TaskReport]) -> TaskReport:
+        """Return the report with the verdict by laws and honest methods alone.
+
+        `reports` are those on earlier tasks.
+        """
+        greeting, causes = self._contestant.greeting, self._causes(reports)
+        self._answers_to(greeting)
+        self._notify(sentence("judging {task}", task=self.task), 0, None)
+        judge = partial(self._judged, NoSearch(), _known_faults(self.task, reports, causes))
+        report = judge(greeting)
+        self._inference = infer(self._contestant, report, judge)
+        return inferred(report, greeting, self._inference, judge)
+
+    def explain(
+        self, verdict: TaskReport, reports: Sequence[TaskReport], cause_search: CauseSearch
+    ) -> TaskReport:
+        """Return the report on a verdict with the cause of wrong answers, if one is found in time.
+
+        `reports` are those on earlier tasks.
+        """
+        if verdict.verdict is Verdict.RIGHT and self.task != inverse_kinematics.TASK:
+            return verdict
+        work = sentence(
+            "searching for the cause in {task} (at most {seconds:.0f} s of processor time)",
+            task=self.task,
+            seconds=SECONDS,
+        )
+        self._notify(work, 0, None)
+        return _explained(partial(self._explain, reports, cause_search), verdict, cause_search)
+
+    def _explain(self, reports: Sequence[TaskReport], cause_search: CauseSearch) -> TaskReport:
+        causes, greeting = self._causes(reports), self._contestant.greeting
+        judge = partial(self._judged, cause_search, _known_faults(self.task, reports, causes))
+        report = inferred(judge(greeting), greeting, self._inference, judge)
+        find_state = partial(with_kept_state, self._contestant, report)
+        report = cause_search.run(find_state, report)
         if not causes:
-            report = with_changed_line(report, contestant.greeting, partial(notify, task))
-        reports.append(_with_cause(report, causes))
-    return Report(contestant.greeting, reports, seed, remarks)
+            find_line = partial(with_changed_line, report, greeting)
+            report = cause_search.run(find_line, report)
+        return _with_cause(report, causes)
+
+    def _causes(self, reports: Sequence[TaskReport]) -> list[TaskReport]:
+        """Return the reports on wrong answers of what the task builds upon, explained first."""
+        causes = [report for report in reports if _builds_on(self.task, self._method, report)]
+        order = BUILDS_ON.get(self.task, ())
+        return sorted(causes, key=lambda r: (not r.diagnosis.explained, order.index(r.task)))
+
+    def _judged(
+        self,
+        cause_search: CauseSearch,
+        known_faults: Sequence[SwitchFault | str] | None,
+        greeting: Greeting,
+    ) -> TaskReport:
+        answers = self._answers_to(greeting)
+        return _judge_answers(
+            answers, self.task, self._method, greeting, known_faults, cause_search
+        )
+
+
+def _explained(
+    find: Callable[[], TaskReport], verdict: TaskReport, cause_search: CauseSearch
+) -> TaskReport:
+    """Return the report with a cause, or that on the verdict and why the search ended early."""
+
+    def find_in_time() -> TaskReport:
+        with cause_search.limited():
+            return find()
+
+    report = cause_search.run(find_in_time, verdict)
+    if cause_search.end is None or report.verdict <= Verdict.RIGHT_EXCEPT:
+        return report
+    hints = (cause_search.end, *report.diagnosis.hints)
+    return replace(report, diagnosis=replace(report.diagnosis, hints=hints))
 
 
 def _known_faults(
@@ -186,26 +321,36 @@ def judge_cases(
     task: str,
     method: str,
     cases: Sequence[Case],
-    notify: Notify = lambda task, count, total: None,
-    declared: Greeting | None = None,
-    known_faults: Sequence[SwitchFault | str] | None = None,
-    budget: Budget | None = None,
+    notify: Notify = lambda work, count, total: None,
 ) -> TaskReport:
-    """Ask a solver some cases of a task and judge its answers; arguments as of `verify`.
+    """Ask a solver some cases of a task, judge its answers and explain wrong answers.
 
-    They are judged by what its greeting declares, or by another greeting. What the task builds upon
-    is known to have some faults; None if it is right, or they are not known. The searches of a step
-    share a budget.
+    The arguments are those of `verify`.
     """
-    budget = budget or Budget()
-    exchanges = _ask(contestant, cases, partial(notify, task))
-    judge: Callable[..., TaskReport] = DISCIPLINES[task].judge
+    answers = Answers(cases, _ask(contestant, cases, notify))
+    judge = partial(_judge_answers, answers, task, method, contestant.greeting, None)
+    cause_search = CauseSearch()
+    return _explained(partial(judge, cause_search), judge(NoSearch()), cause_search)
+
+
+def _judge_answers(
+    answers: Answers,
+    task: str,
+    method: str,
+    greeting: Greeting,
+    known_faults: Sequence[SwitchFault | str] | None,
+    cause_search: CauseSearch,
+) -> TaskReport:
+    """Judge answers by what a greeting declares.
+
+    What the task builds upon is known to have some faults; None if it is right, or they are not
+    known.
+    """
+    exchanges, total = answers.exchanges, len(answers.cases)
+    judge: Callable[..., TaskReport] = partial(DISCIPLINES[task].judge, cause_search=cause_search)
     if known_faults is not None:
         judge = partial(judge, base=known_faults)
-    if isinstance(discipline := DISCIPLINES[task], Stepping):
-        discipline = discipline._replace(budget=budget)
-        judge = partial(discipline.judge, notify=partial(notify, task))
-    greeting, reason = precision.judging_greeting(exchanges, declared or contestant.greeting)
+    greeting, reason = precision.judging_greeting(exchanges, greeting)
     report = judge(exchanges, greeting, method)
     places = precision.decimal_places(exchanges) if report.verdict is Verdict.WRONG else None
     if places is not None:
@@ -224,8 +369,8 @@ def judge_cases(
             report = replace(report, diagnosis=single.diagnosis)
         elif precision.is_off_by_single(report) if is_right else single.diagnosis.explained:
             report, reason = single, precision.INEXACT
-    if unsent := len(cases) - len(exchanges):
-        hints = (*report.diagnosis.hints, _unsent(unsent, len(cases)))
+    if unsent := total - len(exchanges):
+        hints = (*report.diagnosis.hints, _unsent(unsent, total))
         report = replace(report, diagnosis=replace(report.diagnosis, hints=hints))
     return replace(report, assumptions=(reason,) if reason else ())
 
@@ -257,17 +402,15 @@ def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple
     ]
 
 
-def _ask(
-    contestant: Contestant, cases: Sequence[Case], notify: Callable[[int, int], None]
-) -> list[Exchange]:
+def _ask(contestant: Contestant, cases: Sequence[Case], notify: Notify) -> list[Exchange]:
     """Ask each case, then each answered case a second time.
 
     Forces and energies are asked again in reverse, so that what is left over from the request
     before shows.
     """
-    answers, hangs = [], 0
+    answers, hangs, work = [], 0, sentence("asking {task}", task=cases[0].task if cases else "")
     for i, case in enumerate(cases):
-        notify(i, 2 * len(cases))
+        notify(work, i, 2 * len(cases))
         answers.append(contestant.answer(case))
         hangs += is_hung(answers[-1])
         if hangs == MAX_HANGS:
@@ -275,7 +418,7 @@ def _ask(
     exchanges, requests = [], list(zip(cases, answers, strict=False))
     order = -1 if cases and cases[0].task in (forces.TASK, energy.TASK) else 1
     for i, (case, answer) in enumerate(requests[::order]):
-        notify(len(cases) + i, 2 * len(cases))
+        notify(work, len(cases) + i, 2 * len(cases))
         is_last = isinstance(answer, Failure) or hangs >= 2 * MAX_HANGS
         repeat = answer if is_last else contestant.answer(case)
         hangs += not is_last and is_hung(repeat)

@@ -1,7 +1,8 @@
 """The command `plumbob verify`."""
 
 import os
-from collections.abc import Iterable
+import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,12 +12,17 @@ from ..help_text import Command
 from .options import FAILED, SUCCESS, File, Text, Texts, argument, flag, option
 
 if TYPE_CHECKING:
+    from plumbob.crosscheck.verify.judgement import Report
     from plumbob.crosscheck.verify.output.files import Files
     from plumbob.crosscheck.verify.output.question import Question
-    from plumbob.crosscheck.verify.output.words import Say
+    from plumbob.crosscheck.verify.output.words import Presentation, Say
+    from plumbob.crosscheck.verify.sentence import Sentence
     from plumbob.crosscheck.verify.solvers import ProcessLimits
+    from plumbob.crosscheck.verify.verify import Notify
 
 PROGRAM = "plumbob.program"
+# The seconds between lines on progress in a pipe: a service that waits longer may take it for hung.
+LINE_PAUSE = 8.0
 
 
 class SolverCommand(Command):
@@ -116,11 +122,13 @@ def _judge(
     """Judge a solver, print the verdict, and write the files."""
     from plumbob.bench.harness.record import check_regular
     from plumbob.crosscheck.verify.contestant import NoGreetingError
+    from plumbob.crosscheck.verify.output.files import UNJUDGED
     from plumbob.crosscheck.verify.output.question import ask, opened, suited
     from plumbob.crosscheck.verify.output.words import Presentation, speaker
     from plumbob.crosscheck.verify.sentence import sentence
+    from plumbob.crosscheck.verify.verify import failed
 
-    from ..terminal import progress
+    from ..terminal import lines_in_a_pipe, progress
     from .options import writable
 
     say = speaker(language)
@@ -129,17 +137,51 @@ def _judge(
         writable(path.parent)
     contestant = opened(words, limits, say)
     question = suited(question, contestant)
+    context = Presentation(say, language, words)
     try:
-        with progress() as bar:
-            row = bar.add_task("", total=None)
-            report = ask(contestant, question, lambda task, count, total: bar.update(
-                row, description=task, completed=count, total=total))  # fmt: skip
+        with progress() as bar, lines_in_a_pipe(bar, LINE_PAUSE, LINE_PAUSE):
+            notify, publish = _notifier(bar, say), _publisher(bar, files, question, context)
+            report = ask(contestant, question, notify, publish)
     except NoGreetingError as error:
         raise ValueError(say(sentence(
             "solver: it did not start, or did not answer the greeting (the first request). {why}",
             why=error.failure.sentence,
         ))) from None  # fmt: skip
-    return files.write(report, question, Presentation(say, language, words))
+    except (OSError, ValueError):
+        raise
+    except Exception as error:
+        print("plumbob:", say(failed(error)), file=sys.stderr)
+        return UNJUDGED
+    return files.write(report, question, context)
+
+
+def _notifier(bar: Any, say: "Say") -> "Notify":
+    """Return what shows the progress of the present work on a bar."""
+    from plumbob.crosscheck.verify.sentence import sentence
+
+    row = bar.add_task(say(sentence("starting the solver")), total=None)
+
+    def notify(work: "Sentence", count: int, total: int | None) -> None:
+        if (text := say(work)) != bar.tasks[0].description:
+            bar.reset(row, description=text)
+        bar.update(row, completed=count, total=total)
+
+    return notify
+
+
+def _publisher(
+    bar: Any, files: "Files", question: "Question", context: "Presentation"
+) -> Callable[["Report"], None]:
+    """Return what prints the newest verdict and writes the files, before any cause is sought."""
+    from plumbob.crosscheck.verify.output.words import verdict_line
+
+    def publish(report: "Report") -> None:
+        if report.tasks:
+            line = context.say(verdict_line(report.tasks[-1]))
+            bar.console.print(line, highlight=False, markup=False, soft_wrap=True)
+        files.save(report, question, context)
+
+    return publish
 
 
 def _print(lines: Iterable[str]) -> int:

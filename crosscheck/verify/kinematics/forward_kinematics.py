@@ -11,9 +11,10 @@ from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case, not_finite, of_joints
 from . import rounding, skeletons
 from .pose_laws import unit_quaternions
@@ -37,7 +38,12 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     ]  # fmt: skip
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    cause_search: CauseSearch | None = None,
+) -> TaskReport:
     """Compare positions and rotations separately with the reference; name the faults."""
     judgements = [_judge(exchange, greeting) for exchange in exchanges]
     wrong = [
@@ -45,13 +51,22 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
         for exchange, judgement in zip(exchanges, judgements, strict=True)
         if judgement.verdict > Verdict.RIGHT_EXCEPT
     ]
+    find_faults = partial(_diagnosis, exchanges, wrong, greeting)
+    diagnosis = (cause_search or CauseSearch()).run(find_faults, Diagnosis())
+    return report(TASK, method, judgements, diagnosis)
+
+
+def _diagnosis(
+    exchanges: Sequence[Exchange], wrong: Sequence[Exchange], greeting: Greeting
+) -> Diagnosis:
+    """Return the faults that reproduce the answers, or else their positions alone."""
     bound = partial(_prediction_bound, greeting)
     diagnosis = diagnosis_of("forward", exchanges, wrong, bound)
     if wrong and not diagnosis.explained:  # matrices that are no rotations become any quaternion
         alone = {id(exchange): _positions_alone(exchange) for exchange in exchanges}
         of_wrong = [alone[id(exchange)] for exchange in wrong]
         diagnosis = diagnosis_of("forward", list(alone.values()), of_wrong, bound)
-    return report(TASK, method, judgements, diagnosis)
+    return diagnosis
 
 
 def _positions_alone(exchange: Exchange) -> Exchange:

@@ -12,6 +12,7 @@ from plumbob.reference.inverse_kinematics import solve_ik
 from plumbob.reference.skeleton import Skeleton
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange, Failure, FailureKind
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
@@ -68,6 +69,7 @@ def judge(
     greeting: Greeting,
     method: str,
     base: Sequence[SwitchFault] = (),
+    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
     """Judge poses by the laws, and sweeps by the textbook's; name the faults.
 
@@ -75,7 +77,8 @@ def judge(
     """
     limited = [exchange for exchange in exchanges if "cones" in exchange.case.inputs]
     unlimited = [exchange for exchange in exchanges if exchange not in limited]
-    judgements, diagnosis = _judge_unlimited(unlimited, greeting, method, base)
+    search = cause_search or CauseSearch()
+    judgements, diagnosis = _judge_unlimited(unlimited, greeting, method, base, search)
     is_sound = all(judgement.verdict <= Verdict.RIGHT_EXCEPT for judgement in judgements)
     limited_judgements, readings = limits.judge(limited, greeting, is_sound)
     # what is wrong without limits is so with them
@@ -86,9 +89,16 @@ def judge(
 
 
 def _judge_unlimited(
-    exchanges: Sequence[Exchange], greeting: Greeting, method: str, base: Sequence[SwitchFault]
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    base: Sequence[SwitchFault],
+    cause_search: CauseSearch,
 ) -> tuple[list[CaseJudgement], Diagnosis]:
-    """Return the judgements of answers to requests without limits, and the faults."""
+    """Return the judgements of answers to requests without limits, and the faults.
+
+    Whether sweeps are an honest solver's or a mistake's is a part of the verdict.
+    """
     declared = method.lower() if method.lower() in METHODS else ""
     trials = [PoseTrial(exchange) for exchange in exchanges]
     sweep_trials = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
@@ -109,7 +119,9 @@ def _judge_unlimited(
         if original and trial.pose.finite and original.pose.finite:
             trial.add([_equal_worlds(trial, original, comparison, greeting)])
     # what repeats its start is explained by chance by several faults at once
-    diagnosis = _diagnosis(trials, comparison, greeting, 1 if idle else MAX_FAULTS, base)
+    find_faults = partial(_diagnosis, trials, comparison, greeting, 1 if idle else MAX_FAULTS, base)
+    diagnosis = Diagnosis(behaviour=comparison.behaviour)
+    diagnosis = find_faults() if comparison.honest else cause_search.run(find_faults, diagnosis)
     diagnosis = _with_hints(diagnosis, trials, comparison, greeting)
     if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
@@ -120,7 +132,8 @@ def _judge_unlimited(
         for trial in trials
         if trial.pose.finite
     ]
-    return judgements, claims.with_claims(diagnosis, judgements, answers, not base)
+    name_claims = partial(claims.with_claims, diagnosis, judgements, answers, not base)
+    return judgements, cause_search.run(name_claims, diagnosis)
 
 
 def _with_hints(

@@ -10,6 +10,7 @@ from plumbob.reference import curves
 from plumbob.reference.arguments import FloatArray, distinct_texts
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..explain import Variant, explain
 from ..greeting import Greeting
@@ -84,7 +85,12 @@ def _curves(rng: np.random.Generator) -> list[Curve]:
     ]  # fmt: skip
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    cause_search: CauseSearch | None = None,
+) -> TaskReport:
     """Judge points by the laws of resampling; strokes may be bridged or not."""
     judgements = [
         judge_case(
@@ -99,7 +105,9 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     behaviour = _behaviour_at_strokes(exchanges, greeting)
     diagnosis = Diagnosis(behaviour=behaviour)
     if any(judgement.verdict and isinstance(judgement.answer, Answer) for judgement in judgements):
-        diagnosis = _diagnosis([exchange for exchange, _ in wrong_first], greeting, behaviour)
+        ordered = [exchange for exchange, _ in wrong_first]
+        find_faults = partial(_diagnosis, ordered, greeting, behaviour)
+        diagnosis = (cause_search or CauseSearch()).run(find_faults, diagnosis)
     return report(TASK, method, judgements, diagnosis)
 
 

@@ -13,6 +13,7 @@ from plumbob.reference.formats import urdf
 from plumbob.reference.judging import PoseJudgement
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
@@ -40,6 +41,7 @@ def judge(
     greeting: Greeting,
     method: str,
     base: Sequence[str] | None = None,
+    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
     """Judge coordinates by the laws of poses; name the faults, likely those of its Jacobian.
 
@@ -57,13 +59,24 @@ def judge(
         )
         for exchange in exchanges
     ]  # fmt: skip
-    diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
-    if [explanation.faults for explanation in diagnosis.explanations] in ([], [("stopped early",)]):
-        diagnosis = _with_iterations(diagnosis, motions.values(), judgements)
+    find_faults = partial(_diagnosis, judgements, motions, base)
+    diagnosis = (cause_search or CauseSearch()).run(find_faults, Diagnosis())
     if not diagnosis.explained and _ignores_start(motions.values()):
         words = sentence("Its answers do not depend on start.")
         diagnosis = replace(diagnosis, behaviour=words)
     return report(TASK, method, judgements, diagnosis)
+
+
+def _diagnosis(
+    judgements: Sequence[CaseJudgement],
+    motions: Mapping[str, Trajectory],
+    base: Sequence[str] | None,
+) -> Diagnosis:
+    """Return the faults of motions, and what solves of few iterations show."""
+    diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
+    if [explanation.faults for explanation in diagnosis.explanations] in ([], [("stopped early",)]):
+        return _with_iterations(diagnosis, motions.values(), judgements)
+    return diagnosis
 
 
 def _fails_at_zero(exchanges: Sequence[Exchange]) -> bool:

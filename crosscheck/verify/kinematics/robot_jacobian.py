@@ -11,6 +11,7 @@ from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.reference.jacobians import jacobian
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import LEAST_SHARE, Diagnosis, Explanation, Finding, TaskReport, Verdict
@@ -98,7 +99,12 @@ def right_jacobian(inputs: Inputs, convention: Convention) -> FloatArray:
     return convention(J, tool.positions, rotation.to_matrix(tool.rotations))
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    cause_search: CauseSearch | None = None,
+) -> TaskReport:
     """Compare Jacobians with the reference in the convention that suits them; name the faults."""
     answered = [
         exchange
@@ -126,7 +132,9 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     failures = [exchange for exchange, is_right in zip(answered, matches[name], strict=True)
               if not is_right]  # fmt: skip
     rest = [exchange for exchange in answered if exchange not in failures]
-    diagnosis = _diagnosis(failures, rest, greeting) if wrong else Diagnosis()
+    find_faults = partial(_diagnosis, failures, rest, greeting)
+    search = cause_search or CauseSearch()
+    diagnosis = search.run(find_faults, Diagnosis()) if wrong else Diagnosis()
     if not wrong and answered:
         words = sentence("The Jacobian's convention: {convention}.", convention=name)
         diagnosis = Diagnosis(behaviour=words)

@@ -10,9 +10,10 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Exchange
 from ..greeting import Greeting
-from ..judgement import Explanation, Finding, TaskReport, Verdict
+from ..judgement import Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from ..sentence import sentence
 from . import motion_faults, robot_motions, rounding
@@ -58,6 +59,7 @@ def judge(
     greeting: Greeting,
     method: str,
     base: Sequence[str] | None = None,
+    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
     """Judge motions by the laws of tracking; name the faults, likely those of its Jacobian.
 
@@ -72,7 +74,8 @@ def judge(
         )
         for exchange in exchanges
     ]  # fmt: skip
-    diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
+    find_faults = partial(motion_faults.diagnosis_of, judgements, motions, base)
+    diagnosis = (cause_search or CauseSearch()).run(find_faults, Diagnosis())
     if not diagnosis.explanations and (keys := _too_fast(motions)):
         explanation = Explanation(keys, motion_faults.SENTENCES[keys[0]], 1.0, 0.0)
         diagnosis = replace(diagnosis, explanations=(explanation,))

@@ -13,6 +13,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import jacobian
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange, Failure
 from ..explain import Variant, either, explain
 from ..greeting import Greeting
@@ -156,13 +157,17 @@ def solving(
 
 
 def judge(
-    exchanges: Sequence[Exchange], greeting: Greeting, method: str,
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
     base: Sequence[str] | None = None,
-) -> TaskReport:  # fmt: skip
+    cause_search: CauseSearch | None = None,
+) -> TaskReport:
     """Judge speeds by the tool's velocity; name the faults, likely the `base` of its Jacobian."""
     judgements = [_judgement(exchange, greeting) for exchange in exchanges]
     if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
-        diagnosis = _diagnosis(judgements, greeting)
+        find_faults = partial(_diagnosis, judgements, greeting)
+        diagnosis = (cause_search or CauseSearch()).run(find_faults, Diagnosis())
         likely = [_of_base(e, base or ()) for e in diagnosis.explanations
                   if base is None or e.share == 1.0 or set(e.faults) & set(base)]  # fmt: skip
         diagnosis = replace(diagnosis, explanations=tuple(likely), is_double=base is not None)

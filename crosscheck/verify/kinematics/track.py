@@ -14,6 +14,7 @@ from plumbob.reference.skeleton import Skeleton
 from plumbob.reference.tracking import track
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..explain import difference
 from ..greeting import Greeting
@@ -125,6 +126,7 @@ def judge(
     greeting: Greeting,
     method: str,
     base: Sequence[SwitchFault] = (),
+    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
     """Judge each frame by the laws of poses, and compare it with its neighbours.
 
@@ -138,6 +140,27 @@ def judge(
         for judgement in judgements
         if judgement.case.name in comparable and _is_wrong(judgement)
     ]
+    find_faults = partial(_diagnosis, exchanges, comparable, wrong, greeting, method, base)
+    search = cause_search or CauseSearch()
+    diagnosis = search.run(find_faults, Diagnosis())
+    answers = [
+        claims.values_of(e.case, [frame.pose for frame in frames_of(e)], {}, method, greeting)
+        for e in exchanges
+        if e.case.name in comparable
+    ]
+    name_claims = partial(claims.with_claims, diagnosis, judgements, answers, not base)
+    return report(TASK, method, judgements, search.run(name_claims, diagnosis))
+
+
+def _diagnosis(
+    exchanges: Sequence[Exchange],
+    comparable: Mapping[str, Exchange],
+    wrong: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    base: Sequence[SwitchFault],
+) -> Diagnosis:
+    """Return the faults that reproduce the motions of a method, or of any of the textbook's."""
     bound = partial(_prediction_bound, greeting)
     diagnoses = [
         diagnosis_of(f"track {textbook}", list(comparable.values()), wrong, bound, base=base)
@@ -150,13 +173,7 @@ def judge(
     if wrong and not any(explanation.share == 1.0 for explanation in explanations):
         blended = _blended([frames_of(exchange) for exchange in exchanges])
         explanations = (blended,) if blended else explanations
-    best = replace(best, explanations=explanations)
-    answers = [
-        claims.values_of(e.case, [frame.pose for frame in frames_of(e)], {}, method, greeting)
-        for e in exchanges
-        if e.case.name in comparable
-    ]
-    return report(TASK, method, judgements, claims.with_claims(best, judgements, answers, not base))
+    return replace(best, explanations=explanations)
 
 
 def _of_solves(explanation: Explanation, base: Sequence[SwitchFault]) -> Explanation:

@@ -16,6 +16,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..explain import either, first_broken
 from ..greeting import Greeting
@@ -75,10 +76,18 @@ def _displaced(case: Case, seed: int) -> Case:
     )
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    cause_search: CauseSearch | None = None,
+) -> TaskReport:
     """Hold the energies against formulas and the work of forces, and name the faults."""
     judgements = [_judge_case(exchange, exchanges, greeting) for exchange in exchanges]
-    return TaskReport(TASK, "", judgements, _diagnose(judgements, greeting.epsilon))
+    unexplained = Diagnosis(first_broken=first_broken(judgements), hints=hints_of(judgements))
+    find_faults = partial(_diagnose, judgements, greeting.epsilon)
+    diagnosis = (cause_search or CauseSearch()).run(find_faults, unexplained)
+    return TaskReport(TASK, "", judgements, diagnosis)
 
 
 def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:

@@ -11,6 +11,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import forces as reference_forces
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..explain import TRIAL, Variant, either, explain, first_broken
 from ..greeting import Greeting
@@ -45,10 +46,18 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return task_cases(TASK, greeting, seed, thorough)
 
 
-def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+def judge(
+    exchanges: Sequence[Exchange],
+    greeting: Greeting,
+    method: str,
+    cause_search: CauseSearch | None = None,
+) -> TaskReport:
     """Hold the forces against the formula and the balance of momentum, and name the faults."""
     judgements = [_judge_case(exchange, exchanges, greeting) for exchange in exchanges]
-    return TaskReport(TASK, "", judgements, _diagnose(judgements, exchanges, greeting))
+    unexplained = Diagnosis(first_broken=first_broken(judgements), hints=hints_of(judgements))
+    find_faults = partial(_diagnose, judgements, exchanges, greeting)
+    diagnosis = (cause_search or CauseSearch()).run(find_faults, unexplained)
+    return TaskReport(TASK, "", judgements, diagnosis)
 
 
 def tolerance(p: SpringProblem, epsilon: float) -> float:

@@ -10,7 +10,7 @@ A wrong velocity that is a combination of known terms is told from the answers a
 of a motion is searched as a step, then what a motion adds to it.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
@@ -19,6 +19,7 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..greeting import Step
 from ..judgement import LEAST_SHARE
@@ -32,9 +33,8 @@ from .relations import Sample, fitted, relation_of
 # The number of iterations and substeps that predictions with single faults take at one stage, and
 # those with pairs: a few seconds each.
 WORK, WORK_OF_PAIRS = 40_000, 10_000
-# What all searches of the same answers take at most; a prediction takes a unit, and its iterations
-# a fifth of one.
-MAX_WORK, SHARE_OF_ITERATION = 30_000.0, 0.2
+# The share of a prediction that each of its iterations takes.
+SHARE_OF_ITERATION = 0.2
 # The number of hypotheses that are kept from one probe to the next, and of those to which a second
 # fault is added: the nearest.
 HYPOTHESES, NEAREST = 32, 40
@@ -138,13 +138,6 @@ class Probe(NamedTuple):
         return [self.positions(), self]
 
 
-class Budget:
-    """The work that is left for the searches of the same answers."""
-
-    def __init__(self) -> None:
-        self.left = MAX_WORK
-
-
 class ModelSearch:
     """The search of the choices that explain a solver's answers to the probes."""
 
@@ -154,10 +147,13 @@ class ModelSearch:
         step: Step,
         epsilon: float,
         faulty_aspects: Collection[str] | None = None,
-        budget: Budget | None = None,
+        cause_search: CauseSearch | None = None,
+        is_honest: bool = False,
     ) -> None:
-        """Set up the domains of all choices, with faults of some aspects or of all."""
+        """Set up the domains of all choices, with faults of some aspects, of all, or none."""
+        faulty_aspects = () if is_honest else faulty_aspects
         self.probes, self.step, self.epsilon = probes, step, epsilon
+        self.is_honest = is_honest  # whether no fault is assumed
         self.stages = [stage for probe in probes for stage in probe.stages()]
         self.domains = {
             aspect: [
@@ -189,7 +185,8 @@ class ModelSearch:
             *(["damper", "scaling"] if step.damper is not None else []),
             *(["substeps"] if step.substeps is not None else []),
         ]
-        self.budget, self.prediction_count = budget or Budget(), 0  # number of predictions
+        self.cause_search = cause_search or CauseSearch()
+        self.prediction_count = 0  # number of predictions
         self._work = 0.0  # iterations and substeps that they took
         self._skipped: set[int] = set()  # stages that no hypothesis explains
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
@@ -198,22 +195,18 @@ class ModelSearch:
 
     def with_probes(self, probes: Sequence[Probe]) -> "ModelSearch":
         """Return the search with more probes."""
-        return ModelSearch([*self.probes, *probes], self.step, self.epsilon, budget=self.budget)
+        return ModelSearch(
+            [*self.probes, *probes], self.step, self.epsilon, cause_search=self.cause_search
+        )
 
-    def run(
-        self,
-        notify: Callable[[int, int], None] = lambda count, total: None,
-        cases: Sequence[Probe] = (),
-    ) -> list[ModelMatch]:
+    def run(self, cases: Sequence[Probe] = ()) -> list[ModelMatch]:
         """Return the matches of the probes with the fewest faults, none if there are none.
 
-        `notify` is called before each stage with the number of stages done, and of all. Small
-        probes do not tell where many iterations begin: of several honest steps the one that
+        Small probes do not tell where many iterations begin: of several honest steps the one that
         explains all `cases` is taken.
         """
         hypotheses = [Choices()]
         for index in range(len(self.stages)):
-            notify(index, len(self.stages))
             is_hopeless = index - 1 in self._skipped and self._is_complete(index)
             explaining = [] if is_hopeless else self._explaining(hypotheses, index)
             if not explaining:
@@ -235,7 +228,7 @@ class ModelSearch:
         explaining = [branch for branch in branches if self._explains(branch, index)]
         # Free flight alone does not tell some honest steps from others with a fault.
         is_flight = not any(stage.coupled for stage in self.stages[: index + 1])
-        if is_flight or not self._reproducing(explaining, index):
+        if not self.is_honest and (is_flight or not self._reproducing(explaining, index)):
             failing = [branch for branch in branches if not self._explains(branch, index)]
             singles = list(self._singles(failing, index))
             explaining += [
@@ -484,11 +477,11 @@ class ModelSearch:
 
     def _spend(self, effort: float) -> None:
         self._work += effort
-        self.budget.left -= 1.0 + SHARE_OF_ITERATION * effort
+        self.cause_search.predictions_left -= 1.0 + SHARE_OF_ITERATION * effort
 
     def _limit(self, work: float) -> float:
         """Return the sum of work at which to stop after so much more, or none if none is left."""
-        return self._work + (work if self.budget.left > 0.0 else 0.0)
+        return self._work + (work if self.cause_search.predictions_left > 0.0 else 0.0)
 
     def _rounding(self, probe: Probe, model: StepModel) -> Rounding:
         key = probe.name, model.substeps, model.integrator.explicit
@@ -520,41 +513,33 @@ def _start(p: SpringProblem) -> Substep:
     return Substep(p, StepModel(), p.positions, p.velocities, p.h)
 
 
-def matches_of(
-    search: ModelSearch,
-    notify: Callable[[int, int], None] = lambda count, total: None,
-    cases: Sequence[Probe] = (),
-) -> list[ModelMatch]:
+def matches_of(search: ModelSearch, cases: Sequence[Probe] = ()) -> list[ModelMatch]:
     """Return the matches of probes of steps or of motions, as `ModelSearch.run` does."""
     probes, step, epsilon = search.probes, search.step, search.epsilon
     if not any(probe.problem.steps for probe in probes):
-        return _step_matches(search, notify, cases)
-    matches = ModelSearch(probes, step, epsilon, ("frames",), search.budget).run(notify, cases)
+        return _step_matches(search, cases)
+    matches = ModelSearch(probes, step, epsilon, ("frames",), search.cause_search).run(cases)
     if matches:
         return matches
     firsts = [probe.first_step() for probe in probes]
-    matches = _step_matches(ModelSearch(firsts, step, epsilon, budget=search.budget), notify, ())
-    return _with_frames(matches, probes, epsilon)
+    of_steps = ModelSearch(firsts, step, epsilon, cause_search=search.cause_search)
+    return _with_frames(_step_matches(of_steps, ()), probes, epsilon)
 
 
-def _step_matches(
-    search: ModelSearch, notify: Callable[[int, int], None], cases: Sequence[Probe]
-) -> list[ModelMatch]:
+def _step_matches(search: ModelSearch, cases: Sequence[Probe]) -> list[ModelMatch]:
     """Return the matches of steps; a wrong velocity is told without its step where it can be."""
     probes, step, epsilon = search.probes, search.step, search.epsilon
     fault = velocity_fault(probes, epsilon)
     if fault is None:
-        return search.run(notify, cases)
-    matches = ModelSearch(probes, step, epsilon, (), search.budget).run(notify, cases)
+        return search.run(cases)
+    matches = ModelSearch(probes, step, epsilon, (), search.cause_search).run(cases)
     if matches:
         return matches
     positions = [probe.positions() for probe in probes]
-    matches = [
-        _with_velocity(match, fault, probes, step, epsilon)
-        for match in ModelSearch(positions, step, epsilon, budget=search.budget).run(notify)
-    ]
+    of_positions = ModelSearch(positions, step, epsilon, cause_search=search.cause_search)
+    matches = [_with_velocity(match, fault, probes, step, epsilon) for match in of_positions.run()]
     fewest = min((match.complexity for match in matches), default=(MAX_FAULTS, 0))
-    further = search.run(notify, cases) if fewest > ONE_FAULT else []
+    further = search.run(cases) if fewest > ONE_FAULT else []
     if further and further[0].complexity < fewest:
         return further
     return [match for match in matches if match.complexity == fewest]

@@ -16,6 +16,7 @@ from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.mass_spring import State
 
 from ..case import Case
+from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..explain import either, first_broken
 from ..greeting import Greeting, Step
@@ -31,7 +32,6 @@ from .model import EXPLICIT, StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
 from .search import (
     UNEXPLAINED,
-    Budget,
     ModelMatch,
     ModelSearch,
     Probe,
@@ -59,7 +59,6 @@ class Stepping(NamedTuple):
     """The discipline of a task of a single step or of several."""
 
     task: str
-    budget: Budget | None = None  # of the searches of faults; one of its own if None
 
     def cases(self, greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
         """Return cases that suit the solver, the smallest first."""
@@ -70,43 +69,48 @@ class Stepping(NamedTuple):
         exchanges: Sequence[Exchange],
         greeting: Greeting,
         method: str,
-        notify: Callable[[int, int], None] = lambda count, total: None,
+        cause_search: CauseSearch | None = None,
     ) -> TaskReport:
-        """Hold answers against the step that is declared, or inferred, and name the faults.
-
-        `notify` is called with the progress of the search of faults.
-        """
+        """Hold answers against the step that is declared, or inferred, and name the faults."""
+        cause_search = cause_search or CauseSearch()
         problems = problems_of(exchanges, greeting)
         is_constant = _repeats(exchanges, 0.0) or _repeats(exchanges, 1.0)  # no step to be found
         telling = [] if is_constant else probes_of(exchanges, problems)
-        search = ModelSearch(telling, greeting.step, greeting.epsilon, budget=self.budget)
         probes = probes_of(exchanges, problems, every=True)
         step, epsilon, matches = greeting.step, greeting.epsilon, list[ModelMatch]()
+        search = ModelSearch(telling, step, epsilon, cause_search=cause_search)
+        honest_search = ModelSearch(telling, step, epsilon, is_honest=True)
 
         def iteration_of(is_hasty: bool, least: float = IMPRECISE) -> Explanation | None:
             options = honest_options(matches, step)
-            return iterations.explanation(options, probes, step.start, epsilon, is_hasty, least)
+            follow = partial(iterations.explanation, options, probes, step.start, epsilon)
+            return cause_search.run(lambda: follow(is_hasty, least), None)
 
         is_iterative = step.method in ("converged", "linearised") or step.iterations is not None
         iteration = iteration_of(is_hasty=True) if is_iterative else None
         if iteration is None or iteration.share < 1.0 - UNEXPLAINED:
-            matches = with_factorisation(matches_of(search, notify, probes), probes, epsilon)
+            matches = _matches(honest_search, search, probes)
         if iteration is None and (step.method is not None or matches):
             iteration = iteration_of(is_hasty=False)
         judgements, recognised = _judge_all(exchanges, problems, greeting, matches)
         is_right = iteration is None and bool(matches) and not matches[0].faults
-        larger = _faults_of_larger(search, judgements, probes, notify) if is_right else []
+        find_larger = partial(_faults_of_larger, search, judgements, probes)
+        larger = cause_search.run(find_larger, list[ModelMatch]()) if is_right else []
         if larger:
             matches = larger
             judgements, recognised = _judge_all(exchanges, problems, greeting, matches)
         diagnosis = _diagnose(judgements, search, matches, probes)
+        is_double = honest_search.is_double() or search.is_double()
+        diagnosis = replace(diagnosis, is_double=is_double and not diagnosis.explained)
         is_broken = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
         if iteration is None and not diagnosis.explained and is_broken:
             iteration = iteration_of(is_hasty=False, least=SOLVED)  # small errors break laws
         if iteration is not None and iteration.share > diagnosis.share:
             diagnosis = replace(diagnosis, explanations=(iteration,), first_broken=None, hints=())
         elif not diagnosis.explained:
-            hint = iterations.stiffness_hint(honest_options(matches, step), probes, epsilon)
+            options = honest_options(matches, step)
+            find_hint = partial(iterations.stiffness_hint, options, probes, epsilon)
+            hint = cause_search.run(find_hint, None)
             first = diagnosis.first_broken if hint is None else first_broken(judgements)
             hints = diagnosis.hints if hint is None else (hint,)
             diagnosis = replace(diagnosis, first_broken=first, hints=hints)
@@ -117,17 +121,27 @@ class Stepping(NamedTuple):
         return TaskReport(self.task, "", judgements, diagnosis)
 
 
+def _matches(
+    honest_search: ModelSearch, search: ModelSearch, probes: Sequence[Probe]
+) -> list[ModelMatch]:
+    """Return the matches without a fault, or else those with faults."""
+    cause_search, matches = search.cause_search, honest_search.run(probes)
+    if not matches:
+        matches = cause_search.run(lambda: matches_of(search, probes), matches)
+    refine = partial(with_factorisation, matches, probes, search.epsilon)
+    return cause_search.run(refine, matches)
+
+
 def _faults_of_larger(
     search: ModelSearch,
     judgements: Sequence[CaseJudgement],
     probes: Sequence[Probe],
-    notify: Callable[[int, int], None],
 ) -> list[ModelMatch]:
     """Return the matches with faults of the small probes and of some larger wrong answers."""
     wrong = {judgement.case.name for judgement in judgements if judgement.verdict >= Verdict.WRONG}
     larger = [probe for probe in probes if probe.name in wrong][:LARGER]
     is_tried = bool(search.probes and larger)
-    matches = matches_of(search.with_probes(larger), notify, probes) if is_tried else []
+    matches = matches_of(search.with_probes(larger), probes) if is_tried else []
     return [match for match in matches if match.faults]
 
 
@@ -320,11 +334,11 @@ def _diagnose(
     is_undecided = (
         max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED
     )
-    diagnosis = replace(diagnosis, is_double=search.is_double())
     if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
         hints += proportion_of(judgements)
     if search.probes and behaviour is None and (step.method is None or is_undecided):
-        hints += (_nearest(search), laws_that_hold(judgements))
+        nearest = search.cause_search.run(lambda: _nearest(search), None)
+        hints += (*filter(None, [nearest]), laws_that_hold(judgements))
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
 
 

@@ -63,14 +63,11 @@ LINE, AROUND = 60, 20
 TOLERANCE = {"double": 1e-7, "single": 2e-4}
 
 
-def with_changed_line(
-    report: TaskReport, greeting: Greeting, notify: Callable[[int, int], None]
-) -> TaskReport:
+def with_changed_line(report: TaskReport, greeting: Greeting) -> TaskReport:
     """Return a report on wrong answers with the fault or changed line that explains them.
 
     Beside a mistake that explains most answers, or where all targets are reached, the search is for
-    known faults that explain all. `notify` is called before each right program with the number of
-    programs done, and of all.
+    known faults that explain all.
     """
     named, share = report.diagnosis.explanations, _least_share(report)
     if report.verdict > Verdict.RIGHT_EXCEPT:
@@ -82,7 +79,7 @@ def with_changed_line(
         if named or not doubtful:
             return report
         share = 1.0
-    explanations = changed_lines(report, greeting, notify, doubtful, is_known)
+    explanations = changed_lines(report, greeting, doubtful, is_known)
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
@@ -133,7 +130,6 @@ def _is_of_another(entry: Finding) -> bool:
 def changed_lines(
     report: TaskReport,
     greeting: Greeting,
-    notify: Callable[[int, int], None],
     doubtful: Sequence[CaseJudgement] = (),
     is_known: bool = False,
 ) -> tuple[Explanation, ...]:
@@ -154,8 +150,7 @@ def changed_lines(
     ]
     if doubtful and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
-    for i, program in enumerate(programs):
-        notify(i, len(programs))
+    for program in programs:
         if report.task in IN_CONVENTIONS:
             functions.clear()
         explanations = _of_program(

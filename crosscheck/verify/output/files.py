@@ -11,11 +11,18 @@ from ..judgement import Report
 from ..sentence import Sentence, sentence, visible
 from . import json_file, junit, page, saved, terminal
 from .question import Question
-from .words import GOOD, Presentation
+from .words import GOOD, Presentation, verdict_line
 
 FAILURES = Path("plumbob_failures")
 SCREEN = Path("/dev/stdout")
-RIGHT, WRONG, FAILED = 0, 1, 2
+RIGHT, WRONG, FAILED, UNJUDGED = 0, 1, 2, 3
+
+
+class WriteFailure(NamedTuple):
+    """Why a file was not written."""
+
+    sentence: Sentence
+    is_of_system: bool  # whether the system refused, and no mistake of ours is to blame
 
 
 class Files(NamedTuple):
@@ -35,18 +42,19 @@ class Files(NamedTuple):
         names = "verdict.json", "verdict.xml", "index.html", "card.svg"
         return tuple(path or self.folder / name for path, name in zip(paths, names, strict=True))
 
-    def write(self, report: Report, question: Question, context: Presentation) -> int:
-        """Print the screen, write the files, and return the exit code: 2 if writing fails."""
-        failures: list[Sentence] = []
+    def save(
+        self, report: Report, question: Question, context: Presentation
+    ) -> tuple[list[Path], Presentation, list[WriteFailure]]:
+        """Write the files; return them, the context with the failing cases, and what went wrong."""
+        failures: list[WriteFailure] = []
         folder = self.folder / "failures" if self.folder else FAILURES
         options = folder, question.seed, question.thorough
-        paths = {
+        cases = {
             (task.task, task.method): question.rerun
             or _attempt(folder, partial(saved.save, task, *options), failures)
             for task in report.tasks
         }
-        context = context._replace(files={key: path for key, path in paths.items() if path})
-        screen = _attempt(SCREEN, partial(_show, report, context), failures)
+        context = context._replace(files={key: path for key, path in cases.items() if path})
         makers = (
             lambda: json_file.text(report, context.say),
             lambda: junit.text(report, context.say),
@@ -58,11 +66,26 @@ class Files(NamedTuple):
             for path, make in zip(self.paths(), makers, strict=True)
             if path is not None
         ]
-        if screen and any(finished):
-            print(" ".join(visible(str(path)) for path in finished if path))
+        return [path for path in finished if path], context, failures
+
+    def write(self, report: Report, question: Question, context: Presentation) -> int:
+        """Write the files, print the screen, and return the exit code.
+
+        It is 2 if a file cannot be written, and 3 if the judge failed at a task and the others are
+        right. A mistake of ours in a screen or a file leaves it to the verdict.
+        """
+        finished, context, failures = self.save(report, question, context)
+        if not _attempt(SCREEN, partial(_show, report, context), failures):
+            print("\n".join(context.say(verdict_line(task)) for task in report.tasks))
+        elif finished:
+            print(" ".join(visible(str(path)) for path in finished))
         for failure in failures:
-            print(f"plumbob: {context.say(failure)}", file=sys.stderr)
-        return FAILED if failures else RIGHT if report.verdict in GOOD else WRONG
+            print(f"plumbob: {context.say(failure.sentence)}", file=sys.stderr)
+        if any(failure.is_of_system for failure in failures):
+            return FAILED
+        if report.verdict not in GOOD and report.tasks:
+            return WRONG
+        return UNJUDGED if report.unjudged else RIGHT
 
 
 def _show(report: Report, context: Presentation) -> Path:
@@ -76,11 +99,14 @@ def _write(path: Path, make: Callable[[], str]) -> Path:
     return path
 
 
-def _attempt(path: Path, write: Callable[[], Path | None], failures: list[Sentence]) -> Path | None:
-    """Return the written file; on an error add a sentence and return None."""
+def _attempt(
+    path: Path, write: Callable[[], Path | None], failures: list[WriteFailure]
+) -> Path | None:
+    """Return the written file; on an error add a failure and return None."""
     try:
         return write()
     except Exception as error:
         why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
-        failures.append(sentence("{file} could not be written: {why}", file=path, why=why))
+        words = sentence("{file} could not be written: {why}", file=path, why=why)
+        failures.append(WriteFailure(words, isinstance(error, OSError)))
         return None

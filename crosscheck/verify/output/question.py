@@ -1,6 +1,6 @@
 """The solver and the cases that a command line names."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -69,18 +69,29 @@ def suited(question: Question, contestant: Contestant) -> Question:
     return question
 
 
-def ask(contestant: Contestant, question: Question, notify: Notify) -> Report:
-    """Return the report, and end the solver."""
+def ask(
+    contestant: Contestant,
+    question: Question,
+    notify: Notify,
+    publish: Callable[[Report], None] = lambda report: None,
+) -> Report:
+    """Return the report, and end the solver; call `publish` as `verify` does."""
     try:
-        report = _report(contestant, question, notify)
+        report = _report(contestant, question, notify, publish)
     finally:
         contestant.close()  # its remarks are complete then
     return replace(report, remarks=(*report.remarks, *contestant.remarks))
 
 
-def _report(contestant: Contestant, question: Question, notify: Notify) -> Report:
+def _report(
+    contestant: Contestant,
+    question: Question,
+    notify: Notify,
+    publish: Callable[[Report], None],
+) -> Report:
     if question.rerun is None:
-        return verify(contestant, question.tasks or None, question.seed, question.thorough, notify)
+        options = question.tasks or None, question.seed, question.thorough
+        return verify(contestant, *options, notify, publish)
     case, greeting = saved.load(question.rerun), contestant.greeting
     if case.task not in greeting.tasks or case.task not in DISCIPLINES:
         raise ValueError(f"--rerun: the solver does not offer the task {case.task!r}")

@@ -56,6 +56,16 @@ def passed(report: TaskReport) -> str:
     return f"{count}/{len(report.judgements)}"
 
 
+def verdict_line(report: TaskReport) -> Sentence:
+    """Return a task's name, its verdict and the number of cases passed."""
+    return sentence(
+        "{task}: {verdict}, {passed} cases passed",
+        task=title(report),
+        verdict=VERDICTS[report.verdict],
+        passed=passed(report),
+    )
+
+
 def digits(subject: TaskReport | CaseJudgement) -> str:
     """Return the number of correct digits, a dash if it cannot be counted."""
     return "–" if subject.digits is None else f"{max(0.0, subject.digits):.1f}"

@@ -39,7 +39,7 @@ def report_on(source, task):
 
 def changed_lines(source, task):
     report, greeting = report_on(source, task)
-    return search.changed_lines(report, greeting, lambda done, total: None)
+    return search.changed_lines(report, greeting)
 
 
 @pytest.mark.parametrize(
@@ -206,7 +206,7 @@ def test_answers_of_a_right_program_speak_for_no_change():
     judgements = [replace(each, findings=(broken,)) for each in report.judgements]
     report = replace(report, judgements=judgements)
     assert search._compared(report, [])
-    assert search.changed_lines(report, greeting, lambda done, total: None) == ()
+    assert search.changed_lines(report, greeting) == ()
 
 
 @pytest.mark.parametrize("factor", [0.0, 1.0])

@@ -1,0 +1,93 @@
+"""The search for the cause of wrong answers: what it may take, and why it ended early.
+
+A verdict never depends on it: a stage that fails, takes too long or is interrupted costs the name
+of the mistake alone.
+"""
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+from .sentence import Sentence, sentence
+
+T = TypeVar("T")
+# The processor time that the search for the cause of one task's answers may take [s]: wall time
+# would make the answer depend on what else the machine does.
+SECONDS = 20.0
+# The predictions of steps that a search may take: a step is one, and each of its iterations a
+# fifth of one.
+MAX_PREDICTIONS = 30_000.0
+INTERRUPTED = sentence("The search for the cause was interrupted.")
+
+
+class SearchLimit(BaseException):
+    """A search has taken its time; no handler of a stage's own errors catches it."""
+
+
+class CauseSearch:
+    """Stages of the search for the cause of one task's wrong answers."""
+
+    def __init__(self, is_interrupted: bool = False) -> None:
+        self.is_interrupted = is_interrupted  # whether the user ended it, or one before
+        self.end: Sentence | None = INTERRUPTED if is_interrupted else None  # why it ended early
+        self.predictions_left = MAX_PREDICTIONS
+
+    @property
+    def is_on(self) -> bool:
+        """Whether stages run."""
+        return self.end is None
+
+    def run(self, stage: Callable[[], T], default: T) -> T:
+        """Return the result of a stage, or the default if it ends early or the search has ended."""
+        if not self.is_on:
+            return default
+        try:
+            return stage()
+        except SearchLimit:
+            self.end = sentence(
+                "The search for the cause ended after {seconds:.0f} s of processor time.",
+                seconds=SECONDS,
+            )
+        except KeyboardInterrupt:
+            self.end, self.is_interrupted = INTERRUPTED, True
+        except Exception as error:
+            self.end = sentence(
+                "The search for the cause failed ({error}); please report this as a mistake of "
+                "Plumbob. The verdict stands.",
+                error=f"{type(error).__name__}: {error}",
+            )
+        return default
+
+    @contextmanager
+    def limited(self) -> Iterator[None]:
+        """Raise SearchLimit in the block after `SECONDS` of processor time.
+
+        Without timers of processor time (on Windows, and outside the main thread) a search ends
+        by the number of its predictions alone.
+        """
+        is_main = threading.current_thread() is threading.main_thread()
+        if not (is_main and hasattr(signal, "setitimer")):
+            yield
+            return
+        before = signal.signal(signal.SIGPROF, _expire)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            signal.signal(signal.SIGPROF, before)
+
+
+class NoSearch(CauseSearch):
+    """A search without stages: what is judged so is judged by laws and honest methods alone."""
+
+    @property
+    def is_on(self) -> bool:
+        """Whether stages run."""
+        return False
+
+
+def _expire(*_: Any) -> None:
+    raise SearchLimit
