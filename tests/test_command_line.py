@@ -212,6 +212,31 @@ def test_a_path_of_hostile_letters_is_said_in_one_line(capsys, name):
     assert err.rstrip("\n").isprintable()
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["bench", "arm", "--dry-run", "-o"],
+        ["--output"],
+        ["report", "-o"],
+        ["report"],
+        ["records", "drop", "--suite", "arm"],
+        ["records", "merge", "out", "--into"],
+    ],
+)
+@pytest.mark.parametrize("name", ["", " ", "a\nb"])
+def test_a_folder_without_a_name_is_misuse_and_nothing_is_written(
+    capsys, main_job, arguments, name
+):
+    """An empty path would be the working folder, whose records would be dropped or replaced."""
+    for folder in (".", "out"):
+        RecordFile(folder).append([a_record()])
+    files = {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
+    code, _, err = plumbob(capsys, *arguments, name)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "expected a name without control characters, got" in err
+    assert {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()} == files
+
+
 READERS = {"help": ["--help"], "claims": ["check", "--list"], "complaint": ["chek"]}
 
 

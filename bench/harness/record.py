@@ -254,6 +254,16 @@ class RecordFile:
                 line.text for line in lines if not line.record or id(line.record) in remaining
             )
 
+    def replace(self, records: Iterable[Record]) -> None:
+        """Write records in place of all lines; the old file stays until the new file is complete.
+
+        Raises:
+            ValueError: as `read` does.
+            OSError: naming the file, if it cannot be written to.
+        """
+        self._lines()  # raises if the file is of something else
+        self._replace(encode(record).encode() for record in records)
+
     def arrange(self, order: Iterable[Key]) -> None:
         """Sort the records of these keys among their lines.
 

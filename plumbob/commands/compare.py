@@ -1,5 +1,6 @@
 """The commands `compare` and `history`."""
 
+import shlex
 import sys
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ from .options import (
     Text,
     Texts,
     argument,
+    is_name,
     option,
     valid_name,
     writable,
@@ -100,17 +102,20 @@ def _records(folder: Path) -> "list[Record]":
 
 def _save(name: str, folders: list[Path]) -> int:
     """Keep the records of a folder as a baseline, in place of one of the same name."""
+    from plumbob.bench.harness.folder_lock import locked
     from plumbob.bench.harness.record import RecordFile
 
-    if Path(name).name != name or len(folders) > 1:
-        got = f"{name!r} and {len(folders)} folders"
-        raise ValueError(f"--save: expected a name without folders and one folder, got {got}")
+    if not is_name(name) or name == ".." or name[0] == "-" or Path(name).name != name:
+        what = "a name without folders or control characters"
+        raise ValueError(f"--save: expected {what}, got {name!r}")
+    if len(folders) > 1:
+        raise ValueError(f"--save: expected one folder, got {len(folders)}")
     records, target = _records(*folders or [REPORT]), BASELINES / name
     writable(target)
-    file = RecordFile(target)
-    file.drop(lambda record: True)
-    file.append(records)
-    print(visible(f"{len(records)} records kept in {target}; plumbob compare {name} NEW compares."))
+    with locked(target):
+        RecordFile(target).replace(records)
+    old = shlex.quote(str(target) if Path(name).exists() else name)
+    print(visible(f"{len(records)} records kept in {target}; plumbob compare {old} NEW compares."))
     return SUCCESS
 
 

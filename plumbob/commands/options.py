@@ -1,6 +1,7 @@
 """Exit codes and options that several commands share, and checks of arguments."""
 
 import difflib
+import re
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,12 +17,13 @@ SUCCESS, FAILED, MISUSED, UNREAD = 0, 1, 2, 141
 
 def argument(metavar: str, text: str) -> Any:
     """Return an argument, by its metavariable and description."""
-    return typer.Argument(metavar=metavar, help=text)
+    return typer.Argument(metavar=metavar, help=text, parser=_PARSERS.get(metavar))
 
 
 def option(metavar: str, text: str, *names: str, min: int | None = None) -> Any:
     """Return an option with a value, by its metavariable, description, names and least value."""
-    return typer.Option(*names, metavar=metavar or None, help=text, min=min)
+    parser = _PARSERS.get(metavar)
+    return typer.Option(*names, metavar=metavar or None, help=text, min=min, parser=parser)
 
 
 def flag(text: str, *names: str) -> Any:
@@ -29,6 +31,20 @@ def flag(text: str, *names: str) -> Any:
     return typer.Option(*names, help=text)
 
 
+def is_name(text: str) -> bool:
+    """Return whether a text names a file: it is not blank and has no control characters."""
+    return bool(text.strip()) and not re.search(r"[\x00-\x1f\x7f-\x9f]", text)
+
+
+def _folder(text: str | Path) -> Path:
+    """Return the path of a folder; a blank text would be the working folder."""
+    if not is_name(str(text)):
+        raise typer.BadParameter(f"expected a name without control characters, got {text!r}")
+    return Path(text)
+
+
+# How the values of options are read, by metavariable.
+_PARSERS = {"DIR": _folder, "PATH": _folder, "[FOLDER]": _folder}
 Texts = list[str] | None
 File = Path | None
 Text = str | None

@@ -2,6 +2,7 @@
 
 import json
 import math
+import resource
 from dataclasses import replace
 
 import numpy as np
@@ -387,6 +388,38 @@ def test_a_baseline_is_a_run_under_a_name(capsys, folders):
     assert plumbob(capsys, "compare", "v1", "new", "--fail", "accuracy")[0] == 1
     assert plumbob(capsys, "compare", "new", "--save", "v1")[0] == 0  # in place of the other
     assert plumbob(capsys, "compare", "v1", "new", "--fail", "accuracy,gone")[0] == 0
+
+
+@pytest.mark.parametrize("name", ["..", ".", "", " ", "a/b", "../old", "-x", "a\x1b[2Jb", "a\nb"])
+def test_a_baseline_whose_name_is_none_costs_no_record(capsys, folders, name):
+    for folder in (".", "old"):
+        RecordFile(folder).append(RecordFile("new").read().records)
+    files = {path: path.read_bytes() for path in folders.rglob("*.jsonl")}
+    code, out, err = plumbob(capsys, "compare", "--save", name, "new")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "--save" in err
+    assert {path: path.read_bytes() for path in folders.rglob("*.jsonl")} == files
+
+
+def test_a_baseline_that_cannot_be_written_stays_and_is_said_to_stay(capsys, folders):
+    assert plumbob(capsys, "compare", "old", "--save", "v1")[0] == 0
+    file = folders / "plumbob_baselines" / "v1" / "records.jsonl"
+    saved, (soft, hard) = file.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        code, _, err = plumbob(capsys, "compare", "new", "--save", "v1")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert code == 2
+    assert "File too large; what was finished before is on record" in err
+    assert file.read_bytes() == saved
+    assert not file.with_suffix(".new").exists()
+
+
+def test_a_baseline_named_as_a_folder_is_compared_by_its_path(capsys, folders):
+    assert "plumbob compare plumbob_baselines/old NEW" in plumbob(
+        capsys, "compare", "old", "--save", "old"
+    )[1]  # fmt: skip
 
 
 MISUSE = {
