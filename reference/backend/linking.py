@@ -15,6 +15,8 @@ from numba.core.compiler import Compiler
 
 # The first and the last series of numba that the tests have run with.
 OLDEST, NEWEST = (0, 61), (0, 68)
+# The first series whose functions are optimised by the new pass managers of LLVM.
+NEW_PASSES = (0, 62)
 
 
 class LinkedLibrary(JITCodeLibrary):
@@ -25,10 +27,18 @@ class LinkedLibrary(JITCodeLibrary):
 
     def _optimize_functions(self, module: Any) -> None:
         """Simplify the definitions of the module but not its declarations."""
-        module.data_layout = self._codegen._data_layout
-        for function in module.functions:
-            if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager()
+        codegen: Any = self._codegen  # whose methods differ between series
+        module.data_layout = codegen._data_layout
+        functions = [function for function in module.functions if not function.is_declaration]
+        if _series() < NEW_PASSES:
+            with codegen._function_pass_manager(module) as passes:
+                passes.initialize()
+                for function in functions:
+                    passes.run(function)
+                passes.finalize()
+        else:
+            for function in functions:
+                passes, builder = codegen._function_pass_manager()
                 passes.run(function, builder)
 
     def finalize(self) -> None:
@@ -83,8 +93,11 @@ class KernelCompiler(Compiler):
 
 def is_supported() -> bool:
     """Return whether these classes are tested with this series of numba."""
-    series = tuple(map(int, numba.__version__.split(".")[:2]))
-    return OLDEST <= series <= NEWEST
+    return OLDEST <= _series() <= NEWEST
+
+
+def _series() -> tuple[int, ...]:
+    return tuple(map(int, numba.__version__.split(".")[:2]))
 
 
 def compile_directly(dispatcher: Any) -> Any:

@@ -1,6 +1,8 @@
 """What is told of a compilation, and what is compiled."""
 
+import contextlib
 import gc
+from types import SimpleNamespace
 
 import numba
 import numpy as np
@@ -112,6 +114,23 @@ def test_this_numba_is_of_a_series_that_the_linker_is_tested_with():
     """After an update of numba: run all tests of the backend, and raise `linking.NEWEST`."""
     assert linking.OLDEST == (0, 61)  # the lowest that pyproject.toml allows
     assert linking.is_supported()
+
+
+@pytest.mark.parametrize("version", ["0.61.2", "0.62.0"])
+def test_functions_are_simplified_by_the_passes_of_each_series(version, monkeypatch):
+    """Before 0.62 numba makes passes for a module, since then for each function."""
+    simplified = []
+    passes = SimpleNamespace(
+        initialize=lambda: None, finalize=lambda: None, run=lambda name, *_: simplified.append(name)
+    )
+    new = {"_function_pass_manager": lambda: (passes, "builder")}
+    old = {"_function_pass_manager": lambda module: contextlib.nullcontext(passes)}
+    codegen = SimpleNamespace(_data_layout="", **(old if version == "0.61.2" else new))
+    functions = [SimpleNamespace(name=name, is_declaration=name == "c") for name in "acb"]
+    monkeypatch.setattr(numba, "__version__", version)
+    library = SimpleNamespace(_codegen=codegen)
+    linking.LinkedLibrary._optimize_functions(library, SimpleNamespace(functions=functions))
+    assert [function.name for function in simplified] == ["a", "b"]
 
 
 @pytest.mark.parametrize("version", ["0.60.3", "0.99.0", "1.2.0rc1"])
