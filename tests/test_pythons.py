@@ -162,3 +162,8 @@ def test_a_step_that_fails_is_a_failure(pythons, stand_in, monkeypatch, tmp_path
     python = stand_in("x/bin/python", f"sys.exit({failing!r} in sys.argv)")
     monkeypatch.setattr(pythons, "VENVS", tmp_path)
     assert pythons.test("x", python, LOCKS[0], ["-q"]) == (failing is None)
+
+
+def test_the_lowest_versions_are_tested_in_the_workflow():
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    assert "make test-lowest" in workflow
