@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,14 @@ os.environ.pop("COLUMNS", None)
 # The first example of a law may compile a kernel: no deadline.
 settings.register_profile("plumbob", max_examples=20, deadline=None, derandomize=True)
 settings.load_profile("plumbob")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def interruptible():
+    """Let Ctrl-C reach what the tests start, though a job in the background ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(params=compiled.BACKENDS)

@@ -78,15 +78,7 @@ def test_an_error_in_one_slice_is_the_caller_s():
         in_slices(fail, 100, lambda part: (part,), minimum=10)
 
 
-@pytest.fixture
-def interruptible():
-    """Interrupts are felt, even where the tests run in the background of a shell."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-def test_an_interrupt_reaches_the_caller_and_drops_what_has_not_begun(interruptible):
+def test_an_interrupt_reaches_the_caller_and_drops_what_has_not_begun():
     begun, go_on = [], threading.Event()
 
     def wait(part):
