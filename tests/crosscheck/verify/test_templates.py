@@ -81,13 +81,17 @@ FILLED_ROBOT = {
 
 
 def build(language, folder, edit=str):
-    """Write a starter, compile it, and return what runs it; skip without its compiler."""
+    """Write a starter, compile it, and return what runs it; skip without its compiler.
+
+    A compiler may be there without what it needs, as rustup's rustc without a toolchain.
+    """
     for name, text in template(language).items():
         (folder / name).write_text(edit(text), encoding="utf-8")
     make, run = map(shlex.split, (LANGUAGES[language].build, LANGUAGES[language].run))
     for tool in (one[0] for one in (make, run) if one and not one[0].startswith("./")):
-        if shutil.which(tool) is None:
-            pytest.skip(f"{tool} is not on this machine: the {language} starter was not built")
+        version = [shutil.which(tool) or "false", "--version"]
+        if subprocess.run(version, capture_output=True, check=False).returncode:
+            pytest.skip(f"{tool} does not start here: the {language} starter was not built")
     if make:
         quick = ["-O1" if one == "-O2" else one for one in make if one != "-O"]
         subprocess.run(quick, cwd=folder, check=True, timeout=180, capture_output=True)
