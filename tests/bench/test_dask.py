@@ -132,12 +132,15 @@ def test_another_server_at_the_address_is_misuse(name):
     """A Client waits for its answer for ever, so that this one has a process of its own."""
     pytest.importorskip("distributed", reason=INSTALLED)
     answer, why = OTHERS[name]
-    with socket.create_server(("127.0.0.1", 0)) as server:
+    with socket.create_server(("127.0.0.1", 0)) as server, contextlib.ExitStack() as ends:
         address = f"127.0.0.1:{server.getsockname()[1]}"
         if answer is None:
             server.close()
         else:
-            threading.Thread(target=_serve, args=(server, answer), daemon=True).start()
+            thread = threading.Thread(target=_serve, args=(server, answer), daemon=True)
+            thread.start()
+            ends.callback(thread.join)
+            ends.callback(server.shutdown, socket.SHUT_RDWR)  # closing does not end its wait
         program = (
             "from plumbob.bench.harness.executors.dask import DaskExecutor\n"
             f"try: DaskExecutor('{address}', answer=0.5)\n"
@@ -150,11 +153,9 @@ def test_another_server_at_the_address_is_misuse(name):
 
 
 def _serve(server, answer):
-    connections = []
-    with contextlib.suppress(OSError):
+    with contextlib.ExitStack() as connections, contextlib.suppress(OSError):
         while True:
-            connections.append(server.accept()[0])
-            connections[-1].sendall(answer)
+            connections.enter_context(server.accept()[0]).sendall(answer)
 
 
 # A cluster made up: hosts, workers and machines that come and go as we say.
