@@ -17,19 +17,28 @@ from plumbob.crosscheck.process_tree import carry, end_group, family
 
 ROOT = str(Path(__file__).parents[2])
 MARKER = (1 << 61) - 1234567
-# Starts a child in its session, one in another, and one that nothing but its marker betrays.
+# Starts a child in its session, one in another, and one that nothing but its marker betrays; says
+# so when each is where it stays.
 BROOD = """
-import os, sys, time
+import os, time
+settled, settle = os.pipe()
 if os.fork():
     if os.fork():
         if os.fork():
+            for _ in range(3):
+                os.read(settled, 1)
             print("ready", flush=True); time.sleep(99)
         os.setsid()
+        parent = os.getpid()
         if os.fork():
             os._exit(0)
-        time.sleep(99)
-    os.setsid(); time.sleep(99)
-kept = b"x" * (40 << 20); time.sleep(99)
+        while os.getppid() == parent:
+            time.sleep(0.001)
+    else:
+        os.setsid()
+else:
+    kept = b"x" * (40 << 20)
+os.write(settle, b"."); time.sleep(99)
 """
 
 
@@ -57,17 +66,17 @@ def brood(tmp_path):
     assert not running(tmp_path)
 
 
-def wait_for(condition, seconds=5.0):
-    deadline = time.monotonic() + seconds
-    while not condition() and time.monotonic() < deadline:
+def wait_for(condition):
+    """Wait until a condition has held once; a busy machine may take long to get there."""
+    deadline = time.monotonic() + 60.0
+    while not (holds := condition()) and time.monotonic() < deadline:
         time.sleep(0.02)
-    assert condition()
+    assert holds
 
 
 def test_a_family_is_group_descendants_and_what_carries_the_marker(brood, marker):
     wait_for(lambda: len(family(brood.pid, marker)) == (4 if marker else 3))
-    # until it has a session of its own, the child that leaves is still in the group
-    wait_for(lambda: len(family(brood.pid, MARKER - 1)) == 3)
+    assert len(family(brood.pid, MARKER - 1)) == 3
     assert os.getpid() not in [process.pid for process in family(brood.pid, marker)]
 
 
