@@ -148,6 +148,7 @@ class ChildProcess:
         self.pid: int = self._process.pid
         self.partial, self.last_words = bytearray(), bytearray()
         self._unsent, self.request_length = bytearray(), 0
+        self._heard = self._heard_before = 0  # of standard error, and before the last request [B]
         self._is_deaf = False
         self._looks: list[tuple[float, list[Process]]] = []
         self._selector = selectors.DefaultSelector()
@@ -173,8 +174,17 @@ class ChildProcess:
         except ValueError:
             return f"by signal {-self.code}"
 
+    @property
+    def recent_words(self) -> bytes:
+        """The part of `last_words` that came after the last message was sent."""
+        count = self._heard - self._heard_before
+        return bytes(self.last_words[-count:]) if count else b""
+
     def send(self, message: bytes) -> None:
         """Queue a message, which is written while the answer is awaited."""
+        if self._process.stderr:
+            self._listen()
+        self._heard_before = self._heard
         self._unsent += message
         self.request_length = len(message)
         if not self._is_deaf:
@@ -235,19 +245,29 @@ class ChildProcess:
             if key.fileobj is self._process.stdin:
                 self._write()
                 continue
+            if key.fileobj is self._process.stderr:
+                self._listen()
+                continue
             with contextlib.suppress(BlockingIOError):
                 chunk = os.read(key.fd, _CHUNK)
+                self.partial += chunk
                 if not chunk:
                     self._forget(key.fileobj)
-                    is_open &= key.fileobj is not self._process.stdout
-                elif key.fileobj is self._process.stdout:
-                    self.partial += chunk
-                else:
-                    self.last_words += chunk
-                    if len(self.last_words) > STDERR_LENGTH:  # from the first whole line on
-                        self.last_words = self.last_words[-STDERR_LENGTH:]
-                        self.last_words = self.last_words.partition(b"\n")[2] or self.last_words
+                    is_open = False
         return is_open
+
+    def _listen(self) -> None:
+        """Read what standard error holds, and keep its end."""
+        chunk = b""
+        with contextlib.suppress(BlockingIOError):
+            chunk = os.read(self._process.stderr.fileno(), _CHUNK)
+            if not chunk:
+                self._forget(self._process.stderr)
+        self._heard += len(chunk)
+        self.last_words += chunk
+        if len(self.last_words) > STDERR_LENGTH:  # from the first whole line on
+            self.last_words = self.last_words[-STDERR_LENGTH:]
+            self.last_words = self.last_words.partition(b"\n")[2] or self.last_words
 
     def _write(self) -> None:
         try:

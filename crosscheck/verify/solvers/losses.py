@@ -63,7 +63,9 @@ def failure_of(
     }
     message = Sentence(entry["sentence"], values)
     if entry.get("last_words", True):
-        lines = list(dict.fromkeys(map(shown, bytes(process.last_words).splitlines())))
+        is_hung = entry["kind"] == FailureKind.HUNG  # what it wrote before is no reason of that
+        words = process.recent_words if is_hung else bytes(process.last_words)
+        lines = list(dict.fromkeys(map(shown, words.splitlines())))
         lines = [line for line in lines if not any(text in line for text in _HIDDEN)]
         lines = [line for line in lines if line.strip(_MARKS)]
         if lines:

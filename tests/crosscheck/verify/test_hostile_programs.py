@@ -195,6 +195,22 @@ def test_a_late_answer_is_not_taken_for_the_next_one(start):
     assert contestant.answer(case(2)).values["positions"][0, 0] == 1.0  # of a process anew
 
 
+def test_a_hang_quotes_standard_error_of_its_own_request_only(start):
+    """What follows a crash is read with the words before it: they may tell why."""
+    before = "right(request); os.write(2, b'of an earlier request')"
+    contestant = start(
+        "os.write(2, b'of this request\\n')\nwhile True: tick()",
+        loop=LOOP.replace("right(request)", before),
+    )
+    assert isinstance(contestant.answer(case(2)), Answer)
+    time.sleep(0.2)
+    words = str(contestant.answer(case(3)).sentence)
+    assert words.endswith("Its last lines on standard error: of this request")
+    crash = start("os._exit(3)", loop=LOOP.replace("right(request)", before))
+    assert isinstance(crash.answer(case(2)), Answer)
+    assert "standard error: of an earlier request" in str(crash.answer(case(3)).sentence)
+
+
 @pytest.mark.parametrize(
     ("content", "mode", "words"),
     [
