@@ -4,9 +4,9 @@ import functools
 import re
 from collections.abc import Sequence
 
-from plumbob.crosscheck.verify.sentence import all_visible, visible
+from plumbob.crosscheck.verify.sentence import all_visible, harmless, visible
 
-__all__ = ["all_visible", "chunks", "shortened", "visible"]
+__all__ = ["all_visible", "chunks", "harmless", "shortened", "visible"]
 
 # Where a word may be broken: after a dash or the like between letters, never in a number.
 _BREAK = re.compile(r"(?<=[^\W\d_][/_.-])(?=[^\W\d_])")

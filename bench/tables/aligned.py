@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text
 
+from ..text import harmless
 from .table import Table, best_cells, column_widths, naming, without_empty, words
 
 GAP = 2
@@ -107,7 +108,8 @@ def _lines(grid: Grid, width: int) -> list[Text]:
     for segments in _console(width).render_lines(grid, pad=False):
         line = Text.assemble(*((segment.text, segment.style or "") for segment in segments))
         line.rstrip()
-        lines.append(line)
+        safe = harmless(line.plain)
+        lines.append(line if safe == line.plain else Text(safe))
     return lines
 
 
@@ -119,4 +121,4 @@ def _console(width: int) -> Console:
 def filled(text: str, width: int) -> list[str]:
     """Return a text in lines of at most this width."""
     plain = Text(" ".join(text.split()))
-    return [line.plain.rstrip() for line in plain.wrap(_console(width), width)] or [""]
+    return [harmless(line.plain.rstrip()) for line in plain.wrap(_console(width), width)] or [""]

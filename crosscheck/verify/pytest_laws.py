@@ -9,6 +9,7 @@ import pytest
 from .functions import FunctionContestant
 from .judgement import LEAST_SHARE, TaskReport, Verdict
 from .message import decode_greeting
+from .sentence import harmless, visible
 from .solvers.host import PythonSolver
 from .verify import DISCIPLINES, judge_cases, trials
 
@@ -73,4 +74,5 @@ def _check(report: TaskReport, name: str) -> None:
         pytest.skip("; ".join(map(str, judgement.complaints)) or "nobody can tell")
     if judgement.verdict > Verdict.UNDECIDED:
         likely = [e.sentence for e in report.diagnosis.explanations if e.share >= LEAST_SHARE]
-        pytest.fail("\n".join(map(str, [*judgement.complaints, *likely])), pytrace=False)
+        lines = map(visible, map(str, [*judgement.complaints, *likely]))
+        pytest.fail("\n".join(map(harmless, lines)), pytrace=False)

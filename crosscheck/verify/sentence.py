@@ -1,11 +1,14 @@
 """Sentences to print in English or translated: a literal template and its fields."""
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 # Of a longer name only the beginning is compared [characters].
 _LONGEST_NAME = 100
+# What GitHub and Azure obey on a line of a log: the first at its beginning, the second anywhere.
+_COMMAND = re.compile(r"^ ?( *)(?=::)|(?<=#)(?=#\w*\[)")
 
 
 class Sentence(NamedTuple):
@@ -77,6 +80,11 @@ def visible(text: str) -> str:
         letter if letter.isprintable() else letter.encode("unicode_escape").decode()
         for letter in spaced
     )
+
+
+def harmless(line: str) -> str:
+    """Return a line of a screen in which no CI service finds a command, such as `::error`."""
+    return _COMMAND.sub(r"\1\\", line)
 
 
 def all_visible(value: Any) -> Any:

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict, smallest_failures
-from ..sentence import Sentence, sentence, visible, without_repetition
+from ..sentence import Sentence, harmless, sentence, visible, without_repetition
 from . import comparison
 from .words import (
     GOOD,
@@ -71,7 +71,8 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
     if any(line.endswith(_ELLIPSIS) for line in screen):
         hint = sentence("Cut at …: use --html FILE or | cat to see all of it.")
         end = [*wrapped(say(hint)), *end]
-    return [*screen, "", *end] if len(screen) + len(end) < height else [*screen, *end]
+    whole = [*screen, "", *end] if len(screen) + len(end) < height else [*screen, *end]
+    return list(map(harmless, whole))
 
 
 def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
