@@ -1,6 +1,6 @@
 """An answer beside the expected answer: the numbers in which they differ, and points to draw."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,8 @@ from ..contestant import Answer
 from ..judgement import CaseJudgement
 
 Outputs = Mapping[str, Any]
-# Differences below this part of the largest one are not where two answers part.
+# Differences below this part of the largest one are not where two answers part, unless they are
+# above the next part of the largest number.
 _PARTING = 0.01
 # An output that differs by less than this part of another one is rounded, not wrong.
 _ROUNDED = 1e-4
@@ -84,7 +85,7 @@ def _last(array: Any) -> FloatArray:
 
 
 def rows(judgement: CaseJudgement, count: int = 3) -> list[NumberRow]:
-    """Return the first numbers, in the order of the computation, in which answers part."""
+    """Return the first numbers in which answers part, and the one in which they differ most."""
     if not isinstance(judgement.answer, Answer):
         return []
     differing: list[NumberRow] = []
@@ -95,9 +96,19 @@ def rows(judgement: CaseJudgement, count: int = 3) -> list[NumberRow]:
         float(np.nan_to_num(np.abs(np.subtract(row.answer, row.expected)), nan=np.inf).max())
         for row in differing
     ]
-    wrong = [row for row, gap in zip(differing, gaps, strict=True) if gap >= _ROUNDED * max(gaps)]
+    largest = max(filter(np.isfinite, gaps), default=0.0)
+    wrong = [i for i, gap in enumerate(gaps) if gap >= _ROUNDED * largest]
+    if wrong:
+        kept = _first_and_largest([gaps[i] for i in wrong], count)
+        return [differing[wrong[i]] for i in kept]
     inputs, outputs = judgement.case.inputs, judgement.answer.values
-    return (wrong or _disagreeing(inputs, outputs, count) or _effector(inputs, outputs))[:count]
+    return (_disagreeing(inputs, outputs, count) or _effector(inputs, outputs))[:count]
+
+
+def _first_and_largest(gaps: Sequence[float], count: int) -> list[int]:
+    """Return the indices of the first gaps, in so many the index of the largest one."""
+    kept, largest = list(range(len(gaps)))[:count], int(np.argmax(gaps))
+    return kept if largest in kept else [*kept[:-1], largest]
 
 
 def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[NumberRow]:
@@ -109,9 +120,11 @@ def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[Number
     gaps = np.nan_to_num(np.abs(a - b), nan=np.inf)
     if a.ndim:
         gaps = gaps.max(-1)
-    least = max(_PARTING * gaps.max(initial=0.0), _ROUNDING * np.abs(b).max(initial=0.0))
-    parting = np.argwhere((gaps > 0.0) & (gaps >= least))[:count]
-    indices = [tuple(map(int, index)) for index in parting]
+    size = np.abs(b).max(initial=0.0) or np.abs(a[np.isfinite(a)]).max(initial=0.0)
+    least = max(min(_PARTING * gaps.max(initial=0.0), _ROUNDED * size), _ROUNDING * size)
+    parting = [tuple(index) for index in np.argwhere((gaps > 0.0) & (gaps >= least)).tolist()]
+    kept = _first_and_largest([gaps[i] for i in parting], count) if parting else []
+    indices = [parting[i] for i in kept]
     return [
         NumberRow(
             f"{name}[{', '.join(map(str, i))}]" if i else name,
