@@ -101,12 +101,13 @@ def _grid(rows: Sequence[Sequence[str]], sides: str, size: int = _WIDEST) -> lis
 def _summary(
     task: TaskReport, say: Say, indent: str = "", texts: set[str] | None = None
 ) -> list[str]:
-    """Return the name of a task and the sentences about its answers as one paragraph."""
+    """Return the name of a task and the sentences about its answers, each on a line of its own."""
     failure, texts = task.smallest_failure, set[str]() if texts is None else texts
     sentences = [*explanations(task), *failure.complaints] if failure else reservations(task)
     words = list(dict.fromkeys(say(without_repetition(words, texts)) for words in sentences))
     new = [text for text in words if not any(text != other and text in other for other in words)]
-    return wrapped(f"{title(task)}: " + " ".join(new), indent)
+    first, *others = [f"{title(task)}: " + "".join(new[:1]), *new[1:]]
+    return [*wrapped(first, indent), *(s for text in others for s in wrapped(text, f"{indent}  "))]
 
 
 def _all_details(
