@@ -27,7 +27,15 @@ from plumbob.crosscheck.verify.judgement import (
     Verdict,
 )
 from plumbob.crosscheck.verify.language import translator
-from plumbob.crosscheck.verify.output import comparison, drawing, json_file, junit, page, terminal
+from plumbob.crosscheck.verify.output import (
+    comparison,
+    drawing,
+    json_file,
+    junit,
+    page,
+    saved,
+    terminal,
+)
 from plumbob.crosscheck.verify.output.words import GOOD, Presentation, digits, explanations, speaker
 from plumbob.crosscheck.verify.sentence import Sentence, sentence, with_code
 from plumbob.reference import Skeleton, forward_kinematics
@@ -224,6 +232,16 @@ def test_a_fault_that_explains_few_answers_is_not_told_as_what_is_wrong(share, l
         near = {"en": "nearest known mistake explains only", "zh": "最接近的已知错误只能解释"}
         assert (near[language] in text) is (share < 0.5)
     assert json.loads(json_file.text(report, say))["tasks"][0]["explanations"][0]["share"] == share
+
+
+def test_methods_of_other_names_have_failure_files_of_their_own(tmp_path):
+    names = ["a b", "a-b", "a  b", "a_b", "A b", "::", "?", "", f"{'a' * 99}b", f"{'a' * 99}c", "é"]
+    task = a_wrong_task(1.0)
+    paths = [saved.save(replace(task, method=name), tmp_path, 0, False) for name in names]
+    assert len({path.name.lower() for path in paths}) == len(names)
+    assert [saved.load(path).method for path in paths] == names
+    assert all(re.fullmatch(r"[A-Za-z0-9_-]+\.json", path.name) for path in paths)
+    assert paths[names.index("a_b")].name == "energy-a_b.json"
 
 
 def test_no_control_character_is_printed(wrong, right):
@@ -436,15 +454,57 @@ def answered(task, inputs, theirs, ours):
     return CaseJudgement(case, answer, (), ours)
 
 
-def test_numbers_are_shown_from_where_answers_part():
+def test_numbers_are_shown_from_where_answers_part_to_the_largest_difference():
     ours = np.zeros((5, 3))
     theirs = ours.copy()
     theirs[2:, 1] = [0.1, 0.2, np.nan]
     theirs[1, 0] = 1e-9  # rounding
     one = answered("forward_kinematics", {}, {"positions": theirs}, {"positions": ours})
-    assert [row.label for row in comparison.rows(one)] == ["positions[4]"]
+    labels = ["positions[2]", "positions[3]", "positions[4]"]
+    assert [row.label for row in comparison.rows(one)] == labels
     theirs[4] = 0.0
-    assert [row.label for row in comparison.rows(one)] == ["positions[2]", "positions[3]"]
+    assert [row.label for row in comparison.rows(one)] == labels[:2]
+
+
+@pytest.mark.parametrize(("count", "shown_joints"), [(1, [8]), (3, [1, 2, 8]), (8, range(1, 9))])
+def test_the_largest_mistake_is_among_the_numbers_shown(count, shown_joints):
+    """It grows along the chain from 1 mm to 0.5 m."""
+    ours = np.ones((10, 3))
+    theirs = ours.copy()
+    theirs[1:9, 0] += [1e-3, 2e-3, 4e-3, 0.01, 0.02, 0.05, 0.1, 0.5]
+    one = answered("forward_kinematics", {}, {"positions": theirs}, {"positions": ours})
+    rows = comparison.rows(one, count)
+    assert [row.label for row in rows] == [f"positions[{joint}]" for joint in shown_joints]
+
+
+def with_reservations(*texts, method=""):
+    """A report of a right task with such reservations, each in a case of its own."""
+    judgements = [
+        CaseJudgement(
+            Case(text, "energy", {}, "x", sentence("It is all.")), Answer({"total": 1.0}, 1e-3),
+            (Finding("a law", Verdict.RIGHT_EXCEPT, 1.0, 0.0, "m", Sentence(text, {})),), {},
+        )
+        for text in texts
+    ]  # fmt: skip
+    task = TaskReport("energy", method, judgements, Diagnosis())
+    return Report(Greeting(1, ("energy",), name=method), [task], 0)
+
+
+def test_each_reservation_begins_a_line():
+    texts = ("It is slow.", "It prints.")
+    screen = terminal.lines(with_reservations(*texts), shown(), terminal.ENDLESS)
+    assert "  energy: It is slow." in screen
+    assert "    It prints." in screen
+
+
+@pytest.mark.parametrize("width", range(1, 80))
+def test_no_line_of_the_screen_is_a_command_of_a_ci_service(width):
+    """GitHub obeys a line that begins with :: after spaces, or has ##[ anywhere."""
+    text = f"::error::x ##[error]y {'a' * width} ::error::x std::vector {'a' * 70}::error::z"
+    report = with_reservations(text, f"Two. {text}", method=f"::error {'b' * width}::error::")
+    lines = terminal.lines(report, shown(), terminal.ENDLESS)
+    assert any("std::vector" in line for line in lines)
+    assert [line for line in lines if re.match(r" *::", line) or "##[" in line] == []
 
 
 def test_rounded_output_is_not_shown_beside_a_wrong_one():

@@ -3,6 +3,7 @@
 import re
 import shlex
 from collections.abc import Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,6 @@ def save(report: TaskReport, folder: Path, seed: int, thorough: bool) -> Path | 
     if failure is None:
         return None
     folder.mkdir(parents=True, exist_ok=True)
-    name = re.sub(r"[^A-Za-z0-9_]+", "-", f"{report.task} {report.method}").strip("-")[:100]
     case, answer = failure.case, failure.answer
     content = SavedCase(
         report.task, report.method, seed, thorough, case.name, FORMAT, VERSION, str(case.about),
@@ -52,9 +52,20 @@ def save(report: TaskReport, folder: Path, seed: int, thorough: bool) -> Path | 
         failure.expected,
     )  # fmt: skip
     text = msgspec.json.format(msgspec.json.encode(content, enc_hook=plain), indent=1)
-    path = folder / f"{name}.json"
+    path = folder / f"{_file_name(report)}.json"
     path.write_bytes(text + b"\n")
     return path
+
+
+def _file_name(report: TaskReport) -> str:
+    """Return the task and the method in letters of any file system; methods that differ share none.
+
+    A method of other letters, or capital ones, is told apart by a digest.
+    """
+    name = re.sub(r"[^A-Za-z0-9_]+", "-", f"{report.task} {report.method}").strip("-")[:100]
+    if name == f"{report.task}-{report.method}".strip("-").lower():
+        return name
+    return f"{name}-{sha256(report.method.encode(errors='replace')).hexdigest()[:8]}"
 
 
 def load(path: Path) -> SavedCase:
