@@ -117,7 +117,11 @@ class Stepping(NamedTuple):
         faults = {fault.aspect for match in matches[:1] for fault in match.faults}
         is_wrong = diagnosis.explained and (not recognised or "factorisation" in faults)
         if is_wrong or any(found.share == 1.0 for found in diagnosis.explanations):
-            judgements = list(map(_with_wrong_step, judgements))
+            options = honest_options(matches, step)
+            judgements = [
+                _with_wrong_step(judgement, options, problems[judgement.case.name])
+                for judgement in judgements
+            ]
         return TaskReport(self.task, "", judgements, diagnosis)
 
 
@@ -455,8 +459,13 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
     return sentence("{law} {trace}", law=law, trace=trace_of(family))
 
 
-def _with_wrong_step(judgement: CaseJudgement) -> CaseJudgement:
-    """Return a judgement with an undecided step judged as wrong, for a fault explains it."""
+def _with_wrong_step(
+    judgement: CaseJudgement, options: tuple[Option, ...], p: SpringProblem
+) -> CaseJudgement:
+    """Return a judgement with an undecided step judged as wrong, for a fault explains it.
+
+    Expected is the answer of the same step without the fault.
+    """
     message = sentence(
         "No correct time step gives these answers, but a step with a known mistake does."
     )
@@ -466,4 +475,5 @@ def _with_wrong_step(judgement: CaseJudgement) -> CaseJudgement:
         else finding
         for finding in judgement.findings
     ]
-    return replace(judgement, findings=tuple(findings))
+    expected = judgement.expected or predicted(*apply(options, p, StepModel()))
+    return replace(judgement, findings=tuple(findings), expected=expected)
