@@ -153,6 +153,8 @@ def explanation(
     ended = [solve for solve in solves.values() if solve is not None]
     if not all((s := solves[trial.case.name]) is not None and s.is_early for trial in wrong):
         return None
+    if not ended:
+        return None
     early = [solve for solve in ended if solve.is_early]
     if method == "fabrik" and len(early) > 1 and all(len(solve.gaps) == 2 for solve in early):
         fault = by_key("fabrik")["measured between the passes"]  # after one sweep
@@ -160,10 +162,13 @@ def explanation(
     test = ending_test(TESTS, ended, [solve.is_early for solve in ended])
     if test is None:
         return None
-    entry, fields = TABLE["stop"][KEY], {"count": len(early), "total": len(ended), "test": test}
-    return Explanation(
-        (KEY,), with_code(entry["code"], Sentence(entry["sentence"], fields)), 1.0, 0.0
-    )
+    entry = TABLE["stop"][KEY]
+    words = sentence(
+        "{fault} {count} of {total} solves end as soon as {test}, and none goes on after that.",
+        fault=with_code(entry["code"], Sentence(entry["sentence"], {})),
+        count=len(early), total=len(ended), test=test,
+    )  # fmt: skip
+    return Explanation((KEY,), words, 1.0, 0.0)
 
 
 def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> FollowedSolve | None:

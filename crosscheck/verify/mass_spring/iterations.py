@@ -224,9 +224,14 @@ def _words(course: FollowedMethod, tracks: Sequence[Track | None]) -> Sentence:
     name = NAMES[course.integrator.method]
     values = {"name": name, "test": test, "count": len(ends), "total": len(tracks)}
     if course.integrator.method == "local_global" and set(ends) == {1}:
-        return with_code(KEPT_DIRECTIONS["code"], Sentence(KEPT_DIRECTIONS["sentence"], values))
+        kept = with_code(KEPT_DIRECTIONS["code"], Sentence(KEPT_DIRECTIONS["sentence"], {}))
+        return sentence("{fault} This is so in {count} of {total} answers.", fault=kept, **values)
     if course.fault is None:
-        return with_code(EARLY_END["code"], Sentence(EARLY_END["sentence"], values))
+        ended = with_code(EARLY_END["code"], Sentence(EARLY_END["sentence"], {}))
+        return sentence(
+            "{fault} Those of {name} end {test}, and too early in {count} of {total} answers.",
+            fault=ended, **values,
+        )  # fmt: skip
     return sentence(
         "{fault} So the iterations of {name} do not converge in {count} of {total} answers: they "
         "end {test}.", fault=course.fault.sentence, **values,

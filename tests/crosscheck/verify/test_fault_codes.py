@@ -9,6 +9,7 @@ import tomllib
 from itertools import groupby
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from plumbob.crosscheck import verify as package
@@ -24,7 +25,7 @@ from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.kinematics.predictions import forward
 from plumbob.crosscheck.verify.kinematics.switches import Switches
 from plumbob.crosscheck.verify.one_line import search
-from plumbob.crosscheck.verify.output import json_file, junit, page, terminal
+from plumbob.crosscheck.verify.output import comparison, json_file, junit, page, terminal
 from plumbob.crosscheck.verify.output.fault_text import cause_and_remedy, explained, failure_of
 from plumbob.crosscheck.verify.output.words import Presentation, advice, reservations, speaker
 from plumbob.crosscheck.verify.sentence import codes_in, sentence
@@ -147,6 +148,17 @@ def samples():
         yield pytest.param(fault, id=fault.code, marks=marks)
 
 
+def test_no_cause_has_figures_of_the_answers_of_a_run():
+    """A code stands for one cause, whatever solver and in however many cases it is found."""
+    counted = [
+        code
+        for code, fault in coded_faults().items()
+        if re.search(r"\d+ of \d+ ", str(fault.sentence))
+        or {"count", "total"} & fault.sentence.values.keys()
+    ]
+    assert counted == []
+
+
 def test_every_fault_has_lines():
     assert all(fault.lines for fault in coded_faults().values())
 
@@ -227,6 +239,18 @@ def test_a_line_that_the_program_lacks_is_refused():
     fault = next(iter(coded_faults().values()))._replace(lines=(("no such line", ""),))
     with pytest.raises(ValueError, match="expected 'no such line' once"):
         _ = fault.wrong_program
+
+
+@pytest.mark.parametrize("code", ["PB-STEP-120", "PB-STEP-097"])
+def test_a_known_mistake_of_a_step_stands_beside_the_right_numbers(code):
+    """The step is undeclared, and recognised with its mistake alone."""
+    fault = coded_faults()[code]
+    report = reports(fault.wrong_program, fault.task)
+    assert report.diagnosis.explanations[0].share == 1.0
+    for failure in (j for j in report.judgements if j.verdict is Verdict.WRONG):
+        differences = [np.subtract(row.answer, row.expected) for row in comparison.rows(failure)]
+        assert differences
+        assert np.abs(differences[0]).max() > 0.0
 
 
 # ---- plumbob explain
