@@ -160,7 +160,8 @@ def _forgive(case: Case, broken: Finding) -> Finding:
     is_missed = broken.law in ("target reached", "nearest point")
     if not is_missed or broken.verdict is not Verdict.WRONG or broken.error >= gained:
         return broken
-    return finding(SLOW, broken.error, broken.tolerance, law=broken.law)
+    reach = case.facts["reach"]
+    return finding(SLOW, broken.error, broken.tolerance, law=broken.law, reach=reach)
 
 
 def _aggravate(broken: Finding) -> Finding:
@@ -237,7 +238,9 @@ def reached(
     key, limit = _miss(excess, case, method, greeting), inputs["max_iterations"]
     count = outputs.get("iterations", limit)
     key = ENDED if key == SLOW and count < limit else key
-    return finding(key, excess, tolerance, law=law, count=count, limit=limit)
+    return finding(
+        key, excess, tolerance, law=law, count=count, limit=limit, reach=case.facts["reach"]
+    )
 
 
 def _miss(excess: float, case: Case, method: str, greeting: Greeting) -> str:

@@ -7,6 +7,7 @@ only here.
 import numpy as np
 import pytest
 
+from plumbob.crosscheck.verify import laws
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
@@ -171,6 +172,14 @@ def test_target_is_reached_to_the_tolerance(case, method, distance, verdict):
 def test_only_what_uses_all_iterations_converges_slowly(case, iterations, words):
     finding = inverse_kinematics.reached(0.1, 1e-12, case, "", GREETING, {"iterations": iterations})
     assert words in str(finding.sentence)
+    assert f"chain of {REACH:.3g} m" in str(finding.sentence)
+
+
+@pytest.mark.parametrize("key", ["nearest point, approached", "target reached, undetermined"])
+def test_a_distance_stands_beside_the_length_of_the_chain(key):
+    words = laws.finding(key, 4.0, reach=2.6).sentence
+    assert "4 m" in str(words)
+    assert "its chain of 2.6 m could reach" in str(words)
 
 
 @pytest.mark.parametrize("precision", STALL)
