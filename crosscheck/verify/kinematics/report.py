@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import TRIAL, explain, first_broken
@@ -16,7 +18,7 @@ from ..judgement import (
     Verdict,
     smallest_failures,
 )
-from ..laws import hints_of, laws_that_hold, proportion_of
+from ..laws import finding, hints_of, laws_that_hold, proportion_of
 from ..sentence import Sentence
 from .faults import SwitchFault, describe
 from .predictions import variants
@@ -75,6 +77,8 @@ def report(
     task: str, method: str, judgements: Sequence[CaseJudgement], diagnosis: Diagnosis
 ) -> TaskReport:
     """Return the report, with hints and the first broken law where no fault explains answers."""
+    if not any(map(_has_numbers, judgements)):
+        judgements = list(map(_as_broken, judgements))
     failures = smallest_failures(judgements, diagnosis.explained)
     broken = None
     if len(failures) == 1 and not diagnosis.explained:
@@ -86,3 +90,21 @@ def report(
         hints += (laws_that_hold(judgements),)
     diagnosis = replace(diagnosis, first_broken=broken, hints=hints)
     return TaskReport(task, method, judgements, diagnosis)
+
+
+def _has_numbers(judgement: CaseJudgement) -> bool:
+    """Return whether an answer has an output all of whose entries are numbers."""
+    answer = judgement.answer
+    outputs = answer.values.values() if isinstance(answer, Answer) else ()
+    return any(
+        isinstance(output, np.ndarray) and output.size > 0 and bool(np.isfinite(output).all())
+        for output in outputs
+    )
+
+
+def _as_broken(judgement: CaseJudgement) -> CaseJudgement:
+    """Return a judgement that forgives nothing: a solver that answers no case passes none."""
+    if judgement.verdict is Verdict.BROKEN:
+        return judgement
+    is_answered = isinstance(judgement.answer, Answer)
+    return replace(judgement, findings=(finding("numbers, never"),) if is_answered else ())
