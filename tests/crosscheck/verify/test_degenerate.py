@@ -1,6 +1,7 @@
 """Degenerate cases: a solver without guards is RIGHT EXCEPT there, with the missing guard."""
 
 import math
+import re
 
 import conformance_students as students
 import numpy as np
@@ -8,7 +9,12 @@ import pytest
 from kinematics_solvers import INVERSE, judged, reference
 
 from plumbob.crosscheck.verify.contestant import Failure
+from plumbob.crosscheck.verify.functions import FunctionContestant
+from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
+from plumbob.crosscheck.verify.laws import LAWS
+from plumbob.crosscheck.verify.output.words import passed
+from plumbob.crosscheck.verify.verify import DISCIPLINES, judge_cases
 
 RIGHT_EXCEPT, BROKEN = Verdict.RIGHT_EXCEPT, Verdict.BROKEN
 
@@ -98,11 +104,19 @@ def test_solver_without_guards_is_right_except_in_degenerate_cases(
     said = complaints(report)
     for family, cause in causes.items():
         assert cause in said[family]
-        assert "if length < eps" in said[family].replace("If", "if")
+        assert re.search("[Ii]f (length|sine) < eps", said[family])
         assert ("ZeroDivisionError" in said[family]) is (arithmetic == "exceptions")
     assert any(isinstance(judgement.answer, Failure) for judgement in report.judgements) is (
         arithmetic == "exceptions"
     )
+
+
+def test_advice_on_divisions_by_zero_holds_in_the_plane_too():
+    """A program in the plane has no axes, and a cross product of one number."""
+    for name, entry in LAWS["divisions"].items():
+        plain = re.sub(r"\(in space[^)]*\)", "", entry["sentence"])
+        assert "cross product" not in plain, name
+        assert "axis" not in plain, name
 
 
 @pytest.mark.parametrize("method", ["ccd", "fabrik"])
@@ -117,6 +131,27 @@ def test_cosine_beyond_one_in_an_ordinary_case_is_broken(arithmetic, hinted):
     assert report.verdict is BROKEN
     assert report.smallest_failure.case.requirement == "must"
     assert any("acos" in str(hint) for hint in report.diagnosis.hints) is hinted
+
+
+def raises(**_):
+    raise RuntimeError("not today")
+
+
+def without_numbers(local_rotations, **_):
+    return {"local_rotations": np.full_like(local_rotations, np.nan), "iterations": 3}
+
+
+@pytest.mark.parametrize("method", ["", "ccd"])
+@pytest.mark.parametrize("solve", [raises, without_numbers])
+def test_a_solver_that_never_answers_with_a_number_passes_no_case(solve, method):
+    greeting = Greeting(1, (INVERSE,), methods=(method,))
+    every = DISCIPLINES[INVERSE].cases(greeting, method, 0, False)
+    cases = [case for case in every if case.requirement != "must"][:4] + every[:2]
+    contestant = FunctionContestant({INVERSE: solve}, greeting)
+    report = judge_cases(contestant, INVERSE, method, cases)
+    assert {judgement.verdict for judgement in report.judgements} == {BROKEN}
+    assert passed(report) == f"0/{len(cases)}"
+    assert all(judgement.complaints for judgement in report.judgements)
 
 
 @pytest.mark.parametrize("raises", [False, True])
