@@ -1,3 +1,4 @@
+import csv
 import json
 import re
 import subprocess
@@ -78,6 +79,36 @@ def test_the_solver_of_the_readme_is_right_and_is_said_to_be(tmp_path):
         for task in report["tasks"]:
             assert flat(f"{task['task']} {task['method']}") in shown
             assert f"{task['passed']}/{len(task['cases'])}" in shown
+
+
+def test_the_first_program_for_students_is_right(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    exec(snippets("python", README.parent / "docs" / "student.md")[0], {})
+    command = [sys.executable, "-m", "plumbob", "verify", "my_points.py", "--json", "v.json"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stdout
+    assert json.loads(Path("v.json").read_text())["verdict"] == "right"
+
+
+def test_the_summary_for_lecturers_has_a_row_of_each_submission(tmp_path, monkeypatch):
+    """Files of the verdict are missing where a submission could not be started."""
+    monkeypatch.chdir(tmp_path)
+    task = {
+        "task": "resample", "method": "", "verdict": "right", "digits": None, "passed": 16,
+        "explanations": [],
+    }  # fmt: skip
+    for name in ("lee", "kim"):
+        Path("verdicts", name).mkdir(parents=True)
+    Path("verdicts/lee/verdict.json").write_text(json.dumps({"tasks": [task]}))
+    Path("verdicts/lee.txt").write_text("resample  RIGHT")
+    Path("verdicts/kim.txt").write_text("plumbob: solver: it did not start")
+    (code,) = snippets("python", README.parent / "docs" / "lecturer.md")
+    exec(code, {})
+    rows = list(csv.reader(Path("summary.csv").read_text().splitlines()))[1:]
+    assert rows == [
+        ["kim", "", "", "none", "", "", "plumbob: solver: it did not start"],
+        ["lee", "resample", "", "right", "", "16", ""],
+    ]
 
 
 def test_both_pages_show_the_same_program():
