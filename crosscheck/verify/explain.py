@@ -5,7 +5,7 @@ of it suffices.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -41,6 +41,7 @@ class Match(NamedTuple):
 
     variant: Variant
     share: float  # of the answers
+    failing_share: float  # of the answers that fail
     distance: float  # the largest relative difference of those
     predictions: list[Mapping[str, Any]]
 
@@ -51,20 +52,22 @@ def explain(
     tolerance: Callable[[Case], float],
     describe: Callable[[Sequence[str]], Sentence],
     trial: int = TRIAL,
+    failing: Collection[str] = (),
 ) -> tuple[tuple[Explanation, ...], int]:
     """Return the variants that reproduce most answers, nearest first, and the number compared.
 
     The variants come in ascending order of the number of faults, special ones of a number last, the
     most telling answers first: small, and wrong. `tolerance` is the relative difference that
     rounding explains; `describe` puts the faults into words, given the keys of a class that no
-    answer tells apart. Of the first `trial` answers a variant has to reproduce one.
+    answer tells apart. Of the first `trial` answers a variant has to reproduce one, and of the
+    `failing` cases, by their names, the least share.
     """
     answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
     count, matches = 0, list[Match]()
     for _, same_size in groupby(variants, key=lambda v: (len(v.faults), v.is_special)):
         for variant in same_size:
             count += 1
-            match = _match(variant, answers, tolerance, trial)
+            match = _match(variant, answers, tolerance, trial, failing)
             if match is not None:
                 matches.append(match)
         if any(match.share == 1.0 for match in matches):
@@ -92,7 +95,9 @@ def _telling(matches: Sequence[Match]) -> list[Match]:
         return (is_vague and match.share < MOST_ANSWERS) or any(part >= share for part in parts)
 
     perfect = [match for match in matches if match.share == 1.0]
-    faulty = [m for m in matches if m.variant.faults and m.share >= LEAST_SHARE]
+    shares = [min(match.share, match.failing_share) for match in matches]
+    faulty = [m for m, share in zip(matches, shares, strict=True)
+              if m.variant.faults and share >= LEAST_SHARE]  # fmt: skip
     return [match for match in perfect or faulty if not is_needless(match)]
 
 
@@ -101,8 +106,9 @@ def _match(
     answers: Sequence[Exchange],
     tolerance: Callable[[Case], float],
     trial: int,
+    failing: Collection[str],
 ) -> Match | None:
-    hits, largest = 0, 0.0
+    hits, largest = list[str](), 0.0
     predictions: list[Mapping[str, Any]] = []
     for i, exchange in enumerate(answers):
         if i == trial and not hits:
@@ -113,8 +119,12 @@ def _match(
         predictions.append({k: v for k, v in prediction.items() if k in outputs})
         distance = difference(predictions[-1], outputs)
         if distance <= variant.amplification * tolerance(exchange.case):
-            hits, largest = hits + 1, max(largest, distance)
-    return Match(variant, hits / len(answers), largest, predictions) if hits else None
+            hits.append(exchange.case.name)
+            largest = max(largest, distance)
+    wrong = [exchange.case.name in hits for exchange in answers if exchange.case.name in failing]
+    failing_share = sum(wrong) / len(wrong) if wrong else 1.0
+    share = len(hits) / len(answers)
+    return Match(variant, share, failing_share, largest, predictions) if hits else None
 
 
 def _predict(variant: Variant, case: Case) -> Mapping[str, Any]:

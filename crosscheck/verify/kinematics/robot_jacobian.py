@@ -263,7 +263,10 @@ def _diagnosis(
     if not wrong:
         return Diagnosis()
     exchanges = [*sorted(wrong, key=lambda exchange: -len(exchange.case.inputs["q"])), *right]
-    shares = {key: _share(fault, exchanges, greeting) for key, fault in FAULTS.items()}
+    shares = {
+        key: min(_share(fault, exchanges, greeting), _share(fault, wrong, greeting))
+        for key, fault in FAULTS.items()
+    }
     key = max(shares, key=shares.__getitem__, default="")
     if not key or shares[key] < LEAST_SHARE:
         return Diagnosis(hints=_relation(exchanges, greeting), variant_count=len(FAULTS))

@@ -359,6 +359,7 @@ def _diagnosis(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Diagn
         partial(_rounded, greeting=greeting),
         lambda keys: either([[SENTENCES[key]] for key in keys]),
         trial=2,
+        failing=[j.case.name for j in ordered if j.verdict >= Verdict.WRONG],
     )  # fmt: skip
     is_certain = bool(explanations) and explanations[0].share == 1.0
     if not is_certain and (weighted := _weighted(judgements)):

@@ -195,6 +195,7 @@ def _diagnose(
     explanations, count = explain(
         variants(telling, greeting.epsilon, sentences), telling, relative_tolerance,
         lambda keys: either([[sentences[fault] for fault in key.split(" + ")] for key in keys]),
+        failing=[judgements[i].case.name for i in order if wrong[i]],
     )  # fmt: skip
     explanations = tuple(explanation for explanation in explanations if explanation.faults != ("",))
     first = None if explanations else first_broken(judgements)

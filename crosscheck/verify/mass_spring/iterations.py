@@ -95,6 +95,12 @@ class StepAnswer(NamedTuple):
     positions: FloatArray
     error: float  # from the right positions, relative to the displacement
     bound: float  # up to this distance an iterate is the answer [m]
+    is_unlike: bool = False  # whether velocities are not (x' - x) / h, as the model has them
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether positions or velocities are wrong."""
+        return self.is_unlike or self.error > SOLVED
 
 
 class Track(NamedTuple):
@@ -128,7 +134,7 @@ def explanation(
     Iterations without a mistake that end by no known test give way to those with one.
     """
     trials = trials_of(options, probes, epsilon)
-    wrong = [trial for trial in trials if trial.error > SOLVED]
+    wrong = [trial for trial in trials if trial.error > SOLVED and not trial.is_unlike]
     wrong.sort(key=lambda trial: (is_indefinite(trial.problem), trial.problem.count))
     if not any(trial.error > least_error for trial in wrong):
         return None
@@ -145,7 +151,7 @@ def explanation(
                 matches.setdefault(key, course)
         if matches:
             tracks = {key: [_track(options, t, c) for t in trials] for key, c in matches.items()}
-            found = _explanation(matches, tracks)
+            found = _explanation(matches, tracks, trials)
             is_clear = any(c.fault or _ending(tracks[key]) for key, c in matches.items())
             if is_clear and (vague is None or (found and found.share > vague.share)):
                 return found
@@ -199,14 +205,28 @@ def _trial(options: Sequence[Option], epsilon: float, probe: Probe) -> StepAnswe
     error = error if gap > ROUNDED * allowed.positions else 0.0
     size = float(np.abs(positions - problem.positions).max())
     bound = SAME * gap if error > SOLVED else SOLVED * size
-    return StepAnswer(problem, positions, error, 4.0 * allowed.positions + bound)
+    is_unlike = False
+    if "velocities" in probe.answers and (model.velocity, model.substeps) == ("displacement", 1):
+        velocities = {"velocities": probe.answers["velocities"].reshape(-1, problem.count, 3)[0]}
+        own = {"velocities": (positions - problem.positions) / problem.h * model.scaling}
+        is_unlike = relative_gap(problem, own, velocities, allowed) > IMPRECISE
+    return StepAnswer(problem, positions, error, 4.0 * allowed.positions + bound, is_unlike)
 
 
 def _explanation(
-    courses: Mapping[str, FollowedMethod], tracks: Mapping[str, Sequence[Track | None]]
+    courses: Mapping[str, FollowedMethod],
+    tracks: Mapping[str, Sequence[Track | None]],
+    trials: Sequence[StepAnswer],
 ) -> Explanation | None:
-    """Return the courses, by keys, that have most answers among their iterates."""
-    shares = {key: np.mean([track is not None for track in row]) for key, row in tracks.items()}
+    """Return the courses, by keys, that have most answers among their iterates.
+
+    Their share is that of all answers or, if less, of the wrong ones.
+    """
+    wrong, shares = np.array([trial.is_wrong for trial in trials]), dict[str, float]()
+    for key, row in tracks.items():
+        pairs = zip(row, trials, strict=True)
+        hits = np.array([track is not None and not trial.is_unlike for track, trial in pairs])
+        shares[key] = min(hits.mean(), hits[wrong].mean())
     share = float(max(shares.values()))
     keys = [key for key in shares if shares[key] == share][:EXPLANATIONS]
     words = [[_words(courses[key], tracks[key])] for key in keys]

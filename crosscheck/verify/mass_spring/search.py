@@ -536,8 +536,12 @@ def _step_matches(search: ModelSearch, cases: Sequence[Probe]) -> list[ModelMatc
     if matches:
         return matches
     positions = [probe.positions() for probe in probes]
+    position_cases = [case.positions() for case in cases if "positions" in case.answers]
     of_positions = ModelSearch(positions, step, epsilon, cause_search=search.cause_search)
-    matches = [_with_velocity(match, fault, probes, step, epsilon) for match in of_positions.run()]
+    matches = [
+        _with_velocity(match, fault, probes, step, epsilon)
+        for match in of_positions.run(position_cases)
+    ]
     fewest = min((match.complexity for match in matches), default=(MAX_FAULTS, 0))
     further = search.run(cases) if fewest > ONE_FAULT else []
     if further and further[0].complexity < fewest:

@@ -1,7 +1,7 @@
 """Judge steps and motions by the declared or inferred model and by laws."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -319,7 +319,8 @@ def _diagnose(
     explanations: tuple[Explanation, ...] = ()
     behaviour, step = None, search.step
     if matches and matches[0].faults:
-        explanation = _explanation(matches, probes, search.epsilon)
+        failing = {j.case.name for j in judgements if j.verdict >= Verdict.UNDECIDED}
+        explanation = _explanation(matches, probes, search.epsilon, failing)
         is_likely = explanation.share >= (MANY if len(matches[0].faults) > 1 else SOME)
         explanations = (explanation,) if is_likely else ()
     elif matches:
@@ -412,14 +413,23 @@ def _nearest(search: ModelSearch) -> Sentence:
 
 
 def _explanation(
-    matches: Sequence[ModelMatch], probes: Sequence[Probe], epsilon: float
+    matches: Sequence[ModelMatch], probes: Sequence[Probe], epsilon: float, failing: Collection[str]
 ) -> Explanation:
-    """Return the faults found with the share of all answers that they reproduce, in classes."""
+    """Return the faults found with the share of answers that they reproduce, in classes.
+
+    It is the share of all answers or, if less, of those that fail. A factorisation shows in a
+    pattern of failures, whatever it leaves.
+    """
     scores = []
     for match in matches:
         gaps = gaps_of(match.options, probes, epsilon)
         hits = [gap for gap in gaps if gap <= SOLVED]
-        scores.append((-len(hits) / max(len(gaps), 1), max(hits, default=0.0), match))
+        is_pattern = any(fault.aspect == "factorisation" for fault in match.faults)
+        rows = [[gap <= SOLVED for gap, probe in zip(gaps, probes, strict=True)
+                 if is_pattern or probe.name in names]
+                for names in ({probe.name for probe in probes}, failing)]  # fmt: skip
+        share = min(sum(row) / len(row) for row in rows if row)
+        scores.append((-share, max(hits, default=0.0), match))
     scores.sort(key=lambda score: score[:2])
     best, distance, _ = scores[0]
     classes = {" + ".join(m.keys): m.faults for share, _, m in scores if share == best}
