@@ -46,6 +46,8 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         pins: eliminated from the unknowns, overwritten after the solve, held by a penalty, or
             heavy.
         velocity: displacement: (x' - x_n) / h; separate: integrated beside the positions.
+        order: of symplectic Euler's updates: velocities_first: v' = v + h f(x) / m, then
+            x' = x + h v'; positions_first: x' = x + h v, then v' = v + h f(x') / m.
     """
 
     method: Method | None = None
@@ -58,6 +60,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping_factor: float | None = None
     pins: Literal["eliminated", "overwritten", "penalty", "heavy"] | None = None
     velocity: Literal["displacement", "separate"] | None = None
+    order: Literal["velocities_first", "positions_first"] | None = None
 
 
 class System(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

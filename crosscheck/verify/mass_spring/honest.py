@@ -9,6 +9,10 @@ from ..sentence import sentence
 from .faults import ASPECTS, STEP_FAULTS, Option, options_of, read_table
 from .model import EXPLICIT, RIGHT_MATRIX, Integrator
 
+# Symplectic Euler by the order of its updates.
+SYMPLECTIC = {"symplectic": "velocities_first", "positions_first": "positions_first"}
+# Methods with a number of iterations.
+ITERATIVE = ("newton", "local_global")
 # Dampers that explicit methods can have, and of these the ones that only symplectic Euler has.
 EXPLICIT_DAMPERS = ("none", "explicit", "diagonal", "blocks", "matrix")
 SYMPLECTIC_DAMPERS = ("diagonal", "blocks", "matrix")
@@ -65,7 +69,7 @@ def declared(option: Option, step: Step) -> bool:
 
 
 def _declared_integrator(integrator: Integrator, step: Step) -> bool:
-    iterative = integrator.method in ("newton", "local_global")
+    iterative = integrator.method in ITERATIVE
     starts = {None: (integrator.start,), "y": ("y", "s_n")}  # many call s_n y
     if iterative and integrator.start not in starts.get(step.start, (step.start,)):
         return False
@@ -73,7 +77,9 @@ def _declared_integrator(integrator: Integrator, step: Step) -> bool:
         return integrator.method == "newton" and integrator.iterations == 1
     if iterative and step.iterations not in (None, integrator.iterations):
         return False
-    unlimited = step.iterations is None and step.method in ("newton", "local_global")
+    if integrator.method in SYMPLECTIC and step.method in (None, "symplectic"):
+        return step.order in (None, SYMPLECTIC[integrator.method])
+    unlimited = step.iterations is None and step.method in ITERATIVE
     return step.method in (None, integrator.method) or (
         unlimited and integrator.method == "converged"
     )
@@ -119,11 +125,12 @@ def compatible(options: Mapping[str, Option]) -> bool:
         return False
     if fields.get("dampers_apart") and "matrix" not in fields:
         return False
-    if damper in SYMPLECTIC_DAMPERS and method != "symplectic":
+    if damper in SYMPLECTIC_DAMPERS and method not in SYMPLECTIC:
         return False
     if damper and damper not in (EXPLICIT_DAMPERS if method in EXPLICIT else IMPLICIT_DAMPERS):
         return False
-    if velocity == "displacement" and method in ("explicit", "taylor", "runge_kutta"):
+    own = ("explicit", "positions_first", "taylor", "runge_kutta")
+    if velocity == "displacement" and method in own:
         return False
     return _are_few(fields, method)
 
@@ -144,7 +151,7 @@ def _least_substeps(fields: Mapping[str, Any]) -> int:
 def _are_few(fields: Mapping[str, Any], method: str) -> bool:
     """Return whether so many substeps are worth their time."""
     substeps = fields.get("substeps", 1)
-    if method not in ("explicit", "symplectic"):
+    if method not in ("explicit", *SYMPLECTIC):
         return bool(substeps <= (30 if method in EXPLICIT else 20))
     usual = {"velocity": "separate", "scaling": 1.0}
     plain = not fields.keys() & {"time", "keeps_forces"} and "inertia" not in fields

@@ -38,8 +38,9 @@ ESTIMATED = 1e-2
 class Integrator(NamedTuple):
     """How positions follow from the state at the start of a step."""
 
-    # explicit, symplectic, taylor (x + h v + h²/2 a), runge_kutta, in_place; newton, local_global,
-    # descent (along the gradient), converged
+    # explicit, symplectic, positions_first (symplectic, x' = x + h v before v' = v + h f(x') / m),
+    # taylor (x + h v + h²/2 a), runge_kutta, in_place; newton, local_global, descent (along the
+    # gradient), converged
     method: str
     start: str = "x_n"  # of the iterations, "x_n", "y" or "s_n"
     iterations: int = 1
@@ -386,15 +387,19 @@ def _explicit_rates(start: Substep, x: FloatArray, v: FloatArray) -> FloatArray:
 
 
 # The share of the new velocity, beside the old one, that moves positions.
-SHARES = {"explicit": 0.0, "taylor": 0.5, "symplectic": 1.0, "beyond": 1.5}
+SHARES = {"explicit": 0.0, "positions_first": 0.0, "taylor": 0.5, "symplectic": 1.0, "beyond": 1.5}
 
 
 def _by_one_rate(start: Substep) -> tuple[FloatArray, FloatArray]:
-    """Step by the acceleration at the start: explicit or symplectic Euler, or x + h v + h²/2 a."""
+    """Step by one acceleration: explicit or symplectic Euler, or x + h v + h²/2 a.
+
+    It is that of the start, or of the new positions where these come first.
+    """
     _, model, x, v, h, _ = start
     a = _explicit_rates(start, x, v)
     y = start.value(model.inertia) if model.inertia else x + h * v
     return y + SHARES[model.integrator.method] * h * h * a, v + h * a
+    a = _explicit_rates(start, y if model.integrator.method == "positions_first" else x, v)
 
 
 def _half_a(start: Substep) -> tuple[FloatArray, FloatArray]:
@@ -429,6 +434,7 @@ EXPLICIT: Mapping[str, Callable[[Substep], tuple[FloatArray, FloatArray]]] = {
     "explicit": _by_one_rate,
     "symplectic": _by_one_rate,
     "taylor": _by_one_rate,
+    "positions_first": _by_one_rate,
     "beyond": _by_one_rate,
     "half_a": _half_a,
     "runge_kutta": _runge_kutta,

@@ -193,6 +193,7 @@ class ModelSearch:
         self._gaps: dict[tuple[Any, ...], float | None] = {}
         self._fitted: list[Option] = []  # which stay, so that no other option gets their id
 
+            *(["integrator"] if step.order is not None else []),
     def with_probes(self, probes: Sequence[Probe]) -> "ModelSearch":
         """Return the search with more probes."""
         return ModelSearch(

@@ -26,7 +26,7 @@ from ..sentence import Sentence, sentence
 from . import iterations, laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
-from .honest import compatible, domains, honest
+from .honest import ITERATIVE, SYMPLECTIC, compatible, domains, honest
 from .laws import IMPRECISE, SOLVED, StepContext, rounding
 from .model import EXPLICIT, StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
@@ -224,11 +224,12 @@ def declaration_of(options: Sequence[Option]) -> str:
     """Return the field of a greeting that declares a model, "" if the protocol has none for it."""
     fields = {name: value for option in options for name, value in option.fields.items()}
     integrator, pins = fields["integrator"], fields["pins"].split()[0]
-    method, is_iterative = integrator.method, integrator.method in ("newton", "local_global")
+    method, is_iterative = integrator.method, integrator.method in ITERATIVE
     if method == "newton" and integrator.iterations == 1:
         method = "linearised"
     step = {
-        "method": method,
+        "method": "symplectic" if method in SYMPLECTIC else method,
+        "order": "positions_first" if method == "positions_first" else None,
         "start": integrator.start if is_iterative else None,
         "iterations": integrator.iterations if is_iterative else None,
         "substeps": fields["substeps"],
@@ -378,7 +379,13 @@ def _repeats(asked: Sequence[Exchange] | Sequence[CaseJudgement], factor: float)
 def _leaves_open(step: Step, options: Sequence[Option]) -> bool:
     """Return whether a greeting leaves something open that is not as usual."""
     fields = {name: value for option in options for name, value in option.fields.items()}
-    usual = {"substeps": 1, "velocity": VELOCITY_OF[fields["integrator"].explicit]}
+    integrator = fields["integrator"]
+    order = SYMPLECTIC["symplectic"]
+    usual = {"substeps": 1, "velocity": VELOCITY_OF[integrator.explicit], "order": order}
+    fields["order"] = SYMPLECTIC.get(integrator.method, order)
+    is_counted = integrator.method in ITERATIVE and step.method == integrator.method
+    if is_counted and step.iterations is None:
+        return True
     return any(
         getattr(step, name) is None and (name not in usual or fields[name] != usual[name])
         for name in _DECLARED
@@ -388,7 +395,7 @@ def _leaves_open(step: Step, options: Sequence[Option]) -> bool:
 # The usual velocity of implicit and of explicit methods.
 VELOCITY_OF = ("displacement", "separate")
 # What a greeting may say of its step; anything else is inferred.
-_DECLARED = ("method", "substeps", "damper", "pins", "velocity")
+_DECLARED = ("method", "order", "substeps", "damper", "pins", "velocity")
 
 
 def _nearest(search: ModelSearch) -> Sentence:
