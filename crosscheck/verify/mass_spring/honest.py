@@ -58,8 +58,8 @@ def declared(option: Option, step: Step) -> bool:
                 "none",
             )
         case "pins":
-            kinds = ("penalty", "springs") if step.pins == "penalty" else (step.pins,)
-            return step.pins is None or choice.split()[0] in kinds
+            kinds = {"penalty": ("penalty", "springs"), "heavy": ("heavy", "weightless")}
+            return step.pins is None or choice.split()[0] in kinds.get(step.pins, (step.pins,))
         case "velocity":  # explicit methods have no other velocity than their own
             own = step.method in ("explicit", "symplectic") and choice == "separate"
             return own or step.velocity in (None, choice)

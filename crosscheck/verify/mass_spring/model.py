@@ -110,12 +110,12 @@ class StepModel(NamedTuple):
     # beside explicit springs: diagonal, blocks, matrix
     damper: str = "length_rate"
     scaling: float = 1.0  # of every velocity after each substep
-    # eliminated, overwritten; with a number: penalty (weight), springs (stiffness), heavy or
-    # falling (mass); at_the_end: free through the substeps; free; unattached: no springs to them;
-    # first: only one is held; origin: their columns dropped, so that springs end at the origin;
-    # dropped: eliminated, then moved by gravity; held on the right: on that side of the equation
-    # alone; identity rows: of the matrix, but the right-hand side is not zero; coordinates: those
-    # with the numbers of a formula are held
+    # eliminated, overwritten; with a number: penalty (weight), springs (stiffness), heavy,
+    # weightless (heavy, but not pulled by gravity) or falling (mass); at_the_end: free through the
+    # substeps; free; unattached: no springs to them; first: only one is held; origin: their columns
+    # dropped, so that springs end at the origin; dropped: eliminated, then moved by gravity; held
+    # on the right: on that side of the equation alone; identity rows: of the matrix, but the
+    # right-hand side is not zero; coordinates: those with the numbers of a formula are held
     pins: str = "eliminated"
     # displacement, separate; or a formula with d = x' - x (for names see `Substep.value`)
     velocity: str = "displacement"
@@ -269,11 +269,13 @@ def _with_pins(p: SpringProblem, model: StepModel) -> SpringProblem:
     if p.linear is not None:
         p = p.changed(linear=_with_pins(p.linear, model))
     kind, pinned = model.pin_kind, p.pinned
-    if kind in ("heavy", "falling"):
+    if kind in ("heavy", "falling", "weightless"):
         masses, weights = p.masses.copy(), p.weights.copy()
         masses[pinned] = model.pin_strength
         if kind == "falling":
             weights[pinned] *= model.pin_strength / p.weighing[pinned, None]
+        elif kind == "weightless":
+            weights[pinned] = 0.0
         return p.changed(masses=masses, weights=weights)
     if kind == "unattached":
         attached = ~np.isin(p.springs, pinned).any(axis=1)
@@ -396,10 +398,9 @@ def _by_one_rate(start: Substep) -> tuple[FloatArray, FloatArray]:
     It is that of the start, or of the new positions where these come first.
     """
     _, model, x, v, h, _ = start
-    a = _explicit_rates(start, x, v)
     y = start.value(model.inertia) if model.inertia else x + h * v
-    return y + SHARES[model.integrator.method] * h * h * a, v + h * a
     a = _explicit_rates(start, y if model.integrator.method == "positions_first" else x, v)
+    return y + SHARES[model.integrator.method] * h * h * a, v + h * a
 
 
 def _half_a(start: Substep) -> tuple[FloatArray, FloatArray]:
@@ -433,8 +434,8 @@ def _in_place(start: Substep) -> tuple[FloatArray, FloatArray]:
 EXPLICIT: Mapping[str, Callable[[Substep], tuple[FloatArray, FloatArray]]] = {
     "explicit": _by_one_rate,
     "symplectic": _by_one_rate,
-    "taylor": _by_one_rate,
     "positions_first": _by_one_rate,
+    "taylor": _by_one_rate,
     "beyond": _by_one_rate,
     "half_a": _half_a,
     "runge_kutta": _runge_kutta,

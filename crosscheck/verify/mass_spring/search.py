@@ -24,9 +24,10 @@ from ..contestant import Answer, Exchange
 from ..greeting import Step
 from ..judgement import LEAST_SHARE
 from .faults import ASPECTS, MAX_FAULTS, STEP_FAULTS, Option, apply
-from .honest import compatible, domains, honest
+from .honest import compatible, declared, domains, honest
 from .laws import SOLVED, Rounding, relative_gap, rounding
 from .model import RIGHT_MATRIX, Integrator, StepModel, Substep, first_equation, predicted
+from .pin_strength import measured_pins
 from .problem import SpringProblem
 from .relations import Sample, fitted, relation_of
 
@@ -163,6 +164,13 @@ class ModelSearch:
             ]
             for aspect, domain in domains(step).items()
         }
+        honest_pins = [o for o, _ in self.domains["pins"] if id(o) not in FAULTY]
+        pins = measured_pins(honest_pins, [(probe.problem, probe.answers) for probe in probes])
+        self.domains["pins"] = sorted(
+            [(o, int(not declared(o, step))) for o in pins]
+            + [pair for pair in self.domains["pins"] if id(pair[0]) in FAULTY],
+            key=lambda pair: pair[1],
+        )
         # where masses are wrong, local/global iterations differ from Newton's even in flight
         self.flight = Integrator("local_global") if step.method == "local_global" else ONE_STEP
         # the integrators that each one of the domain "flight" stands for
@@ -184,6 +192,7 @@ class ModelSearch:
         self.declared_aspects = [
             *(["damper", "scaling"] if step.damper is not None else []),
             *(["substeps"] if step.substeps is not None else []),
+            *(["integrator"] if step.order is not None else []),
         ]
         self.cause_search = cause_search or CauseSearch()
         self.prediction_count = 0  # number of predictions
@@ -193,7 +202,6 @@ class ModelSearch:
         self._gaps: dict[tuple[Any, ...], float | None] = {}
         self._fitted: list[Option] = []  # which stay, so that no other option gets their id
 
-            *(["integrator"] if step.order is not None else []),
     def with_probes(self, probes: Sequence[Probe]) -> "ModelSearch":
         """Return the search with more probes."""
         return ModelSearch(

@@ -234,7 +234,7 @@ def declaration_of(options: Sequence[Option]) -> str:
         "iterations": integrator.iterations if is_iterative else None,
         "substeps": fields["substeps"],
         "damper": fields["damper"],
-        "pins": {"springs": "penalty", "falling": "heavy"}.get(pins, pins),
+        "pins": {"springs": "penalty", "falling": "heavy", "weightless": "heavy"}.get(pins, pins),
         "velocity": fields["velocity"],
     }
     if fields["scaling"] != 1.0:
@@ -447,7 +447,8 @@ def _explanation(
 
 def _fault_sentence(option: Option) -> Sentence:
     """Return the sentence of a fault, or of an honest choice that the greeting denies."""
-    if not any(option.key == choice.key for choice in honest(Step()).get(option.aspect, ())):
+    templates = {choice.sentence.template for choice in honest(Step()).get(option.aspect, ())}
+    if option.sentence.template not in templates:
         return option.sentence
     integrator = option.fields.get("integrator")
     return sentence(
