@@ -10,10 +10,12 @@ import numpy as np
 from plumbob.reference.judging import StepJudgement, judge_step
 
 from ..contestant import Answer, Exchange
+from ..greeting import Step
 from ..judgement import Finding, Verdict
 from ..laws import finding
 from ..sentence import Sentence
-from .model import StepModel
+from .honest import ITERATIVE
+from .model import EXPLICIT, StepModel
 from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of
 
 # A sum of some ten terms, a few products and a square root, each rounded by half an epsilon, as
@@ -105,8 +107,7 @@ class StepContext:
     recognised: bool  # whether that model is declared or was recognised
     description: Sentence  # the model in words
     expected: Mapping[str, Any]  # its prediction, or {} if it has none
-    pins_declared: bool  # whether the greeting says how pins are held
-    explicit_declared: bool = False  # whether the greeting declares an explicit method
+    step: Step  # as the greeting declares it
 
     @cached_property
     def judgement(self) -> StepJudgement | None:
@@ -123,6 +124,14 @@ class StepContext:
         if np.abs(x).max(initial=0.0) > LARGEST:
             return None
         return judge_step(system_of(p), state_of(p), p.h, x, external_forces=external)
+
+    @property
+    def method_declared(self) -> bool:
+        """Whether the greeting declares a method that need not converge."""
+        step = self.step
+        is_counted = step.method in ITERATIVE and step.iterations is not None
+        is_divided = step.method is not None and step.substeps not in (None, 1)
+        return is_counted or is_divided or step.method in ("linearised", *EXPLICIT)
 
     @property
     def displacement(self) -> float:
@@ -144,12 +153,15 @@ def pins(context: StepContext) -> Finding | None:
     offsets = np.linalg.norm(x - p.positions, axis=-1)[..., p.pinned].reshape(-1, len(p.pinned))
     worst, strict = float(offsets.max()), context.allowed.positions
     tolerance = strict + IMPRECISE * float(np.abs(x - p.positions).max())
+    motion = 0.0
     if context.expected:
         expected = (context.expected["positions"] - p.positions)[..., p.pinned, :]
         motion = 2.0 * float(np.abs(expected).max())
-        largest = np.inf if context.pins_declared else HELD * float(np.abs(x - p.positions).max())
+        largest = np.inf if context.step.pins else HELD * float(np.abs(x - p.positions).max())
         tolerance += min(motion, largest)
-    is_exact = context.model.pins in ("eliminated", "overwritten") and context.pins_declared
+    if context.step.pins in ("penalty", "heavy"):
+        strict += motion
+    is_exact = context.model.pins in ("eliminated", "overwritten") and context.step.pins
     verdict = Verdict.RIGHT_EXCEPT if worst <= tolerance and not is_exact else Verdict.WRONG
     index = int(p.pinned[offsets.max(axis=0).argmax()])
     return finding("pins", worst, strict, verdict=verdict, index=index)
@@ -202,7 +214,7 @@ def is_indefinite(p: SpringProblem) -> bool:
 def minimiser(context: StepContext) -> Finding | None:
     """Return how far positions are from converged implicit Euler, relative to how far y is."""
     p = context.problem
-    is_meant = "positions" in context.answers and not context.explicit_declared
+    is_meant = "positions" in context.answers and not context.method_declared
     judgement = context.judgement if is_meant else None
     if judgement is None or not judgement.outcome.solved:
         return None
@@ -262,6 +274,13 @@ def momentum(context: StepContext) -> Finding | None:
     unbalanced = UNBALANCED if method == "converged" else SOLVED
     tolerance = 4.0 * context.allowed.positions + unbalanced * float(np.abs(x - p.positions).max())
     return finding("momentum", gap, tolerance)
+
+
+def keeps_declaration(context: StepContext) -> bool:
+    """Return whether an answer is that of the declared method and damper."""
+    is_declared = context.method_declared and context.step.damper is not None
+    findings = declared_step(context), velocities(context)
+    return is_declared and all(not entry or not entry.verdict for entry in findings)
 
 
 def consistency(context: StepContext) -> Finding | None:

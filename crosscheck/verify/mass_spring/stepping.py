@@ -28,7 +28,7 @@ from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply
 from .honest import ITERATIVE, SYMPLECTIC, compatible, domains, honest
 from .laws import IMPRECISE, SOLVED, StepContext, rounding
-from .model import EXPLICIT, StepModel, predicted
+from .model import StepModel, predicted
 from .problem import SpringProblem, problem_of, state_of, system_of
 from .search import (
     UNEXPLAINED,
@@ -82,7 +82,9 @@ class Stepping(NamedTuple):
         honest_search = ModelSearch(telling, step, epsilon, is_honest=True)
 
         def iteration_of(is_hasty: bool, least: float = IMPRECISE) -> Explanation | None:
-            options = honest_options(matches, step)
+            options: Sequence[Option] = honest_options(matches, step)
+            if step.iterations is not None and step.start == "y" and not matches:
+                options = _nearest_start(options, probes, epsilon)
             follow = partial(iterations.explanation, options, probes, step.start, epsilon)
             return cause_search.run(lambda: follow(is_hasty, least), None)
 
@@ -210,6 +212,19 @@ def honest_options(matches: Sequence[ModelMatch], step: Step) -> tuple[Option, .
     return tuple(usual[aspect] for aspect in ASPECTS)
 
 
+def _nearest_start(
+    options: Sequence[Option], probes: Sequence[Probe], epsilon: float
+) -> Sequence[Option]:
+    """Return choices of iterations that begin at y or, if more answers show that, at s_n."""
+    place = ASPECTS.index("integrator")
+    integrator = options[place].fields["integrator"]._replace(start="s_n")
+    from_s_n = [*options]
+    from_s_n[place] = options[place]._replace(fields={"integrator": integrator})
+    hits = [sum(gap <= SOLVED for gap in gaps_of(model, probes, epsilon))
+            for model in (options, from_s_n)]  # fmt: skip
+    return options if hits[0] >= hits[1] else from_s_n
+
+
 def describe_model(options: Sequence[Option]) -> Sentence:
     """Return a model in words."""
     parts = {option.aspect: option.sentence for option in options}
@@ -262,8 +277,7 @@ def _judge_case(
     expected, positions = predicted(p, model), answer.values.get("positions")
     context = StepContext(
         p, answer.values, rounding(p, model, greeting.epsilon), model, recognised,
-        describe_model(options), expected, greeting.step.pins is not None,
-        greeting.step.method in EXPLICIT,
+        describe_model(options), expected, greeting.step,
     )  # fmt: skip
     correct_digits = None
     if recognised and expected and positions is not None:
@@ -296,7 +310,7 @@ def _findings(
     if invalid:
         return [finding("finite numbers", name=", ".join(invalid))]
     findings = [law(context) for law in LAWS]
-    if exchange.case.facts.get("consistent"):
+    if exchange.case.facts.get("consistent") and not laws.keeps_declaration(context):
         findings.append(laws.consistency(context))
     if context.model.damper != "diagonal":
         findings.append(laws.symmetry(exchange, exchanges, allowed))

@@ -9,6 +9,7 @@ import pytest
 
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer, Exchange
+from plumbob.crosscheck.verify.greeting import Step
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.laws import equal_answers
 from plumbob.crosscheck.verify.mass_spring import laws
@@ -47,14 +48,13 @@ def triangle(pinned=()):
     )
 
 
-def judged(law, p, model=LINEARISED, declares_pins=True, known=True, **changes):
+def judged(law, p, model=LINEARISED, pins="eliminated", known=True, **changes):
     """Return what a law finds of the model's own step with some outputs changed by an array."""
     expected = predicted(p, model)
     answered = {name: value + changes.get(name, 0.0) for name, value in expected.items()}
     allowed = rounding(p, model, EPSILON)
-    return law(
-        StepContext(p, answered, allowed, model, known, sentence(""), expected, declares_pins)
-    )
+    step = Step(pins=pins)
+    return law(StepContext(p, answered, allowed, model, known, sentence(""), expected, step))
 
 
 def displacement(p, model=LINEARISED):
@@ -112,7 +112,7 @@ EDGES = {
         laws.pins, triangle([0, 1]), {},
         lambda p, share: {"positions": one_moved(1, share * bound(p))}, EDGE),
     "a pin that nothing is said of moves by what is imprecise": (
-        laws.pins, triangle([0]), {"declares_pins": False},
+        laws.pins, triangle([0]), {"pins": None},
         lambda p, share: {"positions": one_moved(0, share * IMPRECISE * displacement(p))},
         [(0.5, RIGHT_EXCEPT), (2.0, WRONG)]),
     "and a declared one does not": (
@@ -173,16 +173,17 @@ def test_a_law_holds_just_within_its_tolerance_and_not_beyond(name):
         assert judged(law, p, **options, **change(p, share)).verdict is verdict, share
 
 
-def test_a_penalty_s_pin_may_move_as_far_as_the_penalty_lets_it():
+@pytest.mark.parametrize(("pins", "best"), [("penalty", RIGHT), (None, RIGHT_EXCEPT)])
+def test_a_penalty_s_pin_may_move_as_far_as_the_penalty_lets_it(pins, best):
     p, model = triangle([0]), LINEARISED._replace(pins="penalty 1e6")
     yields = np.abs(predicted(p, model)["positions"] - p.positions)[0].max()
     assert yields > 1e3 * rounding(p, model, EPSILON).positions
     for axis, share, verdict in (
-        (2, 0.0, RIGHT_EXCEPT),
+        (2, 0.0, best),
         (1, -3.0 - 2e-3 * displacement(p) / yields, WRONG),
     ):
         change = one_moved(0, share * yields, axis)
-        assert judged(laws.pins, p, model, positions=change).verdict is verdict
+        assert judged(laws.pins, p, model, pins, positions=change).verdict is verdict
 
 
 @pytest.mark.parametrize(
