@@ -1,7 +1,7 @@
 """Judge steps and motions by the declared or inferred model and by laws."""
 
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -434,22 +434,21 @@ def _nearest(search: ModelSearch) -> Sentence:
 
 
 def _explanation(
-    matches: Sequence[ModelMatch], probes: Sequence[Probe], epsilon: float, failing: Collection[str]
+    matches: Sequence[ModelMatch], probes: Sequence[Probe], epsilon: float, failing: set[str]
 ) -> Explanation:
     """Return the faults found with the share of answers that they reproduce, in classes.
 
     It is the share of all answers or, if less, of those that fail. A factorisation shows in a
     pattern of failures, whatever it leaves.
     """
-    scores = []
+    scores, names = [], [probe.name for probe in probes]
     for match in matches:
         gaps = gaps_of(match.options, probes, epsilon)
         hits = [gap for gap in gaps if gap <= SOLVED]
+        missed = {name for name, gap in zip(names, gaps, strict=True) if gap > SOLVED}
         is_pattern = any(fault.aspect == "factorisation" for fault in match.faults)
-        rows = [[gap <= SOLVED for gap, probe in zip(gaps, probes, strict=True)
-                 if is_pattern or probe.name in names]
-                for names in ({probe.name for probe in probes}, failing)]  # fmt: skip
-        share = min(sum(row) / len(row) for row in rows if row)
+        groups = ({*names}, set() if is_pattern else {*names} & failing)
+        share = min(1.0 - len(missed & group) / max(len(group), 1) for group in groups)
         scores.append((-share, max(hits, default=0.0), match))
     scores.sort(key=lambda score: score[:2])
     best, distance, _ = scores[0]
