@@ -26,7 +26,7 @@ PinnedAnswer = tuple[SpringProblem, Mapping[str, Any]]
 
 def measured_pins(pins: Sequence[Option], answers: Sequence[PinnedAnswer]) -> list[Option]:
     """Return honest pins, of each kind those of the strength that answers show, if they do."""
-    answers = [(p, outputs) for p, outputs in answers if p.pinned.size and not p.steps]
+    answers = [(p, outputs) for p, outputs in answers if p.pinned.size]
     patterns = {option.fields["pins"].split()[0]: option for option in pins}
     measured = [
         _with_strength(patterns[name], kind, strength)

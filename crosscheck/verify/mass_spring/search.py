@@ -165,7 +165,8 @@ class ModelSearch:
             for aspect, domain in domains(step).items()
         }
         honest_pins = [o for o, _ in self.domains["pins"] if id(o) not in FAULTY]
-        pins = measured_pins(honest_pins, [(probe.problem, probe.answers) for probe in probes])
+        firsts = [probe.first_step() if probe.problem.steps else probe for probe in probes]
+        pins = measured_pins(honest_pins, [(probe.problem, probe.answers) for probe in firsts])
         self.domains["pins"] = sorted(
             [(o, int(not declared(o, step))) for o in pins]
             + [pair for pair in self.domains["pins"] if id(pair[0]) in FAULTY],

@@ -209,10 +209,7 @@ STEPS = (
     "Newton's method with a line search", "implicit step", "implicit motion", "linearised motion",
 )  # fmt: skip
 SLOW = ("limited ccd", "robot", "robot_track", "newton step", *STEPS[2:])
-RESERVED = (
-    "robot", "robot_track", "conjugate gradients", "local-global step by a factor",
-    "step by conjugate gradients", *STEPS[2:6],
-)  # fmt: skip
+RESERVED = ("robot", "robot_track")
 
 
 @pytest.mark.parametrize(
@@ -221,8 +218,7 @@ RESERVED = (
 )
 def test_a_right_program_is_right(name):
     tasks = verify(contestant_of(source_of(name)), [RIGHT_PROGRAMS[name]]).tasks
-    # Another model than converged implicit Euler, a start from which a robot finds no solution, or
-    # a single iteration in each frame.
+    # A start from which a robot finds no solution, or a single iteration in each frame.
     expected = Verdict.RIGHT_EXCEPT if name in RESERVED else Verdict.RIGHT
     assert {report.verdict for report in tasks} == {expected}
     assert not any(report.diagnosis.explanations for report in tasks)
