@@ -40,8 +40,7 @@ class Match(NamedTuple):
     """How well a variant reproduces answers."""
 
     variant: Variant
-    share: float  # of the answers
-    failing_share: float  # of the answers that fail
+    share: float  # of the answers, or of those that fail if that is less
     distance: float  # the largest relative difference of those
     predictions: list[Mapping[str, Any]]
 
@@ -95,9 +94,7 @@ def _telling(matches: Sequence[Match]) -> list[Match]:
         return (is_vague and match.share < MOST_ANSWERS) or any(part >= share for part in parts)
 
     perfect = [match for match in matches if match.share == 1.0]
-    shares = [min(match.share, match.failing_share) for match in matches]
-    faulty = [m for m, share in zip(matches, shares, strict=True)
-              if m.variant.faults and share >= LEAST_SHARE]  # fmt: skip
+    faulty = [m for m in matches if m.variant.faults and m.share >= LEAST_SHARE]
     return [match for match in perfect or faulty if not is_needless(match)]
 
 
@@ -121,10 +118,15 @@ def _match(
         if distance <= variant.amplification * tolerance(exchange.case):
             hits.append(exchange.case.name)
             largest = max(largest, distance)
-    wrong = [exchange.case.name in hits for exchange in answers if exchange.case.name in failing]
-    failing_share = sum(wrong) / len(wrong) if wrong else 1.0
-    share = len(hits) / len(answers)
-    return Match(variant, share, failing_share, largest, predictions) if hits else None
+    share = share_of(hits, [exchange.case.name for exchange in answers], failing)
+    return Match(variant, share, largest, predictions) if hits else None
+
+
+def share_of(hits: Collection[str], names: Sequence[str], failing: Collection[str]) -> float:
+    """Return the share of hits among cases, or among those of them that fail if that is less."""
+    groups = names, [name for name in names if name in failing]
+    shares = [sum(name in hits for name in group) / len(group) for group in groups if group]
+    return min(shares, default=0.0)
 
 
 def _predict(variant: Variant, case: Case) -> Mapping[str, Any]:

@@ -18,7 +18,7 @@ from plumbob.reference.mass_spring import State
 from ..case import Case
 from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
-from ..explain import either, first_broken
+from ..explain import either, first_broken, share_of
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import digits, finding, hints_of, judge_case, laws_that_hold, proportion_of
@@ -444,12 +444,10 @@ def _explanation(
     scores, names = [], [probe.name for probe in probes]
     for match in matches:
         gaps = gaps_of(match.options, probes, epsilon)
-        hits = [gap for gap in gaps if gap <= SOLVED]
-        missed = {name for name, gap in zip(names, gaps, strict=True) if gap > SOLVED}
+        hits = {name: gap for name, gap in zip(names, gaps, strict=True) if gap <= SOLVED}
         is_pattern = any(fault.aspect == "factorisation" for fault in match.faults)
-        groups = ({*names}, set() if is_pattern else {*names} & failing)
-        share = min(1.0 - len(missed & group) / max(len(group), 1) for group in groups)
-        scores.append((-share, max(hits, default=0.0), match))
+        share = share_of(hits, names, () if is_pattern else failing)
+        scores.append((-share, max(hits.values(), default=0.0), match))
     scores.sort(key=lambda score: score[:2])
     best, distance, _ = scores[0]
     classes = {" + ".join(m.keys): m.faults for share, _, m in scores if share == best}

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer, Exchange
+from plumbob.crosscheck.verify.explain import Variant, explain
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Greeting, Step
 from plumbob.crosscheck.verify.judgement import Verdict
@@ -12,6 +15,7 @@ from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel, s
 from plumbob.crosscheck.verify.mass_spring.pin_strength import measured_pins
 from plumbob.crosscheck.verify.mass_spring.problem import problem_of
 from plumbob.crosscheck.verify.self_test import Stepper
+from plumbob.crosscheck.verify.sentence import sentence
 from plumbob.crosscheck.verify.verify import DISCIPLINES, judge_cases
 
 STEP, MOTION = "mass_spring_step", "mass_spring_motion"
@@ -273,3 +277,22 @@ def test_iterations_that_end_early_are_still_named():
     assert report.verdict is Verdict.WRONG
     (explanation,) = report.diagnosis.explanations
     assert explanation.codes == ("PB-STEP-168",)
+
+
+@pytest.mark.parametrize(("explained", "share"), [(0, None), (1, None), (2, 0.5), (4, 1.0)])
+def test_a_mistake_that_explains_few_of_the_failing_cases_is_not_named(explained, share):
+    """Six answers of ten are right, and the mistake does not show in their cases."""
+    cases = [Case(str(number), STEP, {}, "", sentence("")) for number in range(10)]
+    answers = [Answer({"positions": np.ones(3)}, 0.0) for _ in cases]
+    exchanges = [Exchange(*pair, pair[1]) for pair in zip(cases, answers, strict=True)]
+
+    def predict(case):
+        is_missed = explained <= int(case.name) < 4
+        return {"positions": np.ones(3) + is_missed}
+
+    variants = [Variant(("mistake",), predict)]
+    failing = [case.name for case in cases[:4]]
+    explanations, _ = explain(
+        variants, exchanges, lambda case: 1e-9, lambda keys: sentence(""), 10, failing
+    )
+    assert [explanation.share for explanation in explanations] == ([share] if share else [])
