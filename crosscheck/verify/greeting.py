@@ -24,6 +24,12 @@ Iterations = Annotated[
 Substeps = Annotated[
     int, Meta(ge=1, le=1000, description="the judge computes as many for each case")
 ]
+Distance = Annotated[
+    float, Meta(ge=0, le=0.1, description="a solve that ends farther away misses its target")
+]
+Acceleration = Annotated[
+    float, Meta(ge=-1000, le=1000, description="more takes particles out of their scenes")
+]
 # The most iterations of all substeps of a step, for the same reason.
 MOST_ITERATIONS = 1000
 
@@ -90,6 +96,20 @@ class System(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     continues: bool = False
 
 
+class Fixed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Inputs that are constants of a solver; requests hold the same numbers.
+
+    Attributes:
+        max_iterations: how many iterations a solve has, or would have if nothing ended it.
+        tolerance: distance that counts as reached [m]; 0 if no distance ends a solve.
+        gravity: acceleration [m/s²]; zeros without gravity.
+    """
+
+    max_iterations: Iterations | None = None
+    tolerance: Distance | None = None
+    gravity: tuple[Acceleration, Acceleration, Acceleration] | None = None
+
+
 class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a solver says of itself before it is asked anything.
 
@@ -108,6 +128,7 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             is asked for by the request's `method`.
         system: which mass-spring systems it takes.
         step: the time step that it declares.
+        fixed: inputs that it does not read, with the constants that it has instead.
         velocity_limits: whether its robots keep the greatest speeds of a request.
         limits: whether its inverse kinematics keeps the limits of a request's joints.
     """
@@ -126,6 +147,7 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     methods: Methods = ("",)
     system: System = System()
     step: Step = Step()
+    fixed: Fixed = Fixed()
     velocity_limits: bool = False
     limits: bool = False
 

@@ -19,7 +19,8 @@ import numpy as np
 from .case import Case
 from .contestant import Answer, Contestant, Failure, is_hung
 from .explain import largest_gap
-from .greeting import Greeting, System
+from .constants import measured
+from .greeting import Greeting
 from .judgement import Explanation, TaskReport, Verdict
 from .kinematics.robot_models import urdf
 from .sentence import Sentence, sentence
@@ -43,15 +44,18 @@ class Restriction(NamedTuple):
     about: Sentence  # what it is judged on
     sentence: Sentence  # how its answers show that
     asks: bool = False  # whether it is a mistake unless the greeting declares it
+    measured: bool = False  # whether a constant takes its place, which `fixed` declares
+    unused: bool = False  # whether answers do not depend on it at all
+    tasks: Sequence[str] = tuple(TASKS)  # those that it is inferred of
 
 
 # Restrictions, each with how answers show it.
 Evidence = Sequence[tuple[Restriction, Sentence]]
 RESTRICTIONS = tuple(
-    Restriction(
-        entry["input"], entry["greeting"], Sentence(entry["about"], {}),
-        Sentence(entry.get("sentence", ""), {}), entry.get("asks", False),
-    )
+    Restriction(**{
+        **entry, "greeting": entry.get("greeting", {}), "about": Sentence(entry["about"], {}),
+        "sentence": Sentence(entry.get("sentence", ""), {}),
+    })
     for entry in _TABLE["restriction"]
 )  # fmt: skip
 _SHARED = ("masses", "stiffnesses", "dampings", "rest_lengths")
@@ -91,18 +95,30 @@ def infer(
     """
     greeting = contestant.greeting
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
-    if report.verdict <= Verdict.RIGHT_EXCEPT or greeting.system.continues or is_stuck:
+    if report.verdict is Verdict.RIGHT or greeting.system.continues or is_stuck:
         return Inference(())
-    evidence = [(r, why) for r in RESTRICTIONS if (why := _evidence(contestant, report, r))]
+    is_sound = report.verdict is Verdict.RIGHT_EXCEPT
+    constants = measured(contestant, report)
+    evidence = [
+        (r, why)
+        for r in (() if is_sound else RESTRICTIONS)
+        if not r.measured and (why := _evidence(contestant, report, r))
+    ]
+    evidence += [
+        (_of_constant(r, constants[r.input]), r.sentence)
+        for r in RESTRICTIONS
+        if r.measured and r.input in constants
+    ]
 
     def is_right(items: Evidence) -> bool:
         return judge(restricted(greeting, items)).verdict <= Verdict.RIGHT_EXCEPT
 
     if not evidence or not is_right(evidence):
-        return Inference(evidence)
+        return Inference(() if is_sound else evidence)
     for item in tuple(evidence):
         fewer = [other for other in evidence if other is not item]
-        evidence = fewer if fewer and is_right(fewer) else evidence
+        if fewer and not item[0].measured and is_right(fewer):
+            evidence = fewer
     return Inference(evidence, is_right=True)
 
 
@@ -127,9 +143,19 @@ def inferred(
 
 def restricted(greeting: Greeting, evidence: Evidence) -> Greeting:
     """Return a greeting that declares restrictions as well."""
-    fields = _fields(evidence)
-    system = msgspec.structs.asdict(greeting.system) | fields.pop("system", {})
-    return msgspec.structs.replace(greeting, system=System(**system), **fields)
+    fields = {
+        name: msgspec.structs.replace(getattr(greeting, name), **field)
+        if isinstance(field, dict)
+        else field
+        for name, field in _fields(evidence).items()
+    }
+    return msgspec.structs.replace(greeting, **fields)
+
+
+def _of_constant(restriction: Restriction, value: Any) -> Restriction:
+    """Return a restriction to a constant."""
+    about = Sentence(restriction.about.template, {"value": value})
+    return restriction._replace(greeting={"fixed": {restriction.input: value}}, about=about)
 
 
 def _fields(evidence: Evidence) -> dict[str, Any]:
@@ -137,7 +163,8 @@ def _fields(evidence: Evidence) -> dict[str, Any]:
     fields: dict[str, Any] = {}
     for restriction, _ in evidence:
         for name, field in restriction.greeting.items():
-            fields[name] = {**fields.get(name, {}), **field} if name == "system" else field
+            is_part = isinstance(field, dict)
+            fields[name] = {**fields.get(name, {}), **field} if is_part else field
     return fields
 
 
@@ -180,6 +207,8 @@ def _evidence(
     """Return how answers show that a solver does not take an input, None if they do not."""
     answers = [j.answer.values for j in report.judgements if isinstance(j.answer, Answer)]
     names = [field.name for field in TASKS[report.task].inputs]
+    if report.task not in restriction.tasks:
+        return None
     if restriction.input in _REPLACEMENTS:
         is_input = restriction.input in names
         return _unchanged(contestant, report, restriction) if is_input else None
@@ -221,7 +250,8 @@ def _unchanged(
     for plain_case, full_case in pairs[:TRIALS]:
         answer = contestant.answer(plain_case)
         reason = _reason(answer, contestant.answer(full_case), restriction)
-        if reason is None or _is_unused(contestant, plain_case, answer, restriction):
+        is_unused = _is_unused(contestant, plain_case, answer, restriction)
+        if reason is None or is_unused is not restriction.unused:
             return None
     return reason
 

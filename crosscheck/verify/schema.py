@@ -40,7 +40,7 @@ def schema() -> dict[str, Any]:
             **_message(f"Of {task.name}.", outputs, ["id"]),
             "anyOf": [{"required": [field.name]} for field in task.outputs],
         }
-    kinds = [name for name in messages if name not in ("System", "Step")]
+    kinds = [name for name in messages if name not in ("System", "Step", "Fixed")]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Messages of `plumbob verify`, protocol {PROTOCOL}",

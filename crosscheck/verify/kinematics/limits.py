@@ -103,14 +103,14 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     if not greeting.limits or greeting.planar or not greeting.rotations:
         return []
     drawn = [
-        (name, family, inputs | {"method": method})
+        (name, family, inputs | {"method": method} | problems.constants(greeting))
         for name, family, inputs in skeletons.drawn("limits", _draw, seed, 5 if thorough else 1)
         if skeletons.suits(inputs["parents"], greeting, inputs["effector"])
     ]
     single = [
         (f"one sweep, {name}", family, inputs | {"max_iterations": 1})
         for name, family, inputs in drawn
-        if method.lower() in SWEEPS and family.target[0] == "far"
+        if method.lower() in SWEEPS and not greeting.fixed.max_iterations and family.target[0] == "far"
     ]
     return [_case(*arguments) for arguments in (*drawn, *single)]
 

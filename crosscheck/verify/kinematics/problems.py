@@ -33,6 +33,9 @@ DRAWS = 2000
 # The most iterations of a solve by an own method whose poses are asked one by one.
 CONTINUED = 7
 LOOSE = 1e-2
+# Sweeps of a constant number go to targets so far beyond reach [m], if no tolerance asks for more;
+# their last rotations are small and lose a digit more.
+BEYOND, SMALL_ANGLES = 1e-2, 10.0
 
 
 class TargetProblem(NamedTuple):
@@ -53,6 +56,13 @@ def request(problem: TargetProblem, tolerance: float, sweeps: int, method: str) 
         "max_iterations": sweeps,
         "method": method,
     }
+
+
+def constants(greeting: Greeting) -> dict[str, Any]:
+    """Return the inputs that a solver has as constants."""
+    fixed = greeting.fixed
+    values = {"tolerance": fixed.tolerance, "max_iterations": fixed.max_iterations}
+    return {name: value for name, value in values.items() if value}
 
 
 def facts(inputs: Mapping[str, Any]) -> dict[str, Any]:
@@ -190,9 +200,24 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
             TASK, draw, seed, 5 if thorough else 1, greeting.planar
         )
         if skeletons.suits(problem.skeleton.parents, greeting, problem.effector)
+        and not (greeting.fixed.max_iterations and _is_about_sweeps(family))
     ]
-    own = () if method.lower() in ("", *SOLVERS) else problems[2:6:2]
+    is_known = method.lower() in ("", *SOLVERS) or greeting.fixed.max_iterations is not None
+    own = () if is_known else problems[2:6:2]
     return [*problems, *_transformed(problems, greeting), *_continued(own)]
+
+
+def _is_about_sweeps(family: CaseFamily) -> bool:
+    """Return whether a family needs another number of sweeps than one or many."""
+    return family.sweeps == 2 or (family.sweeps == 1 and family.tolerance > 0.0)
+
+
+def _beyond(problem: TargetProblem, tolerance: float) -> TargetProblem:
+    """Return a problem with its target a little beyond reach, which CCD approaches slowly."""
+    geometry, root = facts(request(problem, 0.0, 1, "")), problem.skeleton.offsets[0]
+    distance = geometry["reach"] + max(2.0 * tolerance, BEYOND)
+    direction = (problem.target - root) / np.linalg.norm(problem.target - root)
+    return problem._replace(target=root + distance * direction)
 
 
 def _continued(cases: Sequence[Case]) -> Iterator[Case]:
@@ -216,11 +241,21 @@ def _case(
         tolerance = float(f"{misses(family.sweeps, problem)[0] / family.target[1]:.2g}")
     if not greeting.rotations:
         problem = problem._replace(skeleton=skeletons.without_rotations(problem.skeleton))
-    inputs = request(problem, tolerance, family.sweeps, method)
+    is_sweep, about = tolerance == 0.0 or family.sweeps == 1, family.about
+    count = greeting.fixed.max_iterations
+    if is_sweep and count:
+        name = name.replace("one sweep", "constant sweeps")
+        about = sentence("All {count} sweeps that it makes, whatever is asked.", count=count)
+        if method.lower() != "fabrik":  # which may stretch chains beyond reach
+            problem = _beyond(problem, greeting.fixed.tolerance or 0.0)
+    inputs = request(problem, tolerance, family.sweeps, method) | constants(greeting)
     geometry = facts(inputs)
-    if tolerance == 0.0 or family.sweeps == 1:
-        geometry |= {"amplification": amplification(inputs), "sweeps": family.sweeps}
-    return Case(name, TASK, inputs, family.name, family.about, facts=geometry,
+    if is_sweep:
+        small = SMALL_ANGLES if count else 1.0
+        geometry |= {
+            "amplification": small * amplification(inputs), "sweeps": inputs["max_iterations"],
+        }  # fmt: skip
+    return Case(name, TASK, inputs, family.name, about, facts=geometry,
                 requirement=family.requirement)  # fmt: skip
 
 

@@ -65,7 +65,7 @@ def _case(
     start = problem.start
     if not greeting.rotations:
         start = start._replace(skeleton=skeletons.without_rotations(start.skeleton))
-    inputs = problems.request(start, TOLERANCE, SWEEPS, method)
+    inputs = problems.request(start, TOLERANCE, SWEEPS, method) | problems.constants(greeting)
     frames = [problems.facts({**inputs, "target": target}) for target in problem.curve]
     del inputs["target"]
     inputs["curve"] = problem.curve

@@ -4,7 +4,7 @@ Each probe is a small case that adds an aspect of a step to the cases before it:
 a damper, a pin, a changed h. Faults are sought along the probes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,6 +24,10 @@ ONE_MASS = 0.8
 MOTION_STEPS = 6
 # Families without sense in a plane: turned about an axis of it, or free to buckle within it.
 SPATIAL = ("symmetry", "compression")
+# Families that need no gravity, or one in another direction.
+OF_GRAVITY = ("rest", "gravity")
+# Dampers of a step that add no forces of springs' dampers.
+UNDAMPED = ("none", "global_factor")
 # Scenes of more particles are cloths, which lie level.
 MOST_IN_TRIANGLES = 5
 GRAVITY = np.array([0.0, -9.81, 0.0])
@@ -64,6 +68,10 @@ def task_cases(task: str, greeting: Greeting, seed: int, thorough: bool) -> list
     drawn = scenes(seed, thorough)
     if greeting.planar:
         drawn = [_in_plane(scene) for scene in drawn if scene.family not in SPATIAL]
+    if greeting.fixed.gravity is not None:
+        drawn = _with_gravity(drawn, np.array(greeting.fixed.gravity))
+    if task == "mass_spring_forces" and greeting.step.damper in UNDAMPED:
+        drawn = [replace(scene, dampings=0.0 * scene.dampings) for scene in drawn]
     suitable = [
         _case(task, scene, system)
         for scene in drawn
@@ -81,6 +89,16 @@ def trace_of(family: str) -> Sentence:
 
 def _has(system: System, need: str) -> bool:
     return bool(getattr(system, need))
+
+
+def _with_gravity(drawn: Sequence[SpringScene], gravity: FloatArray) -> list[SpringScene]:
+    """Return those scenes that make sense with a gravity [m/s²] that never changes."""
+    return [
+        replace(scene, gravity=gravity)
+        for scene in drawn
+        if scene.family not in OF_GRAVITY
+        and np.allclose(np.asarray(scene.facts.get("matrix", np.eye(3))) @ gravity, gravity)
+    ]
 
 
 def _in_plane(scene: SpringScene) -> SpringScene:
