@@ -1,6 +1,6 @@
-"""Find constants that a solver has in place of inputs, and measure them from its answers."""
+"""Constants that a solver has in place of inputs, measured from its answers."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -8,178 +8,153 @@ import msgspec
 import numpy as np
 
 from .case import Case
-from .contestant import Answer, Contestant
+from .contestant import Answer, Contestant, Exchange
 from .explain import largest_gap
 from .greeting import Fixed
 from .judgement import TaskReport, Verdict
 from .kinematics import problems
-from .kinematics.pose_laws import read_pose
 from .kinematics.predictions import solve
 from .kinematics.rounding import STALL
+from .kinematics.sweeps import PoseTrial
 from .kinematics.switches import Switches
-from .mass_spring.cases import GRAVITY
-from .task import TASKS
+from .kinematics.textbook import SOLVERS
 
 # The requests in which an input is changed; all answers must stay the same.
 TRIALS = 3
 # Answers that differ by less are the same, in any unit.
 SAME = 1e-12
-# What a program may claim of a solve by an input that does not change its pose.
-CLAIMS = ("residual", "iterations", "converged")
-# The inputs that are changed, each from one value to another; the others are plain.
-CHANGES: Mapping[str, tuple[Any, Any]] = {
-    "tolerance": (0.0, 0.1),
-    "max_iterations": (100, 1),
-    "gravity": (GRAVITY, GRAVITY + [1.0, -2.0, 3.0]),
+# What a program may say of a solve by an input that does not change the pose.
+CLAIMS = {"residual", "iterations", "converged"}
+# What two requests hold that differ in an input, with which right answers change.
+CHANGES: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
+    "tolerance": ({"max_iterations": 100, "tolerance": 0.0}, {"tolerance": 0.1}),
+    "max_iterations": ({"max_iterations": 100, "tolerance": 0.0}, {"max_iterations": 1}),
+    "gravity": ({"gravity": np.array([0.0, -9.81, 0.0])}, {"gravity": np.array([1.0, -8.0, 3.0])}),
 }
-SOLVING = ("inverse_kinematics", "track")
-PLAIN = {"tolerance": 0.0, "max_iterations": 100}
 # A distance that ends solves is no larger than this share of the reach.
 LOOSEST = 0.02
 # The most sweeps that are counted, and the orders of joints in them.
 MOST_SWEEPS, ORDERS = 200, (0, 1)
+# The energies that gravity changes.
+ENERGIES = ("gravitational", "potential", "total")
 
 
-def measured(contestant: Contestant, report: TaskReport) -> dict[str, Any]:
-    """Return the constants, by the names of inputs, that answers do not depend on.
-
-    A number of iterations that does not show is None.
-    """
-    names = [field.name for field in TASKS[report.task].inputs]
-    constants: dict[str, Any] = {}
-    if report.task in SOLVING:
-        if _is_unread(contestant, report, "tolerance"):
-            tolerance = _tolerance(report)
-            constants |= {} if tolerance is None else {"tolerance": tolerance}
-        if _is_unread(contestant, report, "max_iterations"):
-            count = _sweeps(contestant, report, constants.get("tolerance", 0.0))
-            constants["max_iterations"] = count or _claimed_iterations(report)
-    elif "gravity" in names and _is_unread(contestant, report, "gravity"):
-        gravity = _gravity(contestant, report)
-        constants |= {} if gravity is None else {"gravity": gravity}
-    return constants
-
-
-def _is_unread(contestant: Contestant, report: TaskReport, name: str) -> bool:
+def is_unread(contestant: Contestant, report: TaskReport, name: str) -> bool:
     """Return whether the largest requests get the same answers with two values of an input."""
     cases = [
-        case
-        for case in (judgement.case for judgement in report.judgements)
-        if case.requirement == "must" and not {"sweeps", "like"} & {*case.facts}
-        if "cones" not in case.inputs and not case.follows
+        judgement.case
+        for judgement in report.judgements
+        if judgement.case.requirement == "must" and "cones" not in judgement.case.inputs
+        if not {"sweeps", "of"} & {*judgement.case.facts}
     ]
+    first, second = CHANGES[name]
     for case in sorted(cases, key=lambda case: -case.size)[:TRIALS]:
-        plain = PLAIN if report.task in SOLVING else {}
-        first, second = (
-            contestant.answer(replace(case, inputs={**case.inputs, **plain, name: value}))
-            for value in CHANGES[name]
-        )
-        if not (isinstance(first, Answer) and isinstance(second, Answer)):
-            return False
-        outputs = first.values.keys() - CLAIMS
-        if not outputs or any(
-            largest_gap(first.values[output], second.values.get(output, np.inf)) > SAME
-            for output in outputs
-        ):
+        one, other = (_outputs(contestant, case, {**first, **change}) for change in (first, second))
+        names = one.keys() - CLAIMS
+        if not names or any(largest_gap(one[n], other.get(n, np.inf)) > SAME for n in names):
             return False
     return bool(cases)
 
 
-def _tolerance(report: TaskReport) -> float | None:
+def _outputs(contestant: Contestant, case: Case, change: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the outputs of the answer to a changed request, {} without an answer."""
+    answer = contestant.answer(replace(case, inputs={**case.inputs, **change}))
+    return answer.values if isinstance(answer, Answer) else {}
+
+
+def tolerance(contestant: Contestant, report: TaskReport) -> float | None:
     """Return the least round number above the distances at which solves end [m].
 
-    It is 0 if they end as near as they are asked to, None if most end far from their targets.
+    It is 0 if they end as near as they are asked to, None if most end far from their targets, or if
+    a track is not made by the sweeps of its method.
     """
     ends = [
-        (finding.error, finding.verdict, judgement.case.facts)
+        (finding, judgement.case.facts)
         for judgement in report.judgements
         if judgement.case.requirement == "must" and "cones" not in judgement.case.inputs
         for finding in judgement.findings
         if finding.law == "target reached"
     ]
-    if all(verdict is Verdict.RIGHT for _, verdict, _ in ends):
+    if all(finding.verdict is Verdict.RIGHT for finding, _ in ends):
         return 0.0
-    near = [e for e, _, facts in ends if e <= LOOSEST * facts.get("frames", [facts])[0]["reach"]]
-    if len(near) < len(ends) / 2:
+    reaches = [facts.get("frames", [facts])[0]["reach"] for _, facts in ends]
+    pairs = zip([finding.error for finding, _ in ends], reaches, strict=True)
+    near = [error for error, reach in pairs if error <= LOOSEST * reach]
+    is_unchecked = report.task == "track" and report.method.lower() in SOLVERS
+    if len(near) < len(ends) / 2 or (is_unchecked and _sweeps(contestant, report) is None):
         return None
     power = 10.0 ** np.floor(np.log10(max(near)))
     return next(float(f"{n * power:.1g}") for n in (1, 2, 5, 10) if n * power >= max(near))
 
 
-def _claimed_iterations(report: TaskReport) -> int | None:
-    """Return the largest number of iterations that answers claim, None if they claim none."""
-    answers = (j.answer.values for j in report.judgements if isinstance(j.answer, Answer))
-    return max((int(values["iterations"]) for values in answers if "iterations" in values),
-               default=0) or None  # fmt: skip
+def max_iterations(contestant: Contestant, report: TaskReport) -> int:
+    """Return the number of sweeps that a solver makes, of other solvers what is allowed."""
+    return _sweeps(contestant, report) or problems.ALLOWED
 
 
-def _sweeps(contestant: Contestant, report: TaskReport, tolerance: float) -> int | None:
-    """Return the number of a textbook's sweeps after which answers stand, None if none do.
+def _sweeps(contestant: Contestant, report: TaskReport) -> int | None:
+    """Return the number of a textbook's sweeps that a solver makes, None if it makes no such.
 
     Targets are beyond reach, so that nothing else ends a solve.
     """
-    fixed = Fixed(max_iterations=1, tolerance=tolerance)
+    fixed = Fixed(max_iterations=1, tolerance=problems.LOOSE)
     greeting = msgspec.structs.replace(contestant.greeting, fixed=fixed)
-    cases = [c for c in problems.cases(greeting, "", 0, False) if "sweeps" in c.facts][:TRIALS:2]
-    answers = [_end(contestant, report, case) for case in cases]
-    if not cases or any(x is None for x in answers):
+    cases = [c for c in problems.cases(greeting, "", 0, False) if "sweeps" in c.facts][:TRIALS]
+    trials = [PoseTrial(_exchange(contestant, report, case)) for case in cases]
+    if not trials or not all(trial.pose.finite for trial in trials):
         return None
-    named = [method for method in problems.SOLVERS if report.method.lower() in ("", method)]
-    gaps = {
-        (method, order): np.max([
-            [np.abs(x - y).max() / case.facts["reach"] for y in _followed(method, order, case)]
-            for case, x in zip(cases, answers, strict=True)
-        ], axis=0)
-        for method in named for order in ORDERS
-    }  # fmt: skip
-    best = min(gaps.values(), key=np.min, default=np.array([np.inf]))
+    methods = [m for m in SOLVERS if m == report.method.lower()] or SOLVERS
+    gaps = [
+        np.max([_gaps(trial, method, order) for trial in trials], axis=0)
+        for method in methods
+        for order in ORDERS
+    ]
+    best = min(gaps, key=np.min)
     return int(np.argmin(best)) + 1 if best.min() <= STALL["single"] else None
 
 
-def _end(contestant: Contestant, report: TaskReport, case: Case) -> Any:
-    """Return where a solve leaves the joints of the path [m], None if it fails."""
+def _exchange(contestant: Contestant, report: TaskReport, case: Case) -> Exchange:
+    """Return a case of inverse kinematics with the answer, of a track its first frame."""
     inputs = {**case.inputs, "method": report.method}
     if report.task == "track":
-        inputs["curve"] = inputs["target"][None]
-    answer = contestant.answer(replace(case, task=report.task, inputs=inputs))
-    if not isinstance(answer, Answer):
-        return None
+        inputs["curve"] = inputs.pop("target")[None]
+    outputs = _outputs(contestant, replace(case, task=report.task, inputs=inputs), {})
     frame = 0 if report.task == "track" else slice(None)
-    outputs = {name: x[frame] for name, x in answer.values.items() if name not in CLAIMS}
-    pose = read_pose(outputs, case.inputs, case.facts)
-    return pose.positions[pose.path] if pose.finite else None
+    answer = Answer({name: outputs[name][frame] for name in outputs.keys() - CLAIMS}, 0.0)
+    return Exchange(case, answer, answer)
 
 
-def _followed(method: str, order: int, case: Case) -> Iterator[Any]:
-    """Yield where each of a textbook's sweeps leaves the joints of the path [m]."""
-    inputs = {**case.inputs, "tolerance": 0.0, "max_iterations": 1}
+def _gaps(trial: PoseTrial, method: str, order: int) -> list[float]:
+    """Return how far a pose is from that after each of a textbook's sweeps, over the reach."""
+    inputs, gaps = {**trial.case.inputs, "tolerance": 0.0, "max_iterations": 1}, []
     for _ in range(MOST_SWEEPS):
         inputs["local_rotations"], x, _ = solve(method, inputs, Switches(order=order))
-        yield x[case.facts["path"]]
+        gaps.append(trial.pose.distance_to(x) / trial.case.facts["reach"])
+    return gaps
 
 
-def _gravity(contestant: Contestant, report: TaskReport) -> list[float] | None:
+def gravity(contestant: Contestant, report: TaskReport) -> list[float] | None:
     """Return the acceleration of a free particle [m/s²], None if answers do not tell it."""
     case = next(j.case for j in report.judgements if j.case.family == "flight")
-    inputs = {**case.inputs, "velocities": np.zeros_like(case.inputs["velocities"])}
-    shifts = np.vstack([np.zeros(3), np.eye(3)]) if report.task == "energy" else np.zeros((1, 3))
-    answers = [
-        contestant.answer(replace(case, inputs={**inputs, "positions": inputs["positions"] + s}))
-        for s in shifts
-    ]
-    values = [answer.values for answer in answers if isinstance(answer, Answer)]
-    if len(values) < len(answers):
-        return None
-    masses, h, last = inputs["masses"], inputs.get("h", 1.0), values[0]
-    if "forces" in last:
-        g = last["forces"][0] / masses[0]
-    elif name := next((n for n in ("gravitational", "potential", "total") if n in last), None):
-        g = (last[name] - np.array([v[name] for v in values[1:]])) / masses.sum()
-    elif "velocities" in last:
-        g = last["velocities"].reshape(-1, len(masses), 3)[0, 0] / h
-    elif "positions" in last:
-        x = last["positions"].reshape(-1, len(masses), 3)[0, 0]
-        g = (x - inputs["positions"][0]) / h**2
+    x, masses, h = (case.inputs.get(name, 1.0) for name in ("positions", "masses", "h"))
+    at_rest = {"velocities": np.zeros_like(x)}
+    outputs = _outputs(contestant, case, at_rest)
+    if "forces" in outputs:
+        g = outputs["forces"][0] / masses[0]
+    elif "velocities" in outputs:
+        g = outputs["velocities"].reshape(-1, *x.shape)[0, 0] / h
+    elif "positions" in outputs:
+        g = (outputs["positions"].reshape(-1, *x.shape)[0, 0] - x[0]) / h**2
+    elif name := next((name for name in ENERGIES if name in outputs), None):
+        lifted = (_outputs(contestant, case, at_rest | {"positions": x + e}) for e in np.eye(3))
+        g = [(outputs[name] - other.get(name, np.nan)) / masses.sum() for other in lifted]
     else:
         return None
-    return [float(f"{component:.6g}") if abs(component) > 1e-6 else 0.0 for component in g]
+    g = np.where(np.abs(g) > 1e-6, g, 0.0)
+    return [float(f"{component:.6g}") for component in g] if np.isfinite(g).all() else None
+
+
+# How the constants in place of inputs are measured.
+MEASURES: Mapping[str, Callable[[Contestant, TaskReport], Any]] = {
+    "tolerance": tolerance, "max_iterations": max_iterations, "gravity": gravity,
+}  # fmt: skip

@@ -17,9 +17,9 @@ import msgspec
 import numpy as np
 
 from .case import Case
+from .constants import MEASURES, is_unread
 from .contestant import Answer, Contestant, Failure, is_hung
 from .explain import largest_gap
-from .constants import measured
 from .greeting import Greeting
 from .judgement import Explanation, TaskReport, Verdict
 from .kinematics.robot_models import urdf
@@ -52,12 +52,12 @@ class Restriction(NamedTuple):
 # Restrictions, each with how answers show it.
 Evidence = Sequence[tuple[Restriction, Sentence]]
 RESTRICTIONS = tuple(
-    Restriction(**{
-        **entry, "greeting": entry.get("greeting", {}), "about": Sentence(entry["about"], {}),
-        "sentence": Sentence(entry.get("sentence", ""), {}),
-    })
+    Restriction(
+        **{"greeting": {}, **entry}
+        | {name: Sentence(entry.get(name, ""), {}) for name in ("about", "sentence")}
+    )
     for entry in _TABLE["restriction"]
-)  # fmt: skip
+)
 _SHARED = ("masses", "stiffnesses", "dampings", "rest_lengths")
 
 
@@ -98,16 +98,12 @@ def infer(
     if report.verdict is Verdict.RIGHT or greeting.system.continues or is_stuck:
         return Inference(())
     is_sound = report.verdict is Verdict.RIGHT_EXCEPT
-    constants = measured(contestant, report)
     evidence = [
-        (r, why)
-        for r in (() if is_sound else RESTRICTIONS)
-        if not r.measured and (why := _evidence(contestant, report, r))
-    ]
-    evidence += [
-        (_of_constant(r, constants[r.input]), r.sentence)
+        (known, why)
         for r in RESTRICTIONS
-        if r.measured and r.input in constants
+        if not is_sound or r.measured
+        if (why := _evidence(contestant, report, r))
+        if (known := _with_constant(contestant, report, r))
     ]
 
     def is_right(items: Evidence) -> bool:
@@ -115,10 +111,9 @@ def infer(
 
     if not evidence or not is_right(evidence):
         return Inference(() if is_sound else evidence)
-    for item in tuple(evidence):
+    for item in [item for item in evidence if not item[0].measured]:
         fewer = [other for other in evidence if other is not item]
-        if fewer and not item[0].measured and is_right(fewer):
-            evidence = fewer
+        evidence = fewer if fewer and is_right(fewer) else evidence
     return Inference(evidence, is_right=True)
 
 
@@ -152,10 +147,18 @@ def restricted(greeting: Greeting, evidence: Evidence) -> Greeting:
     return msgspec.structs.replace(greeting, **fields)
 
 
-def _of_constant(restriction: Restriction, value: Any) -> Restriction:
-    """Return a restriction to a constant."""
+def _with_constant(
+    contestant: Contestant, report: TaskReport, restriction: Restriction
+) -> Restriction | None:
+    """Return a restriction with the constant in place of its input, None if it does not show."""
+    name = restriction.input
+    if not restriction.measured:
+        return restriction
+    value = MEASURES[name](contestant, report)
+    if value is None:
+        return None
     about = Sentence(restriction.about.template, {"value": value})
-    return restriction._replace(greeting={"fixed": {restriction.input: value}}, about=about)
+    return restriction._replace(greeting={"fixed": {name: value}}, about=about)
 
 
 def _fields(evidence: Evidence) -> dict[str, Any]:
@@ -209,6 +212,10 @@ def _evidence(
     names = [field.name for field in TASKS[report.task].inputs]
     if report.task not in restriction.tasks:
         return None
+    if restriction.measured:
+        is_open = getattr(contestant.greeting.fixed, restriction.input) is None
+        is_constant = is_open and is_unread(contestant, report, restriction.input)
+        return restriction.sentence if is_constant else None
     if restriction.input in _REPLACEMENTS:
         is_input = restriction.input in names
         return _unchanged(contestant, report, restriction) if is_input else None
@@ -250,8 +257,9 @@ def _unchanged(
     for plain_case, full_case in pairs[:TRIALS]:
         answer = contestant.answer(plain_case)
         reason = _reason(answer, contestant.answer(full_case), restriction)
-        is_unused = _is_unused(contestant, plain_case, answer, restriction)
-        if reason is None or is_unused is not restriction.unused:
+        if reason is None:
+            return None
+        if _is_unused(contestant, plain_case, answer, restriction) is not restriction.unused:
             return None
     return reason
 

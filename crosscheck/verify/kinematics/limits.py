@@ -110,7 +110,9 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     single = [
         (f"one sweep, {name}", family, inputs | {"max_iterations": 1})
         for name, family, inputs in drawn
-        if method.lower() in SWEEPS and not greeting.fixed.max_iterations and family.target[0] == "far"
+        if method.lower() in SWEEPS
+        and not greeting.fixed.max_iterations
+        and family.target[0] == "far"
     ]
     return [_case(*arguments) for arguments in (*drawn, *single)]
 

@@ -270,6 +270,8 @@ def _transformed(cases: list[Case], greeting: Greeting) -> Iterator[Case]:
     )
     sweep_cases = [case for case in cases[2 : 2 + len(worlds)] if "sweeps" in case.facts]
     for case, (name, Q, scale, shift) in zip(sweep_cases, worlds, strict=False):
+        if scale != 1.0 and greeting.fixed.tolerance:
+            continue  # it has a unit
         inputs = dict(case.inputs)
         offsets, local = scale * inputs["offsets"], inputs["local_rotations"].copy()
         offsets[0] = scale * rotation.rotate(Q, inputs["offsets"][0]) + shift

@@ -117,7 +117,8 @@ def test_the_page_explains_every_field(task):
 
 
 def test_the_page_names_what_a_greeting_may_hold_and_how_long_one_waits():
-    properties = SCHEMA["$defs"]["System"]["properties"] | SCHEMA["$defs"]["Step"]["properties"]
+    parts = (SCHEMA["$defs"][name]["properties"] for name in ("System", "Step", "Fixed"))
+    properties = {name: field for part in parts for name, field in part.items()}
     said = set(re.findall(r"`(\w+)`", PAGE))
     assert properties.keys() <= said
     assert {"precision", "chains_only", "max_joints", "methods", "system", "step"} <= said
@@ -140,9 +141,9 @@ def limits_of(parts):
 
 def test_the_page_says_every_limit_of_a_greeting():
     table = PAGE.split("beyond these limits is refused.")[1].split("\n## ")[0].splitlines()
-    parts = {name: SCHEMA["$defs"][name] for name in ("greeting", "System", "Step")}
+    parts = {name: SCHEMA["$defs"][name] for name in ("greeting", "System", "Step", "Fixed")}
     limits = list(limits_of(parts))
-    assert len(limits) == 7
+    assert len(limits) == 9
     for name, most, reason in limits:
         assert any(f"`{name}`" in row and f"{most}" in row and reason in row for row in table), name
     assert f"and {MOST_ITERATIONS} iterations in all substeps" in PAGE

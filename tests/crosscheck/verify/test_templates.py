@@ -13,7 +13,7 @@ import msgspec
 import planted_programs
 import pytest
 
-from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting, Step, System
+from plumbob.crosscheck.verify.greeting import PROTOCOL, Fixed, Greeting, Step, System
 from plumbob.crosscheck.verify.kinematics import robot_jacobian, robot_targets
 from plumbob.crosscheck.verify.message import encode_case
 from plumbob.crosscheck.verify.solvers import open_contestant
@@ -217,7 +217,7 @@ def test_starter_is_short_and_lists_every_field_of_the_greeting(language):
     assert max(map(len, lines)) <= 100
     assert set(others) <= template(language).keys()
     words = re.findall(r"\w+", " ".join(re.findall(r"(?://|#) (.*)", text)))
-    for kind in (Greeting, System, Step):
+    for kind in (Greeting, System, Step, Fixed):
         for field in msgspec.structs.fields(kind):
             assert field.name in words
             for values in re.findall(r"Literal\[(.*?)\]", str(field.type)):
