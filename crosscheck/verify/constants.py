@@ -31,8 +31,8 @@ CHANGES: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     "max_iterations": ({"max_iterations": 100, "tolerance": 0.0}, {"max_iterations": 1}),
     "gravity": ({"gravity": np.array([0.0, -9.81, 0.0])}, {"gravity": np.array([1.0, -8.0, 3.0])}),
 }
-# A distance that ends solves is no larger than this share of the reach.
-LOOSEST = 0.02
+# A distance that ends solves is no larger than this share of the reach, and than this [m].
+LOOSEST, FARTHEST = 0.02, 0.1
 # The most sweeps that are counted, and the orders of joints in them.
 MOST_SWEEPS, ORDERS = 200, (0, 1)
 # The energies that gravity changes.
@@ -65,9 +65,11 @@ def _outputs(contestant: Contestant, case: Case, change: Mapping[str, Any]) -> M
 def tolerance(contestant: Contestant, report: TaskReport) -> float | None:
     """Return the least round number above the distances at which solves end [m].
 
-    It is 0 if they end as near as they are asked to, None if most end far from their targets, or if
-    a track is not made by the sweeps of its method.
+    It is 0 if they end as near as they are asked to, None if most end far from their targets, or do
+    not make the sweeps of their method.
     """
+    if max_iterations(contestant, report) is None:
+        return None
     ends = [
         (finding, judgement.case.facts)
         for judgement in report.judgements
@@ -79,17 +81,22 @@ def tolerance(contestant: Contestant, report: TaskReport) -> float | None:
         return 0.0
     reaches = [facts.get("frames", [facts])[0]["reach"] for _, facts in ends]
     pairs = zip([finding.error for finding, _ in ends], reaches, strict=True)
-    near = [error for error, reach in pairs if error <= LOOSEST * reach]
-    is_unchecked = report.task == "track" and report.method.lower() in SOLVERS
-    if len(near) < len(ends) / 2 or (is_unchecked and _sweeps(contestant, report) is None):
+    near = [error for error, reach in pairs if 0.0 < error <= min(LOOSEST * reach, FARTHEST)]
+    if len(near) < len(ends) / 2:
         return None
     power = 10.0 ** np.floor(np.log10(max(near)))
     return next(float(f"{n * power:.1g}") for n in (1, 2, 5, 10) if n * power >= max(near))
 
 
-def max_iterations(contestant: Contestant, report: TaskReport) -> int:
-    """Return the number of sweeps that a solver makes, of other solvers what is allowed."""
-    return _sweeps(contestant, report) or problems.ALLOWED
+def max_iterations(contestant: Contestant, report: TaskReport) -> int | None:
+    """Return the number of sweeps that a solver makes, of other solvers what is allowed.
+
+    It is None if a solver does not make the sweeps of its method.
+    """
+    count = _sweeps(contestant, report)
+    if count is None and report.method.lower() in SOLVERS:
+        return None
+    return problems.ALLOWED if count in (None, MOST_SWEEPS) else count
 
 
 def _sweeps(contestant: Contestant, report: TaskReport) -> int | None:
