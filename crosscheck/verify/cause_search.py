@@ -62,7 +62,7 @@ class CauseSearch:
 
     @contextmanager
     def limited(self) -> Iterator[None]:
-        """Raise SearchLimit in the block after `SECONDS` of processor time.
+        """Raise SearchLimit in the block after `SECONDS` of processor time, and after as many more.
 
         Without timers of processor time (on Windows, and outside the main thread) a search ends
         by the number of its predictions alone.
@@ -72,7 +72,7 @@ class CauseSearch:
             yield
             return
         before = signal.signal(signal.SIGPROF, _expire)
-        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS, SECONDS)  # again, for what follows a stage
         try:
             yield
         finally:

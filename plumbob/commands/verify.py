@@ -162,9 +162,11 @@ def _notifier(bar: Any, say: "Say") -> "Notify":
     row = bar.add_task(say(sentence("starting the solver")), total=None)
 
     def notify(work: "Sentence", count: int, total: int | None) -> None:
+        nonlocal row
         if (text := say(work)) != bar.tasks[0].description:
-            bar.reset(row, description=text)
-        bar.update(row, completed=count, total=total)
+            bar.remove_task(row)
+            row = bar.add_task(text, total=total)
+        bar.update(row, completed=count)
 
     return notify
 

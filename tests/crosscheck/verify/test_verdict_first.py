@@ -7,7 +7,6 @@ import sys
 import time
 
 import msgspec
-import numpy as np
 import pytest
 
 from plumbob.crosscheck.verify import cause_search
@@ -54,7 +53,7 @@ MISHAPS = {
 
 
 def wrong_forces(masses, gravity, **_):
-    return {"forces": 7.0 * masses[:, None] * gravity + np.sin(np.arange(len(masses)))[:, None]}
+    return {"forces": 7.0 * masses[:, None] * gravity}
 
 
 @pytest.mark.parametrize("mishap", MISHAPS)
@@ -64,7 +63,7 @@ def test_a_search_that_ends_early_costs_the_name_alone(
 ):
     if mishap is hangs and not hasattr(signal, "setitimer"):
         pytest.skip("no timers of processor time here")
-    monkeypatch.setattr(cause_search, "SECONDS", 0.3)
+    monkeypatch.setattr(cause_search, "SECONDS", 0.5 if mishap is hangs else 60.0)
     monkeypatch.setattr(importlib.import_module(STAGES[stage]), stage, mishap)
     greeting, published = Greeting(1, ("mass_spring_forces",)), []
     contestant = FunctionContestant({"mass_spring_forces": wrong_forces}, greeting)
@@ -96,7 +95,7 @@ def test_a_killed_search_leaves_the_verdict_in_all_files(tmp_path):
         tmp_path,
     )
     assert done.returncode == 9
-    assert "mass_spring_forces: WRONG, 0/" in done.stderr
+    assert "mass_spring_forces: WRONG, " in done.stderr
     verdict = msgspec.json.decode((tmp_path / "out/verdict.json").read_bytes())
     assert verdict["verdict"] == "wrong"
     assert "written before the end: 1 of 1 tasks" in " ".join(verdict["remarks"])
@@ -129,7 +128,7 @@ def test_a_screen_that_cannot_be_drawn_leaves_the_verdict(monkeypatch, tmp_path,
     context = Presentation(speaker("en"), "en", ("mine.py",))
     assert Files(None, None, None, None, tmp_path).write(report, Question(), context) == WRONG
     printed = capsys.readouterr()
-    assert "mass_spring_forces: WRONG, 0/" in printed.out
+    assert "mass_spring_forces: WRONG, " in printed.out
     assert "could not be written: KeyError: 'a mistake of ours'" in printed.err
 
 
@@ -137,11 +136,13 @@ def test_a_pipe_gets_a_line_while_nothing_else_is_printed(tmp_path):
     done = run(
         "import time\n"
         "from plumbob.commands import verify\n"
+        "from plumbob.crosscheck.verify import cause_search\n"
         "from plumbob.crosscheck.verify.mass_spring import forces\n"
-        "verify.LINE_PAUSE = 0.5\n"
+        "verify.LINE_PAUSE = 0.4\n"
+        "cause_search.SECONDS = 1.0\n"
         "judge = forces.judge\n"
         "def slow(*arguments, **options):\n"
-        "    time.sleep(2.0)\n"
+        "    time.sleep(1.2)\n"
         "    return judge(*arguments, **options)\n"
         "forces.judge = slow\n"
         "from plumbob.cli import main\n"
@@ -150,8 +151,8 @@ def test_a_pipe_gets_a_line_while_nothing_else_is_printed(tmp_path):
     )
     assert done.returncode == 1
     assert done.stderr.count("s: judging mass_spring_forces\n") >= 2
-    assert "s: searching for the cause in mass_spring_forces (at most 20 s" in done.stderr
-    assert "mass_spring_forces: WRONG, 0/" in done.stderr
+    assert "s: searching for the cause in mass_spring_forces (at most 1 s" in done.stderr
+    assert "mass_spring_forces: WRONG, " in done.stderr
 
 
 def test_a_stage_that_has_ended_is_not_followed_by_another():
