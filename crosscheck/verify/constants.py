@@ -142,7 +142,9 @@ def _gaps(trial: PoseTrial, method: str, order: int) -> list[float]:
 
 def gravity(contestant: Contestant, report: TaskReport) -> list[float] | None:
     """Return the acceleration of a free particle [m/s²], None if answers do not tell it."""
-    case = next(j.case for j in report.judgements if j.case.family == "flight")
+    case = next((j.case for j in report.judgements if j.case.family == "flight"), None)
+    if case is None:
+        return None
     x, masses, h = (case.inputs.get(name, 1.0) for name in ("positions", "masses", "h"))
     at_rest = {"velocities": np.zeros_like(x)}
     outputs = _outputs(contestant, case, at_rest)

@@ -156,17 +156,18 @@ class Attempt:
     ) -> None:
         self.task, self._contestant, self._method = task, contestant, method
         self._seed, self._thorough, self._notify = seed, thorough, notify
-        self._answers: dict[Greeting, Answers] = {}  # by the greeting that the cases suit
+        self._answers: dict[bytes, Answers] = {}  # by the greeting that the cases suit
         self._inference = Inference(())
 
     def _answers_to(self, greeting: Greeting) -> Answers:
         """Return the answers to the cases that suit a greeting, which are asked once."""
-        if greeting not in self._answers:
+        key = msgspec.json.encode(greeting)
+        if key not in self._answers:
             discipline = DISCIPLINES[self.task]
             cases = discipline.cases(greeting, self._method, self._seed, self._thorough)
             exchanges = _ask(self._contestant, cases, self._notify)
-            self._answers[greeting] = Answers(cases, exchanges)
-        return self._answers[greeting]
+            self._answers[key] = Answers(cases, exchanges)
+        return self._answers[key]
 
     def judge(self, reports: Sequence[TaskReport]) -> TaskReport:
         """Return the report with the verdict by laws and honest methods alone.

@@ -80,7 +80,8 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 ) -> int:
     """Judge your solver: is it right, how large are its errors, what is the mistake?
 
-    Exit code 0 if every task is RIGHT or RIGHT EXCEPT, 1 if not, 2 if a command or file is wrong.
+    Exit code 0 if every task is RIGHT or RIGHT EXCEPT, 1 if not, 2 if a command or file is wrong,
+    3 if Plumbob itself failed at a task and the other tasks are right.
     """
     # Solver and reference are timed on one thread each; NumPy is not imported yet.
     from plumbob.crosscheck.child_process import one_thread
