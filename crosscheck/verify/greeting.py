@@ -124,6 +124,7 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         rotations: whether poses have rotations; else all are the identity, as for a solver that
             moves points.
         planar: whether everything lies in the plane z = 0.
+        resample_by: whether it resamples curves by count, by spacing or by any of the two.
         methods: of inverse kinematics, in its own words; "ccd" and "fabrik" are understood. Each
             is asked for by the request's `method`.
         system: which mass-spring systems it takes.
@@ -144,6 +145,7 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     effector: Literal["any", "last"] = "any"
     rotations: bool = True
     planar: bool = False
+    resample_by: Literal["any", "count", "spacing"] = "any"
     methods: Methods = ("",)
     system: System = System()
     step: Step = Step()

@@ -77,6 +77,8 @@ _REPLACEMENTS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
 }
 # Inputs that are sent only if the greeting asks for them.
 _ADDED = ("rest_positions", "previous_positions")
+# Inputs of which each request has only one.
+_EITHER = ("count", "spacing")
 
 
 class Inference(NamedTuple):
@@ -216,6 +218,8 @@ def _evidence(
         is_open = getattr(contestant.greeting.fixed, restriction.input) is None
         is_constant = is_open and is_unread(contestant, report, restriction.input)
         return restriction.sentence if is_constant else None
+    if restriction.input in _EITHER:
+        return _unread(contestant, report, restriction) if restriction.input in names else None
     if restriction.input in _REPLACEMENTS:
         is_input = restriction.input in names
         return _unchanged(contestant, report, restriction) if is_input else None
@@ -264,17 +268,31 @@ def _unchanged(
     return reason
 
 
+def _unread(
+    contestant: Contestant, report: TaskReport, restriction: Restriction
+) -> Sentence | None:
+    """Return how requests with an input that others lack show that it is not taken, None if not."""
+    name = restriction.input
+    pairs = [(j.case, j.answer) for j in report.judgements if name in j.case.inputs]
+    if len(pairs) in (0, len(report.judgements)):
+        return None
+    if all(isinstance(answer, Failure) for _, answer in pairs):
+        return UNRELATED
+    return restriction.sentence if all(_keeps(contestant, *pair, name) for pair in pairs) else None
+
+
+def _keeps(contestant: Contestant, case: Case, answer: Answer | Failure, name: str) -> bool:
+    """Return whether an answer stays the same with twice an input."""
+    doubled = contestant.answer(replace(case, inputs={**case.inputs, name: 2 * case.inputs[name]}))
+    return isinstance(answer, Answer) and isinstance(doubled, Answer) and _are_same(answer, doubled)
+
+
 def _is_unused(
     contestant: Contestant, case: Case, answer: Answer | Failure, restriction: Restriction
 ) -> bool:
     """Return whether answers do not even depend on the first of many numbers, or on gravity."""
     name = restriction.input
-    if name not in ("gravity", *_SHARED) or not isinstance(answer, Answer):
-        return False
-    doubled = contestant.answer(
-        replace(case, inputs={**case.inputs, name: 2.0 * case.inputs[name]})
-    )
-    return isinstance(doubled, Answer) and _are_same(answer, doubled)
+    return name in ("gravity", *_SHARED) and _keeps(contestant, case, answer, name)
 
 
 def _with_urdf(inputs: Mapping[str, Any]) -> Mapping[str, Any]:

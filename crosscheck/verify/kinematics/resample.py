@@ -49,6 +49,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
         for i in range(5 if thorough else 1)
         for curve in _curves(generator(seed, f"resample {i}"))
         for case in _cases_of(curve, i + 1)
+        if greeting.resample_by == "any" or greeting.resample_by in case.inputs
     ]
     return sorted(unsorted, key=lambda case: len(case.inputs["curve"]))
 
