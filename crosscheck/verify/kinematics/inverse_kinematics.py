@@ -44,10 +44,10 @@ MAX_FAULTS = 3
 # Sweeps that change the distance by a smaller share of the reach than this have stalled.
 STALLED = 1e-9
 # The verdict on a solver of its own method that answers otherwise in another world: the origin is
-# arbitrary, angles about fixed axes and dampings with a unit are choices.
+# arbitrary; angles about fixed axes (Euler angles) and dampings with a unit are honest choices.
 WORLDS = {
     "shifted": Verdict.WRONG,
-    "rotated": Verdict.UNDECIDED,
+    "rotated": Verdict.RIGHT_EXCEPT,
     "in other units": Verdict.RIGHT_EXCEPT,
 }
 # Beyond reach the textbook's solvers need many sweeps: an honest solver may be so many times as far
