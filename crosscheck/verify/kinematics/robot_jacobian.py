@@ -49,9 +49,9 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
 def _case(name: str, robot: Mapping[str, Any], rng: np.random.Generator) -> Case:
     q = rng.uniform(robot["lower"], robot["upper"])
     inputs = {**robot, "q": q, "urdf": robot_models.urdf(robot)}
-    reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
     about = sentence("A robot of {joints} joints.", joints=len(q))
-    return Case(name, TASK, inputs, "any configuration", about, facts={"size": max(reach, 1.0)})
+    facts = {"size": max(robot_models.size_of(robot), 1.0)}
+    return Case(name, TASK, inputs, "any configuration", about, facts=facts)
 
 
 def _world(J: FloatArray, x: FloatArray, R: FloatArray) -> FloatArray:

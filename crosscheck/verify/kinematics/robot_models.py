@@ -42,6 +42,8 @@ _TEXT = Path(__file__).with_name("robots.toml").read_text(encoding="utf-8")
 # What some robots have and others lack.
 FEATURES: Sequence[tuple[Sentence, Callable[[Inputs], Any]]] = (
     (sentence("slides"), lambda robot: robot["slides"].any()),
+    (sentence("coordinates beyond pi"),
+     lambda robot: (robot["lower"] > np.pi).any() or (robot["upper"] < -np.pi).any()),
     (sentence("negative numbers in axes"), lambda robot: (robot["axes"] < 0.0).any()),
     (sentence("axes along none of x, y and z"),
      lambda robot: (np.abs(robot["axes"]).max(axis=-1) < 1.0).any()),
@@ -117,6 +119,14 @@ def judgement_of(inputs: Mapping[str, Any], q: FloatArray) -> PoseJudgement:
     return judge_pose(mechanism(inputs), q, target_of(inputs), **tolerances)
 
 
+def size_of(robot: Mapping[str, Any]) -> float:
+    """Return the sum of a robot's lengths, slides at their longest [m]."""
+    lower, upper = robot["lower"], robot["upper"]
+    slides = np.max([upper - lower, np.abs(lower), np.abs(upper)], axis=0)
+    reach = sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"]))
+    return float(reach + robot["slides"] @ slides)
+
+
 def urdf(inputs: Mapping[str, Any]) -> str:
     """Return a robot as URDF: links base, link_0 and so on, and the tool."""
     count = len(inputs["parents"])
@@ -165,11 +175,20 @@ def solved(
 
 
 def robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
-    """Return the robots of `robots.toml`, and two with random frames and axes, by name."""
-    tabulated = {name: _robot(**entry) for name, entry in tomllib.loads(_TEXT).items()}
-    return tabulated | {
-        f"seven hinges in rotated frames {i}": _random_frames(rng) for i in range(1, 3)
+    """Return the robots of `robots.toml` by name, two with random frames among them."""
+    table = tomllib.loads(_TEXT)
+    last = table.pop("last")  # so that the random numbers of the other robots do not depend on them
+    limits = {name: _limits(entry) for name, entry in last.items()}
+    return {
+        **{name: _robot(**entry) for name, entry in table.items()},
+        **{f"seven hinges in rotated frames {i}": _random_frames(rng) for i in range(1, 3)},
+        **{name: _robot(**entry) | limits[name] for name, entry in last.items()},
     }
+
+
+def _limits(entry: dict[str, Any]) -> dict[str, FloatArray]:
+    """Take the limits out of an entry of `robots.toml`, {} if it has the usual ones."""
+    return {name: np.array(entry.pop(name)) for name in ("lower", "upper") if name in entry}
 
 
 def _random_frames(rng: np.random.Generator) -> dict[str, Any]:

@@ -17,7 +17,16 @@ from plumbob.reference.tracking import track
 from ..case import Case
 from ..greeting import Greeting
 from ..sentence import Sentence
-from .robot_models import BENT, PRECISION, TOLERANCES, mechanism, robots, tool_pose, urdf
+from .robot_models import (
+    BENT,
+    PRECISION,
+    TOLERANCES,
+    mechanism,
+    robots,
+    size_of,
+    tool_pose,
+    urdf,
+)
 from .robot_targets import (
     HALF_TURNS,
     TOLERANCE,
@@ -33,9 +42,12 @@ TASK = "robot_track"
 CURVE, FLIPPED, STEPS = "curve", "opposite quaternions", "single steps"
 BOUNDARY = "boundary of the reach"
 JUMP, LIMITED_JUMP = "jump", "jump, limited speeds"
+BEYOND_PI = "coordinates beyond pi"
 FRAMES, ITERATIONS, H = 24, 40, 0.02
 # The last joint of this robot may rotate so far [rad]: further than half a turn.
 WRIST = 5.0
+# From the bent arm to one on a rail, whose wrist is rotated further than half a turn [m, rad].
+RAIL = np.array([4.4, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0])
 # How far a target goes along a ray from the bent arm; a sixth of a metre of it is beyond reach [m].
 EXCURSION = 0.3
 DRAWS = 20
@@ -75,6 +87,9 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
         for robot in (arm, twisted):
             requests += [*tight_limits(robot, rng), *limited_steps(robot, rng)]
         motions += [_of_request(request, i) for i, request in enumerate(requests)]
+        rail = _on_rail(arm)
+        q = loop(BENT + RAIL, np.random.default_rng([_SEED, seed, number]))
+        motions += [(f"a rail {number}", rail, {BEYOND_PI: ToolMotion(q[0], tool_pose(rail, q))})]
     return [
         _case(name, family, arm, motion, greeting)
         for name, arm, families in motions
@@ -82,6 +97,14 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
         if suits(arm["parents"], greeting)
         and (greeting.velocity_limits or "velocity_limit" not in _TABLE[family])
     ]
+
+
+def _on_rail(arm: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return an arm whose first joint slides along an oblique axis, and whose last rotates far."""
+    slides, axes = np.arange(7) < 1, np.array([[0.36, 0.48, 0.8], *arm["axes"][1:]])
+    lower, upper = (np.array([a, *arm[side][1:-1], b])
+                    for side, a, b in (("lower", 3.5, 3.2), ("upper", 6.0, 6.0)))  # fmt: skip
+    return {**arm, "slides": slides, "axes": axes, "lower": lower, "upper": upper}
 
 
 def _motions(
@@ -223,7 +246,7 @@ def _case(
     name: str, family: str, arm: Mapping[str, Any], motion: ToolMotion, greeting: Greeting
 ) -> Case:
     entry = _TABLE[family]
-    reach = float(sum(np.linalg.norm(x) for x in (*arm["origins"], arm["tool_position"])))
+    reach = size_of(arm)
     tolerance, rest = TOLERANCES[greeting.precision], entry.get("rest", 0)
     positions, rotations = (
         np.concatenate([part, np.repeat(part[-1:], rest, axis=0)]) for part in motion.tool

@@ -24,6 +24,7 @@ from .robot_models import (
     TOLERANCES,
     mechanism,
     robots,
+    size_of,
     solved,
     target_of,
     tool_pose,
@@ -45,6 +46,8 @@ LIMIT_STEP = "a single iteration at a limit"
 FEW, MOST = "a few iterations", 5
 # Single iterations of tools that are rotated by nearly half a turn about x, y and z.
 HALF_TURNS = tuple(f"half a turn about {axis}" for axis in "xyz")
+# A hinge that the target's rotation takes nearly half a turn one way, and more the other way.
+HALF_AWAY = "half a turn away"
 # Requests whose targets need not be reached.
 UNREACHED = (BEYOND, STEP, TIGHT, FEW, LIMIT_STEP, *HALF_TURNS)
 # From a start so near to an answer [rad, m] no other minimum than the target's is nearer.
@@ -68,6 +71,8 @@ WIDTHS, AWAY, FEW_ITERATIONS, SOME_ITERATIONS = (0.03, 0.09), 1.0, 40, 100
 STEP_DAMPINGS, CLEAR = (1e-6, 1e-3, 1e-1), 0.3
 # Rotations by nearly half a turn [rad].
 NEARLY_HALF = 2.9
+# Tools at starts before half a turn and targets beyond it are rotated so far from it [rad].
+BEFORE_HALF = 0.15
 # The joints of robots that show one feature of their kinematics near their targets alone.
 ONE_FEATURE = 3
 _SEED = 1955
@@ -108,7 +113,7 @@ def _case(name: str, request: ToolRequest, tolerance: float) -> Case:
         "start": request.start,
         "target_position": request.tool.positions,
         "target_rotation": request.tool.rotations,
-        "tolerance": tolerance * max(_size(robot), 1.0),
+        "tolerance": tolerance * max(size_of(robot), 1.0),
         "tolerance_rotation": tolerance,
         "max_iterations": ITERATIONS,
         "urdf": urdf(robot),
@@ -116,14 +121,8 @@ def _case(name: str, request: ToolRequest, tolerance: float) -> Case:
     }
     about = sentence("A robot of {joints} joints.", joints=len(request.start))
     is_reachable = np.array([request.family not in (BEYOND, TIGHT, FEW)])
-    facts = {"size": _size(robot), "reachable": is_reachable, **request.facts}
+    facts = {"size": size_of(robot), "reachable": is_reachable, **request.facts}
     return Case(name, TASK, inputs, request.family, about, facts=facts)
-
-
-def _size(robot: Mapping[str, Any]) -> float:
-    """Return the sum of a robot's lengths [m]."""
-    reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
-    return reach + float(robot["slides"] @ (robot["upper"] - robot["lower"]))
 
 
 def _requests(
@@ -139,7 +138,7 @@ def _requests(
     close = np.clip(answer + rng.uniform(-NEAR, NEAR, joints), lower, upper)
     anywhere = rng.uniform(lower, upper)
     tool = tool_pose(robot, answer)
-    unreachable = tool._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * _size(robot))
+    unreachable = tool._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * size_of(robot))
     yield ToolRequest(AT, robot, answer, tool)
     yield ToolRequest(CLOSE, robot, close, tool)
     if joints != ONE_FEATURE:
@@ -158,13 +157,36 @@ def _requests(
         yield from islice((draw for draw in draws if draw is not None), 2)
         yield from tight_limits(robot, rng)
     if name == "seven hinges":
-        tolerances = tolerance * np.array([max(_size(robot), 1.0), 1.0])
+        tolerances = tolerance * np.array([max(size_of(robot), 1.0), 1.0])
         yield from off_by_tolerances(robot, tolerances, rng)
         for family, turned in zip(HALF_TURNS, half_turns(robot, BENT), strict=True):
             for near in BENT + rng.uniform(-NEAR, NEAR, (3, joints)):
                 tool = tool_pose(turned, near)
                 yield ToolRequest(family, turned, BENT, tool, {"max_iterations": 1})
             yield ToolRequest(CLOSE, turned, BENT, tool)
+    yield from _far_rotations(name, robot)
+
+
+def _far_rotations(name: str, robot: Mapping[str, Any]) -> Iterator[ToolRequest]:
+    """Yield targets nearly half a turn away, and tools that are rotated across half a turn."""
+    if name == "one hinge":
+        ends = 0.5 * NEARLY_HALF * np.array([[-1.0], [1.0]])
+        yield from _of_both_signs(HALF_AWAY, robot, *ends)
+    if name == "seven hinges":
+        for turned in half_turns(robot, BENT, np.pi - BEFORE_HALF):
+            turn = rotation.logarithm(tool_pose(turned, BENT).rotations)
+            signs = np.sign(turn @ jacobian(mechanism(turned), BENT, -1)[3:])
+            yield from _of_both_signs(CLOSE, turned, BENT, BENT + NEAR * signs)
+
+
+def _of_both_signs(
+    family: str, robot: Mapping[str, Any], start: FloatArray, answer: FloatArray
+) -> Iterator[ToolRequest]:
+    """Yield requests for the tool's pose at an answer, its quaternion of either sign."""
+    tool = tool_pose(robot, answer)
+    for sign in (1.0, -1.0):
+        target = tool._replace(rotations=sign * tool.rotations)
+        yield ToolRequest(family, robot, start, target)
 
 
 def _single_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[ToolRequest]:
@@ -262,10 +284,12 @@ def off_by_tolerances(
                 yield ToolRequest(TOLERANCE, robot, BENT, target, options)
 
 
-def half_turns(robot: Mapping[str, Any], start: FloatArray) -> Iterator[Mapping[str, Any]]:
+def half_turns(
+    robot: Mapping[str, Any], start: FloatArray, angle: float = NEARLY_HALF
+) -> Iterator[Mapping[str, Any]]:
     """Yield the robot with tools that are rotated by nearly half a turn about x, y and z."""
     for axis in np.eye(3) + 0.1:
-        turn = rotation.exponential(NEARLY_HALF * axis / np.linalg.norm(axis))
+        turn = rotation.exponential(angle * axis / np.linalg.norm(axis))
         flange = tool_pose({**robot, "tool_rotation": IDENTITY}, start).rotations
         yield {**robot, "tool_rotation": rotation.multiply(rotation.conjugate(flange), turn)}
 

@@ -98,11 +98,11 @@ def _case(
     """Return a request for a velocity that the tool can have."""
     J = jacobian(mechanism(robot), q, -1)
     twist = J @ (rng.choice([-1.0, 1.0], len(q)) * rng.uniform(0.5, 1.5, len(q)))
-    reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
     velocities = {"linear_velocity": twist[:3], "angular_velocity": twist[3:]}
     inputs = {**robot, "q": q, **velocities, "urdf": robot_models.urdf(robot)}
     about = sentence("A robot of {joints} joints.", joints=len(q))
-    return Case(name, TASK, inputs, family, about, facts={"size": max(reach, 1.0)})
+    facts = {"size": max(robot_models.size_of(robot), 1.0)}
+    return Case(name, TASK, inputs, family, about, facts=facts)
 
 
 def _singular_values(robot: Mapping[str, Any], q: FloatArray) -> FloatArray:
