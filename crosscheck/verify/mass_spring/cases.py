@@ -159,9 +159,9 @@ def _lengths(x: FloatArray, springs: Any) -> FloatArray:
 def scenes(seed: int, thorough: bool) -> list[SpringScene]:
     """Return all scenes in their order; the long list has more random cloths."""
     more, base = 12 if thorough else 0, _cloth(seed, 3, name="cloth 3 x 3")
-    pair, stiff = (
+    pair, stiff, zero = (
         [SpringScene(**_fields(_TABLE["pair_defaults"] | entry)) for entry in _TABLE[name]]
-        for name in ("pair", "stiff")
+        for name in ("pair", "stiff", "zero")
     )
     return [
         *pair,
@@ -169,6 +169,7 @@ def scenes(seed: int, thorough: bool) -> list[SpringScene]:
         *_changes(seed),
         *(_random(seed, **entry) for entry in _TABLE["small_step"]),
         *stiff,
+        *zero,
         base,
         *(_transformed(base, **_fields(entry)) for entry in _TABLE["symmetry"]),
         *(_cloth(seed, **entry) for entry in _TABLE["cloth"]),

@@ -26,6 +26,7 @@ from ..sentence import sentence
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, pairs
 from .formulas import evaluate
+from .laws import not_finite
 from .model import StepModel
 from .problem import (
     SpringProblem,
@@ -139,7 +140,7 @@ def _judge_case(
 
     def findings(energies: Energies) -> Iterator[Finding]:
         if not np.isfinite(list(energies.values())).all():
-            yield finding("finite numbers", name="energies")
+            yield not_finite(case, "energies")
             return
         for name, gap in gaps.items():
             yield finding("energy formula", gap, allowed, law=name, name=name)
@@ -208,6 +209,7 @@ def _diagnose(judgements: Sequence[CaseJudgement], epsilon: float) -> Diagnosis:
         (problem_of(judgement.case.inputs), judgement.answer.values)
         for judgement in judgements
         if isinstance(judgement.answer, Answer)
+        and np.isfinite(list(judgement.answer.values.values())).all()
     ]
     if not answers or all(judgement.verdict < Verdict.WRONG for judgement in judgements):
         return Diagnosis()

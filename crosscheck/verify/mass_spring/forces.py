@@ -21,7 +21,7 @@ from ..sentence import Sentence, sentence
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, pairs
 from .formulas import evaluate
-from .laws import symmetry
+from .laws import not_finite, symmetry
 from .model import StepModel
 from .problem import (
     SpringProblem,
@@ -80,7 +80,7 @@ def _judge_case(
     def findings(outputs: Mapping[str, Any]) -> Iterator[Finding]:
         output = outputs["forces"]
         if not np.isfinite(output).all():
-            yield finding("finite numbers", name="forces")
+            yield not_finite(case, "forces")
             return
         yield _formula(p, output, forces, allowed)
         yield _balance(p, output, allowed)

@@ -108,6 +108,7 @@ class _Values(dict[str, Any]):
         return NAMES[name](self._problem)
 
 
+@np.errstate(all="ignore")  # some faults divide by rest lengths, which may be 0
 def evaluate(formula: str, p: SpringProblem | None, values: Mapping[str, Any] | None = None) -> Any:
     """Return the value of a formula for a problem, if it needs any, and of further names."""
     return eval(compiled(formula), _GLOBALS, _Values(p, values or {}))

@@ -9,6 +9,7 @@ import numpy as np
 
 from plumbob.reference.judging import StepJudgement, judge_step
 
+from ..case import Case
 from ..contestant import Answer, Exchange
 from ..greeting import Step
 from ..judgement import Finding, Verdict
@@ -145,6 +146,12 @@ def _graded(error: float, size: float, allowed: float) -> Verdict:
     return Verdict.RIGHT_EXCEPT if gap <= IMPRECISE * size + ROUNDED * allowed else Verdict.WRONG
 
 
+def not_finite(case: Case, name: str) -> Finding:
+    """Return that outputs are not finite: merely wrong where a fault divides by a number of 0."""
+    verdict = Verdict.WRONG if case.family == "zero" else None
+    return finding("finite numbers", name=name, verdict=verdict)
+
+
 def pins(context: StepContext) -> Finding | None:
     """Return how far pins are from where they were."""
     p, x = context.problem, context.answers.get("positions")
@@ -243,6 +250,15 @@ def velocities(context: StepContext) -> Finding | None:
     if not np.isfinite(gap):
         verdict = Verdict.UNDECIDED
     return finding("velocities", error, SOLVED, verdict=verdict, gap=gap)
+
+
+def velocity_loss(context: StepContext) -> Finding | None:
+    """Return the share of its speed that an undeclared factor takes from a particle in 1 s."""
+    factor = context.model.scaling
+    if factor == 1.0 or context.step.damper == "global_factor" or not context.recognised:
+        return None
+    loss = 1.0 - factor ** (context.model.substeps / context.problem.h)
+    return finding("velocity loss", loss, factor=factor)
 
 
 def pin_velocities(context: StepContext) -> Finding | None:

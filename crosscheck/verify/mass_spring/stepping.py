@@ -21,7 +21,7 @@ from ..contestant import Answer, Exchange
 from ..explain import either, first_broken, share_of
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
-from ..laws import digits, finding, hints_of, judge_case, laws_that_hold, proportion_of
+from ..laws import digits, hints_of, judge_case, laws_that_hold, proportion_of
 from ..sentence import Sentence, sentence
 from . import iterations, laws
 from .cases import task_cases, trace_of
@@ -50,8 +50,8 @@ LARGER = 2
 # The least shares of the answers that several faults at once, or one, explain if not by chance.
 MANY, SOME = 0.7, 0.3
 LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
-    laws.pins, laws.declared_step, laws.velocities, laws.pin_velocities, laws.momentum,
-    laws.minimiser,
+    laws.pins, laws.declared_step, laws.velocities, laws.velocity_loss, laws.pin_velocities,
+    laws.momentum, laws.minimiser,
 )  # fmt: skip
 
 
@@ -253,6 +253,8 @@ def declaration_of(options: Sequence[Option]) -> str:
         "velocity": fields["velocity"],
     }
     if fields["scaling"] != 1.0:
+        if fields["damper"] != "none":
+            return ""
         step |= {"damper": "global_factor", "damping_factor": fields["scaling"]}
     step = {name: value for name, value in step.items() if value is not None}
     try:
@@ -308,7 +310,7 @@ def _findings(
     outputs = context.answers.items()
     invalid = [name for name, numbers in outputs if not np.isfinite(numbers).all()]
     if invalid:
-        return [finding("finite numbers", name=", ".join(invalid))]
+        return [laws.not_finite(exchange.case, ", ".join(invalid))]
     findings = [law(context) for law in LAWS]
     if exchange.case.facts.get("consistent") and not laws.keeps_declaration(context):
         findings.append(laws.consistency(context))
