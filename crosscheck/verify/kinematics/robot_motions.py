@@ -17,16 +17,7 @@ from plumbob.reference.tracking import track
 from ..case import Case
 from ..greeting import Greeting
 from ..sentence import Sentence
-from .robot_models import (
-    BENT,
-    PRECISION,
-    TOLERANCES,
-    mechanism,
-    robots,
-    size_of,
-    tool_pose,
-    urdf,
-)
+from .robot_models import BENT, PRECISION, TOLERANCES, mechanism, robots, tool_pose, urdf
 from .robot_targets import (
     HALF_TURNS,
     TOLERANCE,
@@ -246,7 +237,7 @@ def _case(
     name: str, family: str, arm: Mapping[str, Any], motion: ToolMotion, greeting: Greeting
 ) -> Case:
     entry = _TABLE[family]
-    reach = size_of(arm)
+    reach = float(sum(np.linalg.norm(x) for x in (*arm["origins"], arm["tool_position"])))
     tolerance, rest = TOLERANCES[greeting.precision], entry.get("rest", 0)
     positions, rotations = (
         np.concatenate([part, np.repeat(part[-1:], rest, axis=0)]) for part in motion.tool

@@ -46,8 +46,8 @@ LIMIT_STEP = "a single iteration at a limit"
 FEW, MOST = "a few iterations", 5
 # Single iterations of tools that are rotated by nearly half a turn about x, y and z.
 HALF_TURNS = tuple(f"half a turn about {axis}" for axis in "xyz")
-# A hinge that the target's rotation takes nearly half a turn one way, and more the other way.
-HALF_AWAY = "half a turn away"
+# Targets nearly half a turn away, or beyond half a turn: the other way round leads to limits.
+FAR_ROTATION = "far rotation"
 # Requests whose targets need not be reached.
 UNREACHED = (BEYOND, STEP, TIGHT, FEW, LIMIT_STEP, *HALF_TURNS)
 # From a start so near to an answer [rad, m] no other minimum than the target's is nearer.
@@ -171,12 +171,13 @@ def _far_rotations(name: str, robot: Mapping[str, Any]) -> Iterator[ToolRequest]
     """Yield targets nearly half a turn away, and tools that are rotated across half a turn."""
     if name == "one hinge":
         ends = 0.5 * NEARLY_HALF * np.array([[-1.0], [1.0]])
-        yield from _of_both_signs(HALF_AWAY, robot, *ends)
+        yield from _of_both_signs(FAR_ROTATION, robot, *ends)
     if name == "seven hinges":
-        for turned in half_turns(robot, BENT, np.pi - BEFORE_HALF):
+        short = {"lower": BENT - 5.0 * NEAR, "upper": BENT + 5.0 * NEAR}  # the long way is beyond
+        for turned in half_turns({**robot, **short}, BENT, np.pi - BEFORE_HALF):
             turn = rotation.logarithm(tool_pose(turned, BENT).rotations)
             signs = np.sign(turn @ jacobian(mechanism(turned), BENT, -1)[3:])
-            yield from _of_both_signs(CLOSE, turned, BENT, BENT + NEAR * signs)
+            yield from _of_both_signs(FAR_ROTATION, turned, BENT, BENT + NEAR * signs)
 
 
 def _of_both_signs(
