@@ -40,6 +40,7 @@ def misled(case, key):
     """The case with a target that a solver with this fault believes to have reached."""
     inputs, fault = dict(case.inputs), FAULTS[key]
     q = 0.7 * inputs["upper"] + 0.2 - 0.1 * np.arange(len(inputs["upper"]))
+    q = np.clip(q, inputs["lower"], inputs["upper"])
     frames = fault.frames({**inputs, "target_rotation": np.eye(4)[0]}, q)
     target = rotation.from_matrix(frames.rotation)
     if key in ("scalar last", "every scalar last"):
