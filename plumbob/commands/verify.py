@@ -3,6 +3,8 @@
 import os
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -87,21 +89,31 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     from plumbob.crosscheck.child_process import one_thread
 
     os.environ |= {**one_thread(), **os.environ}
-    from plumbob.crosscheck.verify.language import language_of
-    from plumbob.crosscheck.verify.output.files import Files
-    from plumbob.crosscheck.verify.output.question import ANSWERS, Question, limits
-    from plumbob.crosscheck.verify.output.words import speaker
+    from ..terminal import lines_in_a_pipe, progress
 
-    language = lang or language_of()
-    question = Question(tuple(task or ()), rerun, thorough, seed)
-    if names or template or export:
-        return _print(_listed(question, names, template, export, speaker(language)))
-    folder = [ANSWERS, str(answers)] if answers else []
-    words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
-    if self_test:
-        return _self_test([*words, *question.tasks], speaker(language))
-    files = Files(json, junit, html, card, output)
-    return _judge(words, limits(time_limit, memory_limit), question, files, language)
+    with ExitStack() as work:  # imports take seconds, on a busy machine many
+        bar = work.enter_context(progress())
+        work.enter_context(lines_in_a_pipe(bar, LINE_PAUSE, LINE_PAUSE))
+        bar.add_task("starting", total=None)
+        from plumbob.crosscheck.verify.language import language_of
+        from plumbob.crosscheck.verify.output.files import Files
+        from plumbob.crosscheck.verify.output.question import ANSWERS, Question, limits
+        from plumbob.crosscheck.verify.output.words import Presentation, speaker
+
+        language = lang or language_of()
+        question = Question(tuple(task or ()), rerun, thorough, seed)
+        if names or template or export:
+            work.close()
+            return _print(_listed(question, names, template, export, speaker(language)))
+        folder = [ANSWERS, str(answers)] if answers else []
+        words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
+        if self_test:
+            work.close()
+            return _self_test([*words, *question.tasks], speaker(language))
+        files = Files(json, junit, html, card, output)
+        shown = Presentation(speaker(language), language, words)
+        finish = _judge(shown, limits(time_limit, memory_limit), question, files, bar)
+    return finish()
 
 
 def _listed(
@@ -118,31 +130,32 @@ def _listed(
 
 
 def _judge(
-    words: list[str], limits: "ProcessLimits", question: "Question", files: "Files", language: str
-) -> int:
-    """Judge a solver, print the verdict, and write the files."""
+    context: "Presentation",
+    limits: "ProcessLimits",
+    question: "Question",
+    files: "Files",
+    bar: Any,
+) -> Callable[[], int]:
+    """Judge a solver; return what prints the verdict, writes the files and gives the exit code."""
     from plumbob.bench.harness.record import check_regular
     from plumbob.crosscheck.verify.contestant import NoGreetingError
     from plumbob.crosscheck.verify.output.files import UNJUDGED
     from plumbob.crosscheck.verify.output.question import ask, opened, suited
-    from plumbob.crosscheck.verify.output.words import Presentation, speaker
     from plumbob.crosscheck.verify.sentence import sentence
     from plumbob.crosscheck.verify.verify import failed
 
-    from ..terminal import lines_in_a_pipe, progress
     from .options import writable
 
-    say = speaker(language)
+    say = context.say
     for path in filter(None, files.paths()):
         check_regular(path)
         writable(path.parent)
-    contestant = opened(words, limits, say)
+    contestant = opened(list(context.solver), limits, say)
     question = suited(question, contestant)
-    context = Presentation(say, language, words)
+    notify, publish = _notifier(bar, say), _publisher(bar, files, question, context)
     try:
-        with progress() as bar, lines_in_a_pipe(bar, LINE_PAUSE, LINE_PAUSE):
-            notify, publish = _notifier(bar, say), _publisher(bar, files, question, context)
-            report = ask(contestant, question, notify, publish)
+        notify(sentence("starting the solver"), 0, None)
+        report = ask(contestant, question, notify, publish)
     except NoGreetingError as error:
         raise ValueError(say(sentence(
             "solver: it did not start, or did not answer the greeting (the first request). {why}",
@@ -152,15 +165,13 @@ def _judge(
         raise
     except Exception as error:
         print("plumbob:", say(failed(error)), file=sys.stderr)
-        return UNJUDGED
-    return files.write(report, question, context)
+        return lambda: UNJUDGED
+    return partial(files.write, report, question, context)
 
 
 def _notifier(bar: Any, say: "Say") -> "Notify":
     """Return what shows the progress of the present work on a bar."""
-    from plumbob.crosscheck.verify.sentence import sentence
-
-    row = bar.add_task(say(sentence("starting the solver")), total=None)
+    row = bar.tasks[0].id
 
     def notify(work: "Sentence", count: int, total: int | None) -> None:
         nonlocal row
