@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PROGRAM = "plumbob.program"
 # The seconds between lines on progress in a pipe: a service that waits longer may take it for hung.
-LINE_PAUSE = 8.0
+LINE_PAUSE = 6.0
 
 
 class SolverCommand(Command):
