@@ -175,8 +175,6 @@ class Attempt:
         `reports` are those on earlier tasks.
         """
         greeting, causes = self._contestant.greeting, self._causes(reports)
-        self._answers_to(greeting)
-        self._notify(sentence("judging {task}", task=self.task), 0, None)
         judge = partial(self._judged, NoSearch(), _known_faults(self.task, reports, causes))
         report = judge(greeting)
         self._inference = infer(self._contestant, report, judge)
@@ -223,6 +221,8 @@ class Attempt:
         greeting: Greeting,
     ) -> TaskReport:
         answers = self._answers_to(greeting)
+        if not cause_search.is_on:
+            self._notify(sentence("judging {task}", task=self.task), 0, None)
         return _judge_answers(
             answers, self.task, self._method, greeting, known_faults, cause_search
         )

@@ -293,7 +293,10 @@ def not_farther(distance: float, slack: float, case: Case) -> Finding:
 def _equal_worlds(
     trial: PoseTrial, base: PoseTrial, comparison: SweepComparison, greeting: Greeting
 ) -> Finding:
-    """Return whether an answer is the base's, transformed into another world."""
+    """Return whether an answer is the base's, transformed into another world.
+
+    A constant number of iterations enlarges rounding as one sweep does not: then nobody can tell.
+    """
     Q, scale, shift = trial.case.facts["world"]
     x, path = base.pose.positions.copy(), base.pose.path
     x[path] = scale * rotation.rotate(Q, x[path]) + shift
@@ -302,7 +305,9 @@ def _equal_worlds(
     error, verdict = trial.pose.distance_to(x), Verdict.WRONG
     if not comparison.method or comparison.honest:
         is_small = error <= rounding.STALL[greeting.precision] * trial.case.facts["reach"]
-        verdict = Verdict.RIGHT_EXCEPT if is_small else WORLDS[trial.case.facts["how"]]
+        is_constant = greeting.fixed.max_iterations is not None
+        is_forgiven = is_small or is_constant
+        verdict = Verdict.RIGHT_EXCEPT if is_forgiven else WORLDS[trial.case.facts["how"]]
     return finding("equal worlds", error, tolerance, verdict=verdict)
 
 

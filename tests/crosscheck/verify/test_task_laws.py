@@ -321,7 +321,7 @@ def test_equal_answers_without_numbers_are_equal(again, verdict):
 
 def test_a_fault_is_named_once_for_all_programs_that_it_may_be_in():
     numbers = [{"energy": float(i)} for i in range(1, 5)]
-    cases = [Case("", "energy", {"i": i}, "", sentence("")) for i in range(4)]
+    cases = [Case(str(i), "energy", {"i": i}, "", sentence("")) for i in range(4)]
     asked = [Exchange(case, Answer(x, 0.0), None) for case, x in zip(cases, numbers, strict=True)]
 
     def variant(last, *faults):
