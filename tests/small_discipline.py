@@ -33,7 +33,7 @@ class SmallDiscipline:
             for i, inputs in enumerate(made)
         ]  # fmt: skip
 
-    def judge(self, asked, greeting, method):
+    def judge(self, asked, greeting, method, cause_search=None):
         judgements = [self._judged(one) for one in asked]
         wrong = [a for a, j in zip(asked, judgements, strict=True) if j.verdict is Verdict.WRONG]
         return TaskReport(self.task, method, judgements, self._why(wrong))
