@@ -190,7 +190,7 @@ class Attempt:
         if verdict.verdict is Verdict.RIGHT and self.task != inverse_kinematics.TASK:
             return verdict
         work = sentence(
-            "searching for the cause in {task} (at most {seconds:.0f} s of processor time)",
+            "{task}: searching for the cause (at most {seconds:.0f} CPU s)",
             task=self.task,
             seconds=SECONDS,
         )

@@ -151,7 +151,7 @@ def test_a_pipe_gets_a_line_while_nothing_else_is_printed(tmp_path):
     )
     assert done.returncode == 1
     assert done.stderr.count("s: judging mass_spring_forces\n") >= 2
-    assert "s: searching for the cause in mass_spring_forces (at most 1 s" in done.stderr
+    assert "s: mass_spring_forces: searching for the cause (at most 1 CPU s)" in done.stderr
     assert "mass_spring_forces: WRONG, " in done.stderr
 
 
