@@ -260,12 +260,14 @@ class ModelSearch:
         return reproducing[:HYPOTHESES] + unpredicted[:HYPOTHESES]
 
     def _varied(self, hypotheses: Sequence[Choices]) -> list[Choices]:
-        """Return hypotheses, simplest first, in turn with each set of faults."""
+        """Return hypotheses, simplest first, in turn with each set of faults or each integrator."""
         counts, order = dict[frozenset[int], int](), list[tuple[int, int]]()
         for choices in hypotheses:
             faults = frozenset(id(o) for o in choices.values() if self.costs[id(o)])
-            counts[faults] = counts.get(faults, 0) + 1
-            order.append((len(faults), counts[faults]))
+            # several integrators agree in small probes, in single precision in most
+            kind = faults or frozenset(map(id, filter(None, [choices.get("integrator")])))
+            counts[kind] = counts.get(kind, 0) + 1
+            order.append((len(faults), counts[kind]))
         return [hypotheses[i] for i in sorted(range(len(order)), key=order.__getitem__)]
 
     def _explains_all(self, match: ModelMatch, cases: Sequence[Probe]) -> bool:
