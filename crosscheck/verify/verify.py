@@ -156,12 +156,12 @@ class Attempt:
     ) -> None:
         self.task, self._contestant, self._method = task, contestant, method
         self._seed, self._thorough, self._notify = seed, thorough, notify
-        self._answers: dict[bytes, Answers] = {}  # by the greeting that the cases suit
+        self._answers: dict[str, Answers] = {}  # by the greeting that the cases suit
         self._inference = Inference(())
 
     def _answers_to(self, greeting: Greeting) -> Answers:
         """Return the answers to the cases that suit a greeting, which are asked once."""
-        key = msgspec.json.encode(greeting)
+        key = repr(greeting)
         if key not in self._answers:
             discipline = DISCIPLINES[self.task]
             cases = discipline.cases(greeting, self._method, self._seed, self._thorough)

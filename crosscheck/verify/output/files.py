@@ -75,10 +75,11 @@ class Files(NamedTuple):
         right. A mistake of ours in a screen or a file leaves it to the verdict.
         """
         finished, context, failures = self.save(report, question, context)
-        if not _attempt(SCREEN, partial(_show, report, context), failures):
+        if _attempt(SCREEN, partial(_show, report, context), failures):
+            if finished:
+                print(" ".join(visible(str(path)) for path in finished))
+        elif not failures[-1].is_of_system:
             print("\n".join(context.say(verdict_line(task)) for task in report.tasks))
-        elif finished:
-            print(" ".join(visible(str(path)) for path in finished))
         for failure in failures:
             print(f"plumbob: {context.say(failure.sentence)}", file=sys.stderr)
         if any(failure.is_of_system for failure in failures):
