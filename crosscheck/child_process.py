@@ -257,7 +257,7 @@ class ChildProcess:
         return is_open
 
     def _listen(self) -> None:
-        """Read what standard error holds, and keep its end."""
+        """Read standard error, and keep its end."""
         chunk = b""
         with contextlib.suppress(BlockingIOError):
             chunk = os.read(self._process.stderr.fileno(), _CHUNK)

@@ -1,4 +1,4 @@
-"""The search for the cause of wrong answers: what it may take, and why it ended early.
+"""The search for the cause of wrong answers: its limits, and why it ended early.
 
 A verdict never depends on it: a stage that fails, takes too long or is interrupted costs the name
 of the mistake alone.
@@ -27,7 +27,7 @@ class SearchLimit(BaseException):
 
 
 class CauseSearch:
-    """Stages of the search for the cause of one task's wrong answers."""
+    """Stages of the search for the cause of a task's wrong answers."""
 
     def __init__(self, is_interrupted: bool = False) -> None:
         self.is_interrupted = is_interrupted  # whether the user ended it, or one before
@@ -81,7 +81,7 @@ class CauseSearch:
 
 
 class NoSearch(CauseSearch):
-    """A search without stages: what is judged so is judged by laws and honest methods alone."""
+    """A search without stages, which leaves laws and honest methods alone to judge."""
 
     @property
     def is_on(self) -> bool:

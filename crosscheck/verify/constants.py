@@ -89,7 +89,7 @@ def tolerance(contestant: Contestant, report: TaskReport) -> float | None:
 
 
 def max_iterations(contestant: Contestant, report: TaskReport) -> int | None:
-    """Return the number of sweeps that a solver makes, of other solvers what is allowed.
+    """Return the number of sweeps that a solver makes, of other solvers the number allowed.
 
     It is None if a solver does not make the sweeps of its method.
     """
@@ -102,7 +102,7 @@ def max_iterations(contestant: Contestant, report: TaskReport) -> int | None:
 def _sweeps(contestant: Contestant, report: TaskReport) -> int | None:
     """Return the number of a textbook's sweeps that a solver makes, None if it makes no such.
 
-    Targets are beyond reach, so that nothing else ends a solve.
+    Targets are beyond reach, so that only the number of sweeps ends a solve.
     """
     fixed = Fixed(max_iterations=1, tolerance=problems.LOOSE)
     greeting = msgspec.structs.replace(contestant.greeting, fixed=fixed)

@@ -58,7 +58,7 @@ def explain(
     The variants come in ascending order of the number of faults, special ones of a number last, the
     most telling answers first: small, and wrong. `tolerance` is the relative difference that
     rounding explains; `describe` puts the faults into words, given the keys of a class that no
-    answer tells apart. Of the first `trial` answers a variant has to reproduce one, and of the
+    answer tells apart. Of the first `trial` answers a variant has to reproduce any, and of the
     `failing` cases, by their names, the least share.
     """
     answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
@@ -123,7 +123,7 @@ def _match(
 
 
 def share_of(hits: Collection[str], names: Sequence[str], failing: Collection[str]) -> float:
-    """Return the share of hits among cases, or among those of them that fail if that is less."""
+    """Return the share of hits among cases, or among the failing cases if that is less."""
     groups = names, [name for name in names if name in failing]
     shares = [sum(name in hits for name in group) / len(group) for group in groups if group]
     return min(shares, default=0.0)

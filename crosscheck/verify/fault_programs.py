@@ -81,7 +81,7 @@ def _indentation(program: str, text: str) -> int:
 
 
 def _replaced(program: str, right: str, wrong: str, margin: str) -> str:
-    """Return a program with a text replaced by one whose lines get a further margin."""
+    """Return a program with a replaced text; the lines of the new text get a further margin."""
     before, after = program.split(right)
     first, *others = wrong.splitlines(keepends=True) or [""]
     if right.startswith(" "):  # whole lines, whose margin stands before them

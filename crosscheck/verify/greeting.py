@@ -100,7 +100,7 @@ class Fixed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Inputs that are constants of a solver; requests hold the same numbers.
 
     Attributes:
-        max_iterations: how many iterations a solve has, or would have if nothing ended it.
+        max_iterations: the iterations of a solve that does not end earlier.
         tolerance: distance that counts as reached [m]; 0 if no distance ends a solve.
         gravity: acceleration [m/s²]; zeros without gravity.
     """

@@ -82,7 +82,7 @@ _EITHER = ("count", "spacing")
 
 
 class Inference(NamedTuple):
-    """What the answers of a solver show of the inputs that it takes."""
+    """The restrictions that a solver's answers show."""
 
     evidence: Evidence  # () if it takes all, or nothing is known
     is_right: bool = False  # whether a solver of such restrictions answers so
@@ -125,7 +125,7 @@ def inferred(
     inference: Inference,
     judge: Callable[[Greeting], TaskReport],
 ) -> TaskReport:
-    """Return the report on what a solver takes, the same report if it takes all or is wrong in it.
+    """Return the report by a solver's restrictions, the same report if it has none or is wrong.
 
     A report on a restricted solver says so in its assumptions, and keeps the faults that explain
     the other answers.

@@ -106,8 +106,8 @@ def _save(name: str, folders: list[Path]) -> int:
     from plumbob.bench.harness.record import RecordFile
 
     if not is_name(name) or name == ".." or name[0] == "-" or Path(name).name != name:
-        what = "a name without folders or control characters"
-        raise ValueError(f"--save: expected {what}, got {name!r}")
+        expectation = "a name without folders or control characters"
+        raise ValueError(f"--save: expected {expectation}, got {name!r}")
     if len(folders) > 1:
         raise ValueError(f"--save: expected one folder, got {len(folders)}")
     records, target = _records(*folders or [REPORT]), BASELINES / name

@@ -111,8 +111,8 @@ def verify(  # noqa: PLR0913 -- one parameter an option
             work.close()
             return _self_test([*words, *question.tasks], speaker(language))
         files = Files(json, junit, html, card, output)
-        shown = Presentation(speaker(language), language, words)
-        finish = _judge(shown, limits(time_limit, memory_limit), question, files, bar)
+        presentation = Presentation(speaker(language), language, words)
+        finish = _judge(presentation, limits(time_limit, memory_limit), question, files, bar)
     return finish()
 
 

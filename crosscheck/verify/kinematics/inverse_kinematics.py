@@ -295,7 +295,7 @@ def _equal_worlds(
 ) -> Finding:
     """Return whether an answer is the base's, transformed into another world.
 
-    A constant number of iterations enlarges rounding as one sweep does not: then nobody can tell.
+    A constant number of iterations enlarges rounding, which a sweep does not: that proves no fault.
     """
     Q, scale, shift = trial.case.facts["world"]
     x, path = base.pose.positions.copy(), base.pose.path

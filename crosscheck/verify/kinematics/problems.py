@@ -208,7 +208,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
 
 
 def _is_about_sweeps(family: CaseFamily) -> bool:
-    """Return whether a family needs another number of sweeps than one or many."""
+    """Return whether a family needs another number of sweeps than 1 or many."""
     return family.sweeps == 2 or (family.sweeps == 1 and family.tolerance > 0.0)
 
 

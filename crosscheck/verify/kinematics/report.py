@@ -93,7 +93,7 @@ def report(
 
 
 def _has_numbers(judgement: CaseJudgement) -> bool:
-    """Return whether an answer has an output all of whose entries are numbers."""
+    """Return whether an answer has an output that holds numbers alone."""
     answer = judgement.answer
     outputs = answer.values.values() if isinstance(answer, Answer) else ()
     return any(
@@ -103,7 +103,7 @@ def _has_numbers(judgement: CaseJudgement) -> bool:
 
 
 def _as_broken(judgement: CaseJudgement) -> CaseJudgement:
-    """Return a judgement that forgives nothing: a solver that answers no case passes none."""
+    """Return a judgement without pardon: a solver that answers no case passes none."""
     if judgement.verdict is Verdict.BROKEN:
         return judgement
     is_answered = isinstance(judgement.answer, Answer)

@@ -72,7 +72,7 @@ def _diagnosis(
     motions: Mapping[str, Trajectory],
     base: Sequence[str] | None,
 ) -> Diagnosis:
-    """Return the faults of motions, and what solves of few iterations show."""
+    """Return the faults of motions and of solves of few iterations."""
     diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
     if [explanation.faults for explanation in diagnosis.explanations] in ([], [("stopped early",)]):
         return _with_iterations(diagnosis, motions.values(), judgements)

@@ -91,7 +91,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
 
 
 def _on_rail(arm: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return an arm whose first joint slides along an oblique axis, and whose last rotates far."""
+    """Return an arm whose first joint slides along an oblique axis, and which rotates far."""
     slides, axes = np.arange(7) < 1, np.array([[0.36, 0.48, 0.8], *arm["axes"][1:]])
     lower, upper = (np.array([end, *arm[side][1:-1], end])
                     for side, end in (("lower", -6.0), ("upper", 6.0)))  # fmt: skip

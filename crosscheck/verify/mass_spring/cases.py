@@ -92,7 +92,7 @@ def _has(system: System, need: str) -> bool:
 
 
 def _with_gravity(drawn: Sequence[SpringScene], gravity: FloatArray) -> list[SpringScene]:
-    """Return those scenes that make sense with a gravity [m/s²] that never changes."""
+    """Return the scenes that make sense with a gravity [m/s²] that never changes."""
     return [
         replace(scene, gravity=gravity)
         for scene in drawn

@@ -220,7 +220,7 @@ def _explanation(
 ) -> Explanation | None:
     """Return the courses, by keys, that have most answers among their iterates.
 
-    Their share is that of all answers or, if less, of the wrong ones.
+    Their share is that of all answers or, if less, of the wrong answers.
     """
     wrong, shares = np.array([trial.is_wrong for trial in trials]), dict[str, float]()
     for key, row in tracks.items():

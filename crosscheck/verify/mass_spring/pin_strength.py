@@ -25,7 +25,7 @@ PinnedAnswer = tuple[SpringProblem, Mapping[str, Any]]
 
 
 def measured_pins(pins: Sequence[Option], answers: Sequence[PinnedAnswer]) -> list[Option]:
-    """Return honest pins, of each kind those of the strength that answers show, if they do."""
+    """Return honest pins, of each kind with the strength that answers show."""
     answers = [(p, outputs) for p, outputs in answers if p.pinned.size]
     patterns = {option.fields["pins"].split()[0]: option for option in pins}
     measured = [

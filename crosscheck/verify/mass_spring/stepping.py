@@ -130,7 +130,7 @@ class Stepping(NamedTuple):
 def _matches(
     honest_search: ModelSearch, search: ModelSearch, probes: Sequence[Probe]
 ) -> list[ModelMatch]:
-    """Return the matches without a fault, or else those with faults."""
+    """Return the matches without a fault, or else the matches with faults."""
     cause_search, matches = search.cause_search, honest_search.run(probes)
     if not matches:
         matches = cause_search.run(lambda: matches_of(search, probes), matches)
@@ -440,7 +440,7 @@ def _explanation(
 ) -> Explanation:
     """Return the faults found with the share of answers that they reproduce, in classes.
 
-    It is the share of all answers or, if less, of those that fail. A factorisation shows in a
+    It is the share of all answers or, if less, of the failing answers. A factorisation shows in a
     pattern of failures, whatever it leaves.
     """
     scores, names = [], [probe.name for probe in probes]

@@ -85,7 +85,7 @@ def _last(array: Any) -> FloatArray:
 
 
 def rows(judgement: CaseJudgement, count: int = 3) -> list[NumberRow]:
-    """Return the first numbers in which answers part, and the one in which they differ most."""
+    """Return the first numbers in which answers part, and the number of the largest gap."""
     if not isinstance(judgement.answer, Answer):
         return []
     differing: list[NumberRow] = []
@@ -106,7 +106,7 @@ def rows(judgement: CaseJudgement, count: int = 3) -> list[NumberRow]:
 
 
 def _first_and_largest(gaps: Sequence[float], count: int) -> list[int]:
-    """Return the indices of the first gaps, in so many the index of the largest one."""
+    """Return the indices of the first gaps, among them the index of the largest gap."""
     kept, largest = list(range(len(gaps)))[:count], int(np.argmax(gaps))
     return kept if largest in kept else [*kept[:-1], largest]
 

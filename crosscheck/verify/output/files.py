@@ -45,7 +45,7 @@ class Files(NamedTuple):
     def save(
         self, report: Report, question: Question, context: Presentation
     ) -> tuple[list[Path], Presentation, list[WriteFailure]]:
-        """Write the files; return them, the context with the failing cases, and what went wrong."""
+        """Write the files; return them, the context with the failing cases, and the failures."""
         failures: list[WriteFailure] = []
         folder = self.folder / "failures" if self.folder else FAILURES
         options = folder, question.seed, question.thorough
