@@ -305,9 +305,8 @@ def _equal_worlds(
     error, verdict = trial.pose.distance_to(x), Verdict.WRONG
     if not comparison.method or comparison.honest:
         is_small = error <= rounding.STALL[greeting.precision] * trial.case.facts["reach"]
-        is_constant = greeting.fixed.max_iterations is not None
-        is_forgiven = is_small or is_constant
-        verdict = Verdict.RIGHT_EXCEPT if is_forgiven else WORLDS[trial.case.facts["how"]]
+        verdict = Verdict.RIGHT_EXCEPT if is_small else WORLDS[trial.case.facts["how"]]
+        verdict = Verdict.RIGHT if greeting.fixed.max_iterations is not None else verdict
     return finding("equal worlds", error, tolerance, verdict=verdict)
 
 

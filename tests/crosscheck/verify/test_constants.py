@@ -1,11 +1,14 @@
 """Constants in place of iterations, tolerance, gravity and dampers are found, and declared."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from plumbob.crosscheck.verify.functions import FunctionContestant
 from plumbob.crosscheck.verify.greeting import Fixed, Greeting, Step
 from plumbob.crosscheck.verify.judgement import Verdict
+from plumbob.crosscheck.verify.kinematics import inverse_kinematics
 from plumbob.crosscheck.verify.kinematics.predictions import forward, path_to, solve
 from plumbob.crosscheck.verify.mass_spring.problem import all_forces, elastic_energy, problem_of
 from plumbob.crosscheck.verify.verify import verify
@@ -228,3 +231,21 @@ def test_forces_without_dampers_are_right_if_declared():
     wrong = forces(undamped=True, factor=0.5)
     assert judged(FORCES, wrong, step=declared).verdict is Verdict.WRONG
     assert judged(FORCES, wrong).verdict is Verdict.WRONG
+
+
+def test_chaos_of_constant_iterations_is_no_dependence_on_the_origin():
+    """Eighty clipped steps of an honest solver turned a last digit into 0.09 m."""
+    pose = SimpleNamespace(
+        positions=np.zeros((3, 3)), path=np.arange(3), distance_to=lambda x: 0.09
+    )
+    shift = (np.array([1.0, 0.0, 0.0, 0.0]), 1.0, np.array([1.0, 0.0, 0.0]))
+    facts = {"world": shift, "how": "shifted", "size": 1.0, "amplification": 1.0, "reach": 1.0}
+    trial = SimpleNamespace(pose=pose, case=SimpleNamespace(facts=facts))
+    comparison = SimpleNamespace(method="", honest=False)
+    verdicts = [
+        inverse_kinematics._equal_worlds(
+            trial, trial, comparison, Greeting(1, (IK,), fixed=fixed)
+        ).verdict
+        for fixed in (Fixed(), CONSTANTS)
+    ]
+    assert verdicts == [Verdict.WRONG, Verdict.RIGHT]
