@@ -295,7 +295,7 @@ def _equal_worlds(
 ) -> Finding:
     """Return whether an answer is the base's, transformed into another world.
 
-    A constant number of iterations enlarges rounding, which a sweep does not: that proves no fault.
+    A constant number of iterations enlarges rounding: a difference is a reservation.
     """
     Q, scale, shift = trial.case.facts["world"]
     x, path = base.pose.positions.copy(), base.pose.path
@@ -306,7 +306,8 @@ def _equal_worlds(
     if not comparison.method or comparison.honest:
         is_small = error <= rounding.STALL[greeting.precision] * trial.case.facts["reach"]
         verdict = Verdict.RIGHT_EXCEPT if is_small else WORLDS[trial.case.facts["how"]]
-        verdict = Verdict.RIGHT if greeting.fixed.max_iterations is not None else verdict
+        if greeting.fixed.max_iterations is not None:
+            return finding("equal worlds, constant", error, tolerance)
     return finding("equal worlds", error, tolerance, verdict=verdict)
 
 
