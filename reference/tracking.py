@@ -85,9 +85,9 @@ def track(
         solver = "ccd" if solver == "fabrik" else solver
     chained = arguments.boolean("warm", warm)
     settings = problem.checked_settings(
-        solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, chained
+        solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, 1
     )
-    settings = replace(settings, limits=settings.limits._replace(phased=False))
+    settings = replace(settings, limits=settings.limits._replace(chained=chained))
     motion = solve_checked(model, _start(model, start), targets, settings)
     if not coherent:
         return motion

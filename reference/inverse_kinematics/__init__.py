@@ -48,6 +48,7 @@ def solve_ik(
     tolerance_rotation: float = 1e-4,
     max_iterations: int | None = None,
     restarts: int | None = None,
+    phases: int | None = None,
     seed: int = 0,
     record: bool = False,
     prefer: str | None = None,
@@ -65,7 +66,9 @@ def solve_ik(
     iterations, a phase begins anew from the same start, and after 10 such iterations the next: each
     turns effectors the long way round at first (a rotation has two quaternions), uses the null
     space to stay near mid-range (Liegeois 1977), and has a damping of its own (Chan & Lawrence
-    1988), down to 0.001 of the squared error. At last the best of them goes on.
+    1988), down to 0.001 of the squared error. At last the best of them goes on. Mid-range draws
+    later phases together: two of them from different starts often end in the same pose.
+    `phases=1` is the plain method.
 
     Restarts never make a solution worse: a target reached with fewer is reached with more, else the
     merit is no greater than with fewer, or than that of a single attempt; of solvers without phases
@@ -95,6 +98,8 @@ def solve_ik(
         restarts: how many further attempts to make from random poses, until one reaches the target.
             By default 20 where the solver is the default Levenberg-Marquardt, 100 with several
             effectors, else 0.
+        phases: of Levenberg-Marquardt on joints, at most, 1 to 8; by default all. With `phases=1`
+            several effectors are redrawn together. Other solvers have one phase.
         seed: of the random poses.
         record: keep the residuals of all iterations in `history`.
         prefer: "nearest" for the solution with the least sum of squared displacements from the
@@ -114,7 +119,7 @@ def solve_ik(
         restarts = default_restarts if restarts is None else restarts
     settings = checked_settings(
         solver, tolerance, tolerance_rotation, max_iterations,
-        0 if restarts is None else restarts, seed, record,
+        0 if restarts is None else restarts, seed, record, phases,
     )  # fmt: skip
     if prefer is not None:
         model = checked_model(skeleton)

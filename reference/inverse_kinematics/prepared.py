@@ -113,6 +113,7 @@ def prepare_ik(
     tolerance_rotation: float = 1e-4,
     max_iterations: int | None = None,
     restarts: int | None = None,
+    phases: int | None = None,
     seed: int = 0,
 ) -> PreparedIK:
     """Return `solve_ik` for many single targets: `prepare_ik(model)(start, target)`.
@@ -136,6 +137,7 @@ def prepare_ik(
         0 if restarts is None else restarts,
         seed,
         False,
+        phases,
     )
     if isinstance(checked, Skeleton) and (is_oriented or settings.limits.restarts):
         raise ValueError(

@@ -14,6 +14,7 @@ from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import effector_of
 from ..skeleton import Skeleton
+from .jacobian_methods import PHASES
 from .restarts import Limits
 from .solve_chain import ON_CHAINS
 from .solve_mechanism import ON_MECHANISMS
@@ -22,6 +23,8 @@ from .solve_mechanism import ON_MECHANISMS
 # restarts where the solver is left to us and is not FABRIK, with one effector and with several, of
 # which a restart redraws the limbs that fail.
 MAX_ITERATIONS, FAR_ITERATIONS, RESTARTS, LIMB_RESTARTS = 100, 2000, 20, 100
+# The phases of each solver, the first of which is the plain method; of others 1.
+PHASE_COUNTS = {"levenberg_marquardt": 1 + len(PHASES)}
 # All integers up to this are floats.
 LARGEST_COUNT = 2**53
 
@@ -229,21 +232,24 @@ def checked_settings(*arguments: Any) -> Settings:
 
 def _settings(
     solver: Any, tolerance: Any, tolerance_rotation: Any, max_iterations: Any,
-    restarts: Any, seed: Any, record: bool, chained: bool = False,
+    restarts: Any, seed: Any, record: bool, phases: Any = None,
 ) -> Settings:  # fmt: skip
     within_reach, out_of_reach = MAX_ITERATIONS, FAR_ITERATIONS
     if max_iterations is not None:
         count = arguments.integer("max_iterations", max_iterations, minimum=0)
         within_reach = out_of_reach = min(count, LARGEST_COUNT)
     kernels = IK_SOLVERS[arguments.choice("solver", solver, IK_SOLVERS)]
+    phase_count = PHASE_COUNTS.get(kernels.name, 1)
+    if phases is not None:
+        phase_count = arguments.integer("phases", phases, minimum=1, below=phase_count + 1)
     limits = Limits(
         arguments.number("tolerance", tolerance, minimum=0.0),
         arguments.number("tolerance_rotation", tolerance_rotation, minimum=0.0),
         within_reach,
         out_of_reach,
         arguments.count("restarts", restarts, minimum=0),
-        chained,
-        kernels.name == "levenberg_marquardt",
+        False,
+        phase_count,
     )
     seed = arguments.integer("seed", seed, minimum=0)
     return Settings(kernels, limits, seed, arguments.boolean("record", record))

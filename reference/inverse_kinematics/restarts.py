@@ -65,7 +65,7 @@ class Limits(NamedTuple):
     far_iterations: int  # the same where geometry proves a target out of reach
     restarts: int  # further attempts
     chained: bool  # whether each target but the first starts from the solution before it
-    phased: bool  # whether a start that stalls is solved again in further phases of the solver
+    phases: int  # that a start goes through while it stalls, at most; 1 is the plain method
 
 
 class Criteria(NamedTuple):
@@ -97,7 +97,7 @@ def limits_of(numbers):
     """Return Limits from an array of their numbers, which comes in faster from Python."""
     return Limits(
         numbers[0], numbers[1], int(numbers[2]), int(numbers[3]), int(numbers[4]),
-        numbers[5] > 0.0, numbers[6] > 0.0,
+        numbers[5] > 0.0, int(numbers[6]),
     )  # fmt: skip
 
 
@@ -117,7 +117,7 @@ def solve_with_restarts(operations, state, saved, progress, target, limits, crit
         The iterations of all attempts, and whether the best of them stalled.
     """
     total, in_reach = progress[BEST], criteria.distance <= limits.tolerance
-    phased = limits.phased and in_reach and operations.begin(state, 1)
+    phased = limits.phases > 1 and in_reach and operations.begin(state, 1)
     operations.begin(state, 0)
     begin_rows(progress, criteria, in_reach, phased)
     distance, _, _, _ = operations.error(state, target)
@@ -139,7 +139,7 @@ def solve_with_restarts(operations, state, saved, progress, target, limits, crit
             if drawing or phased:
                 continue
         turn += 1
-        if phased and not begin_phase(operations, state, saved, progress, turn):
+        if phased and not begin_phase(operations, state, saved, progress, limits, turn):
             break
         if not phased and not extend_first(progress, criteria, limits, turn):
             break
@@ -205,7 +205,7 @@ def extend_first(progress, criteria, limits, n):
     return n <= limits.restarts and progress[0, STATE] == LIMITED
 
 
-def begin_phase(operations, state, saved, progress, n):
+def begin_phase(operations, state, saved, progress, limits, n):
     """Begin phase n, behind the last go on with the best; return whether there is anything to do.
 
     The phase before it has just ended, and all have the iterations of one attempt together.
@@ -219,7 +219,7 @@ def begin_phase(operations, state, saved, progress, n):
         copy_row(saved[0], saved[BEST_PHASE])
     copy_row(saved[START], state.row)
     patience = FURTHER_PATIENCE
-    if not operations.begin(state, n):
+    if n >= limits.phases or not operations.begin(state, n):
         if best[STATE] == STALLED:
             return False
         copy_row(saved[BEST_PHASE], state.row)

@@ -205,7 +205,7 @@ def mechanism_criteria(mechanism, bound, limits):
         limits.tolerance_rotation - slack_rotation,
         max(margin, FAR_MARGIN * limits.tolerance) if unreachable else margin,
         limits.far_iterations if unreachable else limits.max_iterations,
-        limits.phased and not unreachable and len(mechanism.effectors) > 1,
+        limits.phases > 1 and not unreachable and len(mechanism.effectors) > 1,
     )
 
 

@@ -2,6 +2,7 @@
 
 import gc
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -284,7 +285,8 @@ def test_a_batch_on_all_cores_is_the_same_as_on_one(many, rng, solver):
 
 def test_chained_each_target_starts_from_the_last_solution(many, solver, backend):
     model, starts, (near, far) = many
-    chained = checked_settings(solver, 1e-4, 1e-4, 4, 0, 0, False, True)
+    settings = checked_settings(solver, 1e-4, 1e-4, 4, 0, 0, False)
+    chained = replace(settings, limits=settings.limits._replace(chained=True))
     targets = checked_targets(model, [near, far], None)
     motion = solve_checked(model, starts[0, 0], targets, chained)
     q = starts[0, 0]

@@ -1,6 +1,6 @@
 """The phases of Levenberg-Marquardt from one start."""
 
-from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from plumbob.reference import (
     Skeleton,
     Target,
     forward_kinematics,
+    prepare_ik,
     rotation,
     solve_ik,
     track,
@@ -25,9 +26,7 @@ from plumbob.reference.inverse_kinematics.box_step import (
     turn_the_long_way,
 )
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
-from plumbob.reference.inverse_kinematics.problem import checked_settings, checked_targets
 from plumbob.reference.inverse_kinematics.restarts import FIRST_PATIENCE
-from plumbob.reference.inverse_kinematics.solve import solve_checked
 
 COUNT = 150
 
@@ -47,9 +46,7 @@ def task(arm, rng):
 
 def first_phase(model, start, target, solver="levenberg_marquardt", most=200):
     """Return what the first phase alone answers."""
-    settings = checked_settings(solver, 1e-4, 1e-4, most, 0, 0, False)
-    alone = replace(settings, limits=settings.limits._replace(phased=False))
-    return solve_checked(model, start, checked_targets(model, target, None), alone)
+    return solve_ik(model, start, target, solver, max_iterations=most, phases=1)
 
 
 def test_phases_reach_most_of_what_the_first_does_not(arm, task):
@@ -82,6 +79,30 @@ def test_phases_keep_the_limits_and_the_number_of_iterations(arm, task, most):
     assert np.count_nonzero(phased.outcome == Outcome.CONVERGED) >= np.count_nonzero(
         alone.outcome == Outcome.CONVERGED
     )
+
+
+def test_more_phases_reach_no_fewer_targets_and_restarts_of_the_plain_method_stay_plain(arm, task):
+    start, target = task
+    settings = {"solver": "levenberg_marquardt", "max_iterations": 200}
+    reached = [
+        solve_ik(arm, start, target, **settings, phases=n).outcome == Outcome.CONVERGED
+        for n in range(1, 9)
+    ]
+    assert all(np.all(fewer <= more) for fewer, more in pairwise(reached))
+    assert reached[7].sum() > reached[1].sum() > reached[0].sum()
+    all_phases = solve_ik(arm, start, target, **settings)
+    np.testing.assert_array_equal(all_phases.outcome == Outcome.CONVERGED, reached[7])
+    prepared = prepare_ik(arm, oriented=True, **settings, phases=1)
+    pose = np.concatenate([target.position[0], target.rotation[0]])
+    single = solve_ik(arm, start[0], Target(pose[:3], pose[3:]), **settings, phases=1)
+    assert prepared(start[0], pose) == single.outcome
+    np.testing.assert_array_equal(prepared.coordinates, single.coordinates)
+
+
+@pytest.mark.parametrize(("solver", "phases"), [("levenberg_marquardt", 9), ("ccd", 2), (None, 0)])
+def test_phases_that_no_solver_has_are_refused(arm, task, solver, phases):
+    with pytest.raises(ValueError, match=f"phases: expected an integer .* got {phases}"):
+        solve_ik(arm, *task, solver, phases=phases)
 
 
 def test_phases_give_a_batch_the_answers_of_single_calls_and_repeat_them(arm, task):

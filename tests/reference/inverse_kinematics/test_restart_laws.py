@@ -208,7 +208,7 @@ def test_a_chain_s_answer_is_the_better_of_one_start_s_and_its_restarts_with_bot
     """Two sweeps arrive nowhere: which of the two is nearer differs from target to target."""
     chain = Skeleton(range(-1, 4), rng.uniform(-1.0, 1.0, (5, 3)))
     goals = forward_kinematics(chain, rotation.random(rng, 40, 5)).positions[:, -1]
-    settings = checked_settings("ccd", 1e-12, 1e-12, 2, 1, 3, True, False)
+    settings = checked_settings("ccd", 1e-12, 1e-12, 2, 1, 3, True)
     targets, start = checked_targets(chain, goals, None), rotation.random(rng, 5)
     one = solve_ik(chain, start, goals, "ccd", tolerance=1e-12, max_iterations=4, record=True)
     balls = Articulation(chain, "ball")
