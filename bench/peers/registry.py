@@ -166,9 +166,9 @@ class Adapter:
         return self.entrant.name if self.entrant else ""
 
 
-# A solver that makes one attempt from a start and one that starts again from random poses until it
-# succeeds answer different questions.
-ONE_START, RESTARTS = "one start", "restarts"
+# A single attempt, several within 100 iterations together, and restarts from random poses until the
+# solver succeeds, within 3,000 iterations, answer different questions.
+ONE_START, PORTFOLIO, RESTARTS = "one start", "portfolio", "restarts"
 # Attempts beside the first where the bench starts a solver again.
 _RESTART_COUNT = 20
 
@@ -177,7 +177,7 @@ _RESTART_COUNT = 20
 class PeerEntry:
     """A peer with settings, as it enters the tables."""
 
-    kind: str  # `ONE_START` or `RESTARTS`
+    kind: str  # `ONE_START`, `PORTFOLIO` or `RESTARTS`
     settings: Mapping[str, Any] = field(default_factory=dict)  # of its adapter
     restarts: int = 0  # further attempts from random poses, for solvers without restarts
     note: str = ""  # tells it from another entry of the same solver and kind
@@ -374,5 +374,5 @@ def _solvers() -> Iterator[Solver]:
     yield from (*LOOPS, *_BENCHMARKED.values(), *FACTORS)
     yield from (Solver(peer.title, peer.title, peer.engine) for peer in cloth_peers())
     for peer in PEERS:
-        labels = [peer.label_of(entry) for entry in peer.entries]
+        labels = dict.fromkeys([*map(peer.label_of, peer.entries), peer.name])
         yield from (Solver(label, label, peer.package, loop=peer.loop) for label in labels)

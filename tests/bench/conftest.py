@@ -326,7 +326,7 @@ def records():
         sample("proven"),
         *(swung(s, c) for c in ("undamped", "damped") for s in ("RK4", "discrete")),
         *(
-            raced("Plumbob LM", kind, task)
+            raced("Plumbob LM, first phase", kind, task)
             for kind in ("one start", "restarts")
             for task in ("reachable", "unreachable")
         ),

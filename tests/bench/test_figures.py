@@ -17,6 +17,8 @@ from plumbob.bench.report import report
 from plumbob.bench.report.page import page
 from plumbob.bench.tables.results import Results
 
+OURS = "Plumbob LM, first phase"
+
 ENTRANT = "my very own solver, a name of some length"
 CHARTS = 14
 
@@ -32,7 +34,7 @@ def with_solvers(records, count):
             found += [
                 replace(r, solver=name, facts={**r.facts, **facts}, arrays=slower(r.arrays, i))
                 for r in records
-                if r.suite == suite and r.solver in (first, "Plumbob LM", "Plumbob Newton",
+                if r.suite == suite and r.solver in (first, OURS, "Plumbob Newton",
                     "Plumbob, compiled", "RK4", "ccd", "newton")
                 and r.facts.get("task") not in ("few iterations", "dampers")
             ]  # fmt: skip

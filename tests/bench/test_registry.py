@@ -147,6 +147,19 @@ def test_an_unknown_style_is_one_clear_error():
         registry.style_of({"name": "ours", "style": "loud"})
 
 
+def test_portfolios_make_100_iterations_and_restarts_3000_at_the_most():
+    """Of ours the attempts are made twice at the most; who has no iterations has a time limit."""
+    for peer in registry.PEERS:
+        for entry in peer.entries:
+            settings, attempts = entry.settings, entry.restarts + 1
+            if "iterations" not in settings:
+                continue
+            attempts *= settings.get("searches", 1) * settings.get("attempts", 1)
+            attempts *= 1 + 2 * settings.get("restarts", 0)
+            limit = {registry.PORTFOLIO: 100, registry.RESTARTS: 3000}.get(entry.kind)
+            assert limit is None or settings["iterations"] * attempts <= limit, (peer, entry)
+
+
 def test_every_solver_has_one_entry_and_every_style_is_its_own():
     names = [solver.name for solver in registry._solvers()]
     assert len(names) == len(set(names))

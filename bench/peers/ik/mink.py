@@ -13,8 +13,8 @@ import mink
 
 from ...problems.evaluate import evaluator_of, mujoco_model
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
-from .differential import meeting, reaching
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+from .differential import PhasedReach, meeting, reaching
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 METERED = True
 
@@ -27,6 +27,7 @@ def prepare(
     lm_damping: float = 0.01,
     gain: float = 1.0,
     limit_gain: float = 0.95,
+    phases: int = 1,
 ) -> Ask:
     """Return the solver, set up for a robot."""
     configuration = mink.Configuration(mujoco_model(robot))
@@ -37,7 +38,10 @@ def prepare(
     ]
     goal = (robot, tolerance, iterations)
     options: dict[str, Any] = {"damping": damping, "limits": limits}
-    reach = reaching(mink.solve_ik, configuration, tasks, *goal, **options)
+    reach: Callable[..., bool] = reaching(mink.solve_ik, configuration, tasks, *goal, **options)
+    if phases > 1:
+        both, phased_goal = (*tasks, mink.PostureTask(configuration.model, 0.0)), (*goal, phases)
+        reach = PhasedReach(mink.solve_ik, configuration, both, _rotated, phased_goal, **options)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [
@@ -48,6 +52,10 @@ def prepare(
         return Solve(solve, lambda claim: (configuration.q.copy(), claim))
 
     return ask
+
+
+def _rotated(target: Any, R: FloatArray) -> Any:
+    return target @ mink.SE3.from_rotation(mink.SO3.from_matrix(R))
 
 
 def prepare_task(

@@ -12,12 +12,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import numpy as np
 import pink
 
 from ...problems.evaluate import evaluator_of, from_pinocchio, pinocchio_model, to_pinocchio
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
-from .differential import meeting, reaching
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance, UnableError
+from .differential import PhasedReach, meeting, reaching
+from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance, UnableError
 
 METERED = True
 
@@ -30,6 +31,7 @@ def prepare(
     lm_damping: float = 0.0,
     gain: float = 1.0,
     limit_gain: float = 0.5,
+    phases: int = 1,
 ) -> Ask:
     """Return the solver, set up for a robot."""
     configuration, cost = _configuration(robot), float(robot.oriented)
@@ -37,7 +39,11 @@ def prepare(
     tasks = [pink.FrameTask(effector, 1.0, cost, lm_damping, gain) for effector in robot.effectors]
     goal = (robot, tolerance, iterations)
     options: dict[str, Any] = {"damping": damping, "limits": limits, "safety_break": False}
-    reach = reaching(pink.solve_ik, configuration, tasks, *goal, **options)
+    reach: Callable[..., bool] = reaching(pink.solve_ik, configuration, tasks, *goal, **options)
+    if phases > 1:
+        posture = pink.PostureTask(np.zeros(configuration.model.nv))
+        both, phased_goal = (*tasks, posture), (*goal, phases)
+        reach = PhasedReach(pink.solve_ik, configuration, both, _rotated, phased_goal, **options)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [pink.configuration.pin.SE3(R, x) for x, R in request.poses]
@@ -45,6 +51,10 @@ def prepare(
         return Solve(solve, lambda claim: (from_pinocchio(robot, configuration.q), claim))
 
     return ask
+
+
+def _rotated(target: Any, R: FloatArray) -> Any:
+    return target * pink.configuration.pin.SE3(R, np.zeros(3))
 
 
 def prepare_task(

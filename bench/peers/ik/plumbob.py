@@ -39,11 +39,12 @@ def prepare(
     solver: str = "levenberg_marquardt",
     restarts: int = 0,
     iterations: int = 200,
+    phases: int | None = None,
 ) -> Ask:
     """Return the solver, set up for a robot."""
     read = urdf.parse if robot.is_chain else mjcf.parse
     articulation = read(robot.text).articulation
-    settings: dict[str, Any] = {"solver": solver, "restarts": restarts}
+    settings: dict[str, Any] = {"solver": solver, "restarts": restarts, "phases": phases}
     settings |= {"max_iterations": iterations, "tolerance": tolerance.position}
     settings |= {"tolerance_rotation": tolerance.rotation}
 

@@ -1,52 +1,68 @@
-"""roboplan: `SimpleIk`, damped least squares on Pinocchio, clamped to the limits, with restarts.
+"""roboplan: OInK, differential inverse kinematics by quadratic programs in C++ on Pinocchio.
 
-Its limit of time is lifted, so that the iterations end it; its generator is seeded for each target,
-which its user would do for answers that can be repeated. Its own default is two restarts.
+Each step asks for a part of the error (`gain`) within the joint limits, and takes at most the part
+`limit_gain` of the way to a limit. `damping` is the regularization of the program. Its solutions
+keep limits to 1e-6 only, so joints are clamped, as its users would.
 """
 
-from roboplan import core, simple_ik
+from math import hypot
 
+import numpy as np
+from roboplan import core, optimal_ik
+
+from .overhead import library
 from .protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance
 
-GROUP, SEED, UNLIMITED = "arm", 1986, 1e6
+METERED = True
+GROUP = "arm"
 
 
 def prepare(
     robot: BenchRobot,
     tolerance: Tolerance,
-    iterations: int = 100,
-    restarts: int = 0,
-    step: float = 0.25,
-    damping: float = 1e-3,
+    iterations: int = 200,
+    damping: float = 1e-12,
+    lm_damping: float = 0.0,
+    gain: float = 1.0,
+    limit_gain: float = 1.0,
 ) -> Ask:
     """Return the solver, set up for a robot."""
-    solver = simple_ik.SimpleIk(
-        scene_of(robot),
-        simple_ik.SimpleIkOptions(
-            group_name=GROUP,
-            max_iters=iterations,
-            max_restarts=restarts,
-            max_time=UNLIMITED,
-            step_size=step,
-            damping=damping,
-            max_linear_error_norm=tolerance.position,
-            max_angular_error_norm=tolerance.rotation,
-            check_collisions=False,
-        ),
-    )
+    scene = scene_of(robot)
+    oink, frames = optimal_ik.Oink(scene, GROUP), (robot.effectors[0], robot.root)
+    pose = core.CartesianConfiguration(robot.root, robot.effectors[0], np.eye(4))
+    options = optimal_ik.FrameTaskOptions(task_gain=gain, lm_damping=lm_damping)
+    task = optimal_ik.FrameTask(oink, scene, pose, options)
+    tasks, limits = [task], [optimal_ik.PositionLimit(oink, limit_gain)]
+    step = np.zeros(oink.num_variables)
+    solve_ik, integrate = library(oink.solveIk), library(scene.integrate)
+    forward, place = library(scene.forwardKinematics), library(scene.setJointPositions)
+
+    def reach(target: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, bool]:
+        task.setTargetFrameTransform(target)
+        place(q)
+        for _ in range(iterations):
+            if is_done(target, forward(q, *frames)):
+                return q, True
+            solve_ik(scene, tasks, limits, step, damping)
+            q = np.clip(integrate(q, step), robot.lower, robot.upper)
+            place(q)
+        return q, is_done(target, forward(q, *frames))
+
+    def is_done(target: np.ndarray, pose: np.ndarray) -> bool:
+        if hypot(*(pose[:3, 3] - target[:3, 3]).tolist()) > tolerance.position:
+            return False
+        return rotation_angle(pose[:3, :3], target[:3, :3]) <= tolerance.rotation
 
     def ask(request: PoseRequest) -> Solve:
-        target = core.CartesianConfiguration(robot.root, robot.effectors[0], request.matrix)
-        start = core.JointConfiguration(list(robot.joints), request.start)
-        solution = core.JointConfiguration()
-
-        def solve() -> bool:
-            solver.setRngSeed(SEED)
-            return bool(solver.solveIk(target, start, solution))
-
-        return Solve(solve, lambda claim: (solution.positions, claim))
+        matrix, start = np.asfortranarray(request.matrix), request.start.copy()
+        return Solve(lambda: reach(matrix, start), lambda answer: answer)
 
     return ask
+
+
+def rotation_angle(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the angle between two rotation matrices [rad]."""
+    return 2.0 * float(np.arcsin(min(1.0, np.linalg.norm(a - b) / np.sqrt(8.0))))
 
 
 def kinematics(robot: BenchRobot) -> Forward:

@@ -1,0 +1,123 @@
+"""The phases of Levenberg-Marquardt with a library's own task loop."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from plumbob.bench.peers.ik.differential import LONG_WAY, PhasedReach, long_way, reaching
+from plumbob.bench.problems.evaluate import Tolerance, evaluator_of, pinocchio_model, to_pinocchio
+from plumbob.bench.problems.robot_targets import robot_targets
+from plumbob.bench.problems.robots import CHARACTER, UnableError, is_installed
+from plumbob.reference import rotation
+
+TOLERANCE = Tolerance(1e-3, 1e-3)
+needs_robots = pytest.mark.skipif(not is_installed("panda"), reason="example-robot-data is absent")
+
+
+class FrameTask:
+    """The error of an effector in its own frame, as pink and mink define it."""
+
+    def __init__(self, frame):
+        self.frame, self.lm_damping = frame, 0.0
+
+    def set_target(self, target):
+        self.target = target
+
+    def compute_error(self, configuration):
+        return pin.log6(configuration.pose(self.frame).actInv(self.target)).vector
+
+    def rows(self, configuration):
+        e, J = self.compute_error(configuration), configuration.jacobian(self.frame)
+        return [(J, e), (np.sqrt(self.lm_damping * e @ e) * np.eye(J.shape[1]), 0.0)]
+
+
+class PostureTask:
+    """The displacement from a posture, with a cost."""
+
+    def __init__(self, size):
+        self.cost = np.zeros(size)
+
+    def set_target(self, q):
+        self.q = q
+
+    def rows(self, configuration):
+        return [(np.diag(self.cost), self.cost * (self.q - configuration.q))]
+
+
+class Configuration:
+    """The coordinates of an arm, kept within its limits."""
+
+    def __init__(self, robot):
+        self.robot, self.model = robot, pinocchio_model(robot)
+        self.data = self.model.createData()
+
+    def update(self, q):
+        self.q = q
+        pin.computeJointJacobians(self.model, self.data, to_pinocchio(self.robot, q))
+        pin.updateFramePlacements(self.model, self.data)
+
+    def integrate_inplace(self, velocity, dt):
+        self.update(np.clip(self.q + dt * velocity, self.robot.lower, self.robot.upper))
+
+    def pose(self, frame):
+        return self.data.oMf[self.model.getFrameId(frame)]
+
+    def jacobian(self, frame):
+        index = self.model.getFrameId(frame)
+        return pin.getFrameJacobian(self.model, self.data, index, pin.LOCAL)
+
+
+def solve_ik(configuration, tasks, dt, **_):
+    """Return the velocity that fits all tasks best."""
+    rows = [row for task in tasks for row in task.rows(configuration)]
+    A = np.vstack([matrix for matrix, _ in rows] + [1e-6 * np.eye(len(configuration.q))])
+    b = np.concatenate([np.broadcast_to(e, len(J)) for J, e in rows] + [np.zeros(A.shape[1])])
+    return np.linalg.lstsq(A, b, rcond=None)[0] / dt
+
+
+@needs_robots
+def test_phases_reach_what_one_does_not_within_the_same_iterations():
+    robot, targets = evaluator_of("panda").robot, robot_targets("panda", 5)
+    configuration, frame = Configuration(robot), FrameTask(robot.effectors[0])
+    posture, steps = PostureTask(len(robot.joints)), []
+    options = {"rotated": lambda target, R: target * pin.SE3(R, np.zeros(3))}
+
+    def counted(*arguments, **more):
+        steps.append(arguments)
+        return solve_ik(*arguments, **more)
+
+    plain = reaching(counted, configuration, [frame], robot, TOLERANCE, 100)
+    phased = PhasedReach(
+        counted, configuration, (frame, posture), options["rotated"], (robot, TOLERANCE, 100, 8)
+    )
+    reached = {plain: 0, phased: 0}
+    for i in range(targets.shape[0]):
+        request = targets.request(i)
+        (pose,) = request.poses
+        for reach in reached:
+            steps.clear()
+            claim = reach([pin.SE3(pose[1], pose[0])], request.start.copy())
+            assert len(steps) <= 100
+            assert (
+                not claim
+                or np.linalg.norm(configuration.pose(frame.frame).translation - pose[0]) < 1e-3
+            )
+            reached[reach] += claim
+    assert reached[plain] < 0.8 * targets.shape[0]
+    assert reached[phased] >= reached[plain] + 5
+
+
+def test_the_long_way_turns_about_the_opposite_axis(rng):
+    R, target = rotation.to_matrix(rotation.random(rng, 2))
+    error = rotation.logarithm(rotation.from_matrix(R.T @ target))
+    turned = rotation.logarithm(rotation.from_matrix(R.T @ target @ long_way(error)))
+    np.testing.assert_allclose(turned, -LONG_WAY * error / np.linalg.norm(error), atol=1e-9)
+
+
+def test_phases_are_refused_for_a_robot_of_several_effectors():
+    robot = evaluator_of(CHARACTER).robot
+    tasks = (SimpleNamespace(), SimpleNamespace())
+    with pytest.raises(UnableError):
+        PhasedReach(solve_ik, None, tasks, None, (robot, TOLERANCE, 100, 8))
