@@ -4,7 +4,7 @@
 #               wheels of; 9 GB on Linux x86-64, of which CUDA, which PyTorch's wheels bring, is 5
 # make lint     ruff and mypy
 # make bench    every benchmark at full length, then the report
-# make sample   every benchmark, quick, with every peer, as docs/sample
+# make sample   every benchmark, quick, with every peer and four seeds, as docs/sample
 # make docs     the documentation, as a site in build/docs that works offline
 # make drawing  draw the pictures of docs/ anew, the architecture's from the imports
 # make messages renew the translations of `plumbob verify` from its sentences
@@ -53,7 +53,7 @@ bench: .venv/installed
 	$(BIN)/plumbob report
 
 sample: .venv/peers/installed
-	$(BIN)/plumbob bench --quick --output build/sample
+	$(BIN)/plumbob bench --quick --seeds 4 --output build/sample
 	$(BIN)/python docs/write_sample.py build/sample
 
 docs: .venv/docs-installed

@@ -17,7 +17,7 @@ from plumbob.bench.tables.table import words
 
 DOCS = Path(__file__).parent
 SAMPLE, README, CHART = DOCS / "sample", DOCS.parent / "README.md", DOCS / "best.svg"
-PAGE, HEADLINES, FIGURE = "index.html", "headlines.md", "robots_map_one_start.svg"
+PAGE, HEADLINES, FIGURE = "index.html", "headlines.md", "group_budget_restarts.svg"
 BEGIN = "<!-- Written by docs/write_sample.py: who is best in docs/sample. -->"
 FILES = re.compile(r'\s*<a href="(?:tables|figures)/[^>]*>[^<]*</a>')  # left out of the sample
 END = "<!-- The end of what docs/write_sample.py writes. -->"

@@ -54,6 +54,7 @@ class Scale:
     targets: int  # random targets a problem
     seconds: float  # of a benchmark
     seed: int = SEED  # of random targets
+    seeds: int = 1  # that reachable targets of robots are drawn from, this one and the following
     entrants: tuple[Entrant, ...] = ()  # the user's solvers, beside the registered ones
     problems: "tuple[OwnProblem, ...]" = ()  # the user's problems, likewise
 

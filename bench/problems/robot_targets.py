@@ -33,8 +33,27 @@ SEED = 1986
 
 
 @functools.lru_cache(maxsize=16)
-def robot_targets(name: str, count: int, seed: int = SEED) -> Targets:
-    """Return `count` targets in each stratum, the strata alternating, and random starts."""
+def robot_targets(name: str, count: int, seed: int = SEED, seeds: int = 1) -> Targets:
+    """Return `count` targets of each seed in each stratum, and random starts.
+
+    The strata alternate, then the seeds, from `seed` on.
+    """
+    draws = [_drawn_targets(name, count, seed + k) for k in range(seeds)]
+
+    def interleaved(*parts: np.ndarray) -> np.ndarray:
+        rounds = [part.reshape(count, len(STRATA), *part.shape[1:]) for part in parts]
+        return np.stack(rounds, axis=1).reshape(-1, *parts[0].shape[1:])
+
+    return Targets(*map(interleaved, *draws))
+
+
+def seed_indices(target_count: int, seeds: int) -> np.ndarray:
+    """Return the index of each target's seed in `robot_targets`, (target,)."""
+    return np.arange(target_count) // len(STRATA) % seeds
+
+
+def _drawn_targets(name: str, count: int, seed: int) -> Targets:
+    """Return `count` targets of a seed in each stratum, the strata alternating."""
     evaluator = evaluator_of(name)
     rng = np.random.default_rng([seed, seed_of(name)])
     poses = np.stack(list(stratum_poses(evaluator, rng, count).values()), axis=1)

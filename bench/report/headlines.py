@@ -41,7 +41,10 @@ from .standings import Headline, best_rival, factor, full_name, percent, speed, 
 
 # The most robots or cases that a sentence names.
 MAX_NAMED = 3
-_FROM = dict(zip(STARTS, ("from one start", "with restarts"), strict=True))
+_STARTS = ("from one start", "with a portfolio of 100 iterations", "with restarts")
+_FROM = dict(zip(STARTS, _STARTS, strict=True))
+# Times within which the shares of solved poses are compared [s].
+_BUDGETS = {"50 µs": 5e-5, "1 ms": 1e-3}
 # What is timed of other engines' own code; loops of ours on engines are no rivals.
 _SUBJECTS = {"kinematics": "forward kinematics", "cloth": "a step of a cloth"}
 # The goals of cloths: what is solved, to which error, and the table that ranks it.
@@ -172,17 +175,40 @@ def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> 
     order = [solver for solver in row.success.order if rows[solver].share.hits]
     untimed = [solver for solver in order if solver not in times]
     order.sort(key=lambda s: (-rows[s].share.hits, [*times, *untimed].index(s)))
-    if first := _first(order):
-        sentence = _most_solved(rows, first, best_rival(first, order))
-        yield _headline("Most poses solved", group, start, f"{place}, {sentence}.")
+    first = _first(order)
+    if sentence := _solved_in_time(rows):
+        yield _headline("Solved within a time", group, start, f"{place}, {sentence}.")
     if sentence := _fastest(rows, times, first):
         yield _headline("Fastest", group, start, f"{place}, {sentence}.")
+    if first:
+        sentence = _most_solved(rows, first, best_rival(first, order))
+        yield _headline("Most poses solved", group, start, f"{place}, {sentence}.")
+
+
+def _solved_in_time(rows: dict[str, Score]) -> str:
+    """Return who solves the largest share of the timed poses within each budget of time."""
+    sentences = []
+    for budget, seconds in _BUDGETS.items():
+        shares = {
+            solver: metrics.share(row.timed_solved & (row.seconds <= seconds))
+            for solver, row in rows.items()
+            if row.is_timed
+        }
+        order = sorted(shares, key=lambda solver: -shares[solver].hits)
+        first = _first(order)
+        if first and (rival := best_rival(first, order)) and shares[first].hits:
+            sentences.append(
+                f"within {budget} {full_name(first)} solves {percent(shares[first])} of the poses "
+                f"and {full_name(rival)}, the best other solver, {percent(shares[rival])}"
+            )
+    return "; ".join(sentences)
 
 
 def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:
     """Return who solves the most poses, the best other solver if any, and how many tie."""
-    share = rows[first].share
-    solved = f"{percent(share)} of {words(share.total)}"
+    share, rates = rows[first].share, 100.0 * np.array(rows[first].shares_by_seed)
+    span = f", {rates.min():.1f} to {rates.max():.1f} by seed" if rates.size > 1 else ""
+    solved = f"{percent(share)} of {words(share.total)}{span}"
     if not rival:
         return f"{full_name(first)} solves the most poses: {solved}"
     ties = sum(rows[solver].share.hits > 0 for solver in rows[first].success.first)

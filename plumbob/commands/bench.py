@@ -53,6 +53,7 @@ Problems = Annotated[Texts, option("NAME", "Only this problem, or your .py, mode
 Robots = Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")]
 Targets = Annotated[int | None, option("N", "Targets per problem; of robots 1/20 of each kind.")]
 Seed = Annotated[int | None, option("N", "Seed of other random targets in suite ik.")]
+Seeds = Annotated[int, option("N", "Draw targets of robots from N seeds.", min=1)]
 Effector = Annotated[Text, option("NAME", "Link of your models that must reach the target.")]
 Pins = Annotated[Text, option("RULE", "Pinned vertices of your OBJ: far, top or 0,10.")]
 Listing = Annotated[bool, flag("List problems and solvers, and stop.", "--list")]
@@ -77,6 +78,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     robot: Robots = None,
     targets: Targets = None,
     seed: Seed = None,
+    seeds: Seeds = 1,
     effector: Effector = None,
     pins: Pins = None,
     listing: Listing = False,
@@ -95,7 +97,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
     request = MeasurementRequest(
-        entrants or (), program_of(context), *parts, targets, seed, effector, pins
+        entrants or (), program_of(context), *parts, targets, seed, seeds, effector, pins
     )
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:

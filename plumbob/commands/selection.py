@@ -32,6 +32,7 @@ class MeasurementRequest(NamedTuple):
         solvers, problems, robots: by name; all if empty. Problems may be files.
         targets: random targets a problem, if not as in the scale.
         seed: of random targets, if not as in the scale.
+        seeds: that targets of robots are drawn from.
         effector: link of the user's models that reaches the target.
         pins: rule for the pins of the user's cloths.
     """
@@ -43,6 +44,7 @@ class MeasurementRequest(NamedTuple):
     robots: Sequence[str] = ()
     targets: int | None = None
     seed: int | None = None
+    seeds: int = 1
     effector: str | None = None
     pins: str | None = None
 
@@ -62,7 +64,8 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
         else:
             entrants.append(entrant)
     own, names = files.read(request.problems, suites, request.effector, request.pins)
-    size = replace(scale_of(scale, request.targets, entrants, own), seed=seed_of(request.seed))
+    size = scale_of(scale, request.targets, entrants, own)
+    size = replace(size, seed=seed_of(request.seed), seeds=request.seeds)
     if not any((request.solvers, names, request.robots)):
         return Choice(scale, size, is_partial=request.targets is not None)
     every = [block for suite in suites for block in blocks(suite, size)]

@@ -28,6 +28,7 @@ from plumbob.bench.problems.robot_targets import (
     least_distances,
     least_singular_values,
     robot_targets,
+    seed_indices,
     spread,
     stratum_poses,
     uniform_targets,
@@ -55,6 +56,16 @@ def name(request):
     if not is_installed(request.param):
         pytest.skip("example-robot-data, the extra `robots`, is not installed")
     return request.param
+
+
+def test_targets_of_several_seeds_are_those_of_each_seed_in_turns():
+    together = robot_targets(CHARACTER, 2, 5, 3)
+    assert together.shape[0] == 2 * 3 * len(STRATA)
+    indices = seed_indices(together.shape[0], 3)
+    for k in range(3):
+        alone = robot_targets(CHARACTER, 2, 5 + k)
+        for part, expected in zip(together, alone, strict=True):
+            np.testing.assert_array_equal(part[indices == k], expected)
 
 
 def test_the_limits_and_joints_are_those_of_the_evaluator(name):

@@ -20,7 +20,7 @@ from ...tables.layout import Figure
 from ...tables.results import Results, grouped
 from ...tables.table import words
 from . import REPEATS
-from .readings import PENALTY, SHIFT, STARTS, Score, fields_of
+from .readings import PENALTY, SHIFT, STARTS, Score, fields_of, in_groups, together
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,19 +38,27 @@ CAPTIONS = Captions(
 # The quantities of a map; so many times the shortest time is drawn as the palest.
 SOLVED, TIME, SLOWEST = "poses solved", "time", 1000.0
 UNITS_OF_MAPS = {SOLVED: "solved [%]", TIME: "median time of a pose solved [µs]"}
+# Times of a target within which shares are drawn [s].
+_BUDGETS = np.logspace(-6, 0, 121)
 # Maps of more robots than this are stacked.
 MAXIMUM_BESIDE = 5
 
 
 def budgets(start: str, results: Results) -> Sketch | None:
     """Return the shares of targets that are solved within each budget of time."""
+    return _chart("budget", _rates_in_time, _BUDGETS, fields_of(results, start), results)
 
-    def rates(field: Sequence[Score], seconds: Floats) -> list[Floats]:
-        return [
-            metrics.within_budget(score.seconds, score.timed_solved, seconds) for score in field
-        ]
 
-    return _chart("budget", rates, np.logspace(-6, 0, 121), fields_of(results, start), results)
+def _rates_in_time(field: Sequence[Score], seconds: Floats) -> list[Floats]:
+    return [metrics.within_budget(score.seconds, score.timed_solved, seconds) for score in field]
+
+
+def group_budgets(start: str, results: Results) -> Sketch | None:
+    """Return the same shares over all robots held out, of the solvers that take them all."""
+    members = in_groups(fields_of(results, start)).get("held out", {})
+    scores = together(list(members), members) if len(members) > 1 else []
+    fields = {scores[0].robots: scores} if scores else {}
+    return _chart("group_budget", _rates_in_time, _BUDGETS, fields, results)
 
 
 def performance_profiles(start: str, results: Results) -> Sketch | None:
@@ -218,5 +226,7 @@ def _draw_map(ax: "Axes", rows: Sequence[Sequence[MapCell | None]], robots: Sequ
 
 
 FIGURES: tuple[Figure, ...] = tuple(
-    partial(draw, start) for draw in (heat_map, budgets, performance_profiles) for start in STARTS
+    partial(draw, start)
+    for draw in (group_budgets, heat_map, budgets, performance_profiles)
+    for start in STARTS
 )

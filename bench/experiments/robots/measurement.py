@@ -61,6 +61,7 @@ class RobotJob(NamedTuple):
     size: int  # how many targets there are
     timed_count: int  # so many of them, the first, are timed
     seed: int = SEED  # of the targets
+    seeds: int = 1  # that they are drawn from
     is_beyond: bool = False  # whether the targets are out of reach
 
     @property
@@ -84,6 +85,7 @@ class RobotJob(NamedTuple):
             "tolerance": self.tolerance.position,
             "tolerance_rotation": self.tolerance.rotation,
             "seed": self.seed,
+            "seeds": self.seeds,
         }
         solver = self.peer.label_of(self.entry)
         group = Group(problem, solve_together, self)
@@ -131,17 +133,19 @@ def _blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
             yield dataclasses.replace(block, measure=absent, group=None)
             continue
         for name in robots:
-            targets = partial(robot_targets, name, count, scale.seed)
-            timings = max(min(count, _LEAST_TIMED), -(-count // _PER_TIMED))
-            sizes = (count * len(STRATA), len(STRATA) * timings, scale.seed)
-            job = RobotJob(name, peer, entry, TOLERANCE, targets, *sizes)
+            targets = partial(robot_targets, name, count, scale.seed, scale.seeds)
+            timings = scale.seeds * max(min(count, _LEAST_TIMED), -(-count // _PER_TIMED))
+            sizes = (scale.seeds * count * len(STRATA), len(STRATA) * timings)
+            job = RobotJob(name, peer, entry, TOLERANCE, targets, *sizes, scale.seed, scale.seeds)
             yield job.block(f"robots/{name}", _facts(REACHABLE, title(name)))
             if name in HELD_OUT:
                 continue
             beyond = max(1, round(_TARGETS_BEYOND * scale.targets))
             targets = partial(unreachable_targets, name, beyond, scale.seed)
-            sizes = (beyond, -(-beyond // _PER_TIMED_BEYOND), scale.seed)
-            job = RobotJob(name, peer, entry, TOLERANCE, targets, *sizes, is_beyond=True)
+            sizes = (beyond, -(-beyond // _PER_TIMED_BEYOND))
+            job = RobotJob(
+                name, peer, entry, TOLERANCE, targets, *sizes, scale.seed, is_beyond=True
+            )
             yield job.block(f"unreachable/{name}", _facts(UNREACHABLE, title(name)))
 
 

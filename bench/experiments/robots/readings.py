@@ -15,13 +15,14 @@ from ...harness import metrics
 from ...harness.metrics import Floats, Ranking, Share
 from ...harness.record import Record
 from ...peers import registry
-from ...peers.registry import ONE_START, RESTARTS
+from ...peers.registry import ONE_START, PORTFOLIO, RESTARTS
+from ...problems.robot_targets import seed_indices
 from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.results import Results, grouped, listed
 from ...tables.table import words
 from . import REACHABLE, UNREACHABLE
 
-STARTS = (ONE_START, RESTARTS)
+STARTS = (ONE_START, PORTFOLIO, RESTARTS)
 # The time of a target that is not solved in a mean of times [s], if it did not take longer.
 PENALTY = 0.1
 # Added to times before their geometric mean is taken, so that microseconds do not decide [s].
@@ -40,7 +41,7 @@ class Score(NamedTuple):
     """A solver over all targets of one robot, or of several."""
 
     robots: str  # their names, or a phrase
-    start: str  # `ONE_START` or `RESTARTS`, "" if both are in one field
+    start: str  # one of `STARTS`, "" if all are in one field
     solver: str  # as records call it
     records: tuple[Record, ...]  # its record of each robot, in the same order for all solvers
     has_same_targets: bool = True  # whether it was given the targets of most solvers
@@ -84,6 +85,26 @@ class Score(NamedTuple):
     def share(self) -> Share:
         """The share of all targets that are solved."""
         return metrics.share(self.solved)
+
+    @property
+    def shares_by_seed(self) -> list[float]:
+        """The share of targets of each seed that are solved."""
+        return self._by_seed(self.solved, [total(record) for record in self.records])
+
+    @property
+    def mean_times_by_seed(self) -> list[float]:
+        """The mean time of the timed targets of each seed [s]; empty without times."""
+        if not self.is_timed:
+            return []
+        sizes = [rounds_of(record).shape[1] for record in self.records]
+        means = self._by_seed(np.log(self.penalised + SHIFT), sizes)
+        return [float(np.exp(mean) - SHIFT) for mean in means]
+
+    def _by_seed(self, numbers: np.ndarray, sizes: Sequence[int]) -> list[float]:
+        """Return the mean of the numbers of each seed; a record has so many."""
+        seeds = self.records[0].details.seeds
+        indices = np.concatenate([seed_indices(size, seeds) for size in sizes])
+        return [float(np.mean(numbers[indices == k])) for k in range(seeds) if k in indices]
 
     def solved_in_stratum(self, stratum: int) -> np.ndarray:
         """Return which of all targets in a stratum are solved, (target,)."""

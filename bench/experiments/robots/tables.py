@@ -142,12 +142,19 @@ def _reachable_row(score: Score) -> Row:
     return {
         **_row(score),
         "solved": score.share if score.is_finished else None,
+        "solved, by seed": _list_by_seed([100.0 * rate for rate in score.shares_by_seed]),
         **_interval(MEAN, mean),
+        f"{MEAN}, by seed": _list_by_seed([1e6 * time for time in score.mean_times_by_seed]),
         "time relative to fastest": _cell(score.relative_time),
         **_spread("position residual", score.attempted("position")[reached]),
         **_spread("rotation residual", score.attempted("rotation")[reached]),
         "set-up": score.records[0].values.setup,
     }
+
+
+def _list_by_seed(numbers: Sequence[float]) -> str | None:
+    """Return the numbers of several seeds, in the order of the seeds; None of a single one."""
+    return ", ".join(map(words, numbers)) if len(numbers) > 1 else None
 
 
 def _unreachable_row(score: Score) -> Row:

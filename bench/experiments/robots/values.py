@@ -52,13 +52,15 @@ class RobotSolves(Values, frozen=True, kw_only=True):
 class RobotDetails(Details, frozen=True):
     """The solver's start and version, why it does not take a robot, and a description of the robot.
 
-    Targets, a pose or a position for each effector, are solved within the tolerances [m], [rad].
+    Targets, a pose or a position for each effector, are solved within the tolerances [m], [rad];
+    they come from so many seeds in turns, stratum after stratum.
     """
 
     kind: str
     version: str = ""
     tolerance: float = 0.0
     tolerance_rotation: float = 0.0
+    seeds: int = 1
     remark: str = ""
     strata: list[str] = msgspec.field(default_factory=list)
     effectors: list[str] = msgspec.field(default_factory=list, name="tips")
