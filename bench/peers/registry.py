@@ -166,9 +166,11 @@ class Adapter:
         return self.entrant.name if self.entrant else ""
 
 
-# A single attempt, several within 100 iterations together, and restarts from random poses until the
-# solver succeeds, within 3,000 iterations, answer different questions.
+# A single attempt, a portfolio of several, and restarts from random poses until the solver succeeds
+# answer different questions.
 ONE_START, PORTFOLIO, RESTARTS = "one start", "portfolio", "restarts"
+# The iterations of all attempts together, and the attempts and iterations of most portfolios.
+PORTFOLIO_ITERATIONS, RESTART_ITERATIONS, SHORT_ATTEMPTS = 100, 3000, (8, 12)
 # Attempts beside the first where the bench starts a solver again.
 _RESTART_COUNT = 20
 

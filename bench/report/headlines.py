@@ -41,10 +41,13 @@ from .standings import Headline, best_rival, factor, full_name, percent, speed, 
 
 # The most robots or cases that a sentence names.
 MAX_NAMED = 3
-_STARTS = ("from one start", "with a portfolio of 100 iterations", "with restarts")
-_FROM = dict(zip(STARTS, _STARTS, strict=True))
+_FROM = {
+    registry.ONE_START: "from one start",
+    registry.PORTFOLIO: f"with a portfolio of {words(registry.PORTFOLIO_ITERATIONS)} iterations",
+    registry.RESTARTS: "with restarts",
+}
 # Times within which the shares of solved poses are compared [s].
-_BUDGETS = {"50 µs": 5e-5, "1 ms": 1e-3}
+_BUDGETS = (5e-5, 1e-3)
 # What is timed of other engines' own code; loops of ours on engines are no rivals.
 _SUBJECTS = {"kinematics": "forward kinematics", "cloth": "a step of a cloth"}
 # The goals of cloths: what is solved, to which error, and the table that ranks it.
@@ -188,7 +191,7 @@ def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> 
 def _solved_in_time(rows: dict[str, Score]) -> str:
     """Return who solves the largest share of the timed poses within each budget of time."""
     sentences = []
-    for budget, seconds in _BUDGETS.items():
+    for seconds in _BUDGETS:
         shares = {
             solver: metrics.share(row.timed_solved & (row.seconds <= seconds))
             for solver, row in rows.items()
@@ -197,9 +200,10 @@ def _solved_in_time(rows: dict[str, Score]) -> str:
         order = sorted(shares, key=lambda solver: -shares[solver].hits)
         first = _first(order)
         if first and (rival := best_rival(first, order)) and shares[first].hits:
+            share, other = percent(shares[first]), percent(shares[rival])
             sentences.append(
-                f"within {budget} {full_name(first)} solves {percent(shares[first])} of the poses "
-                f"and {full_name(rival)}, the best other solver, {percent(shares[rival])}"
+                f"within {1e6 * seconds:,.0f} µs {full_name(first)} solves {share} of the poses "
+                f"and {full_name(rival)}, the best other solver, {other}"
             )
     return "; ".join(sentences)
 

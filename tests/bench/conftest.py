@@ -327,8 +327,13 @@ def records():
         *(swung(s, c) for c in ("undamped", "damped") for s in ("RK4", "discrete")),
         *(
             raced("Plumbob LM, first phase", kind, task)
-            for kind in ("one start", "restarts")
+            for kind in ("one start", "portfolio", "restarts")
             for task in ("reachable", "unreachable")
+        ),
+        *(
+            raced("Plumbob LM, first phase", kind, robot=robot)
+            for kind in ("one start", "portfolio", "restarts")
+            for robot in ("ur10", "z1")
         ),
         lacking("pink", "one start", "pink is not installed"),
         entrant("ik"),

@@ -81,8 +81,8 @@ def test_the_share_within_a_time_counts_the_timed_poses_that_are_solved_in_it(ru
     records = [run(OURS, N, seconds=times), run("pink", 150, seconds=6e-5), run("slow", N, 1.0)]
     assert sentence(records, "Solved within a time, yours, one start") == (
         f"On the arm from one start, within 50 µs {WRITTEN} solves 50 % of the poses and pink, "
-        f"the best other solver, 0 %; within 1 ms {WRITTEN} solves 100 % of the poses and pink, "
-        "the best other solver, 75 %."
+        f"the best other solver, 0 %; within 1,000 µs {WRITTEN} solves 100 % of the poses and "
+        "pink, the best other solver, 75 %."
     )
 
 

@@ -15,7 +15,7 @@ from plumbob.bench.peers.ik import overhead, protocol
 from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.protocol import OwnTime
-from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, RESTARTS
+from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, PORTFOLIO, RESTARTS
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
 from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, enter, is_installed, robot
@@ -193,7 +193,7 @@ def test_a_robot_of_other_lengths_is_none_of_the_makers_models():
 def test_every_entry_has_a_name_of_its_own_within_its_kind():
     names = [(entry.kind, peer.label_of(entry)) for peer in PEERS for entry in peer.entries]
     assert len(set(names)) == len(names)
-    assert {kind for kind, _ in names} == {ONE_START, RESTARTS}
+    assert {kind for kind, _ in names} == {ONE_START, PORTFOLIO, RESTARTS}
 
 
 def test_only_the_calls_of_a_solver_are_timed_and_the_rest_of_a_loop_is_overhead(monkeypatch):

@@ -12,6 +12,7 @@ from ...figures.sketch import Sketch
 from ...figures.style import COLOURS, plain_label
 from ...harness import metrics
 from ...harness.metrics import Floats
+from ...peers import registry
 from ...problems.evaluate import AGREEMENT
 from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.captions import Captions
@@ -34,6 +35,10 @@ CAPTIONS = Captions(
     limit_tolerance=words(LIMIT_TOLERANCE),
     agreement=words(AGREEMENT),
     repeats=str(REPEATS),
+    portfolio=words(registry.PORTFOLIO_ITERATIONS),
+    restarts=words(registry.RESTART_ITERATIONS),
+    attempts=words(registry.SHORT_ATTEMPTS[0]),
+    short=words(registry.SHORT_ATTEMPTS[1]),
 )
 # The quantities of a map; so many times the shortest time is drawn as the palest.
 SOLVED, TIME, SLOWEST = "poses solved", "time", 1000.0
