@@ -16,11 +16,11 @@ from ..peers.ik.overhead import overhead
 from ..peers.ik.protocol import SolverOutput, attempt
 from ..peers.ik.restarts import digest_of, restarted
 from ..peers.protocol import NoAnswerError, OwnTime, describe, remark_of
+from ..peers.stopwatch import time_call
 from ..problems.robots import UnableError
 from .isolation import JobOutcome, WorkerProcess, raised
 from .machine import pace
 from .progress import TROUBLE, Progress
-from .stopwatch import time_call
 from .worker import Finished, Lap, Message, Ready, Solved
 
 # Times of slow solves are sent whenever they add up to this [s], so that the worker is not silent.

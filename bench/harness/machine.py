@@ -15,7 +15,7 @@ import psutil
 
 from ..peers.registry import version
 from ..peers.sources import git_commit
-from .stopwatch import time_call
+from ..peers.stopwatch import time_call
 
 PACKAGES = (
     *("plumbob", "numpy", "scipy", "numba", "cholespy", "pin", "mujoco", "example-robot-data"),

@@ -11,10 +11,10 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import SystemArrays
 
 from ...harness.job import announced, solved_in, unfit
-from ...harness.stopwatch import time_call
 from ...harness.worker import Finished, Message, Ready, Solved
 from ...peers.cloth.protocol import Mover
 from ...peers.protocol import OwnTime, remark_of
+from ...peers.stopwatch import time_call
 from ...problems.falling_cloth import FRAME
 
 # Each solver moves a small cloth once before the timing, so that everything is compiled, in a frame

@@ -25,9 +25,9 @@ from plumbob.reference.sparse.linear_solver import factorize
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
-from ...harness.stopwatch import time_call
 from ...harness.values import read
 from ...peers import registry
+from ...peers.stopwatch import time_call
 from .values import FactorCosts
 
 H, STIFFNESS, ITERATIONS = 1 / 60, 1e4, 10

@@ -10,7 +10,7 @@ from plumbob.reference import Outcome, Target, certify_ik, rotation, solve_ik
 from plumbob.reference.formats import urdf
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.stopwatch import processor_time_of
+from ...peers.stopwatch import processor_time_of
 from ...problems.chains import unit
 from ...problems.evaluate import Targets, evaluator_of
 from ...problems.robot_targets import STRATA, farthest, robot_targets

@@ -26,10 +26,10 @@ import numpy as np
 from ...harness.isolation import WorkerProcess
 from ...harness.job import seed_shared_generators
 from ...harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
-from ...harness.stopwatch import processor_time_of
 from ...peers.ik.protocol import attempt
 from ...peers.ik.restarts import digest_of, restarted
 from ...peers.registry import PEERS, Peer
+from ...peers.stopwatch import processor_time_of
 from ...problems.evaluate import Targets, arbiter_of, evaluator_of
 from ...problems.robot_targets import STRATA, robot_targets
 from ...problems.robots import TUNING

@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
+from ...peers.stopwatch import Patience
 from ..block import Block, Scale
 from ..machine import stamp
 from ..measure import block_key, failure, record_of
 from ..progress import Progress, announce
 from ..record import Record, decode
-from ..stopwatch import Patience
 from . import DASK, Executor, NotMeasured, Step
 from .work import perform, place, unlike
 
