@@ -24,6 +24,7 @@ from plumbob.bench.experiments.timing.measurement import ROUNDS, SWEEPS, cases
 from plumbob.bench.harness import run
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.peers import stopwatch
 from plumbob.crosscheck.engines import MujocoMassSpring
 from plumbob.reference import forward_kinematics, set_num_threads
 
@@ -115,6 +116,38 @@ def test_a_group_is_timed_once_in_a_run_and_again_in_the_next():
 def test_rounds_are_as_long_and_as_many_as_the_time_allows(single, expected):
     timer = SimpleNamespace(timeit=lambda n: n * single, repeat=lambda n, loops: [loops * single])
     assert measurement.shape(timer, 0.2) == expected
+
+
+def test_reading_the_clock_takes_less_than_a_hundredth_of_a_round():
+    """The processor's clock takes ten times as long as this call."""
+    seconds = lambda n: 2e-6 + 2e-7 * n  # noqa: E731
+    timer = SimpleNamespace(timeit=seconds, repeat=lambda n, loops: [seconds(loops)])
+    loops, _ = measurement.shape(timer, 0.2)
+    assert 0.01 * loops * 2e-7 > 2e-6
+
+
+def test_work_on_one_core_is_timed_by_the_processors_clock(monkeypatch):
+    """Other programs on the core cost a case nothing; work on all cores has the wall clock."""
+    clocks = iter(range(10**9))
+    tick = {"process_time": lambda: 1e-3 * next(clocks), "perf_counter": lambda: next(clocks)}
+    for name, clock in tick.items():
+        monkeypatch.setattr(measurement, name, clock)
+    for cores, longest in ((1, 2e-3), (None, 2.0)):
+        case = TimedCase(WORK, "a", lambda: lambda: None, cores=cores)
+        assert longest / 10 < max(next(measurement._rounds(case, 1e-9))) < longest
+
+
+@pytest.mark.parametrize(
+    ("wall", "processor", "expected"),
+    [(4.0, 1.0, 1.0), (1.0, 4.0, 1.0), (1e-4, 2e-6, 1e-4)],
+    ids=["another program works meanwhile", "several threads", "too short for the clock"],
+)
+def test_a_solver_is_timed_while_it_computes(monkeypatch, wall, processor, expected):
+    now = dict.fromkeys(("perf_counter", "process_time"), 0.0)
+    clocks = {name: lambda name=name: now[name] for name in now}
+    monkeypatch.setattr(stopwatch, "time", SimpleNamespace(**clocks))
+    call = lambda: now.update(perf_counter=wall, process_time=processor)  # noqa: E731
+    assert stopwatch.compute_time_of(call) == (None, expected)
 
 
 def test_a_copy_moves_as_many_bytes_as_it_says(monkeypatch):

@@ -14,7 +14,7 @@ from ...harness.job import announced, solved_in, unfit
 from ...harness.worker import Finished, Message, Ready, Solved
 from ...peers.cloth.protocol import Mover
 from ...peers.protocol import OwnTime, remark_of
-from ...peers.stopwatch import time_call
+from ...peers.stopwatch import compute_time_of, time_call
 from ...problems.falling_cloth import FRAME
 
 # Each solver moves a small cloth once before the timing, so that everything is compiled, in a frame
@@ -79,7 +79,7 @@ def advanced(mover: Mover, nowhere: FloatArray) -> Solved:
     """Advance by a frame, of which nothing else is timed; `nowhere` if the solver overflows."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            own_time, seconds = time_call(mover.advance)
+            own_time, seconds = compute_time_of(mover.advance)
     except FloatingPointError:
         return solved_in(OwnTime(np.nan), nowhere, UNKNOWN)
     return solved_in(own_time or OwnTime(seconds), mover.positions(), UNKNOWN)

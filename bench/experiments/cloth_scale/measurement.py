@@ -27,7 +27,7 @@ from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
 from ...harness.values import read
 from ...peers import registry
-from ...peers.stopwatch import time_call
+from ...peers.stopwatch import compute_time_of
 from .values import FactorCosts
 
 H, STIFFNESS, ITERATIONS = 1 / 60, 1e4, 10
@@ -92,7 +92,7 @@ def measure(size: int, library: str) -> dict[str, Any]:
         return {"before": before, **steps(system, state, rounds, say)}
     matrix = global_matrix(system, H)
     say("factor")
-    factor, seconds = time_call(lambda: factorize(matrix, library))
+    factor, seconds = compute_time_of(lambda: factorize(matrix, library))
     sides = np.array(state.positions)
     times = in_turn({"solve": lambda: factor.solve(sides)}, rounds, say)
     return {"factor": seconds, **times, "memory": memory(), "before": before}
@@ -103,9 +103,9 @@ def steps(
 ) -> dict[str, Any]:
     """Return the times of iterations and of their parts, and the final residual."""
     say("matrix")
-    matrix, assembly = time_call(lambda: global_matrix(system, H))
+    matrix, assembly = compute_time_of(lambda: global_matrix(system, H))
     say("factor")
-    factor, seconds = time_call(lambda: prefactored(matrix))
+    factor, seconds = compute_time_of(lambda: prefactored(matrix))
     assert isinstance(factor, CholeskyFactor)
     integrator = ImplicitEuler(
         system, h=H, solver="local_global", tolerance=0.0, max_iterations=ITERATIONS
@@ -122,7 +122,7 @@ def steps(
     say("second factor")
     peak, result = memory(), integrator.step(state)
     double = global_matrix(system, 2 * H)
-    _, refactor = time_call(lambda: factor.refactorize(double))
+    _, refactor = compute_time_of(lambda: factor.refactorize(double))
     sizes = {"entries": factor.entries, "matrix_entries": matrix.nnz, "memory": peak}
     errors = {"residual": result.residual, "history": result.history.tolist()}
     factors = {"assembly": assembly, "factor": seconds, "refactor": refactor}
@@ -137,7 +137,7 @@ def in_turn(
     for i in range(rounds + 1):
         say(f"round {i} of {rounds}")
         for name, call in work.items():
-            times[name].append(time_call(call)[1])
+            times[name].append(compute_time_of(call)[1])
     return {name: seconds[1:] for name, seconds in times.items()}
 
 

@@ -5,6 +5,7 @@ import math
 import secrets
 from collections.abc import Iterator
 from functools import partial
+from time import perf_counter, process_time
 from timeit import Timer
 from typing import Any
 
@@ -110,7 +111,7 @@ def _rounds(case: TimedCase, seconds: float) -> Iterator[list[float]]:
     """
     call = case.prepare()
     call()  # may compile
-    timer = Timer(call)
+    timer = Timer(call, timer=process_time if case.cores == 1 else perf_counter)
     loops, count = shape(timer, seconds)
     first = [t / loops for t in timer.repeat(count, loops)]
     yield first
@@ -121,10 +122,14 @@ def _rounds(case: TimedCase, seconds: float) -> Iterator[list[float]]:
 
 
 def shape(timer: Timer, seconds: float) -> tuple[int, int]:
-    """Return the calls of a round, and the rounds of a sweep, that take so long in total."""
+    """Return the calls of a round, and the rounds of a sweep, that take so long in total.
+
+    The processor's clock takes longer than a short call: many are timed at once, not one by one.
+    """
     shortest = seconds / ROUNDS
-    single = timer.timeit(1)
-    if single < shortest:
-        single = min(timer.repeat(5, 1))
+    loops, single = 1, timer.timeit(1)
+    for _ in range(2):
+        loops = max(1, math.ceil(shortest / single))
+        single = min(timer.repeat(5, loops)) / loops if single < shortest else single
     loops = max(1, math.ceil(shortest / single))
     return loops, max(1, int(seconds / SWEEPS / (loops * single)))

@@ -20,6 +20,7 @@ from plumbob.reference.arguments import FloatArray
 from ...problems.evaluate import PoseRequest, Tolerance
 from ...problems.robots import BenchRobot, UnableError
 from ..protocol import OwnTime, describe
+from ..stopwatch import compute_time_of
 
 __all__ = ["BenchRobot", "FloatArray", "PoseRequest", "Tolerance", "UnableError"]
 
@@ -48,10 +49,8 @@ class Solve:
 
     def __call__(self) -> SolverOutput:
         """Return the answer, and the time of `call`."""
-        begin = perf_counter()
-        answer = self.call()
-        time = OwnTime(perf_counter() - begin)
-        return SolverOutput(*self.read(answer), time)
+        answer, seconds = compute_time_of(self.call)
+        return SolverOutput(*self.read(answer), OwnTime(seconds))
 
 
 Ask = Callable[[PoseRequest], Callable[[], SolverOutput]]
