@@ -56,6 +56,7 @@ class Solver:
     engine: str = PLUMBOB  # its engine; "" if that is not known
     style: Style = OTHER  # how it is drawn where each solver has a style of its own
     loop: bool = False  # whether it is a Python loop of ours on another engine's kinematics
+    ranked: bool = True  # whether its times are compared with those of others
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def style_of(row: Mapping[str, str]) -> Style:
 _IK, _STEP = _rows("ik", Solver), _rows("steps", StepSolver)
 LOOPS, FACTORS = (tuple(_rows(name, Solver).values()) for name in ("loops", "factors"))
 _BENCHMARKED = _rows("benchmarked", Solver)
-COMPILED, PREPARED, PLAIN, OUR_KINEMATICS, *_, LIMIT = _BENCHMARKED.values()
+COMPILED, PREPARED, PLAIN, OUR_KINEMATICS, *_, PRESET, TIGHT, LIMIT = _BENCHMARKED.values()
 LIMIT_NAME = LIMIT.name
 SUPERNODAL = FACTORS[0]
 

@@ -30,7 +30,7 @@ from ..experiments.robots.readings import (
     times_of_both,
     together,
 )
-from ..experiments.timing.tables import median_time, ranked_by_time
+from ..experiments.timing.tables import is_ranked, median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import registry
@@ -49,7 +49,10 @@ _FROM = {
 # Times within which the shares of solved poses are compared [s].
 _BUDGETS = (5e-5, 1e-3)
 # What is timed of other engines' own code; loops of ours on engines are no rivals.
-_SUBJECTS = {"kinematics": "forward kinematics", "cloth": "a step of a cloth"}
+_SUBJECTS = {
+    "kinematics": "forward kinematics",
+    "cloth": "a step of a cloth",
+}
 # The goals of cloths: what is solved, to which error, and the table that ranks it.
 _CLOTH_GOALS = {
     ONE_STEP: (f"a step solved to {SOLVED}", TARGETS[SOLVED], "cloth_peers_step"),
@@ -57,7 +60,6 @@ _CLOTH_GOALS = {
 }
 # The groups of robots: those that no setting has seen come first.
 _GROUPS = ["held out", "tuning", CHARACTER, "yours"]
-_NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
 # What the scales of a run mean.
 _SCALES = {"quick": "Quick run: few targets and rounds", "full": "Full run: all targets and rounds"}
 
@@ -322,7 +324,7 @@ def _races(results: Results) -> Iterator[Race]:
                 best[engine] = min(point.seconds, best.get(engine, np.inf))
         yield Race("cloth", goal, "cloth", table, cloths, set())
     for subject, task in _SUBJECTS.items():
-        records = [r for r in results.all("timing", subject=subject) if r.solver not in _NOT_RIVALS]
+        records = list(filter(is_ranked, results.all("timing", subject=subject)))
         cases = {g[0].title: g for g in by_problem(records).values() if len(g) > 1}
         times = {case: _times_of_engines(members) for case, members in cases.items()}
         rankings = {case: ranked_by_time(cases[case]) for case in cases}

@@ -24,7 +24,7 @@ from plumbob.bench.experiments.cloth_peers import SOLVED
 from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.report.sections import SECTIONS, tables
 from plumbob.bench.tables.results import Results, label
-from plumbob.bench.tables.table import words
+from plumbob.bench.tables.table import best_cells, words
 from plumbob.bench.tables.tex_text import escaped
 from plumbob.bench.tables.writers import comma_separated, markdown
 
@@ -243,6 +243,21 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
     again = swept(make, "MuJoCo", 1e-6 * rng.permutation(drift))
     (point,) = timing.kinematics(Results([ours, again])).summary.points
     assert "in a tie with" in point
+
+
+def test_rows_that_are_only_shown_are_never_first_and_remarks_have_the_numbers_on_record(make):
+    """The share of setting qpos follows from two times; an error is the record's own."""
+    given = {"MuJoCo": 4e-6, "MuJoCo, qpos set before": 1e-6, "Plumbob, compiled": 3e-6}
+    records = [swept(make, solver, np.full(9, seconds)) for solver, seconds in given.items()]
+    table = timing.kinematics(Results(records))
+    remarks = dict(zip(column(table, "implementation"), column(table, "remark"), strict=True))
+    assert remarks["MuJoCo"] == "qpos[:] = q takes 75 %"
+    assert remarks["MuJoCo, qpos set before"] == remarks["Plumbob, compiled"] == ""
+    assert {table.rows[i][1] for i, _ in best_cells(table)} == {"Plumbob, compiled"}
+    assert table.summary.points[0].endswith("first: Plumbob")
+    inexact = replace(records[0], arrays={**records[0].arrays, "error": 4.5e-11})
+    (remark,) = column(timing.kinematics(Results([inexact])), "remark")
+    assert remark == "error 4.5e-11"
 
 
 @pytest.mark.parametrize(("noise", "mark"), [(0.049, ""), (0.12, "noisy")])

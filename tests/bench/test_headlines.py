@@ -280,6 +280,24 @@ def test_without_rivals_there_is_no_headline(make):
     assert headlines.overview(Results([])) == (None, [], "", [], [], [])
 
 
+def test_an_engine_races_at_its_default_tolerance(make):
+    rounds, step = np.linspace(1e-6, 1.1e-6, 27).reshape(9, 3), ("cloth", "x1", "linearised once")
+    factors = {"Plumbob, compiled": 2.0, "MuJoCo": 1.0, "MuJoCo, tolerance 1e-15": 3.0}
+    made = {solver: make.timed(solver, 1.0, *step) for solver in factors}
+    records = [
+        replace(made[solver], arrays=made[solver].arrays | {"seconds": factor * rounds})
+        for solver, factor in factors.items()
+    ]
+    assert sentence(records, "Fastest in a step of a cloth") == (
+        "In a step of a cloth, MuJoCo is the fastest on 1 of 1 case, 2.0 times faster than the "
+        "best other engine, Plumbob (ours)."
+    )
+    first = replace(records[2], arrays=records[2].arrays | {"seconds": 0.1 * rounds})
+    assert sentence([*records[:2], first], "Fastest in a step of a cloth") == sentence(
+        records, "Fastest in a step of a cloth"
+    )
+
+
 def test_a_motion_is_a_race_of_its_own(make):
     near = {"error": [np.inf, 5e-3, 1e-3]}
     records = [

@@ -15,6 +15,7 @@ from ...peers import registry
 
 COMPILED, PREPARED = registry.COMPILED.name, registry.PREPARED.name
 PLAIN, LIMIT = registry.PLAIN.name, registry.LIMIT.name
+PRESET, TIGHT = registry.PRESET.name, registry.TIGHT.name
 
 
 class TimedWork(NamedTuple):
@@ -43,6 +44,7 @@ class TimedCase:
     moved: int = 0  # bytes that one call reads and writes, for a yardstick of memory
     backend: str = "numba"  # of the reference
     cores: int | None = 1  # None for all
+    error: Callable[[], float] | None = None  # of the result, where it depends on a tolerance
 
     @property
     def name(self) -> str:

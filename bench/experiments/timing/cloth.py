@@ -12,8 +12,9 @@ from plumbob.reference import ImplicitEuler, State, symplectic_euler
 from plumbob.reference.implicit_euler.factor_cache import global_factor
 from plumbob.reference.sparse import CholeskyFactor
 
+from ...harness import metrics
 from ..cloth.measurement import MIDDLE, ClothSwing, cloth_swing, converged_motion, motion
-from .case import COMPILED, PLAIN, TimedCase, TimedWork, copying
+from .case import COMPILED, PLAIN, TIGHT, TimedCase, TimedWork, copying
 
 FACTORS = (1, 100)
 SUBSTEPS = ITERATIONS = 10
@@ -21,7 +22,7 @@ SUBSTEPS = ITERATIONS = 10
 LARGE = 50
 # Newton's motion of more particles than this would take longer than all the timing.
 MANY_PARTICLES = 1000
-MUJOCO = "MuJoCo"
+MUJOCO, DEFAULT = "MuJoCo", mujoco.MjOption()
 
 # Sets a problem up and returns the call to be timed.
 Starter = Callable[[ClothSwing], Callable[[], Any]]
@@ -31,12 +32,13 @@ def cases() -> Iterator[TimedCase]:
     """Yield a frame of 1/60 s by four methods, at two stiffnesses, and of a larger cloth."""
     for factor in FACTORS:
         problem = cloth_swing(factor)
-        for title, (reference, engine) in WORKS.items():
+        for title, (reference, engines) in WORKS.items():
             work = _work(f"x{factor:g}", f"stiffness × {factor:g}", title)
             yield TimedCase(work, COMPILED, partial(reference, problem))
             yield TimedCase(work, PLAIN, partial(reference, problem), backend="python")
-            if engine:
-                yield TimedCase(work, MUJOCO, partial(engine, problem))
+            for name, engine in engines.items():
+                error = partial(step_error, engine, problem) if len(engines) > 1 else None
+                yield TimedCase(work, name, partial(engine, problem), error=error)
         yield solving(_work(f"x{factor:g}", f"stiffness × {factor:g}", LOCAL_GLOBAL), problem)
     large, group = cloth_swing(1, LARGE), f"{LARGE} × {LARGE} particles"
     work = _work(group, group, LOCAL_GLOBAL)
@@ -67,10 +69,18 @@ def substeps(problem: ClothSwing) -> Callable[[], Any]:
     return run
 
 
-def mujoco_steps(problem: ClothSwing, integrator: str, count: int) -> Callable[[], Any]:
-    """Return a frame of MuJoCo's steps, from and to its own state, without conversions."""
+def mujoco_steps(
+    problem: ClothSwing, integrator: str, count: int, is_tight: bool = False
+) -> Callable[[], MujocoMassSpring]:
+    """Return a frame of MuJoCo's steps, from and to its own state, without conversions.
+
+    Tolerance and iterations are MuJoCo's defaults, or those of the cross-check.
+    """
     engine = MujocoMassSpring(problem.system, h=problem.h / count, integrator=integrator)
-    engine.model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    option = engine.model.opt
+    option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    if not is_tight:
+        option.tolerance, option.iterations = DEFAULT.tolerance, DEFAULT.iterations
     engine.write(moving(problem))
     kind = mujoco.mjtState.mjSTATE_INTEGRATION
     start = np.empty(mujoco.mj_stateSize(engine.model, kind))
@@ -82,6 +92,13 @@ def mujoco_steps(problem: ClothSwing, integrator: str, count: int) -> Callable[[
         return engine
 
     return run
+
+
+def step_error(engine: Callable[..., Any], problem: ClothSwing) -> float:
+    """Return the error of MuJoCo's linearised step relative to its length, by a direct solve."""
+    exact = stepping(problem, solver="gauss_newton")().state.positions
+    start = moving(problem).positions
+    return metrics.relative_error(engine(problem)().read().positions, exact, start)
 
 
 def moving(problem: ClothSwing) -> State:
@@ -108,15 +125,16 @@ LOCAL_GLOBAL = f"implicit Euler, {ITERATIONS} local-global iterations"
 local_global: Starter = partial(
     stepping, solver="local_global", tolerance=0.0, max_iterations=ITERATIONS
 )
-WORKS: dict[str, tuple[Starter, Starter | None]] = {
-    LOCAL_GLOBAL: (local_global, None),
-    "implicit Euler, Newton to 1e-10": (stepping, None),
+discrete = partial(mujoco_steps, integrator="discrete", count=1)
+WORKS: dict[str, tuple[Starter, dict[str, Starter]]] = {
+    LOCAL_GLOBAL: (local_global, {}),
+    "implicit Euler, Newton to 1e-10": (stepping, {}),
     "implicit Euler, linearised once": (
         partial(stepping, solver="gauss_newton"),
-        partial(mujoco_steps, integrator="discrete", count=1),
+        {MUJOCO: discrete, TIGHT: partial(discrete, is_tight=True)},
     ),
     f"symplectic Euler, {SUBSTEPS} substeps": (
         substeps,
-        partial(mujoco_steps, integrator="Euler", count=SUBSTEPS),
+        {MUJOCO: partial(mujoco_steps, integrator="Euler", count=SUBSTEPS)},
     ),
 }

@@ -4,14 +4,15 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from plumbob.crosscheck.engines import SKELETON_ENGINES
-from plumbob.crosscheck.engines.skeleton_engine import coordinates
+from plumbob.crosscheck.engines.skeleton_engine import MujocoSkeleton, coordinates
 from plumbob.reference import Skeleton, forward_kinematics, prepare, rotation, scenes
 from plumbob.reference.kinematics import THREAD_JOINTS
 
-from .case import COMPILED, PLAIN, PREPARED, TimedCase, TimedWork, streaming
+from .case import COMPILED, PLAIN, PREPARED, PRESET, TimedCase, TimedWork, streaming
 
 # Bytes of each joint: its local rotation is read, its position and global rotation are written.
 READ, WRITE = 8 * 4, 8 * (3 + 4)
@@ -22,7 +23,7 @@ LIMBS = ((0, 5), (0, 5), (0, 5), (4, 7), (4, 7))
 
 
 def cases() -> Iterator[TimedCase]:
-    """Yield single poses by everyone, and our batches, each with a plain copy of its bytes."""
+    """Yield poses and batches, each with a plain copy of its bytes."""
     for name, (skeleton, batch) in models().items():
         size = skeleton.joint_count * np.array([READ, WRITE])
         pose = _work(name, "one pose a call")
@@ -30,7 +31,8 @@ def cases() -> Iterator[TimedCase]:
         yield TimedCase(pose, PREPARED, partial(prepared_poses, skeleton))
         yield TimedCase(pose, PLAIN, partial(compiled_poses, skeleton), backend="python")
         for engine in SKELETON_ENGINES:
-            yield TimedCase(pose, engine, partial(engine_pose, engine, skeleton))
+            yield TimedCase(pose, engine, partial(engine_poses, engine, skeleton))
+        yield TimedCase(pose, PRESET, partial(preset_pose, skeleton))
         yield streaming(pose, *size)
         for count, cores, suffix, minimum in (
             (batch, 1, "", 0),
@@ -39,6 +41,9 @@ def cases() -> Iterator[TimedCase]:
             poses = _work(name, f"{count:,} poses a call{suffix}")
             prepare = partial(compiled_poses, skeleton, count)
             yield TimedCase(poses, COMPILED, prepare, count, cores=cores)
+            for engine in SKELETON_ENGINES if cores else ():
+                loop = partial(engine_poses, engine, skeleton, count)
+                yield TimedCase(poses, engine, loop, count)
             yield streaming(poses, *(count * size), operations=count, cores=cores, minimum=minimum)
 
 
@@ -73,10 +78,19 @@ def prepared_poses(skeleton: Skeleton) -> Callable[[], Any]:
     return partial(prepare(skeleton), _local_rotations(skeleton))
 
 
-def engine_pose(name: str, skeleton: Skeleton) -> Callable[[], Any]:
-    """Return an engine's forward kinematics of a random pose; the result stays in the engine."""
+def engine_poses(name: str, skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
+    """Return an engine's forward kinematics of random poses; the last stays in the engine."""
     engine = SKELETON_ENGINES[name](skeleton)
-    return partial(engine.update_kinematics, coordinates(engine, _local_rotations(skeleton)))
+    q = coordinates(engine, _local_rotations(skeleton, *batch))
+    call = engine.update_kinematics
+    return (lambda: [*map(call, q)]) if batch else partial(call, q)
+
+
+def preset_pose(skeleton: Skeleton) -> Callable[[], Any]:
+    """Return MuJoCo's forward kinematics of a random pose that is in its memory already."""
+    engine = MujocoSkeleton(skeleton)
+    engine.update_kinematics(coordinates(engine, _local_rotations(skeleton)))
+    return partial(mujoco.mj_kinematics, engine.model, engine.data)
 
 
 def _local_rotations(skeleton: Skeleton, *batch: int) -> np.ndarray:

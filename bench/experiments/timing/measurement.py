@@ -69,7 +69,8 @@ def measure_case(run: str, case: TimedCase, seconds: float) -> Measured:
     if trouble := results["troubles"][i]:
         raise RuntimeError(trouble)
     rounds = np.array(results["rounds"][i]) / case.operations
-    return Measured(RoundTimes(rounds, case.moved / case.operations), facts=results["facts"])
+    error = case.error() if case.error else None
+    return Measured(RoundTimes(rounds, case.moved / case.operations, error), facts=results["facts"])
 
 
 @functools.lru_cache(maxsize=1)  # the blocks of a group follow one another

@@ -1,7 +1,7 @@
 """Times of forward kinematics, solves and steps, compared with the engines and a plain copy."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -11,6 +11,7 @@ from ...figures.chart import MARKS, Panel, Series, declared_chart, series
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Layout, Row
@@ -25,9 +26,14 @@ from ...tables.results import (
     steadiness,
 )
 from ...tables.table import UNITS, Column, Summary, words
-from .case import COMPILED, LIMIT, PLAIN
+from .case import COMPILED, LIMIT, PRESET
 
 CAPTIONS = Captions(__file__)
+
+
+def is_ranked(record: Record) -> bool:
+    """Return whether an implementation is compared with others."""
+    return registry.find(record.solver).ranked
 
 
 def median_time(record: Record) -> float:
@@ -77,18 +83,14 @@ def _marks(solver: str, records: Sequence[Record], works: list[str], scale: floa
 def _rows(subject: str, results: Results) -> list[Row]:
     """Return a row for each time of a subject, without plain copies."""
     records = results.all("timing", subject=subject)
-    compiled, copies = (
-        {record.problem: record for record in records if record.solver == solver}
-        for solver in (COMPILED, LIMIT)
-    )
-    return [
-        _row(record, compiled.get(record.problem), copies.get(record.problem))
-        for record in records
-        if record.solver != LIMIT
-    ]
+    works = by_problem(records)
+    by_solver = {name: {r.solver: r for r in works[name]} for name in works}
+    return [_row(r, by_solver[r.problem]) for r in records if r.solver != LIMIT]
 
 
-def _row(record: Record, compiled: Record | None, copy: Record | None) -> Row:
+def _row(record: Record, by_solver: dict[str, Record]) -> Row:
+    """Return the row of a time, given all records of the work."""
+    compiled, copy = by_solver.get(COMPILED), by_solver.get(LIMIT)
     median, low, high, rounds, interval = metrics.timing(record.values.seconds)
     half = (interval.high - interval.low) / (2.0 * median)
     baseline = None if compiled in (None, record) else compiled
@@ -99,7 +101,7 @@ def _row(record: Record, compiled: Record | None, copy: Record | None) -> Row:
         "median": median,
         "95 % interval of the median, ±": None if math.isnan(half) else half,
         "relative to compiled": baseline and metrics.ratio(median, median_time(baseline)),
-        "remark": "noisy" if record.details.noise > PRECISION else "",
+        "remark": "; ".join(_remarks(record, by_solver)),
         "10th percentile": low,
         "90th percentile": high,
         "rounds": rounds,
@@ -113,6 +115,17 @@ def _row(record: Record, compiled: Record | None, copy: Record | None) -> Row:
         "relative to a plain copy": metrics.ratio(median, seconds),
         "bandwidth of the copy": float(copy.values.moved) / seconds / 1e9,
     }
+
+
+def _remarks(record: Record, by_solver: dict[str, Record]) -> Iterator[str]:
+    """Yield the error that a tolerance leaves, the share of setting qpos, and noise."""
+    if record.values.error is not None:
+        yield f"error {words(record.values.error)}"
+    if record.solver == registry.MUJOCO and (preset := by_solver.get(PRESET)):
+        share = 1.0 - median_time(preset) / median_time(record)
+        yield f"qpos[:] = q takes {100 * share:.0f} %"
+    if record.details.noise > PRECISION:
+        yield "noisy"
 
 
 def _columns(unit: str, rows: Sequence[Row]) -> list[Column]:
@@ -130,13 +143,13 @@ def _noise(rows: Sequence[Row]) -> float:
 
 
 def _summary(unit: str, rows: Sequence[Row]) -> Summary:
-    """Return the times of each work, a point for each group of works, without plain Python."""
+    """Return the times of each work, a point for each group of works, of what is ranked."""
     points = []
     for name, group in grouped(rows, lambda row: str(row["record"].details.group)).items():
         works = grouped(group, lambda row: str(row["record"].details.work)).items()
         sentences = [f"{work}: {_times(unit, members)}" for work, members in works]
         points.append(f"{name} – {'; '.join(sentences)}")
-    rivals = [row for row in rows if row["implementation"] != PLAIN]
+    rivals = [row for row in rows if is_ranked(row["record"])]
     by_work = grouped(rivals, lambda row: str(row["work"])).values()
     rankings = [ranked_by_time([row["record"] for row in members]) for members in by_work]
     firsts = [ranking.order[0] for ranking in rankings if ranking]
@@ -150,7 +163,7 @@ def _summary(unit: str, rows: Sequence[Row]) -> Summary:
 
 def _times(unit: str, rows: Sequence[Row]) -> str:
     """Return the times of some work, and the fastest implementation, with ties."""
-    rivals = [row for row in rows if row["implementation"] != PLAIN]
+    rivals = [row for row in rows if is_ranked(row["record"])]
     times = ", ".join(_time(row, unit) for row in rivals)
     if rivals and "copy" in rivals[0]:
         times += f" ({words(rivals[0]['relative to a plain copy'])} times a plain copy)"
@@ -173,6 +186,7 @@ def _layout(subject: str, unit: str) -> Layout:
         partial(_summary, unit),
         measured=lambda rows: {"steadiness": steadiness(_noise(rows))},
         columns=partial(_columns, unit),
+        ranked=lambda row: is_ranked(row["record"]),
         figures=(partial(timing_chart, subject, unit),),
     )
 

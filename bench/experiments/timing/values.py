@@ -6,10 +6,14 @@ from ...harness.values import Details, Floats2, Kind, Values
 
 
 class RoundTimes(Values, frozen=True):
-    """The seconds of an operation, (sweep, round), and the bytes that it moves as a yardstick."""
+    """The seconds of an operation, (sweep, round), and the bytes that it moves as a yardstick.
+
+    The error of an iterative solver is that of the answer, relative to the first guess.
+    """
 
     seconds: Floats2
     moved: float
+    error: float | None = None
 
 
 class WorkDetails(Details, frozen=True):
