@@ -51,6 +51,7 @@ _BUDGETS = (5e-5, 1e-3)
 # What is timed of other engines' own code; loops of ours on engines are no rivals.
 _SUBJECTS = {
     "kinematics": "forward kinematics",
+    "jacobians": "the Jacobian of an effector",
     "cloth": "a step of a cloth",
 }
 # The goals of cloths: what is solved, to which error, and the table that ranks it.

@@ -11,10 +11,11 @@ import pytest
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.timing import case as timing_case
-from plumbob.bench.experiments.timing import cloth, kinematics, measurement
+from plumbob.bench.experiments.timing import cloth, kinematics, measurement, robots
 from plumbob.bench.experiments.timing.case import (
     COMPILED,
     LIMIT,
+    PREPARED,
     TIGHT,
     TimedCase,
     TimedWork,
@@ -27,9 +28,11 @@ from plumbob.bench.harness import run
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import registry, stopwatch
+from plumbob.bench.problems.robots import is_installed, robot
 from plumbob.crosscheck.engines import SKELETON_ENGINES, MujocoMassSpring
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import ImplicitEuler, forward_kinematics, set_num_threads
+from plumbob.reference.formats import mjcf, urdf
 
 WORK = TimedWork("p", "s", "g", "t")
 
@@ -267,3 +270,39 @@ def test_a_loop_over_an_engine_ends_in_the_last_pose_of_our_batch():
         engine = inspect.getclosurevars(loop).nonlocals["call"].__self__
         assert len(loop()) == 3
         np.testing.assert_allclose(engine.pose().positions, batch[-1], atol=1e-13)
+
+
+@pytest.mark.parametrize("name", robots.ROBOTS)
+def test_kinematics_and_jacobians_of_a_robot_are_equal_in_all_engines(name):
+    if not is_installed(name):
+        pytest.skip("the package of robots is not installed")
+    timed = robot(name)
+    model = (urdf.parse if timed.is_chain else mjcf.parse)(timed.text).articulation
+    tip, link = model.index(timed.effectors[0]), timed.effectors[0]
+    pose = robots.timed_call("kinematics", COMPILED, name, 1)()
+    prepared = robots.timed_call("kinematics", PREPARED, name, 1)()
+    data = robots.timed_call("kinematics", "MuJoCo", name, 1)()
+    call = robots.timed_call("kinematics", "Pinocchio", name, 1)
+    call()
+    engine_model, engine_data = call.args[:2]
+    positions = [
+        prepared.positions[tip],
+        data.body(link).xpos,
+        engine_data.oMf[engine_model.getFrameId(link)].translation,
+    ]
+    np.testing.assert_allclose(positions, [pose.positions[tip]] * 3, atol=1e-13)
+    batch = robots.timed_call("jacobians", COMPILED, name, 3)()
+    for engine in ("Pinocchio", "MuJoCo"):
+        *_, last = robots.timed_call("jacobians", engine, name, 3)()
+        np.testing.assert_allclose(last, batch[-1], atol=1e-13)
+        single = robots.timed_call("jacobians", engine, name, 1)()
+        np.testing.assert_allclose(single, batch[0], atol=1e-13)
+
+
+def test_robots_are_timed_by_us_and_by_both_engines_a_pose_and_a_batch():
+    solvers = {case.work.problem: set() for case in robots.cases()}
+    for case in robots.cases():
+        solvers[case.work.problem].add(case.solver)
+        assert case.operations == (1 if "one pose" in case.work.title else robots.POSES)
+    assert all({COMPILED, "Pinocchio", "MuJoCo"} <= names for names in solvers.values())
+    assert {problem.partition("/")[0] for problem in solvers} == {"kinematics", "jacobians"}

@@ -19,7 +19,7 @@ from ...harness.isolation import in_a_fresh_process
 from ...harness.machine import pace
 from ...harness.progress import announce
 from ...peers.protocol import describe
-from . import cloth, ik, kinematics
+from . import cloth, ik, kinematics, robots
 from .case import TimedCase
 from .values import RoundTimes
 
@@ -38,7 +38,7 @@ QUICK = 1e-3
 @functools.cache
 def cases() -> tuple[TimedCase, ...]:
     """Return the cases of all subjects."""
-    return tuple(case for subject in (kinematics, ik, cloth) for case in subject.cases())
+    return tuple(case for subject in (kinematics, robots, ik, cloth) for case in subject.cases())
 
 
 def compared(subject: str, group: str) -> list[TimedCase]:

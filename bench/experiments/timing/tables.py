@@ -191,8 +191,9 @@ def _layout(subject: str, unit: str) -> Layout:
     )
 
 
-kinematics, inverse_kinematics, cloth = LAYOUTS = (
+kinematics, jacobians, inverse_kinematics, cloth = LAYOUTS = (
     _layout("kinematics", "ns"),
+    _layout("jacobians", "ns"),
     _layout("ik", "µs"),
     _layout("cloth", "µs"),
 )
