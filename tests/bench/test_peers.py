@@ -20,6 +20,7 @@ from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, PO
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
 from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, enter, is_installed, robot
+from plumbob.reference.inverse_kinematics.prepared import PreparedIK
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several effectors.
@@ -179,6 +180,28 @@ def test_times_that_a_solver_measures_are_added_over_its_restarts(each, together
     answer = restarted(measuring(each), arm, 5)(PoseRequest(*nowhere))()
     assert answer.claim
     assert answer.time == (together and OwnTime(together))
+
+
+@pytest.mark.parametrize("restarts", [0, 3])
+def test_our_prepared_call_is_ranked_and_answers_as_the_plain_call_does(restarts):
+    """Peers that are set up beforehand are compared with a call of ours that is as well."""
+    arm = robot("iiwa14")
+    targets, module = robot_targets("iiwa14", 2), importlib.import_module(PLUMBOB_LM.module)
+    prepared, plain = (
+        module.prepare(arm, TOLERANCE, restarts=restarts, iterations=20, **settings)
+        for settings in ({}, {"prepared": False})
+    )
+    solves = [prepared(targets.request(i)) for i in range(targets.shape[0])]
+    for i, solve in enumerate(solves):
+        answer, expected = solve(), plain(targets.request(i))()
+        np.testing.assert_array_equal(answer.q, expected.q)
+        assert answer.claim == expected.claim
+        assert isinstance(solve.call.func, PreparedIK)
+    for kind in (ONE_START, RESTARTS):
+        assert PLUMBOB_LM.entry(kind).settings.get("prepared", True)
+        plain_calls = [e for e in PLUMBOB_LM.entries if e.kind == kind and not
+                       e.settings.get("prepared", True)]  # fmt: skip
+        assert [entry.note.endswith("plain call") for entry in plain_calls] == [True]
 
 
 def test_a_robot_of_other_lengths_is_none_of_the_makers_models():

@@ -12,6 +12,7 @@ from plumbob.reference import (
     Outcome,
     Target,
     all_solutions,
+    prepare_ik,
     rotation,
     solve_ik,
     solve_tasks,
@@ -19,6 +20,7 @@ from plumbob.reference import (
 )
 from plumbob.reference.formats import mjcf, urdf
 from plumbob.reference.formats.robot import Robot
+from plumbob.reference.inverse_kinematics.prepared import PreparedIK
 from plumbob.reference.inverse_kinematics.solve_tasks import TaskSolution
 
 from ...problems.evaluate import evaluator_of
@@ -40,13 +42,17 @@ def prepare(
     restarts: int = 0,
     iterations: int = 200,
     phases: int | None = None,
+    prepared: bool = True,
 ) -> Ask:
-    """Return the solver, set up for a robot."""
+    """Return the solver, set up for a robot; `prepare_ik` takes a single effector."""
     read = urdf.parse if robot.is_chain else mjcf.parse
     articulation = read(robot.text).articulation
     settings: dict[str, Any] = {"solver": solver, "restarts": restarts, "phases": phases}
     settings |= {"max_iterations": iterations, "tolerance": tolerance.position}
     settings |= {"tolerance_rotation": tolerance.rotation}
+    if prepared and robot.is_chain:
+        effector = robot.effectors[0]
+        return _prepared(prepare_ik(articulation, effector=effector, oriented=True, **settings))
 
     def ask(request: PoseRequest) -> Solve:
         x, R, start = request
@@ -54,6 +60,17 @@ def prepare(
         targets = [*map(Target, x, quaternions, robot.effectors)]
 
         return Solve(partial(solve_ik, articulation, start, targets, **settings), _read)
+
+    return ask
+
+
+def _prepared(solve: PreparedIK) -> Ask:
+    def ask(request: PoseRequest) -> Solve:
+        target = np.append(request.positions[0], rotation.from_matrix(request.rotations[0]))
+        return Solve(partial(solve, request.start, target), read)
+
+    def read(outcome: Outcome) -> tuple[FloatArray, bool]:
+        return solve.coordinates.copy(), outcome == Outcome.CONVERGED
 
     return ask
 
