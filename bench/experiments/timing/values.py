@@ -6,14 +6,11 @@ from ...harness.values import Details, Floats2, Kind, Values
 
 
 class RoundTimes(Values, frozen=True):
-    """The seconds of an operation, (sweep, round), and the bytes that it moves as a yardstick.
-
-    The error of an iterative solver is that of the answer, relative to the first guess.
-    """
+    """The seconds of an operation, (sweep, round), and the bytes that it moves as a yardstick."""
 
     seconds: Floats2
     moved: float
-    error: float | None = None
+    error: float | None = None  # that a tolerance leaves, relative to the length of the step
 
 
 class WorkDetails(Details, frozen=True):

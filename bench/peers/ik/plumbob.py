@@ -20,7 +20,6 @@ from plumbob.reference import (
 )
 from plumbob.reference.formats import mjcf, urdf
 from plumbob.reference.formats.robot import Robot
-from plumbob.reference.inverse_kinematics.prepared import PreparedIK
 from plumbob.reference.inverse_kinematics.solve_tasks import TaskSolution
 
 from ...problems.evaluate import evaluator_of
@@ -51,8 +50,14 @@ def prepare(
     settings |= {"max_iterations": iterations, "tolerance": tolerance.position}
     settings |= {"tolerance_rotation": tolerance.rotation}
     if prepared and robot.is_chain:
-        effector = robot.effectors[0]
-        return _prepared(prepare_ik(articulation, effector=effector, oriented=True, **settings))
+        solve = prepare_ik(articulation, effector=robot.effectors[0], oriented=True, **settings)
+
+        def ask_prepared(request: PoseRequest) -> Solve:
+            target = np.append(request.positions[0], rotation.from_matrix(request.rotations[0]))
+            call = partial(solve, request.start, target)
+            return Solve(call, lambda o: (solve.coordinates.copy(), o == Outcome.CONVERGED))
+
+        return ask_prepared
 
     def ask(request: PoseRequest) -> Solve:
         x, R, start = request
@@ -60,17 +65,6 @@ def prepare(
         targets = [*map(Target, x, quaternions, robot.effectors)]
 
         return Solve(partial(solve_ik, articulation, start, targets, **settings), _read)
-
-    return ask
-
-
-def _prepared(solve: PreparedIK) -> Ask:
-    def ask(request: PoseRequest) -> Solve:
-        target = np.append(request.positions[0], rotation.from_matrix(request.rotations[0]))
-        return Solve(partial(solve, request.start, target), read)
-
-    def read(outcome: Outcome) -> tuple[FloatArray, bool]:
-        return solve.coordinates.copy(), outcome == Outcome.CONVERGED
 
     return ask
 
