@@ -83,7 +83,7 @@ def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
     text = "".join(page.texts)
     assert text.count("Questions without records: ") == 5
     assert "Which solvers of yours" not in text
-    assert "Forward kinematics. Inverse kinematics. A step of the cloth. What" in text
+    assert "Forward kinematics. Jacobians. Inverse kinematics. A step of the cloth. What" in text
     assert "plumbob bench timing cloth_scale measures them at full length." in text
 
 
