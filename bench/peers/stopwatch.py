@@ -16,13 +16,6 @@ def time_call(call: Callable[[], T]) -> tuple[T, float]:
     return result, time.perf_counter() - begin
 
 
-def processor_time_of(call: Callable[[], T]) -> tuple[T, float]:
-    """Return the result of a call, and how long processors worked in it [s], all threads."""
-    begin = time.process_time()
-    result = call()
-    return result, time.process_time() - begin
-
-
 def compute_time_of(call: Callable[[], T]) -> tuple[T, float]:
     """Return the result of a call in this process, and how long it computed [s].
 

@@ -10,7 +10,7 @@ from plumbob.reference import Outcome, Target, certify_ik, rotation, solve_ik
 from plumbob.reference.formats import urdf
 
 from ...harness.block import Block, Measured, Scale
-from ...peers.stopwatch import processor_time_of
+from ...peers.stopwatch import compute_time_of
 from ...problems.chains import unit
 from ...problems.evaluate import Targets, evaluator_of
 from ...problems.robot_targets import STRATA, farthest, robot_targets
@@ -52,11 +52,11 @@ def prove(name: str, kind: str, count: int, seed: int) -> Measured:
     proofs = []
     for q, x, Q in zip(solution.coordinates, positions, rotations, strict=True):
         proof = partial(certify_ik, model, q, Target(x, Q, effector), **tolerances)
-        proofs.append(processor_time_of(proof))
+        proofs.append(compute_time_of(proof))
     certificates, seconds = zip(*proofs, strict=True)
     anew = urdf.parse(arm.text).articulation
     far = Target(positions[0] + 100.0, rotations[0], effector)
-    _, setup = processor_time_of(partial(certify_ik, anew, anew.neutral(), far))
+    _, setup = compute_time_of(partial(certify_ik, anew, anew.neutral(), far))
     bounds = np.array([certificate.least_distance for certificate in certificates])
     levers = np.array([certificate.lever for certificate in certificates])
     return Measured(

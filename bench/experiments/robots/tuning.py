@@ -29,7 +29,6 @@ from ...harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_me
 from ...peers.ik.protocol import attempt
 from ...peers.ik.restarts import digest_of, restarted
 from ...peers.registry import PEERS, Peer
-from ...peers.stopwatch import processor_time_of
 from ...problems.evaluate import Targets, arbiter_of, evaluator_of
 from ...problems.robot_targets import STRATA, robot_targets
 from ...problems.robots import TUNING
@@ -130,12 +129,10 @@ def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, 
     for i in range(count):
         solve = ask(request := targets.request(i))
         seed_shared_generators(digest_of(*request))
-        output, duration = processor_time_of(functools.partial(attempt, solve))
+        output = attempt(solve)
         q[i] = math.nan if output.q is None else output.q
         errors += [output.error] if output.error else []
-        # A solver that works in yet another process has a clock of its own.
-        own_time = output.time if peer.environment else None
-        seconds.append(own_time.seconds if own_time else duration)
+        seconds.append(output.time.seconds if output.time else math.nan)
     return {"q": q, "seconds": seconds, "errors": errors}
 
 
