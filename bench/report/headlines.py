@@ -61,6 +61,8 @@ _CLOTH_GOALS = {
 }
 # The groups of robots: those that no setting has seen come first.
 _GROUPS = ["held out", "tuning", CHARACTER, "yours"]
+# Behind the name of an engine among absent solvers.
+_IN_CLOTH = " (cloth)"
 # What the scales of a run mean.
 _SCALES = {"quick": "Quick run: few targets and rounds", "full": "Full run: all targets and rounds"}
 
@@ -105,15 +107,27 @@ def verdict(results: Results) -> ClaimCount | None:
 def headlines(results: Results) -> list[Headline]:
     """Return the best solver and the best other one of each task, as far as measured.
 
-    Robots that no setting has seen come first.
+    Robots that no setting has seen come first. A sentence on other solvers counts the absent ones.
     """
+    missing = absent(results)
+    engines = sum(name.endswith(_IN_CLOTH) for name in missing)
+    counts = {"kinematics": len(missing) - engines, "cloth": engines}
     robots = [
         headline
         for group, start, fields in _robot_groups(results)
         if group != CHARACTER
         for headline in _robot_headlines(group, start, fields)
     ]
-    return [*robots, *filter(None, map(_race_headline, _races(results)))]
+    every = [*robots, *filter(None, map(_race_headline, _races(results)))]
+    return [_with_absent(headline, counts.get(headline.chapter, 0)) for headline in every]
+
+
+def _with_absent(headline: Headline, count: int) -> Headline:
+    """Add the number of absent solvers to a sentence on other solvers."""
+    if not count or " other " not in headline.sentence:
+        return headline
+    absence = f"{counted(count, 'other')} {'was' if count == 1 else 'were'} not installed"
+    return headline._replace(sentence=f"{headline.sentence.removesuffix('.')}; {absence}.")
 
 
 def scale(results: Results) -> str:
@@ -139,7 +153,7 @@ def absent(results: Results) -> list[str]:
     solvers = [peer for peer, names in peers.items() if names & requested and not names & present]
     packages = {record.solver for record in results.all("cloth", task=MISSING)}
     engines = [peer.engine for peer in registry.cloth_peers() if peer.package in packages]
-    return [*solvers, *(f"{engine} (cloth)" for engine in dict.fromkeys(engines))]
+    return [*solvers, *(f"{engine}{_IN_CLOTH}" for engine in dict.fromkeys(engines))]
 
 
 def not_asked(results: Results) -> list[str]:
@@ -151,7 +165,7 @@ def not_asked(results: Results) -> list[str]:
     measured = [point for task in _CLOTH_GOALS for point in points(results, task)]
     present = {registry.find(point.solver).engine for point in measured}
     engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers())
-    cloth = [f"{engine} (cloth)" for engine in engines if present and engine not in present]
+    cloth = [f"{engine}{_IN_CLOTH}" for engine in engines if present and engine not in present]
     missing = absent(results)
     return [*solvers, *(name for name in cloth if name not in missing)]
 

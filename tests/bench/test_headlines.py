@@ -360,6 +360,17 @@ def test_peers_without_a_measurement_are_absent_or_were_not_asked(make, run):
     assert headlines.absent(Results([])) == headlines.not_asked(Results([])) == []
 
 
+def test_a_sentence_on_other_solvers_counts_those_that_were_not_installed(make, run):
+    """Of this task: a cloth engine is no solver of robots."""
+    records = [run("Plumbob LM", 190), run("pink", 100), make.lacking("mink", "one start", "")]
+    missing = make.record("cloth", "peers/all", "mujoco", facts={"task": "missing"})
+    absence = "; 1 other was not installed."
+    assert sentence([*records, missing], MOST).endswith(f" is pink with 50 %{absence}")
+    records += [make.lacking(name, "one start", "") for name in ("DART", "ikpy")]
+    assert sentence(records, MOST).endswith("; 3 others were not installed.")
+    assert sentence(records[:2], MOST).endswith(" is pink with 50 %.")
+
+
 def test_the_scale_gives_the_number_of_targets_if_there_are_records(make, run):
     quick = make.record(FINISHED, "ik", "", notes={"scale": "quick"})
     scale = headlines.scale(Results([quick, run("a", 1)]))
