@@ -7,6 +7,8 @@ solver is a peer of the run that it was entered for. No engine is imported.
 
 import functools
 import importlib.metadata
+import json
+import shlex
 import sys
 import tomllib
 import zlib
@@ -14,6 +16,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import msgspec
 
@@ -125,6 +129,24 @@ def version(package: str) -> str:
     """Return the version of a package, "" if it is not installed."""
     distribution = _distribution("", package)
     return distribution.version if distribution else ""
+
+
+@functools.cache
+def peers_command() -> str:
+    """Return the command that installs the peers into the environment of this Plumbob."""
+    distributions = importlib.metadata.distributions(name=PLUMBOB.casefold())
+    texts = filter(None, (each.read_text("direct_url.json") for each in distributions))
+    origin = json.loads(next(texts, "{}"))
+    url, revision = origin.get("url", ""), origin.get("vcs_info", {})
+    folder = url2pathname(urlsplit(url).path) if "dir_info" in origin else ""
+    if folder and Path(sys.prefix) == Path(folder, ".venv"):
+        return "make peers"
+    if folder:
+        is_editable = origin["dir_info"].get("editable", False)
+        return f"pip install {'-e ' * is_editable}{shlex.quote(f'{folder}[peers]')}"
+    prefix = f"{revision['vcs']}+" if revision else ""
+    place = f" @ {prefix}{url}" if url else ""
+    return f"pip install '{PLUMBOB.casefold()}[peers]{place}'"
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
+from ..peers.registry import peers_command
 from ..tables.aligned import filled
 from ..tables.entered import remarks_of_entrants
 from ..tables.results import Results, counted, grouped
@@ -16,6 +17,8 @@ from .standings import Headline
 HEADLINES, WINS = 3, 1
 # Lines on a report without those on the user's solvers; tables that a bench summarises.
 LINES, TABLES = 14, 4
+# The most lines on the scale and the absent peers.
+ABSENT_LINES = 2
 
 
 def outcome(report: BenchReport, width: int) -> list[str]:
@@ -49,15 +52,15 @@ def _lines(sentences: Iterable[str], width: int) -> list[str]:
 
 
 def _scale_and_absent(answers: Overview, width: int) -> list[str]:
-    """Return a line on the scale and as many absent peers as fit, if there are any."""
+    """Return a sentence on the scale and as many absent peers as fit, if there are any."""
     scale = f"{answers.scale}. " if answers.scale else ""
     if not answers.absent:
         return [scale] if scale else []
     for count in range(len(answers.absent), -1, -1):
         more = len(answers.absent) - count
         names = answers.absent[:count] + ([f"{more} more" if count else f"{more}"] if more else [])
-        line = f"{scale}Absent: {', '.join(names)}; `make peers` adds."
-        if len(line) <= width:
+        line = f"{scale}Absent: {', '.join(names)}; `{peers_command()}` adds."
+        if len(_lines([line], width)) <= ABSENT_LINES:
             break
     return [line]
 

@@ -8,6 +8,7 @@ from ..experiments import SUITES
 from ..experiments.robots.figures import robot_maps
 from ..figures.sketch import Drawing, drawn
 from ..harness.record import FINISHED, Record, check_regular
+from ..peers.registry import peers_command
 from ..tables.latex import latex
 from ..tables.layout import Figure
 from ..tables.results import Results, listed, results_of
@@ -97,8 +98,8 @@ def _missing(results: Results, newest: Record) -> Iterator[str]:
             yield f"{package} is not installed."
     if names := absent(results):
         yield (
-            f"Absent peers: {listed(names)}. `make peers` (or `pip install -e .[peers]`) adds those"
-            " that have a wheel for this Python; `plumbob bench ik cloth` then measures them."
+            f"Absent peers: {listed(names)}. `{peers_command()}` adds those that have a wheel for "
+            "this Python; `plumbob bench ik cloth` then measures them."
         )
     if names := not_asked(results):
         yield f"Not selected: {listed(names)}. `plumbob bench ik cloth` measures all."

@@ -84,5 +84,5 @@ def _missing(present: set[str]) -> Sequence[str]:
     absent = [peer.title for peer in registry.PEERS if not peer.is_installed]
     return (
         f"Without a result here: {listed(refused)}." * bool(refused),
-        f"Not installed: {listed(absent)}; `make peers` adds them." * bool(absent),
+        f"Not installed: {listed(absent)}; `{registry.peers_command()}` adds them." * bool(absent),
     )

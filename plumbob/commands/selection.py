@@ -72,6 +72,8 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
     solvers = _recorded("solver", request.solvers, every, _solver_names)
     problems = _recorded("problem", names, every, _problem_names)
     problems += _recorded("robot", request.robots, every, _robot_names)
+    # Blocks of absent solvers are of the problem "robots/all".
+    problems += [f"{name.partition('/')[0]}/all" for name in problems]
     choice = Choice(scale, size, tuple(solvers), tuple(problems), is_partial=True)
     if not any(map(choice.takes, every)):
         names_text = " and ".join(filter(None, map(name_list, (names, request.robots))))

@@ -136,6 +136,20 @@ def test_a_peer_that_is_missing_is_listed_as_such(folder, monkeypatch):
     assert line.endswith("  not installed")
 
 
+@pytest.mark.parametrize(
+    ("asked", "is_named"),
+    [({"robots": ["ur5"]}, True), ({"problems": ["chain"]}, False), ({"solvers": ["ccd"]}, False)],
+)
+def test_a_part_of_the_robots_names_absent_peers_and_no_other_part_does(
+    folder, monkeypatch, asked, is_named
+):
+    version = property(lambda peer: "" if peer.title == "mink" else "1")
+    monkeypatch.setattr(registry.Peer, "version", version)
+    choice = selection.choose(["ik"], "quick", selection.MeasurementRequest(**asked))
+    solvers = {block.solver for block in filter(choice.takes, blocks("ik", choice.scale))}
+    assert ("mink" in solvers) == is_named
+
+
 def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder, monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     lines = listed()

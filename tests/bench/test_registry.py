@@ -1,5 +1,6 @@
 """What is new takes one file and one line: a step solver, a peer, a table, an experiment."""
 
+import json
 import sys
 from dataclasses import replace
 from functools import partial
@@ -168,3 +169,41 @@ def test_every_solver_has_one_entry_and_every_style_is_its_own():
     for known in (registry.ik_solvers(), registry.step_solvers()):
         styles = [s.style for s in known.values() if s.style != registry.OTHER]
         assert len(styles) == len(set(styles)) >= 5
+
+
+class Installed:
+    """A distribution that was installed from somewhere, as `direct_url.json` says."""
+
+    def __init__(self, origin):
+        self.origin = origin
+
+    def read_text(self, _):
+        return self.origin and json.dumps(self.origin)
+
+
+@pytest.mark.parametrize(
+    ("origin", "command"),
+    [
+        ({"url": "file:///a/clone", "dir_info": {"editable": True}}, "make peers"),
+        ({"url": "file:///a/b", "dir_info": {"editable": True}}, "pip install -e '/a/b[peers]'"),
+        ({"url": "file:///a%20b", "dir_info": {}}, "pip install '/a b[peers]'"),
+        (
+            {"url": "https://x.org/p.git", "vcs_info": {"vcs": "git", "commit_id": "abc"}},
+            "pip install 'plumbob[peers] @ git+https://x.org/p.git'",
+        ),
+        (
+            {"url": "file:///p.whl", "archive_info": {}},
+            "pip install 'plumbob[peers] @ file:///p.whl'",
+        ),
+        (None, "pip install 'plumbob[peers]'"),
+    ],
+)
+def test_the_command_that_adds_peers_fits_how_plumbob_was_installed(monkeypatch, origin, command):
+    installed = [Installed(None), Installed(origin)]  # the first as in the folder of a clone
+    monkeypatch.setattr("importlib.metadata.distributions", lambda **_: installed)
+    monkeypatch.setattr(sys, "prefix", "/a/clone/.venv")
+    registry.peers_command.cache_clear()
+    try:
+        assert registry.peers_command() == command
+    finally:
+        registry.peers_command.cache_clear()

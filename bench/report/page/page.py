@@ -18,6 +18,7 @@ from ...figures import svg
 from ...figures.sketch import Drawing
 from ...harness.record import Record
 from ...motion import motion
+from ...peers.registry import peers_command
 from ...tables.columns import words_in
 from ...tables.layout import Figure, Layout
 from ...tables.table import Table
@@ -75,6 +76,7 @@ def render(contents: Contents, newest: Record, missing: Sequence[str]) -> str:
         machine=_machine(newest),
         versions=newest.stamp.get("versions", {}),
         answers=contents.answers,
+        peers_command=peers_command(),
         maps=contents.maps,
         scenes=contents.scenes,
         chapters=[_chapter(section, contents) for section in SECTIONS],
