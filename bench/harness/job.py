@@ -8,6 +8,7 @@ import math
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,10 +22,13 @@ from ..problems.robots import UnableError
 from .isolation import JobOutcome, WorkerProcess, raised
 from .machine import pace
 from .progress import TROUBLE, Progress
+from .record import FIRST_TARGETS
 from .worker import Finished, Lap, Message, Ready, Solved
 
 # Times of slow solves are sent whenever they add up to this [s], so that the worker is not silent.
 _LAP_SECONDS = 0.5
+# A user's solver may take so long for a target, on average, and at least so long in all [s].
+_TARGET_SECONDS, _LEAST_SECONDS = 0.2, 10.0
 # A solver that hangs on so many targets does not finish.
 MAXIMUM_SILENCES = 3
 
@@ -42,6 +46,12 @@ class Job(NamedTuple):
     restarts: int = 0  # further attempts from random poses, made here for solvers without restarts
     entrant: str = ""  # the name of a user's solver, to announce its first trouble; else ""
     warms_up: bool = True  # whether the first target is solved once before, uncounted
+
+    @property
+    def budget(self) -> float:
+        """The time after which a user's solver begins no further target [s]."""
+        seconds = max(_LEAST_SECONDS, _TARGET_SECONDS * self.targets.shape[0])
+        return seconds if self.entrant else math.inf
 
     def perform(self) -> Iterator[Message]:
         """Yield the messages of the job, each as soon as it is there."""
@@ -74,12 +84,15 @@ class Job(NamedTuple):
         return overhead(adapter, self._prepare, self.targets.request(0))
 
     def _answers(self, ask: Any) -> Iterator[Solved]:
-        """Solve the targets in order."""
+        """Solve the targets in order, until the budget is spent."""
+        end = perf_counter() + self.budget
         for i in range(self.targets.shape[0]):
             request = self.targets.request(i)
             solve = ask(request)
             seed_shared_generators(digest_of(*request))
             yield self._solved(solve)
+            if perf_counter() > end:
+                break
 
     def _solved(self, solve: Callable[[], SolverOutput]) -> Solved:
         output, seconds = time_call(lambda: attempt(solve))
@@ -107,6 +120,13 @@ class Job(NamedTuple):
                 yield output.time or OwnTime(seconds)
 
 
+def first_targets(job: Job, outcome: JobOutcome) -> dict[str, Any]:
+    """Return as a fact how many targets a slow solver was given, nothing if it was given all."""
+    count = len(outcome.solved)
+    is_cut = 0 < count < job.targets.shape[0] and job.budget < math.inf and not outcome.is_lost
+    return {FIRST_TARGETS: count} if is_cut else {}
+
+
 def answers(job: Job) -> JobOutcome:
     """Return the answers of a job; continue in a new process behind a target that loses the old.
 
@@ -123,7 +143,8 @@ def answers(job: Job) -> JobOutcome:
             solved += last.solved
     if not outcome.is_lost:
         return outcome
-    return outcome._replace(solved=solved, trouble=raised(solved), is_lost=len(solved) < count)
+    is_lost = last.is_lost and len(solved) < count
+    return outcome._replace(solved=solved, trouble=raised(solved), is_lost=is_lost)
 
 
 class TimedTurns(NamedTuple):

@@ -27,6 +27,8 @@ FILE_NAME = "records.jsonl"
 LARGEST = 1 << 30
 # The suite of the records that say of each other suite that it was run to its end.
 FINISHED = "finished"
+# The fact that counts the targets of a slow solver, which got the first targets only.
+FIRST_TARGETS = "first_targets"
 # How many invalid lines a warning lists; it counts the others.
 LISTED_LINES = 5
 # How numbers are written for which JSON has no sign.

@@ -9,6 +9,7 @@ from ..experiments import chain, cloth_peers
 from ..experiments.cloth_peers.readings import Point, points
 from ..experiments.robots import readings
 from ..harness import metrics
+from ..harness.record import FIRST_TARGETS
 from ..peers import registry
 from ..tables.columns import words_in
 from ..tables.results import Results, counted, grouped, label, listed
@@ -65,7 +66,8 @@ def _target_ranks(
     scores = [score for field in fields.values() for score in field]
     for solver in dict.fromkeys(s.solver for s in scores if s.records[0].facts.get("entrant")):
         problems = {score.robots for score in scores if score.solver == solver}
-        rows = {row.solver: row for row in readings.together(problems, fields)}
+        equal_fields = readings.on_targets_of(solver, fields)
+        rows = {row.solver: row for row in readings.together(problems, equal_fields)}
         yield Headline("", f"{solver}, {task}", _rank(rows[solver], rows), table)
 
 
@@ -73,6 +75,8 @@ def _rank(row: readings.Score, rows: Mapping[str, readings.Score]) -> str:
     """Return a sentence on a solver: its rank, share solved, the best share, relative times."""
     order, first = row.success
     share = f"it solves {percent(row.share)} of {counted(row.share.total, 'target')}"
+    if any(FIRST_TARGETS in record.facts for record in row.records):
+        share += ", the first, for it is slow"
     if not row.is_ranked or not row.share.hits:
         why = f"it is marked “{row.limits}”" if row.limits else "it solves no target"
         return f"{row.solver} is not ranked: {why}."

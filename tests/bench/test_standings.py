@@ -68,6 +68,17 @@ def test_a_solver_that_is_cut_off_has_no_rank_and_one_that_solves_nothing_neithe
     assert none.sentence == "Mine is not ranked: it solves no target."
 
 
+def test_a_slow_solver_is_ranked_on_the_targets_that_it_was_given(make):
+    """Others solve more of the later targets, and fewer of the first."""
+    slow = make.solving("Mine", 19, begun=20, mine=True, seconds=2e-3, facts={"first_targets": 20})
+    rivals = [make.solving("pink", 5, seconds=1e-3), make.solving("mink", 190, seconds=1e-3)]
+    standing = only([*rivals, slow])
+    assert standing.sentence.startswith("Mine ranks 1 of 3, in a tie of 2: it solves 95 % of 20 ")
+    assert "20 targets, the first, for it is slow; where both solve, it is 2.0" in standing.sentence
+    (other,) = standings(Results([*rivals, slow, make.solving("Other", 150, mine=True)]))[1:]
+    assert other.sentence.startswith("Other ranks 2 of 3 (1 solver did not finish): it solves 75 %")
+
+
 def test_a_rank_is_among_those_that_finished(make):
     rivals = [make.solving("pink", 100), make.solving("mink", 18, begun=18)]
     standing = only([*rivals, make.solving("Mine", 20, mine=True)])

@@ -16,8 +16,9 @@ from plumbob.reference.arguments import FloatArray
 from ...harness import metrics
 from ...harness.block import Block, Group, Measured, Scale
 from ...harness.isolation import JobOutcome, raised
-from ...harness.job import Job, answers, times_in_turns
+from ...harness.job import Job, answers, first_targets, times_in_turns
 from ...harness.measure import failure, not_asked
+from ...harness.record import FIRST_TARGETS
 from ...peers import registry
 from ...peers.entrant import CHAIN_TASK
 from ...peers.ik import chain_loops
@@ -92,13 +93,17 @@ def solve_together(jobs: Sequence[ChainJob]) -> list[Measured]:
     results = [_answer_of(job) for job in jobs]
     values = [result.values for result in results]
     places = [i for i, v in enumerate(values) if v and np.isfinite(v.residual).any()]
-    count = min(MAX_TIMED, -(-jobs[0].job.targets.shape[0] // PER_TIMED))
-    turns = times_in_turns([jobs[i].job for i in places], count, ROUNDS)
+    places = [i for i in places if FIRST_TARGETS not in results[i].facts]
+    turns = times_in_turns([jobs[i].job for i in places], _timed_count(jobs[0].job), ROUNDS)
     for i, times in zip(places, turns, strict=True):
         if times is not None:
             values = structs.replace(results[i].values, **times._asdict())
             results[i] = results[i]._replace(values=values)
     return results
+
+
+def _timed_count(job: Job) -> int:
+    return min(MAX_TIMED, -(-job.targets.shape[0] // PER_TIMED))
 
 
 def _answer_of(job: ChainJob) -> Measured:
@@ -173,24 +178,30 @@ def solve_one_by_one(
 ) -> Measured:
     """Have a solver solve all targets in a process of its own.
 
-    A target without an answer counts as infinitely far from being reached.
+    A target without an answer counts as infinitely far from being reached. A slow solver is timed
+    while it answers the first targets, and gets no others.
     """
     total, outcome = len(problem.targets), answers(job)
     solves, count = outcome.solved, len(outcome.solved)
     if not solves:
         raise NoAnswerError(outcome.trouble or "It answered nothing.")
     arrays = _evaluated(problem, limits, *_answers(job.targets, outcome))
+    if facts := first_targets(job, outcome):
+        arrays |= {name: arrays[name][:count] for name in arrays if np.ndim(arrays[name])}
+        arrays["seconds"] = np.array([[solve.seconds for solve in solves[: _timed_count(job)]]])
     has_answer = np.isfinite(arrays["residual"][:count])
     arrays["solved"] = arrays["solved"][:count]
     arrays["claims"] = np.where(has_answer, [solve.claim for solve in solves], -1)
     remarks = [outcome.note]
-    if count < total:
+    if facts:
+        remarks += [f"slow: its first {count} of {total} targets"]
+    elif count < total:
         remarks += [f"not finished: {count} of {total} targets, the others count as not reached"]
     if followed and not outcome.is_lost:
         history = _history(problem, job)
         arrays |= history
-        remarks += [] if history else [NOT_FOLLOWED]
-    facts = {"trouble": raised(solves)}
+        remarks += [] if history or facts else [NOT_FOLLOWED]
+    facts |= {"trouble": raised(solves)}
     return Measured(ChainSolves(**arrays), {"remark": "; ".join(filter(None, remarks))}, facts)
 
 
@@ -232,11 +243,12 @@ def _history(problem: chains.TargetsForSkeleton, job: Job) -> dict[str, FloatArr
     every = replace(problem, starts=starts, targets=repeated)
     requests = chains.ChainRequests(every, np.tile(allowed, len(targets)))
     outcome = answers(job._replace(targets=requests))
-    if len(outcome.solved) < len(repeated):
+    count = len(outcome.solved) // len(allowed)
+    if outcome.is_lost or not count:
         return {}
     positions = _answers(requests, outcome)[0][:, -1].reshape(len(targets), len(allowed), 3)
     effectors = np.concatenate([first[:, None], positions], axis=1)
-    history = np.linalg.norm(effectors - targets[:, None], axis=-1)
+    history = np.linalg.norm(effectors - targets[:, None], axis=-1)[:count]
     if not np.isfinite(history).all() or (history[:, 1:] == history[:, 1:2]).all():
         return {}
     return _quantiles(history)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...harness.block import Block, Group, Measured, Scale
 from ...harness.isolation import JobOutcome, raised
-from ...harness.job import Job, Times, answers, times_in_turns
+from ...harness.job import Job, Times, answers, first_targets, times_in_turns
 from ...harness.measure import not_asked, not_installed
 from ...harness.progress import announce
 from ...harness.worker import Solved
@@ -171,8 +171,9 @@ def solve_together(jobs: Sequence[RobotJob]) -> list[Measured]:
         announce(f"{job.peer.label_of(job.entry)}: answers")
         outcomes.append(answers(job.job))
     finished = [i for i, outcome in enumerate(outcomes) if len(outcome.solved) == jobs[i].size]
+    slow = [i for i, job in enumerate(jobs) if first_targets(job.job, outcomes[i])]
     turns = [i for i in finished if not jobs[i].entry.has_time_limit]
-    times: dict[int, Times | None] = {i: _own_times(jobs[i], outcomes[i]) for i in finished}
+    times: dict[int, Times | None] = {i: _own_times(jobs[i], outcomes[i]) for i in finished + slow}
     if turns:
         announce("times, all solvers in turns")
         requests = [jobs[i].job for i in turns]
@@ -220,6 +221,7 @@ def _measured(job: RobotJob, outcome: JobOutcome, times: Times | None) -> Measur
         "arbiter": engine,
         "group": group_of(job.robot),
         "time_limited": job.entry.has_time_limit,
+        **first_targets(job.job, outcome),
     }
     solves = RobotSolves(**arrays, setup=outcome.setup, overhead=outcome.overhead)
     return Measured(solves, {"remark": outcome.note}, facts)

@@ -7,13 +7,14 @@ never averaged together.
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...harness import metrics
 from ...harness.metrics import Floats, Ranking, Share
-from ...harness.record import Record
+from ...harness.record import FIRST_TARGETS, Record
 from ...peers import registry
 from ...peers.registry import ONE_START, PORTFOLIO, RESTARTS
 from ...problems.robot_targets import seed_indices
@@ -204,8 +205,8 @@ class Score(NamedTuple):
 
 
 def total(record: Record) -> int:
-    """Return the number of targets of a record, attempted or not."""
-    return max(int(record.size), record.arrays["solved"].size)
+    """Return the number of targets that the solver of a record was given, attempted or not."""
+    return record.facts.get(FIRST_TARGETS, max(int(record.size), record.arrays["solved"].size))
 
 
 def rounds_of(record: Record) -> Floats:
@@ -268,6 +269,30 @@ def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score
     for members in robots.values():
         members.sort(key=lambda record: places.get(record.solver, len(places)))
     return {robot: _field(robot, start, members) for robot, members in robots.items()}
+
+
+def on_targets_of(solver: str, fields: dict[str, list[Score]]) -> dict[str, list[Score]]:
+    """Return all solvers on the targets of one, where it was so slow that it got the first only."""
+    return {robot: _on_targets_of(solver, field) for robot, field in fields.items()}
+
+
+def _on_targets_of(solver: str, field: list[Score]) -> list[Score]:
+    records = [score.records[0] for score in field]
+    own = next((r for r in records if r.solver == solver and FIRST_TARGETS in r.facts), None)
+    if own is None:
+        return field
+    count, timed = total(own), rounds_of(own).shape[1]
+    firsts = [
+        replace(
+            record,
+            size=0,
+            arrays={"solved": record.arrays["solved"][:count],
+                    "seconds": rounds_of(record)[:, :timed]},
+            facts={**record.facts, FIRST_TARGETS: min(count, total(record))},
+        )
+        for record in records
+    ]  # fmt: skip
+    return _field(field[0].robots, field[0].start, firsts)
 
 
 def _field(robot: str, start: str, records: Sequence[Record]) -> list[Score]:
