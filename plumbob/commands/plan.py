@@ -37,7 +37,8 @@ def listed(suites: Sequence[str], choice: Choice) -> Iterator[str]:
         yield f"{suite}: {SUITES[suite]}"
         if len(suites) == 1:
             yield from ("", "problems", *_aligned(problems.items()))
-            yield from ("", "solvers", *_aligned(solvers))
+            for problem_names, rows in grouped(solvers, partial(_problems_of, selection)).items():
+                yield from ("", f"solvers of {problem_names}", *_aligned(rows))
         else:
             yield from _in_short("problem", problems)
             yield from _in_short("solver", [name for name, *_ in solvers])
@@ -52,6 +53,17 @@ def _problems(selection: Iterable[Block]) -> dict[str, str]:
         for block in selection
         if not _measures(block, not_installed, not_asked)
     }
+
+
+def _problems_of(selection: Iterable[Block], solver: tuple[str, ...]) -> str:
+    """Return the problems that a solver takes, counted by families: "chain (4); published (2)"."""
+    own = [block for block in selection if block.solver == solver[0]]
+    problems = dict.fromkeys(block.problem for block in own if not _measures(block, not_asked))
+    families = Counter(problem.partition("/")[0] for problem in problems)
+    if len(families) > _MAX_NAMES:
+        return counted(len(problems), "problem")
+    whole = {problem.removesuffix("/all") for problem in problems}
+    return "; ".join(f if f in whole else f"{f} ({count})" for f, count in families.items())
 
 
 def _solvers(selection: Iterable[Block]) -> list[tuple[str, str, str]]:
@@ -125,7 +137,8 @@ class PlannedBlock(NamedTuple):
 def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
     """Return lines on the work and time of a run."""
     present = {record.key: record for record in RecordFile(folder).read().records}
-    selection = [b for suite in suites for b in filter(choice.takes, blocks(suite, choice.scale))]
+    every = [b for suite in suites for b in filter(choice.takes, blocks(suite, choice.scale))]
+    selection = [block for block in every if not _measures(block, not_installed, not_asked)]
     reasons = [run.why_again(block, present, THIS_PROCESS) for block in selection]
     steps = [
         PlannedBlock(block, reason, *_estimate(block, present))
@@ -137,8 +150,7 @@ def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
     for (suite, solver), group in by_solver.items():
         repeats = Counter(step.reason for step in group if step.reason)
         whys = "".join(f"; again {count}, for {reason}" for reason, count in repeats.items())
-        time = duration(sum(step.seconds for step in group))
-        lines.append(f"  {suite}: {solver}: {len(group)}, about {time}{whys}")
+        lines.append(f"  {suite}: {solver}: {len(group)}, {_time(group)}{whys}")
     return [*lines, _total(steps)]
 
 
@@ -165,13 +177,18 @@ def _scaled_time(record: Record, block: Block) -> float:
 def _total(steps: Sequence[PlannedBlock]) -> str:
     if not steps:
         return "Nothing would be measured"
-    sources = Counter(step.source for step in steps)
-    unknown = sources.pop(UNKNOWN, 0)
+    sources = Counter(step.source for step in steps if step.source != UNKNOWN)
     listed = ", ".join(f"{count} from {source}" for source, count in sources.items())
-    listed = listed or "no estimate"
-    listed += f"; {unknown} without an estimate" if unknown else ""
-    total = duration(sum(step.seconds for step in steps))
-    return f"About {total} in all ({listed}), without compilation"
+    return f"Total: {_time(steps)}{f' ({listed})' if listed else ''}, without compilation"
+
+
+def _time(steps: Sequence[PlannedBlock]) -> str:
+    """Return the expected time as words: "about 12 s", "time unknown"."""
+    times = [step.seconds for step in steps if step.source != UNKNOWN]
+    if not times:
+        return "time unknown"
+    unknown = len(steps) - len(times)
+    return f"about {duration(sum(times))}{f' and the unknown time of {unknown}' * bool(unknown)}"
 
 
 def duration(seconds: float) -> str:

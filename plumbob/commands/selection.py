@@ -70,6 +70,9 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
         return Choice(scale, size, is_partial=request.targets is not None)
     every = [block for suite in suites for block in blocks(suite, size)]
     solvers = _recorded("solver", request.solvers, every, _solver_names)
+    if solvers:  # the solvers of this command take part beside them
+        doors = {entry.door for entry in entries}
+        solvers += [block.solver for block in every if block.facts.get("door") in doors]
     problems = _recorded("problem", names, every, _problem_names)
     problems += _recorded("robot", request.robots, every, _robot_names)
     # Blocks of absent solvers are of the problem "robots/all".

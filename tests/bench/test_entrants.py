@@ -12,6 +12,7 @@ from plumbob.bench.experiments.arm.tables import residuals_chart
 from plumbob.bench.experiments.chain.tables import iterations_chart
 from plumbob.bench.experiments.cloth_peers import tables as cloth_tables
 from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness import job
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening
 from plumbob.bench.peers.sources import commit_of, digest_of
@@ -118,6 +119,26 @@ def test_a_cloth_solver_has_the_limit_of_its_method(folder):
     assert bench("cloth", "--quick", *asked, "--with", "my_cloth.py") == 0
     limits = [one.arrays["limit"] for one in records() if one.problem == "peers/stability"]
     np.testing.assert_allclose(*limits, rtol=1e-3)
+
+
+def test_a_slow_solver_gets_the_first_targets_and_a_rank_on_these(
+    folder, capsys, monkeypatch, in_this_process
+):
+    """It is measured although another solver is named."""
+    worker = in_this_process()
+    monkeypatch.setattr(job, "worker_process", lambda: worker)
+    monkeypatch.setattr(job, "_LEAST_SECONDS", 0.0)
+    monkeypatch.setattr(job, "_TARGET_SECONDS", 0.0)
+    asked = ("ik", *SMALL, "--with", "my_ik.py", "--solver", "ccd")
+    assert bench(*asked) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert re.search(r"My FABRIK ranks 1 of 2, .* of 1 target, the first, for it is slow", printed)
+    (mine,), (ours,) = records("My FABRIK"), records("ccd")
+    assert mine.arrays["seconds"].shape == (1, 1)
+    assert [len(record.arrays["residual"]) for record in (mine, ours)] == [1, 2]
+    assert "slow: its first 1 of 2 targets" in cells(made("ik")["accuracy"])
+    assert bench(*asked) == 0
+    assert "0 measured, 2 already on record" in capsys.readouterr().out
 
 
 def test_a_later_plain_run_keeps_records_of_entrants(folder, capsys, monkeypatch):
@@ -352,15 +373,17 @@ def test_a_dry_run_measures_nothing_and_knows_how_long_it_takes(folder, capsys):
     asked = ("ik", *SMALL, "--with", "my_ik.py")
     assert bench(*asked, "--dry-run") == 0
     told = capsys.readouterr().out
-    assert "8 to measure, 0 already" in told
+    assert "9 to measure, 0 already" in told
+    assert "Total: time unknown, without compilation" in told
+    assert "about" not in told
     assert not Path("out").exists()
     bench(*asked, "--solver", "ccd")
     capsys.readouterr()
     bench(*asked, "--dry-run")
     told = capsys.readouterr().out
-    assert "7 to measure, 1 already" in told
+    assert "7 to measure, 2 already" in told
     assert "from records of others" in told
-    assert len(records()) == 1
+    assert {record.solver for record in records()} == {"ccd", "My FABRIK"}
 
 
 def test_problems_of_a_python_file_stand_in_the_same_tables(folder, capsys):
