@@ -259,10 +259,14 @@ def test_a_reader_that_leaves_ends_it_without_a_word(arguments, buffered):
 
 
 def test_the_main_job_says_first_what_it_does_and_where(capsys, monkeypatch, empty_folder):
-    monkeypatch.setattr(bench, "run_suites", lambda *_, **__: 1)
+    calls = []
+    monkeypatch.setattr(bench, "run_suites", lambda suites, *_, **__: calls.append(suites) or 1)
     monkeypatch.setattr(bench, "write_report", lambda *_: 0)
     code, out, _ = plumbob(capsys, "--output", "here")
     assert code == 1
+    ((first, *_, last),) = calls
+    assert (first, last) == ("check", "cloth_scale")
+    assert {*calls[0]} == {*bench.SUITES} - {"self_test"}
     assert all(text in out for text in ("Pinocchio and MuJoCo", "here/index.html", "minute"))
 
 
