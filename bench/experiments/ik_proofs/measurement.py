@@ -21,7 +21,7 @@ from .values import PoseProofs
 SUITE, SOLVER = "ik_proofs", "Plumbob LM"
 TOLERANCE, RESTARTS = 1e-3, 20
 # Targets in a stratum, for those of a scale.
-_TARGETS = 0.05
+_TARGETS = 0.025
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
