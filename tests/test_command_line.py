@@ -328,10 +328,28 @@ def robots(empty_folder, monkeypatch):
 def test_files_are_checked_and_counted(capsys, robots):
     code, out, err = plumbob(capsys, "check", "--files", "robots")
     assert (code, err) == (0, "")
-    assert re.search(r"^robots/arms/arm\|1.urdf +URDF +agrees \(0\) +agrees \(0\)", out, re.M)
-    assert "  robots/c.xml: Pinocchio: not read by us: c.xml, line 1: <composite>: exp" in out
+    assert re.search(r"^robots/arms/arm\|1.urdf \(URDF\): \w+ agrees \(0\); \w+ agr", out, re.M)
+    assert re.search(
+        r"^robots/c.xml \(MJCF\): .*\n  Pinocchio: not read by us: c.xml, li", out, re.M
+    )
     assert "Of 3 files nothing disagrees; 1 is a part that others include, 1 XML file is of" in out
     assert re.search(r"^MJCF +Pinocchio +2 +1 +0 +1 ", out, re.MULTILINE)
+
+
+def test_a_file_is_printed_before_the_next_is_read(capsys, robots, monkeypatch):
+    from plumbob.crosscheck.robots import files
+
+    read, printed = files.check, []
+
+    def check(selection):
+        for reading in read(selection):
+            yield reading
+            printed.append(capsys.readouterr().out)
+
+    monkeypatch.setattr(files, "check", check)
+    assert plumbob(capsys, "check", "--files", "robots")[0] == 0
+    names = ("robots/arms/arm|1.urdf ", "robots/b.xml ", "robots/c.xml ")
+    assert [text.startswith(name) for name, text in zip(names, printed, strict=False)] == [True] * 3
 
 
 def test_files_that_nobody_reads_are_counted_and_names_are_no_markup(capsys, robots):
@@ -348,7 +366,7 @@ def test_files_that_differ_exit_1(capsys, robots):
     (robots / "b.xml").write_text(CHARACTER(BODY("<frame><joint name='k'/></frame>")))
     code, out, _ = plumbob(capsys, "check", "--files", "robots/b.xml", "robots/arms")
     assert code == 1
-    assert re.search(r"^robots/b.xml +MJCF +differs \(", out, re.MULTILINE)
+    assert re.search(r"^robots/b.xml \(MJCF\): Pinocchio differs \(", out, re.MULTILINE)
     assert "Of 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
 
 

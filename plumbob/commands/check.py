@@ -1,5 +1,6 @@
 """The command `check`: compare the reference with Pinocchio and MuJoCo, or read files by all."""
 
+import sys
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -40,17 +41,19 @@ def check_files(paths: Sequence[str]) -> int:
     """Compare how each engine reads the files at some paths; return 1 if two disagree."""
     if not paths:
         raise ValueError("--files: expected folders or files, got none")
-    from plumbob.bench.experiments.check.files import report
+    from plumbob.bench.experiments.check.files import lines_on, summary
     from plumbob.crosscheck.robots.files import check, find
 
     search = find(paths)
-    readings = []
+    readings, output = [], sys.stdout
     with progress() as bar:
+        stream = None if output.isatty() else output  # a bar takes what is printed, above itself
         task = bar.add_task("", total=len(search.files))
         for reading in check(search.files):
             readings.append(reading)
             bar.update(task, description=reading.file.path.name, advance=1)
-    files, summary, disagreements = report(search, readings)
-    for table in (files, summary):
-        print_aligned(table)
+            for line in lines_on(reading):
+                print(line, file=stream, flush=True)
+    table, disagreements = summary(search, readings)
+    print_aligned(table)
     return FAILED if disagreements else SUCCESS

@@ -1,4 +1,4 @@
-"""Tables and sentences on how engines and the reference read a user's files."""
+"""Lines and a table on how engines and the reference read a user's files."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -18,6 +18,7 @@ from plumbob.crosscheck.robots.files import (
 
 from ...tables.columns import text
 from ...tables.table import Column, Summary, Table, cells, words
+from ...text import visible
 
 # Outcomes by which files are counted; the first two are shown even where there are none.
 READ = (AGREES, DIFFERS, files.DEVIATES)
@@ -28,14 +29,6 @@ SHOWS = (
 )
 
 
-class FileReport(NamedTuple):
-    """A row for each file, a row for each kind and engine, and how many readings disagree."""
-
-    files: Table
-    summary: Table
-    disagreements: int
-
-
 class FileGroup(NamedTuple):
     """The readings of all files of a kind by one engine."""
 
@@ -44,26 +37,26 @@ class FileGroup(NamedTuple):
     readings: list[FileReading]
 
 
-def report(scan: FileSelection, checked: Sequence[CheckedFile]) -> FileReport:
-    """Return the tables of files that were checked."""
+def lines_on(checked: CheckedFile) -> list[str]:
+    """Return a line on the readings of a file and lines on their reasons; none for a fragment."""
+    if checked.file.kind == FRAGMENT:
+        return []
+    outcomes = "; ".join(f"{reading.engine} {_outcome(reading)}" for reading in checked.readings)
+    return [visible(f"{_name(checked)} ({checked.file.kind}): {outcomes}"), *_points(checked)]
+
+
+def summary(scan: FileSelection, checked: Sequence[CheckedFile]) -> tuple[Table, int]:
+    """Return a row for each kind of file and engine, and how many readings disagree."""
     groups = [
         FileGroup(kind, engine, readings)
         for kind, engines in ENGINES.items()
         for engine in engines
         if (readings := _readings(kind, engine, checked))
     ]
-    columns = (
-        text("file", _name),
-        text("format", lambda checked: checked.file.kind),
-        *(text(e, partial(_outcome, e)) for e in dict.fromkeys(group.engine for group in groups)),
-    )
-    whole = [file for file in checked if file.file.kind != FRAGMENT]
-    points = tuple(point for file in checked for point in _points(file))
-    table = Table("files", "Files", columns, cells(columns, whole), summary=Summary(SHOWS, points))
     outcomes = [reading.outcome for group in groups for reading in group.readings]
     disagreements = outcomes.count(DIFFERS)
-    summary = Summary(_sentence(scan, checked, disagreements))
-    return FileReport(table, _summary(groups, {*outcomes}, summary), disagreements)
+    sentences = f"{SHOWS} {_sentence(scan, checked, disagreements)}"
+    return _summary(groups, {*outcomes}, Summary(sentences)), disagreements
 
 
 def _readings(kind: str, engine: str, checked: Sequence[CheckedFile]) -> list[FileReading]:
@@ -88,11 +81,10 @@ def _summary(groups: Sequence[FileGroup], outcomes: set[str], summary: Summary) 
     return Table("summary", title, columns, cells(columns, groups), summary=summary)
 
 
-def _outcome(engine: str, checked: CheckedFile) -> str | None:
-    """Return the outcome of an engine's reading, with the difference; None without a reading."""
-    reading = next((r for r in checked.readings if r.engine == engine), None)
-    if reading is None or reading.difference is None:
-        return reading and reading.outcome
+def _outcome(reading: FileReading) -> str:
+    """Return the outcome of a reading, with the difference if there is one."""
+    if reading.difference is None:
+        return reading.outcome
     return f"{reading.outcome} ({words(reading.difference)})"
 
 
@@ -107,10 +99,10 @@ def _name(checked: CheckedFile) -> str:
 
 
 def _points(checked: CheckedFile) -> Iterator[str]:
-    """Return the reasons and notes that a file's row has no space for."""
+    """Return indented lines with the reasons and notes of a file's readings."""
     reasons = [f"{r.engine}: {r.outcome}: {r.why}" for r in checked.readings if r.why]
     notes = dict.fromkeys(note for reading in checked.readings for note in reading.notes)
-    return (f"{_name(checked)}: {sentence}" for sentence in (*reasons, *notes))
+    return (f"  {visible(sentence)}" for sentence in (*reasons, *notes))
 
 
 def _sentence(scan: FileSelection, checked: Sequence[CheckedFile], disagreements: int) -> str:
