@@ -80,7 +80,8 @@ def compare_statistics(key: RowKey, pair: Pair) -> Iterator[RowChange]:
     if pair.old.size != pair.new.size:
         return
     if all(SOLVED in record.arrays for record in pair):
-        old, new = (float(np.mean(record.arrays[SOLVED])) for record in pair)
+        solved = _common_targets(pair.old.arrays[SOLVED], pair.new.arrays[SOLVED])
+        old, new = (float(np.mean(part)) for part in solved)
         why = f"from {100 * old:.1f} % to {100 * new:.1f} %"
         yield from _statistic(key, SHARE, new - old, f"{'fell' if new < old else 'rose'} {why}")
     for name in _SMALLEST & pair.old.arrays.keys() & pair.new.arrays.keys():

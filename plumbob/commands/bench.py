@@ -160,8 +160,10 @@ def _main_suites() -> list[str]:
     """
     from plumbob.bench.harness.experiment import EXPERIMENTS
 
-    timed = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
-    return sorted(SUITES.keys() - {"self_test"}, key=lambda s: (s in timed, [*SUITES].index(s)))
+    timed_suites = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
+    return sorted(
+        SUITES.keys() - {"self_test"}, key=lambda s: (s in timed_suites, [*SUITES].index(s))
+    )
 
 
 def run_suites(

@@ -137,6 +137,8 @@ def test_a_slow_solver_gets_the_first_targets_and_a_rank_on_these(
     assert mine.arrays["seconds"].shape == (1, 1)
     assert [len(record.arrays["residual"]) for record in (mine, ours)] == [1, 2]
     assert "slow: its first 1 of 2 targets" in cells(made("ik")["accuracy"])
+    assert bench("ik", *SMALL, "--solver", "fabrik") == 0
+    assert "Over all problems most targets" in made("ik")["accuracy"].summary.sentence
     assert bench(*asked) == 0
     assert "0 measured, 2 already on record" in capsys.readouterr().out
 

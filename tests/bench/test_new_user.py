@@ -120,14 +120,19 @@ def test_the_list_of_a_suite_names_each_problem_once_and_lines_up(folder):
     titled = [line for line in lines if re.match(r"  (robots|unreachable)/(panda|pr2)  ", line)]
     assert len({len(line) - len(line.split("  ")[-1].strip()) for line in titled}) == 1
     assert all(line.endswith(("  Franka Panda", "  PR2, right arm")) for line in titled)
-    solvers = lines[lines.index("solvers") + 1 :]
-    said = {line.split("  ")[1]: line.split("  ")[-1].strip() for line in solvers if line}
+    text = "\n".join(lines)
+    groups = dict(re.findall(r"^solvers of (.*)\n((?:  .*\n?)+)", text, re.MULTILINE))
+    solvers = [line for group in groups.values() for line in group.splitlines()]
+    said = {line.split("  ")[1]: line.split("  ")[-1].strip() for line in solvers}
     assert said["my_ik.py"] == "entered, my_ik.py"
     assert re.fullmatch(r"\d+\.\d+\S*", said["Plumbob LM"])
     assert re.fullmatch(r"\d+\.\d+\S*", said["ccd"])
     assert set(said) >= {"mink", "TRAC-IK, 5 ms"}
-    columns = {line.rindex("  ") for line in solvers if line.startswith("  ")}
-    assert len(columns) == 1
+    for group in groups.values():
+        assert len({line.rindex("  ") for line in group.splitlines()}) == 1
+    mine = next(problems for problems, group in groups.items() if "  my_ik.py" in group)
+    assert mine == "chain (4); published (2)"
+    assert "  Plumbob LM, 20 " in groups["robots (17); unreachable (7); published (4)"]
 
 
 def test_a_peer_that_is_missing_is_listed_as_such(folder, monkeypatch):

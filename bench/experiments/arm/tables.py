@@ -58,7 +58,9 @@ def _summary(rows: Sequence[Row]) -> Summary:
 
 def _ranking(hits: dict[str, dict[tuple[str, str], np.ndarray]]) -> metrics.Ranking | None:
     """Return a ranking of the solvers that solve all problems, None of fewer than two."""
-    sizes = {problem: hit.size for problems in hits.values() for problem, hit in problems.items()}
+    sizes: dict[tuple[str, str], int] = {}
+    for problem, hit in (item for problems in hits.values() for item in problems.items()):
+        sizes[problem] = max(hit.size, sizes.get(problem, 0))
     complete = {
         solver: np.concatenate([problems[problem] for problem in sizes])
         for solver, problems in hits.items()
