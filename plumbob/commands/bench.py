@@ -161,9 +161,7 @@ def _main_suites() -> list[str]:
     from plumbob.bench.harness.experiment import EXPERIMENTS
 
     timed_suites = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
-    return sorted(
-        SUITES.keys() - {"self_test"}, key=lambda s: (s in timed_suites, [*SUITES].index(s))
-    )
+    return sorted((s for s in SUITES if s != "self_test"), key=timed_suites.__contains__)
 
 
 def run_suites(

@@ -87,7 +87,7 @@ SOLVERS = {
 
 
 @pytest.mark.parametrize(
-    "name", [n if n == "library" else pytest.param(n, marks=pytest.mark.slow) for n in SOLVERS]
+    "name", [n if n == "fabrik" else pytest.param(n, marks=pytest.mark.slow) for n in SOLVERS]
 )
 def test_constant_iterations_and_tolerance_are_found_and_said(name):
     solver, method, count = SOLVERS[name]
