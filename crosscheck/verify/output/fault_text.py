@@ -1,7 +1,7 @@
 """What `plumbob explain` prints: a fault's cause, remedy, lines of programs, and symptom."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches, unified_diff
 from itertools import groupby
 
@@ -17,26 +17,50 @@ from .words import Say
 
 # The lines around a change, and of the numbers of a failing case.
 CONTEXT, ROWS = 2, 4
-# The end of the first sentence, in English and in Chinese.
-_FIRST_END = re.compile(r"(?<=\.) (?=\S)|(?<=。)")
+# The end of the first sentence, in English and in Chinese; a dot after a space is a product.
+_FIRST_END = re.compile(r"(?<=[^\s.]\.) (?=\S)|(?<=。)")
 
 
-def find_fault(code: str) -> CodedFault:
-    """Return the fault of a code in any case; raise ValueError with the nearest code if none."""
-    faults = coded_faults()
-    if (name := code.upper()) not in faults:
-        near = get_close_matches(name, faults, n=1, cutoff=0.0)
-        raise ValueError(f"code: expected a code of a fault, got {code!r}; nearest: {near[0]}")
-    return faults[name]
+def answered(words: Sequence[str], say: Say) -> Iterator[str]:
+    """Yield the explanation of a code, the faults with all words, or without words the families.
+
+    Raises:
+        ValueError: if no fault has these words; the message has the nearest code.
+    """
+    faults, text = coded_faults(), " ".join(words)
+    if (name := text.upper()) in faults:
+        return explained(faults[name], say)
+    if not words:
+        return _families(say)
+    folded = [word.casefold() for word in words]
+    causes = {code: cause_and_remedy(fault, say)[0].casefold() for code, fault in faults.items()}
+    family = [code for code in causes if code.startswith(f"{name}-")]
+    matches = family or [c for c, cause in causes.items() if all(w in cause for w in folded)]
+    if not matches:
+        near = get_close_matches(name, faults, n=1)
+        hint = f"nearest: {near[0]}" if near else "`plumbob explain` lists the families"
+        raise ValueError(f"code: expected a code of a fault, or words, got {text!r}; {hint}")
+    return _listed([faults[code] for code in matches], say)
 
 
-def listed(say: Say, width: int) -> Iterator[str]:
-    """Yield a line for each code, by family, in so many columns."""
+def _families(say: Say) -> Iterator[str]:
+    """Yield a line for each family of faults: what its codes begin with, number and subject."""
     for family, faults in groupby(coded_faults().values(), key=lambda fault: fault.family):
+        about = say(Sentence(FAMILIES[family]["about"], {}))
+        yield f"  {f'PB-{family}':<11} {len(list(faults)):>4}  {about}"
+    yield ""
+    yield say(sentence("plumbob explain PB-FK lists a family, plumbob explain WORD ... searches."))
+    yield say(sentence("plumbob explain CODE shows a fault in a short program."))
+
+
+def _listed(faults: Sequence[CodedFault], say: Say) -> Iterator[str]:
+    """Yield code and cause of each fault, by family."""
+    for family, members in groupby(faults, key=lambda fault: fault.family):
         yield say(Sentence(FAMILIES[family]["about"], {}))
-        for fault in faults:
-            first, *more = wrapped(f"{fault.code}  {cause_and_remedy(fault, say)[0]}", "  ", width)
-            yield f"{first[: width - 2]} …" if more else first
+        for fault in members:
+            margin = " " * (len(fault.code) + 4)
+            first, *more = wrapped(cause_and_remedy(fault, say)[0], margin)
+            yield from (f"  {fault.code}  {first.strip()}", *more)
         yield ""
     yield say(sentence("plumbob explain CODE shows a fault in a short program."))
 

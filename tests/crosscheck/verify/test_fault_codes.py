@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.cells import cell_len
 
 from plumbob.crosscheck import verify as package
 from plumbob.crosscheck.verify.fault_programs import (
@@ -26,7 +27,12 @@ from plumbob.crosscheck.verify.kinematics.predictions import forward
 from plumbob.crosscheck.verify.kinematics.switches import Switches
 from plumbob.crosscheck.verify.one_line import search
 from plumbob.crosscheck.verify.output import comparison, json_file, junit, page, terminal
-from plumbob.crosscheck.verify.output.fault_text import cause_and_remedy, explained, failure_of
+from plumbob.crosscheck.verify.output.fault_text import (
+    answered,
+    cause_and_remedy,
+    explained,
+    failure_of,
+)
 from plumbob.crosscheck.verify.output.words import Presentation, advice, reservations, speaker
 from plumbob.crosscheck.verify.sentence import codes_in, sentence
 from plumbob.crosscheck.verify.verify import verify
@@ -286,11 +292,36 @@ def test_an_unknown_code_is_refused_with_the_nearest():
     assert re.search(r"nearest: PB-FORCE-\d{3}$", text.strip())
 
 
-def test_without_a_code_each_has_a_line():
-    code, text = printed()
-    assert code == 0
-    lines = [line.split()[0] for line in text.splitlines() if line.startswith("  PB-")]
-    assert lines == list(coded_faults())
+def listed(*words, language="en"):
+    """The lines of a list of faults, and what each begins with."""
+    lines = list(answered(words, speaker(language)))
+    assert max(map(cell_len, lines)) <= 80
+    return lines, [line.split()[0] for line in lines if line.startswith("  PB-")]
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_without_a_code_each_family_has_a_line_and_is_listed_by_its_name(language):
+    lines, families = listed(language=language)
+    assert sorted(families) == sorted(f"PB-{family}" for family in FAMILIES)
+    assert sum(int(line.split()[1]) for line in lines[: len(families)]) == len(coded_faults())
+    codes = [code for family in families for code in listed(family.lower(), language=language)[1]]
+    assert codes == list(coded_faults())
+
+
+def test_words_list_the_faults_that_have_all_of_them():
+    codes = listed("Parent", "rotation")[1]
+    causes = {code: cause_and_remedy(f, str)[0].lower() for code, f in coded_faults().items()}
+    assert codes == [c for c, text in causes.items() if "parent" in text and "rotation" in text]
+    with pytest.raises(ValueError, match="got 'parent qqq'; `plumbob explain` lists the families"):
+        answered(("parent", "qqq"), str)
+
+
+def test_a_cause_does_not_end_at_the_dot_of_a_product():
+    texts = [cause_and_remedy(fault, str)[0] for fault in coded_faults().values()]
+    assert [text for text in texts if text.endswith((" .", "..."))] == []
+    assert cause_and_remedy(coded_faults()["PB-QUAT-002"], str)[0].endswith(
+        "w = a.w b.w - a.v . b.v."
+    )
 
 
 def test_a_remedy_is_told_apart_from_its_cause_in_both_languages():
