@@ -54,7 +54,7 @@ MemoryLimit = Annotated[int | None, option("MIB", "Memory limit of the solver.",
 Folder = Annotated[
     File, option("DIR", "Write all four formats and failing cases.", "--output", "-o")
 ]
-Language = Annotated[Text, option("LANG", "Language: en or zh; default: the locale.")]
+Language = Annotated[Text, option("LANG", "Language: en or zh (zh-CN); default: the locale.")]
 SelfTest = Annotated[bool, flag("Test verify itself with all known faults.", "--self-test")]
 
 
@@ -100,7 +100,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         from plumbob.crosscheck.verify.output.question import ANSWERS, Question, limits
         from plumbob.crosscheck.verify.output.words import Presentation, speaker
 
-        language = lang or language_of()
+        language = language_of(lang)
         question = Question(tuple(task or ()), rerun, thorough, seed)
         if names or template or export:
             work.close()

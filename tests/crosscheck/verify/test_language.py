@@ -78,7 +78,12 @@ def test_only_templates_with_words_need_a_translation(text, expected):
     ],
 )
 def test_the_locale_chooses_the_language(environment, language):
-    assert language_of(environment) == language
+    assert language_of(environment=environment) == language
+
+
+@pytest.mark.parametrize("option", ["zh", "zh-CN", "zh_CN", "zh_CN.UTF-8", "ZH"])
+def test_the_option_takes_a_language_with_its_country(option):
+    assert language_of(option, {"LANG": "en_GB.UTF-8"}) == "zh"
 
 
 def test_sentences_within_sentences_are_translated():
@@ -90,7 +95,7 @@ def test_sentences_within_sentences_are_translated():
 
 def test_a_language_that_is_unknown_is_refused():
     with pytest.raises(ValueError, match="lang: expected one of en, zh, got 'fr'"):
-        translator("fr")
+        language_of("fr")
 
 
 def test_mistakes_that_all_explanations_share_are_said_once():
