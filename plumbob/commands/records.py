@@ -23,9 +23,13 @@ Failed = Annotated[bool, flag("Only failed measurements.", "--failed")]
 Superseded = Annotated[bool, flag("Only records with outdated settings.", "--superseded")]
 
 
-@app.callback(epilog=epilog("records"))
-def records() -> None:
-    """List, merge or drop records. Only `drop` and the option --fresh delete records."""
+@app.callback(invoke_without_command=True, epilog=epilog("records"))
+def records(context: typer.Context) -> int:
+    """List, merge or drop records. Only `drop` and the option --fresh delete records.
+
+    Without a command: list the records in report.
+    """
+    return SUCCESS if context.invoked_subcommand else list_records()
 
 
 @app.command("list", cls=Command, epilog=epilog("records list"))

@@ -32,6 +32,12 @@ def read(folder):
     return {record.solver: record for record in RecordFile(folder).read().records}
 
 
+def test_without_a_command_the_records_in_report_are_listed(capsys, here):
+    (here / "laptop").rename("report")
+    assert plumbob(capsys) == plumbob(capsys, "list", "report")
+    assert "3 records" in plumbob(capsys)[1]
+
+
 @pytest.mark.parametrize("order", [("laptop", "desktop"), ("desktop", "laptop")])
 def test_merged_records_are_the_later_ones_and_none_that_failed_before_one_that_did_not(
     capsys, here, order
