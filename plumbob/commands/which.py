@@ -1,13 +1,14 @@
 """The command `which`: every installed solver on a robot of the user's, and which to choose."""
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from ..terminal import print_filled, print_lines
 from .bench import run_with_progress
-from .options import SUCCESS, Text, argument, option, valid_name
+from .options import SUCCESS, Entrants, Text, argument, option, valid_name
 from .report import FORMATS, formatted
 
 if TYPE_CHECKING:
@@ -19,12 +20,13 @@ SUFFIXES = (".urdf", ".xml", ".mjcf")
 def which(
     robot: Annotated[Path, argument("ROBOT", "Your robot: .urdf, or .xml or .mjcf of MuJoCo.")],
     *,
+    entrants: Entrants = None,
     link: Annotated[Text, option("NAME", "Link or body that must reach the targets.")] = None,
     form: Annotated[
         str, option("FORMAT", f"Print the table as {', '.join(FORMATS)}.", "--format")
     ] = "",
 ) -> int:
-    """Try every installed solver of inverse kinematics on your robot, in about a minute.
+    """Try every installed solver of inverse kinematics, and yours, on your robot, in a minute.
 
     All solve the same 60 poses within 1 mm, 1 mrad and the limits of the joints. Your robot must
     have only hinges from its root to the link.
@@ -35,7 +37,7 @@ def which(
 
     if form:
         valid_name("format", form, FORMATS)
-    choice = _choice(robot, link)
+    choice = _choice(robot, link, entrants or ())
     with tempfile.TemporaryDirectory(prefix="plumbob-which-") as folder:
         run_with_progress(["ik"], choice, Path(folder))
         table = solvers_on_robot(Results(on_record(Path(folder)).records), robot.name)
@@ -49,15 +51,20 @@ def which(
     return SUCCESS
 
 
-def _choice(robot: Path, link: str | None) -> "Choice":
+def _choice(robot: Path, link: str | None, entrants: Sequence[str]) -> "Choice":
     """Return each solver on poses that a robot can reach, ten in each of six strata.
 
     Raises:
-        ValueError: if the file is none of a robot, or the bench cannot take it.
+        ValueError: if the file is none of a robot, the bench cannot take the robot, or a solver of
+            the user cannot be opened or takes no robots.
     """
     from plumbob.bench.harness.block import SCALES, Choice
+    from plumbob.bench.peers import opening
+    from plumbob.bench.peers.entrant import ROBOT_TASK
     from plumbob.bench.problems.files import read
 
+    if not robot.exists():
+        raise ValueError(f"ROBOT: expected a file, got {robot}, which does not exist")
     if not robot.is_file() or robot.suffix.lower() not in SUFFIXES:
         raise ValueError(f"ROBOT: expected a file of type {' or '.join(SUFFIXES)}, got {robot}")
     try:
@@ -65,5 +72,8 @@ def _choice(robot: Path, link: str | None) -> "Choice":
     except ValueError as error:
         hint = "" if link else "; --link names the link that must reach the targets"
         raise ValueError(str(error).replace("effector: ", "--link: ") + hint) from None
-    scale = replace(SCALES["quick"], problems=tuple(own))
+    entered = opening.opened(opening.addresses(entrants), ["ik"])
+    if chains_only := [e.door for e in entered if ROBOT_TASK not in e.tasks]:
+        raise ValueError(f"with: expected a solver with {ROBOT_TASK}, got {chains_only[0]}")
+    scale = replace(SCALES["quick"], entrants=tuple(entered), problems=tuple(own))
     return Choice("quick", scale, problems=(poses,), is_partial=True)

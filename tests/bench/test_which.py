@@ -19,6 +19,16 @@ ARM = """<robot name="arm"><link name="base"/><link name="a"/><link name="b"/><l
 <origin xyz="0.3 0 0"/><limit lower="-2" upper="2"/></joint></robot>"""
 
 
+MINE = """import numpy as np
+
+PLUMBOB = {"name": "Mine", "version": "1"}
+
+
+def robot_inverse_kinematics(start):
+    return {"q": np.array(start), "converged": False}
+"""
+
+
 def table_of(*records):
     return solvers_on_robot(Results(records), "arm.urdf")
 
@@ -73,6 +83,8 @@ def folder(tmp_path, monkeypatch, in_this_process):
                         in_this_process)  # fmt: skip
     for name, kind in (("arm", "revolute"), ("slider", "prismatic")):
         (tmp_path / f"{name}.urdf").write_text(ARM.format(kind=kind))
+    (tmp_path / "my_robot.py").write_text(MINE)
+    (tmp_path / "my_ik.py").write_text(MINE.replace("robot_inverse", "inverse"))
     return tmp_path
 
 
@@ -82,15 +94,25 @@ def test_the_command_tries_60_targets_prints_a_line_a_solver_and_advises(folder,
     assert lines[0] == "arm.urdf, 3 joints to c: 60 targets"
     assert any(line.startswith("Plumbob LM (ours) ") for line in lines)
     assert lines[-1].startswith("Choose Plumbob LM")
-    assert sorted(folder.iterdir()) == [folder / "arm.urdf", folder / "slider.urdf"]
+    files = ["arm.urdf", "my_ik.py", "my_robot.py", "slider.urdf"]
+    assert sorted(path.name for path in folder.iterdir()) == files
     assert run_command(["which", "arm.urdf", "--format", "csv"]) == 0
     assert capsys.readouterr().out.startswith("solver,solved [%],median [µs],")
+
+
+def test_the_users_solver_has_one_row_among_the_others(folder, capsys):
+    assert run_command(["which", "arm.urdf", "--with", "my_robot.py", "--format", "csv"]) == 0
+    _, *rows = capsys.readouterr().out.splitlines()
+    assert [row.split(",")[0] for row in rows] == ["Plumbob LM (ours)", "Mine"]
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["no.urdf"], "ROBOT: expected a file of type .urdf or .xml or .mjcf, got no.urdf"),
+        (["no.urdf"], "ROBOT: expected a file, got no.urdf, which does not exist"),
+        (["my_ik.py"], "ROBOT: expected a file of type .urdf or .xml or .mjcf, got my_ik.py"),
+        (["arm.urdf", "--with", "my_ik.py"], "with: expected a solver with "
+                                             "robot_inverse_kinematics, got my_ik.py"),
         (["arm.urdf", "--link", "x"], "--link: expected one of base, a, b, c, got 'x'"),
         (["slider.urdf"], "slider.urdf: expected hinges to 'c', got a slide; --link names the link "
                           "that must reach the targets"),
