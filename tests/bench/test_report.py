@@ -79,9 +79,18 @@ def test_tables_in_three_formats_and_figures_lie_beside_it(whole):
 
 def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
     """But that nobody entered a solver is no omission."""
-    _, page = written(tmp_path, [record for record in records if record.suite == "check"])
+    result, page = written(tmp_path, [record for record in records if record.suite == "check"])
     text = "".join(page.texts)
     assert text.count("Questions without records: ") == 5
+    folds = re.findall(
+        r"<details class=\"method\"( open)?><summary>Questions without", result.page.read_text()
+    )
+    assert folds == [" open"] * 4 + [""]  # open in chapters without any record
+    commands = re.findall(
+        r"Questions without records: \d+; (plumbob bench [a-z_ ]+) measures", text
+    )
+    assert len(commands) == 5
+    assert commands[-1] == "plumbob bench self_test robot_models ik_proofs"
     assert "Which solvers of yours" not in text
     assert "Forward kinematics. Jacobians. Inverse kinematics. A step of the cloth. What" in text
     assert "plumbob bench timing cloth_scale measures them at full length." in text
