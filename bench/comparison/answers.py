@@ -113,7 +113,7 @@ def compare_limited_answers(key: RowKey, pair: Pair, chance: float, error_rate: 
     """Return the change of the targets solved within a time limit, by its adjusted probability."""
     old, new = _common_targets(pair.old.arrays[SOLVED], pair.new.arrays[SOLVED])
     before, after = int(np.sum(old)), int(np.sum(new))
-    why = f"solved {before} of {len(old)}, now {after}, within a time limit"
+    why = f"solved {before:,} of {len(old):,}, now {after:,}, within a time limit"
     if chance > error_rate:
         verdict = ChangeVerdict.SAME if before == after else ChangeVerdict.UNDECIDED
     else:
@@ -145,7 +145,8 @@ def _compare_array(key: RowKey, name: str, pair: Pair) -> RowChange:
     texts = [*map(words, first)]
     why = ", now ".join(texts if texts[0] != texts[1] else map(repr, first))
     if old.size > 1:
-        why += f" ({len(before)} of {old.size} differ" + (f", {worse} worse)" if sign else ")")
+        worse_text = f", {worse:,} worse" if sign else ""
+        why += f" ({len(before):,} of {old.size:,} differ{worse_text})"
     verdict = ChangeVerdict.CHANGED
     if sign:
         is_worse = 2 * worse >= len(before)

@@ -163,7 +163,7 @@ def headline(comparison: RunComparison, failed: Sequence[RowChange]) -> str:
 def verdict_counts(comparison: RunComparison) -> str:
     """Return the number of rows of each verdict, the worst first."""
     counts = Counter(row.verdict for row in comparison.rows)
-    listed = ", ".join(f"{counts[verdict]} {verdict}" for verdict in ORDER if counts[verdict])
+    listed = ", ".join(f"{counts[verdict]:,} {verdict}" for verdict in ORDER if counts[verdict])
     return listed or "No rows in common"
 
 
@@ -178,7 +178,7 @@ def summary(comparison: RunComparison, failed: Sequence[RowChange], width: int) 
     if comparison.short:
         last.append(_not_compared(comparison))
     for count in range(min(MAX_LINES, len(rows)), -1, -1):
-        more = [f"  and {len(rows) - count} more: --markdown FILE or --json FILE writes all"]
+        more = [f"  and {len(rows) - count:,} more: --markdown FILE or --json FILE writes all"]
         texts = [*first, *(_line(row, settings[row.key]) for row in rows[:count])]
         texts += [*(more if count < len(rows) else ()), *last]
         lines = [line for text in texts for line in wrap(text, width, subsequent_indent=_INDENT)]

@@ -138,7 +138,7 @@ def _drift_by_controls(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
         medians = [[np.median(record.arrays["seconds"]) for record in pair] for pair in controls]
         differences = np.diff(np.log(medians))
         sigma, count = float(np.sqrt(np.mean(differences**2))), len(differences)
-        yield Drift(sigma, count, f"{count} times of unchanged code")
+        yield Drift(sigma, count, f"{count:,} times of unchanged code")
 
 
 def _drift_by_fixed_loop(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
@@ -146,7 +146,7 @@ def _drift_by_fixed_loop(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
     paces = [pace for pace in conditions if isinstance(pace, float) and 0 < pace < math.inf]
     if len(paces) > 1:  # a difference of two moments, hence the root of two
         sigma = math.sqrt(2) * float(np.std(np.log(paces), ddof=1))
-        yield Drift(sigma, len(paces) - 1, f"a fixed loop timed with {len(paces)} records")
+        yield Drift(sigma, len(paces) - 1, f"a fixed loop timed with {len(paces):,} records")
 
 
 def _is_control(pair: Pair) -> bool:

@@ -168,7 +168,7 @@ def raised(solved: list[Solved]) -> str:
     """Return the most frequent exception with its count, and why times are doubted; else ""."""
     counts = Counter(target.trouble for target in solved if target.trouble)
     sentences = [
-        f"{trouble}, on {count} of {len(solved)} targets"
+        f"{trouble}, on {count:,} of {len(solved):,} targets"
         for trouble, count in counts.most_common(1)
     ]
     sentences += [target.doubt for target in solved if target.doubt][:1]

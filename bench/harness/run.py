@@ -145,7 +145,7 @@ def _extra_records(
 
 
 def _records(count: int) -> str:
-    return f"{count} record{'' if count == 1 else 's'}"
+    return f"{count:,} record{'' if count == 1 else 's'}"
 
 
 def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:

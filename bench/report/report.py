@@ -105,6 +105,6 @@ def _missing(results: Results, newest: Record) -> Iterator[str]:
         yield f"Not selected: {listed(names)}. `plumbob bench ik cloth` measures all."
     if count := sum(record.stamp != newest.stamp for record in results.every):
         yield (
-            f"{count} of {len(results.every)} records are from other sources, versions or another "
-            "machine than the head of this page says; `plumbob bench` measures them again."
+            f"{count:,} of {len(results.every):,} records are from other sources, versions or "
+            "another machine than the head of this page says; `plumbob bench` measures them again."
         )

@@ -296,4 +296,4 @@ def _share(share: Share) -> str:
     rates = (share.hits / share.total, share.low, share.high)
     texts = (f"{100 * rate:.{digits}f}".rstrip("0").rstrip(".") for rate in rates)
     percent, low, high = texts
-    return f"{share.hits}/{share.total} = {percent} % ({low}–{high})"
+    return f"{share.hits:,}/{share.total:,} = {percent} % ({low}–{high})"

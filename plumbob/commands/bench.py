@@ -256,11 +256,11 @@ def _print_counts(events: "Sequence[Event]", output: Path) -> None:
     from plumbob.bench.harness.record import RecordFile
 
     counts = Counter(event.state for event in events)
-    unchanged = visible(f"{counts[run.KEPT]} already on record in {output}")
-    print(f"{counts[run.MEASURED]} measured, {unchanged}")
+    unchanged = visible(f"{counts[run.KEPT]:,} already on record in {output}")
+    print(f"{counts[run.MEASURED]:,} measured, {unchanged}")
     repeats = Counter(e.message for e in events if e.state == run.MEASURING and e.message)
     for reason, count in repeats.items():
-        print(visible(f"Measured again: {count}, for {reason}"))
+        print(visible(f"Measured again: {count:,}, for {reason}"))
     for event in events:
         if event.state == run.NOT_RUN:
             print(visible(f"{event.suite}: {event.message}"))

@@ -115,7 +115,8 @@ def _save(name: str, folders: list[Path]) -> int:
     with locked(target):
         RecordFile(target).replace(records)
     old = shlex.quote(str(target) if Path(name).exists() else name)
-    print(visible(f"{len(records)} records kept in {target}; plumbob compare {old} NEW compares."))
+    message = f"{len(records):,} records kept in {target}"
+    print(visible(f"{message}; plumbob compare {old} NEW compares."))
     return SUCCESS
 
 

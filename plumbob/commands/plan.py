@@ -145,12 +145,12 @@ def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
         for block, reason in zip(selection, reasons, strict=True)
         if reason is not None
     ]
-    lines = [f"{len(steps)} to measure, {len(selection) - len(steps)} already on record"]
+    lines = [f"{len(steps):,} to measure, {len(selection) - len(steps):,} already on record"]
     by_solver = grouped(steps, lambda step: (step.block.suite, step.block.solver))
     for (suite, solver), group in by_solver.items():
         repeats = Counter(step.reason for step in group if step.reason)
-        whys = "".join(f"; again {count}, for {reason}" for reason, count in repeats.items())
-        lines.append(f"  {suite}: {solver}: {len(group)}, {_time(group)}{whys}")
+        whys = "".join(f"; again {count:,}, for {reason}" for reason, count in repeats.items())
+        lines.append(f"  {suite}: {solver}: {len(group):,}, {_time(group)}{whys}")
     return [*lines, _total(steps)]
 
 

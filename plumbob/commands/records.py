@@ -79,8 +79,8 @@ def merge(
         if added:
             file.append(added.values())
     replaced = len(added.keys() & present.keys())
-    print(f"{len(added)} added to {into}, {replaced} of them in place of earlier ones; "
-          f"{len(candidates) - len(added)} left out: {into} has them or later ones")  # fmt: skip
+    print(f"{len(added):,} added to {into}, {replaced:,} of them in place of earlier ones; "
+          f"{len(candidates) - len(added):,} left out: {into} has them or later ones")  # fmt: skip
     if len(machines := _machines({**present, **added}.values())) > 1:
         print(f"{into} now holds times of {len(machines)} machines: {'; '.join(sorted(machines))}")
     return SUCCESS
@@ -110,7 +110,7 @@ def drop(
     if not dry_run and count:
         with locked(folder):
             RecordFile(folder).drop(matches)
-    print(f"{count} {'would be ' if dry_run else ''}dropped from {folder}")
+    print(f"{count:,} {'would be ' if dry_run else ''}dropped from {folder}")
     return SUCCESS
 
 

@@ -57,6 +57,13 @@ def test_merged_records_are_the_later_ones_and_none_that_failed_before_one_that_
     assert RecordFile("both").path.read_bytes() == whole
 
 
+def test_counts_of_records_have_separators_of_thousands(capsys, here, make):
+    record = make.drawn("a", False, 1.0)
+    RecordFile("many").append([replace(record, problem=f"p{i}") for i in range(1001)])
+    assert plumbob(capsys, "merge", "many", "--into", "all")[1].startswith("1,001 added to all")
+    assert plumbob(capsys, "drop", "all", "--solver", "a")[1] == "1,001 dropped from all\n"
+
+
 def test_only_what_fits_all_that_is_given_is_dropped(capsys, here):
     assert plumbob(capsys, "drop", "laptop", "--solver", "a", "--dry-run")[1] == (
         "1 would be dropped from laptop\n"

@@ -136,6 +136,11 @@ def test_an_answer_stands_in_markdown_with_its_points():
     assert "Thus:\n\n- x\n- y\n" in writers.markdown(answered)
 
 
+def test_counts_have_separators_of_thousands():
+    assert words(Share(1200, 2400, 0.48, 0.52)).startswith("1,200/2,400 = 50 %")
+    assert words(1200) == words(1200.0) == "1,200"
+
+
 @pytest.mark.parametrize("total", [2, 10, 999, 1000, 1001, 10_000, 123_456])
 def test_a_share_is_all_or_nothing_only_where_it_is(total):
     def percent(hits):

@@ -194,9 +194,9 @@ def solve_one_by_one(
     arrays["claims"] = np.where(has_answer, [solve.claim for solve in solves], -1)
     remarks = [outcome.note]
     if facts:
-        remarks += [f"slow: its first {count} of {total} targets"]
+        remarks += [f"slow: its first {count:,} of {total:,} targets"]
     elif count < total:
-        remarks += [f"not finished: {count} of {total} targets, the others count as not reached"]
+        remarks += [f"not finished: {count:,} of {total:,} targets, others count as not reached"]
     if followed and not outcome.is_lost:
         history = _history(problem, job)
         arrays |= history

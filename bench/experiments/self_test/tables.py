@@ -40,7 +40,7 @@ def _counts(rows: Sequence[Row]) -> str:
     caught, correct, accused = (
         sum(bool(row[title]) for row in rows) for title in ("caught", "named", "accused")
     )
-    planted = f"{caught} of {len(faults)} planted faults are caught and {correct} are named"
+    planted = f"{caught:,} of {len(faults):,} planted faults are caught and {correct:,} are named"
     honest = f"{accused} of {len(rows) - len(faults)} honest solvers are accused"
     return "; ".join([planted] * bool(faults) + [honest] * (len(faults) < len(rows)))
 
