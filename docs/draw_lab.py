@@ -33,7 +33,7 @@ def draw_scene(scene: str, name: str, *options: str, folder: Path = DOCS) -> Non
 def draw_heart_beside(name: str) -> None:
     """Draw the heart by the solver of docs/show.md beside ours."""
     page = (DOCS / "show.md").read_text(encoding="utf-8")
-    source = re.search(r'Path\("my_ik.py"\).write_text\("""\n(.*?)"""\)', page, re.DOTALL)
+    source = re.search(r"```python\n(# my_ik.py\n.*?)```", page, re.DOTALL)
     assert source
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "my_ik.py").write_text(source[1], encoding="utf-8")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from plumbob import cli
 from plumbob.crosscheck.verify import catalogue
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer
@@ -36,9 +37,16 @@ def snippets(language, page=README):
 
 
 def blocks(page):
-    """The Python blocks of a page, each with the text block that follows it, if one does."""
+    """The Python blocks of a page, each with the text block that follows it, if one does.
+
+    A block that begins with the name of a file in a comment is that file, and is written.
+    """
     text = page.read_text(encoding="utf-8")
-    return re.findall(r"```python\n(.*?)```\n(?:\n```text\n(.*?)```)?", text, re.DOTALL)
+    files = re.compile(r"```\w+\n(# (\w+\.\w+)\n.*?)```\n", re.DOTALL)
+    for content, name in files.findall(text):
+        Path(name).write_text(content, encoding="utf-8")
+    programs = files.sub("", text)
+    return re.findall(r"```python\n(.*?)```\n(?:\n```text\n(.*?)```)?", programs, re.DOTALL)
 
 
 @pytest.mark.parametrize("page", PROGRAMS, ids=lambda page: page.stem)
@@ -50,6 +58,15 @@ def test_the_blocks_of_a_page_are_one_program_that_prints_what_it_says(
     for code, printed in blocks(page):
         exec(compile(code, str(page), "exec"), names)
         assert capsys.readouterr().out == printed
+
+
+def test_the_solver_of_the_page_on_pictures_is_drawn(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    page = README.parent / "docs" / "show.md"
+    assert blocks(page) == []
+    command = snippets("sh", page)[-1].split()
+    assert cli.run_command(command[1:]) == 0
+    assert capsys.readouterr().out == f"{command[-1]}\n"
 
 
 def verified(page, folder, change=None):
@@ -83,7 +100,7 @@ def test_the_solver_of_the_readme_is_right_and_is_said_to_be(tmp_path):
 
 def test_the_first_program_for_students_is_right(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    exec(snippets("python", README.parent / "docs" / "student.md")[0], {})
+    assert blocks(README.parent / "docs" / "student.md") == []
     command = [sys.executable, "-m", "plumbob", "verify", "my_points.py", "--json", "v.json"]
     run = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert run.returncode == 0, run.stdout
