@@ -177,6 +177,14 @@ def test_every_path_that_a_page_names_exists(page):
     assert [path for path in named if not (README.parent / path).exists()] == []
 
 
+def test_no_page_installs_plumbob_from_an_index():
+    """There is no package of this name; extras are in quotes, since zsh reads brackets."""
+    for page in (README, CHINESE, *PAGES):
+        lines = re.findall(r"pip install ([^\n`#]*)", page.read_text(encoding="utf-8"))
+        wrong = [line for line in lines if re.search(r"(?<![./\w])plumbob|(?<!')\.\[", line)]
+        assert wrong == [], page
+
+
 def test_every_make_target_that_is_named_exists():
     targets = set(
         re.findall(r"^([a-z-]+):", (README.parent / "Makefile").read_text(), re.MULTILINE)

@@ -32,7 +32,7 @@ ANSWER, WORKERS = 10.0, 120.0
 _LOOK = 1.0
 _NO_EXTRA = (
     "--executor: expected the package distributed, which is not installed: "
-    "pip install -e .[cluster], on the workers as well"
+    "pip install '.[cluster]', on the workers as well"
 )
 
 
