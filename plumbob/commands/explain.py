@@ -16,9 +16,9 @@ def explain(
     With words: list the faults that have all of them. Without: list the families of faults.
     """
     from plumbob.crosscheck.verify.language import language_of
-    from plumbob.crosscheck.verify.output.fault_text import answered
+    from plumbob.crosscheck.verify.output.fault_text import fault_help
     from plumbob.crosscheck.verify.output.words import speaker
 
-    for line in answered(words or (), speaker(language_of(lang))):
+    for line in fault_help(words or (), speaker(language_of(lang))):
         print(line, flush=True)
     return SUCCESS

@@ -72,8 +72,8 @@ def _choice(robot: Path, link: str | None, entrants: Sequence[str]) -> "Choice":
     except ValueError as error:
         hint = "" if link else "; --link names the link that must reach the targets"
         raise ValueError(str(error).replace("effector: ", "--link: ") + hint) from None
-    entered = opening.opened(opening.addresses(entrants), ["ik"])
-    if chains_only := [e.door for e in entered if ROBOT_TASK not in e.tasks]:
+    own_solvers = opening.opened(opening.addresses(entrants), ["ik"])
+    if chains_only := [e.door for e in own_solvers if ROBOT_TASK not in e.tasks]:
         raise ValueError(f"with: expected a solver with {ROBOT_TASK}, got {chains_only[0]}")
-    scale = replace(SCALES["quick"], entrants=tuple(entered), problems=tuple(own))
+    scale = replace(SCALES["quick"], entrants=tuple(own_solvers), problems=tuple(own))
     return Choice("quick", scale, problems=(poses,), is_partial=True)

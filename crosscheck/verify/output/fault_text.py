@@ -21,7 +21,7 @@ CONTEXT, ROWS = 2, 4
 _FIRST_END = re.compile(r"(?<=[^\s.]\.) (?=\S)|(?<=。)")
 
 
-def answered(words: Sequence[str], say: Say) -> Iterator[str]:
+def fault_help(words: Sequence[str], say: Say) -> Iterator[str]:
     """Yield the explanation of a code, the faults with all words, or without words the families.
 
     Raises:

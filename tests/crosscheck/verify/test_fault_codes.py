@@ -28,10 +28,10 @@ from plumbob.crosscheck.verify.kinematics.switches import Switches
 from plumbob.crosscheck.verify.one_line import search
 from plumbob.crosscheck.verify.output import comparison, json_file, junit, page, terminal
 from plumbob.crosscheck.verify.output.fault_text import (
-    answered,
     cause_and_remedy,
     explained,
     failure_of,
+    fault_help,
 )
 from plumbob.crosscheck.verify.output.words import Presentation, advice, reservations, speaker
 from plumbob.crosscheck.verify.sentence import codes_in, sentence
@@ -294,7 +294,7 @@ def test_an_unknown_code_is_refused_with_the_nearest():
 
 def listed(*words, language="en"):
     """The lines of a list of faults, and what each begins with."""
-    lines = list(answered(words, speaker(language)))
+    lines = list(fault_help(words, speaker(language)))
     assert max(map(cell_len, lines)) <= 80
     return lines, [line.split()[0] for line in lines if line.startswith("  PB-")]
 
@@ -313,7 +313,7 @@ def test_words_list_the_faults_that_have_all_of_them():
     causes = {code: cause_and_remedy(f, str)[0].lower() for code, f in coded_faults().items()}
     assert codes == [c for c, text in causes.items() if "parent" in text and "rotation" in text]
     with pytest.raises(ValueError, match="got 'parent qqq'; `plumbob explain` lists the families"):
-        answered(("parent", "qqq"), str)
+        fault_help(("parent", "qqq"), str)
 
 
 def test_a_cause_does_not_end_at_the_dot_of_a_product():
