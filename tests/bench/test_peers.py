@@ -4,7 +4,6 @@ import importlib
 import itertools
 import sys
 import types
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from plumbob.bench.peers.protocol import OwnTime
 from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, PORTFOLIO, RESTARTS
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
-from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, enter, is_installed, robot
+from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, is_installed, robot
 from plumbob.reference.inverse_kinematics.prepared import PreparedIK
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
@@ -52,12 +51,8 @@ def answers(peer, entry, name, targets):
 
 @pytest.fixture
 def arm(peer):
-    """An arm that a peer takes: some take no seven joints."""
-    name = "ur5" if module(peer) in {"eaik", "ur_analytic"} else "iiwa14"
-    if module(peer) == "tinyik":  # which reaches positions only
-        name = "iiwa14, positions"
-        enter(replace(robot("iiwa14"), name=name, oriented=False))
-        return name
+    """An arm that a peer takes: EAIK takes no seven joints."""
+    name = "ur5" if module(peer) == "eaik" else "iiwa14"
     if not is_installed(name):
         pytest.skip("example-robot-data is not installed")
     return name
@@ -202,16 +197,6 @@ def test_our_prepared_call_is_ranked_and_answers_as_the_plain_call_does(restarts
         plain_calls = [e for e in PLUMBOB_LM.entries if e.kind == kind and not
                        e.settings.get("prepared", True)]  # fmt: skip
         assert [entry.note.endswith("plain call") for entry in plain_calls] == [True]
-
-
-def test_a_robot_of_other_lengths_is_none_of_the_makers_models():
-    model_of = pytest.importorskip("plumbob.bench.peers.ik.ur_analytic").model_of
-    arm = robot("ur5")
-    assert model_of(arm).solver.__name__.endswith("ur5")
-    longer = replace(arm, text=arm.text.replace("0.425", "0.42501"))
-    assert longer.text != arm.text
-    with pytest.raises(UnableError, match="Universal Robots only"):
-        model_of(longer)
 
 
 def test_every_entry_has_a_name_of_its_own_within_its_kind():
