@@ -1,7 +1,7 @@
 # make report   check, bench and write report/index.html
 # make test     the tests, a few minutes; `make test-all` adds the heavy sweeps
 # make peers    install the solvers of others as well, for `make bench`: all that this Python has
-#               wheels of; 3.5 GB on Linux x86-64
+#               wheels of; 4 GB on Linux x86-64
 # make lint     ruff and mypy
 # make bench    every benchmark at full length, then the report
 # make sample   every benchmark, quick, with every peer and four seeds, as docs/sample
