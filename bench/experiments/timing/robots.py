@@ -37,39 +37,39 @@ def cases() -> Iterator[TimedCase]:
 
 def timed_call(subject: str, solver: str, name: str, count: int) -> Callable[[], Any]:
     """Return the work of random poses: our compiled call takes a batch at once, others loop."""
-    timed = robot(name)
-    q = timed.draw(np.random.default_rng(0), POSES)[:count]
+    bench_robot = robot(name)
+    q = bench_robot.draw(np.random.default_rng(0), POSES)[:count]
     if solver == PINOCCHIO:
-        q = np.array([to_pinocchio(timed, row) for row in q])
-    call = CALLS[solver](timed)[subject]
+        q = np.array([to_pinocchio(bench_robot, row) for row in q])
+    call = CALLS[solver](bench_robot)[subject]
     if count == 1:
         return partial(call, q[0])
     return partial(call, q) if solver == COMPILED else lambda: [*map(call, q)]
 
 
-def our_calls(timed: BenchRobot, is_prepared: bool = False) -> Calls:
+def our_calls(bench_robot: BenchRobot, is_prepared: bool = False) -> Calls:
     """Return our forward kinematics of all links, and our Jacobian of the first effector."""
-    model = (urdf.parse if timed.is_chain else mjcf.parse)(timed.text).articulation
+    model = (urdf.parse if bench_robot.is_chain else mjcf.parse)(bench_robot.text).articulation
     return {
         "kinematics": prepare(model) if is_prepared else partial(forward_kinematics, model),
-        "jacobians": partial(jacobian, model, effector=model.index(timed.effectors[0])),
+        "jacobians": partial(jacobian, model, effector=model.index(bench_robot.effectors[0])),
     }
 
 
-def pinocchio_calls(timed: BenchRobot) -> Calls:
+def pinocchio_calls(bench_robot: BenchRobot) -> Calls:
     """Return Pinocchio's forward kinematics of all frames, and its Jacobian."""
-    model, axes = pinocchio_model(timed), pinocchio.LOCAL_WORLD_ALIGNED
-    data, frame = model.createData(), model.getFrameId(timed.effectors[0])
+    model, axes = pinocchio_model(bench_robot), pinocchio.LOCAL_WORLD_ALIGNED
+    data, frame = model.createData(), model.getFrameId(bench_robot.effectors[0])
     return {
         "kinematics": partial(pinocchio.framesForwardKinematics, model, data),
         "jacobians": lambda q: pinocchio.computeFrameJacobian(model, data, q, frame, axes),
     }
 
 
-def mujoco_calls(timed: BenchRobot) -> Calls:
+def mujoco_calls(bench_robot: BenchRobot) -> Calls:
     """Return MuJoCo's forward kinematics, and its Jacobian, in the same memory every time."""
-    model = mujoco_model(timed)
-    data, body = mujoco.MjData(model), model.body(timed.effectors[0]).id
+    model = mujoco_model(bench_robot)
+    data, body = mujoco.MjData(model), model.body(bench_robot.effectors[0]).id
     J = np.empty((6, model.nv))
     linear, angular = J[:3], J[3:]
 
