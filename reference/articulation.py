@@ -230,8 +230,7 @@ class Articulation(KeepsReadOnly):
     def zero(self) -> FloatArray:
         """Return the coordinates in which every joint is at zero, limits or not."""
         q = np.zeros(self.coordinate_count)
-        for quaternion in self.quaternions:
-            q[quaternion.start] = 1.0
+        q[self.quaternions[:, 0]] = 1.0
         return q
 
     def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
@@ -286,19 +285,18 @@ class Articulation(KeepsReadOnly):
     def checked(self, name: str, q: ArrayLike) -> FloatArray:
         """Return coordinates (..., coordinate), their quaternions made unit."""
         q = arguments.coordinates(name, q, "...", self.coordinate_count)
-        if not self.quaternions:
+        if not len(self.quaternions):
             return q
         result = q.copy()
-        for quaternion in self.quaternions:
-            result[..., quaternion] = rotation.unit(name, q[..., quaternion])
+        result[..., self.quaternions] = rotation.unit(name, q[..., self.quaternions])
         return result
 
     @functools.cached_property
-    def quaternions(self) -> list[slice]:
-        """The slices of q that hold quaternions."""
+    def quaternions(self) -> IndexArray:
+        """The indices of quaternions in q, (quaternion, 4)."""
         rotating = [int(joint) for joint in self._leading if self.kinds[joint] in ("ball", "free")]
         ends = [self.coordinates_of(joint).stop for joint in rotating]
-        return [slice(end - 4, end) for end in ends]
+        return frozen(np.array(ends, dtype=np.int64)[:, None] - np.arange(4, 0, -1))
 
     @functools.cached_property
     def _leading(self) -> IndexArray:

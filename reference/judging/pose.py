@@ -157,11 +157,8 @@ def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatA
         unit, deviations = rotation.normalise(quaternions, name)
         return unit, float(deviations.max())
     unit = arguments.coordinates(name, pose, model.coordinate_count).copy()
-    deviation = 0.0
-    for part in model.quaternions:
-        unit[part], difference = rotation.normalise(unit[part], name)
-        deviation = max(deviation, float(difference))
-    return unit, deviation
+    unit[model.quaternions], deviations = rotation.normalise(unit[model.quaternions], name)
+    return unit, float(deviations.max(initial=0.0))
 
 
 def _length_errors(model: Skeleton | Articulation, tree: Skeleton, x: FloatArray) -> FloatArray:

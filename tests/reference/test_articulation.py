@@ -247,6 +247,17 @@ def test_slightly_long_quaternions_are_normalised_once(arm, q, backend):
     )
 
 
+def test_a_quaternion_that_is_not_unit_is_named_by_its_number(backend):
+    model = Articulation(Skeleton([-1, 0, 1], np.eye(3)))
+    q = model.zero()
+    np.testing.assert_array_equal(model.quaternions, np.arange(12).reshape(3, 4))
+    q[model.quaternions[1]] *= 1.1
+    with pytest.raises(ValueError, match=r"length 1\.1 at index \(1,\)"):
+        forward_kinematics(model, q)
+    with pytest.raises(ValueError, match=r"length 1\.1 at index \(4, 1\)"):
+        forward_kinematics(model, [model.zero()] * 4 + [q])
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
