@@ -269,7 +269,8 @@ def suite(monkeypatch, worker):
     monkeypatch.setattr(registry, "PEERS", peers)
     monkeypatch.setattr(robots, "ROBOTS", ("iiwa14",))
     monkeypatch.setattr(job_module, "worker_process", lambda: worker)
-    return {(b.solver, b.problem): b for b in robots.blocks(Scale(targets=3, seconds=10.0))}
+    yield {(b.solver, b.problem): b for b in robots.blocks(Scale(targets=3, seconds=10.0))}
+    registry._by_name.cache_clear()  # where the fakes stand in place of the peers
 
 
 def test_every_manner_becomes_one_record(suite):
