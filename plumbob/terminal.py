@@ -150,14 +150,15 @@ def progress() -> Any:
 
 
 @contextlib.contextmanager
-def lines_in_a_pipe(
-    bar: Any, first_pause: float = PAUSE, longest_pause: float = LONGEST_PAUSE
-) -> Iterator[None]:
-    """Print the state of a progress bar now and then, where standard error is no terminal."""
+def lines_in_a_pipe(bar: Any, pauses: tuple[float, float] | None = None) -> Iterator[None]:
+    """Print the state of a progress bar now and then, where standard error is no terminal.
+
+    `pauses` are the first pause and the longest one [s].
+    """
     end = threading.Event()
 
     def report() -> None:
-        pause = first_pause
+        pause, longest_pause = pauses or (PAUSE, LONGEST_PAUSE)
         while not end.wait(pause):
             pause = min(1.5 * pause, longest_pause)
             for task in bar.tasks:

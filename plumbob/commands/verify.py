@@ -93,7 +93,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 
     with ExitStack() as work:  # imports take seconds, on a busy machine many
         bar = work.enter_context(progress())
-        work.enter_context(lines_in_a_pipe(bar, LINE_PAUSE, LINE_PAUSE))
+        work.enter_context(lines_in_a_pipe(bar, (LINE_PAUSE, LINE_PAUSE)))
         bar.add_task("starting", total=None)
         from plumbob.crosscheck.verify.language import language_of
         from plumbob.crosscheck.verify.output.files import Files
