@@ -228,11 +228,12 @@ def _solved_in_time(rows: dict[str, Score]) -> str:
 def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:
     """Return who solves the most poses, the best other solver if any, and how many tie."""
     share, rates = rows[first].share, 100.0 * np.array(rows[first].shares_by_seed)
-    span = f", {rates.min():.1f} to {rates.max():.1f} by seed" if rates.size > 1 else ""
+    span = f", {rates.min():.1f} to {rates.max():.1f} by seed" if np.ptp(rates) else ""
     solved = f"{percent(share)} of {words(share.total)}{span}"
     if not rival:
         return f"{full_name(first)} solves the most poses: {solved}"
-    ties = sum(rows[solver].share.hits > 0 for solver in rows[first].success.first)
+    equals = [solver for solver in rows[first].success.first if rows[solver].share.hits]
+    ties = len({solver.partition(", ")[0] for solver in equals})
     chance = f", and {ties} solvers tie within chance" * (ties > 2)
     chance += ", a tie within chance" * (ties == 2)
     if rows[rival].share.hits == share.hits:

@@ -64,6 +64,8 @@ def test_only_what_chance_would_not_do_as_much_leads_or_wins(run):
     assert sentence(near, MOST).endswith(f" {WRITTEN} with 94 %, a tie within chance.")
     assert sentence([*near, run("d", 189)], MOST).endswith(", and 3 solvers tie within chance.")
     assert wins(near) == []
+    again = [*near, run(f"{OURS}, plain call", 189)]
+    assert sentence(again, MOST).endswith(", a tie within chance.")
 
 
 def test_of_solvers_that_solve_as_much_the_fastest_is_named_first(run):
