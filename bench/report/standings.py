@@ -66,7 +66,7 @@ def _target_ranks(
     scores = [score for field in fields.values() for score in field]
     for solver in dict.fromkeys(s.solver for s in scores if s.records[0].facts.get("entrant")):
         problems = {score.robots for score in scores if score.solver == solver}
-        equal_fields = readings.on_targets_of(solver, fields)
+        equal_fields = {r: readings.on_targets_of(solver, field) for r, field in fields.items()}
         rows = {row.solver: row for row in readings.together(problems, equal_fields)}
         yield Headline("", f"{solver}, {task}", _rank(rows[solver], rows), table)
 
@@ -76,7 +76,7 @@ def _rank(row: readings.Score, rows: Mapping[str, readings.Score]) -> str:
     order, first = row.success
     share = f"it solves {percent(row.share)} of {counted(row.share.total, 'target')}"
     if any(FIRST_TARGETS in record.facts for record in row.records):
-        share += ", the first, for it is slow"
+        share += ", the first of each problem because the solver is slow"
     if not row.is_ranked or not row.share.hits:
         why = f"it is marked “{row.limits}”" if row.limits else "it solves no target"
         return f"{row.solver} is not ranked: {why}."

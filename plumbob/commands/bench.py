@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from plumbob.bench.experiments import SUITES
+from plumbob.bench.experiments import EXPERIMENTS, SUITES
 from plumbob.bench.harness.compile_ahead import compiling_ahead
 from plumbob.bench.harness.progress import TROUBLE, Progress, listening
 from plumbob.bench.text import visible
@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from plumbob.bench.harness.run import Event
 
 QUICK, FULL = "quick", "full"
+TIMED_SUITES = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
+# The main job leaves out the long self-test of `plumbob verify`. Kernels are compiled ahead while
+# suites without times are measured.
+MAIN_SUITES = sorted((s for s in SUITES if s != "self_test"), key=TIMED_SUITES.__contains__)
 # Between the columns of a line.
 _GAP = re.compile(r"( {2,})")
 
@@ -149,19 +153,8 @@ def main_job(output: Path, fresh: bool) -> int:
     )
     writable(output)
     with compiling_ahead() as wait:
-        code = run_suites(_main_suites(), QUICK, output, fresh, before_times=wait)
+        code = run_suites(MAIN_SUITES, QUICK, output, fresh, before_times=wait)
     return max(code, write_report(output))
-
-
-def _main_suites() -> list[str]:
-    """Return all suites but the self-test of `plumbob verify`, suites with times last.
-
-    Kernels are compiled ahead while the first suites are measured.
-    """
-    from plumbob.bench.harness.experiment import EXPERIMENTS
-
-    timed_suites = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
-    return sorted((s for s in SUITES if s != "self_test"), key=timed_suites.__contains__)
 
 
 def run_suites(
@@ -213,16 +206,14 @@ def run_with_progress(
     """Run suites with a progress bar, and return all events."""
     from plumbob.bench.harness import run
     from plumbob.bench.harness.executors import THIS_PROCESS
-    from plumbob.bench.harness.experiment import EXPERIMENTS
 
     events: list[Event] = []
-    timed_suites = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
     with terminal.progress() as bar, terminal.lines_in_a_pipe(bar):
         task, counts = bar.add_task("starting", total=run.count(suites, scale)), Counter[str]()
         is_serial = executor in (None, THIS_PROCESS)
         with listening(_listener(bar, task, events if is_serial else ())):
             for event in run.run(suites, scale, output, executor or THIS_PROCESS):
-                if event.state == run.MEASURING and event.suite in timed_suites:
+                if event.state == run.MEASURING and event.suite in TIMED_SUITES:
                     before_times()
                 events.append(event)
                 counts[event.state] += 1

@@ -132,7 +132,7 @@ def test_a_slow_solver_gets_the_first_targets_and_a_rank_on_these(
     asked = ("ik", *SMALL, "--with", "my_ik.py", "--solver", "ccd")
     assert bench(*asked) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert re.search(r"My FABRIK ranks 1 of 2, .* of 1 target, the first, for it is slow", printed)
+    assert re.search(r"My FABRIK ranks 1 of 2, .* of 1 target, the first of each problem", printed)
     (mine,), (ours,) = records("My FABRIK"), records("ccd")
     assert mine.arrays["seconds"].shape == (1, 1)
     assert [len(record.arrays["residual"]) for record in (mine, ours)] == [1, 2]

@@ -74,7 +74,8 @@ def test_a_slow_solver_is_ranked_on_the_targets_that_it_was_given(make):
     rivals = [make.solving("pink", 5, seconds=1e-3), make.solving("mink", 190, seconds=1e-3)]
     standing = only([*rivals, slow])
     assert standing.sentence.startswith("Mine ranks 1 of 3, in a tie of 2: it solves 95 % of 20 ")
-    assert "20 targets, the first, for it is slow; where both solve, it is 2.0" in standing.sentence
+    reason = "20 targets, the first of each problem because the solver is slow; where both solve, "
+    assert f"{reason}it is 2.0 times slower than mink" in standing.sentence
     (other,) = standings(Results([*rivals, slow, make.solving("Other", 150, mine=True)]))[1:]
     assert other.sentence.startswith("Other ranks 2 of 3 (1 solver did not finish): it solves 75 %")
 

@@ -271,28 +271,20 @@ def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score
     return {robot: _field(robot, start, members) for robot, members in robots.items()}
 
 
-def on_targets_of(solver: str, fields: dict[str, list[Score]]) -> dict[str, list[Score]]:
-    """Return all solvers on the targets of one, where it was so slow that it got the first only."""
-    return {robot: _on_targets_of(solver, field) for robot, field in fields.items()}
-
-
-def _on_targets_of(solver: str, field: list[Score]) -> list[Score]:
+def on_targets_of(solver: str, field: list[Score]) -> list[Score]:
+    """Return the solvers of a robot on the first targets if a slow solver got these only."""
     records = [score.records[0] for score in field]
     own = next((r for r in records if r.solver == solver and FIRST_TARGETS in r.facts), None)
     if own is None:
         return field
     count, timed = total(own), rounds_of(own).shape[1]
-    firsts = [
-        replace(
-            record,
-            size=0,
-            arrays={"solved": record.arrays["solved"][:count],
-                    "seconds": rounds_of(record)[:, :timed]},
-            facts={**record.facts, FIRST_TARGETS: min(count, total(record))},
-        )
-        for record in records
-    ]  # fmt: skip
-    return _field(field[0].robots, field[0].start, firsts)
+
+    def cut(record: Record) -> Record:
+        solved, seconds = record.arrays["solved"][:count], rounds_of(record)[:, :timed]
+        facts = {**record.facts, FIRST_TARGETS: min(count, total(record))}
+        return replace(record, arrays={"solved": solved, "seconds": seconds}, facts=facts)
+
+    return _field(field[0].robots, field[0].start, list(map(cut, records)))
 
 
 def _field(robot: str, start: str, records: Sequence[Record]) -> list[Score]:
