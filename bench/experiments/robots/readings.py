@@ -277,14 +277,14 @@ def on_targets_of(solver: str, field: list[Score]) -> list[Score]:
     own = next((r for r in records if r.solver == solver and FIRST_TARGETS in r.facts), None)
     if own is None:
         return field
-    count, timed = total(own), rounds_of(own).shape[1]
+    count, timed_count = total(own), rounds_of(own).shape[1]
 
-    def cut(record: Record) -> Record:
-        solved, seconds = record.arrays["solved"][:count], rounds_of(record)[:, :timed]
+    def first_targets(record: Record) -> Record:
+        solved, seconds = record.arrays["solved"][:count], rounds_of(record)[:, :timed_count]
         facts = {**record.facts, FIRST_TARGETS: min(count, total(record))}
         return replace(record, arrays={"solved": solved, "seconds": seconds}, facts=facts)
 
-    return _field(field[0].robots, field[0].start, list(map(cut, records)))
+    return _field(field[0].robots, field[0].start, list(map(first_targets, records)))
 
 
 def _field(robot: str, start: str, records: Sequence[Record]) -> list[Score]:

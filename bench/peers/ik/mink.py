@@ -40,8 +40,13 @@ def prepare(
     options: dict[str, Any] = {"damping": damping, "limits": limits}
     reach: Callable[..., bool] = reaching(mink.solve_ik, configuration, tasks, *goal, **options)
     if phases > 1:
-        both, phased_goal = (*tasks, mink.PostureTask(configuration.model, 0.0)), (*goal, phases)
-        reach = PhasedReach(mink.solve_ik, configuration, both, _rotated, phased_goal, **options)
+        all_tasks, phased_goal = (
+            (*tasks, mink.PostureTask(configuration.model, 0.0)),
+            (*goal, phases),
+        )
+        reach = PhasedReach(
+            mink.solve_ik, configuration, all_tasks, _rotated, phased_goal, **options
+        )
 
     def ask(request: PoseRequest) -> Solve:
         targets = [

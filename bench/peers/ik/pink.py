@@ -42,8 +42,10 @@ def prepare(
     reach: Callable[..., bool] = reaching(pink.solve_ik, configuration, tasks, *goal, **options)
     if phases > 1:
         posture = pink.PostureTask(np.zeros(configuration.model.nv))
-        both, phased_goal = (*tasks, posture), (*goal, phases)
-        reach = PhasedReach(pink.solve_ik, configuration, both, _rotated, phased_goal, **options)
+        all_tasks, phased_goal = (*tasks, posture), (*goal, phases)
+        reach = PhasedReach(
+            pink.solve_ik, configuration, all_tasks, _rotated, phased_goal, **options
+        )
 
     def ask(request: PoseRequest) -> Solve:
         targets = [pink.configuration.pin.SE3(R, x) for x, R in request.poses]
