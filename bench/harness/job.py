@@ -8,7 +8,6 @@ import math
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,13 +84,15 @@ class Job(NamedTuple):
 
     def _answers(self, ask: Any) -> Iterator[Solved]:
         """Solve the targets in order, until the budget is spent."""
-        end = perf_counter() + self.budget
+        spent = 0.0
         for i in range(self.targets.shape[0]):
             request = self.targets.request(i)
             solve = ask(request)
             seed_shared_generators(digest_of(*request))
-            yield self._solved(solve)
-            if perf_counter() > end:
+            answer = self._solved(solve)
+            yield answer
+            spent += answer.seconds
+            if spent > self.budget:
                 break
 
     def _solved(self, solve: Callable[[], SolverOutput]) -> Solved:

@@ -377,10 +377,14 @@ def is_loop(name: str) -> bool:
     return find(name).loop
 
 
+def title_of(name: str) -> str:
+    """Return the name of a solver without its settings."""
+    return name.partition(", ")[0]
+
+
 def engine_of(name: str) -> str:
     """Return the engine or package of a solver, whatever its settings were, else its name."""
-    title = name.partition(", ")[0]
-    return (find(name).engine or find(title).engine or name).casefold()
+    return (find(name).engine or find(title_of(name)).engine or name).casefold()
 
 
 @functools.cache

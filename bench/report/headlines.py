@@ -233,7 +233,7 @@ def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:
     if not rival:
         return f"{full_name(first)} solves the most poses: {solved}"
     equals = [solver for solver in rows[first].success.first if rows[solver].share.hits]
-    ties = len({solver.partition(", ")[0] for solver in equals})
+    ties = len(set(map(registry.title_of, equals)))
     chance = f", and {ties} solvers tie within chance" * (ties > 2)
     chance += ", a tie within chance" * (ties == 2)
     if rows[rival].share.hits == share.hits:

@@ -73,7 +73,7 @@ def _peers() -> dict[str, tuple[str, str]]:
 
 def _title(score: Score) -> str:
     """Return a solver's name without its settings."""
-    title = _peers().get(score.solver, (score.solver.partition(", ")[0],))[0]
+    title = _peers().get(score.solver, (registry.title_of(score.solver),))[0]
     return f"{title} (ours)" if registry.is_ours(score.solver) else title
 
 

@@ -125,14 +125,14 @@ def test_the_list_of_a_suite_names_each_problem_once_and_lines_up(folder):
     solvers = [line for group in groups.values() for line in group.splitlines()]
     said = {line.split("  ")[1]: line.split("  ")[-1].strip() for line in solvers}
     assert said["my_ik.py"] == "entered, my_ik.py"
-    assert re.fullmatch(r"\d+\.\d+\S*", said["Plumbob LM"])
+    assert re.fullmatch(r"\d+\.\d+\S*", said["Plumbob LM, first phase"])
     assert re.fullmatch(r"\d+\.\d+\S*", said["ccd"])
     assert set(said) >= {"mink", "TRAC-IK, 5 ms"}
     for group in groups.values():
         assert len({line.rindex("  ") for line in group.splitlines()}) == 1
     mine = next(problems for problems, group in groups.items() if "  my_ik.py" in group)
     assert mine == "chain (4); published (2)"
-    lm = next(problems for problems, group in groups.items() if "  Plumbob LM, 20 " in group)
+    lm = next(problems for problems, group in groups.items() if "  Plumbob LM, 14 " in group)
     assert re.fullmatch(r"robots \(\d+\); unreachable \(\d+\); published \(\d\)", lm)
 
 
