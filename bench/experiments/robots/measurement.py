@@ -134,8 +134,9 @@ def _blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
             continue
         for name in robots:
             targets = partial(robot_targets, name, count, scale.seed, scale.seeds)
-            timings = scale.seeds * max(min(count, _LEAST_TIMED), -(-count // _PER_TIMED))
-            sizes = (scale.seeds * count * len(STRATA), len(STRATA) * timings)
+            rounds = scale.seeds * count
+            timings = max(min(rounds, _LEAST_TIMED), -(-rounds // _PER_TIMED))
+            sizes = (rounds * len(STRATA), len(STRATA) * timings)
             job = RobotJob(name, peer, entry, TOLERANCE, targets, *sizes, scale.seed, scale.seeds)
             yield job.block(f"robots/{name}", _facts(REACHABLE, title(name)))
             if name in HELD_OUT:
