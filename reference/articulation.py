@@ -3,7 +3,8 @@
 A joint's frame sits in its parent's at an offset and a rotation, its *frame*. Its coordinates move
 it from there: a hinge rotates about its axis and a slide moves along it, a ball rotates by a unit
 quaternion, a free joint does both, a fixed one stays. A mimic joint is a hinge or a slide
-that moves with a leader: its coordinate times a multiplier, plus a shift.
+that moves with a leader: its coordinate times a multiplier, plus a shift. The limits of a leader
+are narrowed to the coordinates that keep the limits of its followers as well.
 """
 
 import functools
@@ -111,7 +112,8 @@ class Articulation(KeepsReadOnly):
         frames: each joint's rotation in its parent's frame where its coordinates are zero, (joint,
             4).
         axes: unit axes of hinges and slides, and twist axes of balls, (joint, 3).
-        lower: least coordinate of hinges and slides, least twist of balls, (joint,).
+        lower: least coordinate of hinges and slides, least twist of balls, (joint,). The limits of
+            a leader are those in effect, which keep the limits of its followers as well.
         upper: greatest of the same.
         cones: greatest tilt of the axis of a ball [rad], (joint,).
         mimics: the joints that move with their leaders.
@@ -149,15 +151,16 @@ class Articulation(KeepsReadOnly):
             kinds: of each joint.
             axes: any length but zero.
             frames: unit quaternions.
-            lower: limits of hinges [rad], slides [m] and of the twist of balls [rad].
+            lower: limits of hinges [rad], slides [m] and of the twist of balls [rad]; a mimic joint
+                keeps its limits by those of its leader.
             upper: likewise.
             cones: limits of the tilt of balls [rad].
             mimics: which hinges and slides move with others.
 
         Raises:
             ValueError: naming the argument, if it has another shape, is out of range, an axis is
-                zero, limits cross or no twist could keep them, or a mimic joint or its leader is
-                no hinge or slide.
+                zero, limits cross or no twist could keep them, a mimic joint or its leader is no
+                hinge or slide, or no coordinate of a leader keeps the limits of a mimic joint.
         """
         count = checked_skeleton(skeleton).joint_count
         if isinstance(kinds, str):
@@ -169,6 +172,7 @@ class Articulation(KeepsReadOnly):
         leaders = _checked_mimics({} if mimics is None else mimics, skeleton, names)
         joints = _records(skeleton, numbers, leaders)
         joints["lower"], joints["upper"] = bounds
+        _narrow_leaders(joints, skeleton.names)
         joints["frame"] = _per_joint("frames", rotation.unit("frames", frames), count, 4)
         joints["axis"] = _checked_axes(axes, count)
         joints["cone"] = tilts = _checked_bound("cones", cones, count)
@@ -527,7 +531,7 @@ def _checked_bound(name: str, value: ArrayLike, count: int) -> FloatArray:
     if np.isnan(bounds).any():
         raise ValueError(f"{name}: expected numbers or infinity, got NaN")
     arguments.array(name, bounds[np.isfinite(bounds)], "...")
-    return bounds
+    return bounds + 0.0  # no -0.0, from which no generator draws
 
 
 def _checked_mimics(
@@ -578,6 +582,35 @@ def _records(skeleton: Skeleton, kinds: IndexArray, mimics: Mapping[int, Mimic])
         joints["multiplier"][joint], joints["shift"][joint] = multiplier, shift
     number_coordinates(joints)
     return joints
+
+
+def _narrow_leaders(joints: RecordArray, names: tuple[str, ...]) -> None:
+    """Narrow the limits of leaders to coordinates that keep the limits of all followers."""
+    for j in np.flatnonzero(joints["leader"] != np.arange(len(joints))):
+        leader = joints[joints["leader"][j]]
+        least, greatest = _bounds_by_follower(joints[j])
+        lower, upper = max(leader["lower"], least), min(leader["upper"], greatest)
+        if lower > min(upper + LIMIT_TOLERANCE, LARGEST_COORDINATE) or upper < -LARGEST_COORDINATE:
+            raise ValueError(
+                f"mimics: expected a coordinate of {names[joints['leader'][j]]!r} that keeps the "
+                f"limits of its follower {names[j]!r}, got none from {leader['lower']:g} to "
+                f"{leader['upper']:g}"
+            )
+        if lower > upper:  # by rounding
+            lower = upper = 0.5 * (lower + upper)
+        leader["lower"], leader["upper"] = lower, upper
+
+
+def _bounds_by_follower(follower: Any) -> tuple[float, float]:
+    """Return the least and the greatest coordinate of a leader by the limits of its follower."""
+    multiplier, shift = float(follower["multiplier"]), float(follower["shift"])
+    least, greatest = float(follower["lower"]) - shift, float(follower["upper"]) - shift
+    if multiplier == 0.0:  # the follower stays at its shift
+        is_within = least <= LIMIT_TOLERANCE and greatest >= -LIMIT_TOLERANCE
+        return (-math.inf, math.inf) if is_within else (math.inf, -math.inf)
+    bounds = np.sort([least / multiplier, greatest / multiplier]) + 0.0  # no -0.0
+    bounds[np.abs(bounds) > LARGEST_COORDINATE] *= math.inf
+    return float(bounds[0]), float(bounds[1])
 
 
 def number_coordinates(joints: RecordArray) -> IndexArray:

@@ -75,19 +75,22 @@ def random_articulation(kinds, seed):
     upper = np.where(limited, rng.uniform(0.5, 2.5, count), np.inf)
     single = [j for j in range(count) if kinds[j] in ("hinge", "slide")]
     leaders = {j: int(rng.choice(single)) for j in single if rng.random() < 0.3}
-    return Articulation(
+    skeleton, axes = (
         Skeleton(parents, rng.standard_normal((count, 3))),
-        kinds,
         rng.standard_normal((count, 3)),
-        frames=rotation.random(rng, count),
-        lower=lower,
-        upper=upper,
-        cones=np.where(limited, rng.uniform(0.0, 3.0, count), np.inf),
-        mimics={
-            j: Mimic(leader, *rng.uniform(-2.0, 2.0, 2))
-            for j, leader in leaders.items()
-            if leader not in leaders
-        },
+    )
+    frames = rotation.random(rng, count)
+    cones = np.where(limited, rng.uniform(0.0, 3.0, count), np.inf)
+    mimics = {
+        j: Mimic(leader, *rng.uniform(-2.0, 2.0, 2))
+        for j, leader in leaders.items()
+        if leader not in leaders
+    }
+    for j, (_, multiplier, shift) in mimics.items():  # all limits hold where leaders are at 0.5
+        lower[j] += 0.5 * multiplier + shift - 0.5
+        upper[j] += 0.5 * multiplier + shift - 0.5
+    return Articulation(
+        skeleton, kinds, axes, frames=frames, lower=lower, upper=upper, cones=cones, mimics=mimics
     )
 
 

@@ -83,6 +83,71 @@ def test_a_mimic_of_a_mimic_moves_with_the_first(backend):
     )
 
 
+def follower_excess(model, q):
+    """Return how far coordinates of mimic joints are beyond their own limits, the largest."""
+    excess = 0.0
+    for j, (leader, multiplier, shift) in model.mimics.items():
+        x = multiplier * q[..., model.coordinates_of(leader)] + shift
+        excess = max(excess, (model.lower[j] - x).max(), (x - model.upper[j]).max())
+    return excess
+
+
+@at_both_speeds
+@given(**TREES)
+def test_mimic_joints_keep_their_own_limits(articulated, backend, kinds, seed):
+    model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+    q = model.random(rng, 20)
+    assert follower_excess(model, q) <= ANGLE
+    free = Articulation(model.skeleton, model.kinds, mimics=model.mimics)
+    q = 2.0 * free.random(rng, 20)
+    q[:, model.quaternions] /= 2.0
+    assert follower_excess(model, model.clamp(q)) <= ANGLE
+    for wild in q:
+        beyond = follower_excess(model, wild)
+        assert beyond <= ANGLE or not model.within_limits(wild, 0.4 * beyond)
+
+
+def followed(lower, upper, **mimics):
+    """Return three hinges, of which others than the first may be mimics, with limits."""
+    tree = Skeleton([-1, 0, 1], np.zeros((3, 3)), ["a", "b", "c"])
+    return Articulation(tree, "hinge", lower=lower, upper=upper, mimics=mimics)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "mimics", "expected"),
+    [
+        ((-2.0, -0.2, -9.0), (2.0, 0.4, 9.0), {"b": ("a",)}, (-0.2, 0.4)),
+        ((-2.0, -0.2, -9.0), (2.0, 0.4, 9.0), {"b": ("a", -0.5)}, (-0.8, 0.4)),
+        ((-2.0, -0.2, -9.0), (2.0, 0.4, 9.0), {"b": ("a", 1.0, 0.3)}, (-0.5, 0.1)),
+        ((-2.0, -0.2, -0.1), (2.0, 0.4, 9.0), {"b": ("a",), "c": ("a", -1.0)}, (-0.2, 0.1)),
+        ((-2.0, -1.0, -1.0), (2.0, 0.4, 9.0), {"b": ("a", 2.0), "c": ("b", 2.0)}, (-0.25, 0.2)),
+        ((-np.inf, -np.inf, -9.0), (np.inf, 0.5, 9.0), {"b": ("a", -1.0)}, (-0.5, np.inf)),
+        ((-2.0, -0.2, -9.0), (2.0, 0.4, 9.0), {"b": ("a", 0.0, 0.4)}, (-2.0, 2.0)),
+        ((-np.inf, -1.0, -9.0), (np.inf, 1.0, 9.0), {"b": ("a", 1e-80)}, (-np.inf, np.inf)),
+        ((0.0, 0.0, -9.0), (0.5, 0.5, 9.0), {"b": ("a", -1.0)}, (0.0, 0.0)),
+        ((0.1, -0.33, -9.0), (0.3, -0.33, 9.0), {"b": ("a", -1.1)}, (0.3, 0.3)),
+    ],
+)
+def test_limits_of_leaders_are_those_in_effect(lower, upper, mimics, expected):
+    model = followed(lower, upper, **mimics)
+    assert (model.lower[0], model.upper[0]) == pytest.approx(expected, rel=0, abs=1e-15)
+    again = Articulation(
+        model.skeleton, "hinge", lower=model.lower, upper=model.upper, mimics=model.mimics
+    )
+    assert (again.lower == model.lower).all()
+    assert (again.upper == model.upper).all()
+    assert model.within_limits(model.random(np.random.default_rng(1), 5)).all()
+
+
+@pytest.mark.parametrize(
+    ("lower", "mimic"),
+    [(1.0, ("a",)), (0.1, ("a", 0.0)), (0.1, ("a", -1.0)), (1.0, ("a", 1e-80)), (0.0, ("a", 1, 5))],
+)
+def test_followers_that_no_leader_satisfies_are_refused(lower, mimic):
+    with pytest.raises(ValueError, match=r"^mimics: .* 'a' .* follower 'b', got none from 0 to "):
+        followed((0.0, lower, 0.0), (0.5, 1.5, 1.0), b=mimic)
+
+
 @at_both_speeds
 @given(**TREES)
 def test_clamping_brings_within_limits_and_again_changes_nothing(articulated, backend, kinds, seed):
@@ -117,14 +182,15 @@ def test_random_coordinates_keep_all_limits(articulated, backend, kinds, seed):
         (-1.0, np.inf, (-1.0, np.pi)),
         (-np.inf, -1.0, (-1.0 - np.pi, -1.0)),
         (-np.inf, 1.0, (-np.pi, 1.0)),
+        (0.0, -0.0, (0.0, 0.0)),
     ],
 )
 def test_random_angles_fill_their_range(lower, upper, expected, rng):
     q = one("hinge", lower=lower, upper=upper).random(rng, 1000)
     # Of 1,000 even draws the least is within 2 % of the range but for a chance of 2e-9.
     slack = 0.02 * (expected[1] - expected[0])
-    assert expected[0] <= q.min() < expected[0] + slack
-    assert expected[1] - slack < q.max() <= expected[1]
+    assert expected[0] <= q.min() <= expected[0] + slack
+    assert expected[1] - slack <= q.max() <= expected[1]
 
 
 def test_random_balls_fill_cone_and_twist(rng):

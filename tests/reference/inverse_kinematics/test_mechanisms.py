@@ -17,8 +17,10 @@ from plumbob.reference import (
     Skeleton,
     Target,
     forward_kinematics,
+    judge_pose,
     rotation,
     solve_ik,
+    solve_tasks,
 )
 from plumbob.reference.arguments import frozen
 from plumbob.reference.backend.threads import set_num_threads
@@ -152,6 +154,21 @@ def test_limits_are_kept_and_other_joints_left_as_they_are(
         own = model.coordinates_of(j)
         expected = clamped if j in moving else q
         np.testing.assert_allclose(found[own], expected[own], rtol=0, atol=LIMIT)
+
+
+def test_solvers_judge_and_tasks_keep_the_limits_of_followers(solver):
+    links = Skeleton(range(-1, 3), [[0.0, 0.0, 0.0], *[[1.0, 0.0, 0.0]] * 3])
+    kinds, lower = ["hinge"] * 3 + ["fixed"], np.array([-3.0, -3.0, -0.2, 0.0])
+    arm = Articulation(links, kinds, lower=lower, upper=-lower, mimics={2: Mimic(1)})
+    free = Articulation(links, kinds, mimics={2: Mimic(1)})
+    beyond = np.array([0.3, 1.0])
+    target = Target(forward_kinematics(free, beyond).positions[-1])
+    assert judge_pose(arm, beyond, target).limit_excess.max() == pytest.approx(0.8)
+    solution = solve_ik(arm, [0.3, 0.9], target, solver)
+    assert solution.outcome is not Outcome.CONVERGED
+    for q in (solution.coordinates, solve_tasks(arm, beyond, [target], restarts=0).coordinates):
+        assert np.abs(q[arm.coordinates_of(2)]).max() <= 0.2
+        assert judge_pose(arm, q, target).limit_excess.max() == 0.0
 
 
 @at_both_speeds
