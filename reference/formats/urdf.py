@@ -3,7 +3,9 @@
 Every link becomes the joint of the articulation that moves it, with the link's name.
 The root link is fixed to the world; a file with a moving base has a floating joint. Links precede
 their descendants, and siblings keep the order of the file. A planar joint becomes two slides, named
-after the joint with " x" and " y" added, and a hinge. Links without an inertial have no mass.
+after the joint with " x" and " y" added, and a hinge. A revolute or prismatic joint whose limit has
+neither `lower` nor `upper` is locked at zero, with a FormatWarning; a mimic joint without these
+numbers follows its leader anywhere. Links without an inertial have no mass.
 Shapes, transmissions and safety controllers are ignored.
 """
 
@@ -13,7 +15,7 @@ from typing import NamedTuple
 
 from .. import arguments
 from ..arguments import LARGEST_COORDINATE, distinct_texts
-from ..articulation import Mimic
+from ..articulation import Articulation, Mimic
 from ..quaternion import exponential, multiply, rotate
 from . import xml
 from .robot import INFINITY, ORIGIN, Robot, RobotLink, assemble, centre_of, mass_of, upright
@@ -31,7 +33,8 @@ KINDS = {
 # Treatments of limits with lower > upper. MuJoCo drops them; Pinocchio keeps both as they are, so
 # that no coordinate is within them.
 CROSSED_LIMITS = ("unlimited", "ordered", "refused")
-SCALAR_TYPES = ("revolute", "continuous", "prismatic")
+LIMITED_TYPES = "revolute", "prismatic"
+SCALAR_TYPES = (*LIMITED_TYPES, "continuous")
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
 
@@ -93,7 +96,38 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
     for link in root.children_named("link"):
         j = link_index[link.word("name")]
         links[j] = _with_mass(links[j], link)
-    return assemble(origin, links, joint_index, _mimics(joints, joint_index) if follows else {})
+    mimics = _mimics(joints, joint_index) if follows else {}
+    _complete_limits(joints, links, joint_index, mimics)
+    robot = assemble(origin, links, joint_index, mimics)
+    _warn_of_locked_leaders(origin, links, robot.articulation)
+    return robot
+
+
+def _complete_limits(
+    joints: Mapping[str, _Joint],
+    links: list[RobotLink],
+    index: Mapping[str, int],
+    mimics: Mapping[int | str, Mimic],
+) -> None:
+    """Leave mimic joints whose limit has no number to their leaders; warn of other such joints."""
+    for joint in joints.values():
+        limit = joint.element.single("limit") if joint.type in LIMITED_TYPES else None
+        if limit is None or {"lower", "upper"} & limit.attributes.keys():
+            continue
+        j = index[joint.name]
+        if j in mimics:
+            links[j] = links[j]._replace(lower=-INFINITY, upper=INFINITY)
+        else:
+            warn(str(joint.element.error("expected lower or upper, got neither; locked at 0")))
+
+
+def _warn_of_locked_leaders(origin: str, links: list[RobotLink], model: Articulation) -> None:
+    """Warn where the limits of followers leave a leader, which has a range, a single value."""
+    for leader in {mimic.leader: None for mimic in model.mimics.values()}:
+        link, value = links[int(leader)], model.upper[int(leader)]
+        if link.lower < link.upper and model.lower[int(leader)] == value:
+            problem = "expected limits of followers that leave a range to their leader"
+            warn(f"{origin}: {problem}, got {link.name!r} locked at {value:g}")
 
 
 def _with_mass(link: RobotLink, element: Element) -> RobotLink:
