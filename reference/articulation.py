@@ -118,7 +118,7 @@ class Articulation(KeepsReadOnly):
         cones: greatest tilt of the axis of a ball [rad], (joint,).
         mimics: the joints that move with their leaders.
         joints: the records (JOINT) that the kernels read, a record a joint; do not write to them.
-        mechanisms: cache of inverse kinematics, by effectors.
+        mechanisms: cache of inverse kinematics, by effectors, of a limited size.
     """
 
     skeleton: Skeleton

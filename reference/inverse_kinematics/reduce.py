@@ -22,6 +22,8 @@ from .mechanism import EFFECTOR, Mechanism
 SPOT = 1e-9
 # Random poses are drawn so many at a time.
 BLOCK = 16
+# An articulation keeps so many prepared mechanisms, the latest: each seed makes a new one.
+LARGEST_CACHE = 256
 
 
 class Prepared(NamedTuple):
@@ -43,7 +45,8 @@ def prepare(
 ) -> Prepared:
     """Return the mechanism and its restarts, cached by the articulation."""
     key = effectors, oriented, restarts, seed
-    if key not in articulation.mechanisms:
+    prepared = articulation.mechanisms.get(key)
+    if prepared is None:
         mechanism, rng = _mechanism(articulation, effectors, oriented), np.random.default_rng(seed)
         # in blocks: the first poses are those of any larger number of restarts
         blocks = [articulation.random(rng, BLOCK) for _ in range(-(-restarts // BLOCK))]
@@ -54,8 +57,18 @@ def prepare(
             effector_frames = np.concatenate([x, R], axis=-1)[:, list(effectors)]
         drawn = np.ascontiguousarray(poses[:, mechanism.columns]), effector_frames.copy()
         model = articulation.joints, tuple(mechanism), *drawn
-        articulation.mechanisms[key] = Prepared(mechanism, *drawn, model)
-    return articulation.mechanisms[key]
+        prepared = Prepared(mechanism, *drawn, model)
+        store_prepared(articulation, key, prepared)
+    return prepared
+
+
+def store_prepared(articulation: Articulation, key: tuple[Any, ...], prepared: Prepared) -> None:
+    """Keep a prepared mechanism in place of the oldest, if there are already LARGEST_CACHE."""
+    entries = list(articulation.mechanisms.items())
+    keys = [old for old, entry in entries if isinstance(entry, Prepared)]
+    for old in keys[: max(0, len(keys) + 1 - LARGEST_CACHE)]:
+        articulation.mechanisms.pop(old, None)
+    articulation.mechanisms[key] = prepared
 
 
 def _mechanism(

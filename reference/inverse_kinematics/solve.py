@@ -29,7 +29,7 @@ from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
 from .mechanism import TARGET
 from .problem import CheckedTarget, IKSolution, Settings, Target, check_numbers
-from .reduce import prepare
+from .reduce import prepare, store_prepared
 from .restarts import FIGURES, ITERATIONS, MERIT, OUTCOME, Result
 
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
@@ -78,7 +78,7 @@ def solve_plain(
     prepared = model.mechanisms.get(key)
     if prepared is None:
         prepared = prepare(model, (effector_of(model, effector),), (key[1],), *key[2:])
-        model.mechanisms[key] = prepared
+        store_prepared(model, key, prepared)
     targets = np.empty((1, 1), TARGET)
     row = targets.view(FLOAT64)[0]  # of its fields one after the other
     row[:3], row[3:7], row[7] = position, IDENTITY if rotation is None else rotation, 1.0

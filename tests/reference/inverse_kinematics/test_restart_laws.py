@@ -15,6 +15,7 @@ from plumbob.reference import (
     scenes,
     solve_ik,
 )
+from plumbob.reference.inverse_kinematics import reduce
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.inverse_kinematics.problem import checked_settings, checked_targets
 from plumbob.reference.inverse_kinematics.reduce import prepare
@@ -223,3 +224,18 @@ def test_a_chain_s_answer_is_the_better_of_one_start_s_and_its_restarts_with_bot
         np.testing.assert_array_equal(best.history[row, : made + further + 1], residuals)
         nearer = one if one.merit[row] < more.merit[row] else more
         np.testing.assert_array_equal(best.positions[row], nearer.positions[row])
+
+
+def test_an_articulation_keeps_the_mechanisms_of_the_latest_seeds_only(monkeypatch):
+    monkeypatch.setattr(reduce, "LARGEST_CACHE", 4)
+    model, _, _ = readme_robot()
+    model.mechanisms["another cache"] = kept = object()
+    for seed in range(9):
+        latest = prepare(model, (3,), (False,), 0, seed)
+    assert len(model.mechanisms) == 5
+    assert model.mechanisms["another cache"] is kept
+    assert prepare(model, (3,), (False,), 0, seed) is latest
+    q, target = model.neutral(), np.array([0.4, 0.2, 0.5])
+    for seed in range(5):
+        solve_ik(model, q, target, "ccd", restarts=1, seed=seed)
+    assert len(model.mechanisms) == 5
