@@ -58,7 +58,8 @@ def solve_ik(
     The root of a Skeleton rotates but does not move. Joints that move no effector keep their
     rotation, as does an effector whose own rotation is free. A pose is always returned; `outcome`
     says how the solve ended. A start that is stuck, like a straight chain collinear with its
-    target, is first bent, always alike. Limits are kept; a start outside of them is brought within.
+    target, is first bent, always alike. All joints keep their limits, also those that move no
+    effector; a start outside of them is brought within.
 
     On limited joints Levenberg-Marquardt from one start most often fails where a limit stops it.
     It is therefore a portfolio (Huberman, Lukose & Hogg 1997) of phases, always the same, without

@@ -139,11 +139,11 @@ def solve_mechanisms(
         copy_row(coordinates[i - 1] if chained else starts[i % len(starts)], q)
         if not (normalise_start(joints, q) and normalise_target(target)):
             return False
+        for j in range(len(joints)):  # also joints that move no effector
+            clamp_joint(joints, j, q)
         gather(mechanism, q, data.q)
         clear(data.far_step)
         forget(mixing)
-        for j in range(len(mechanism.joints)):
-            clamp_joint(mechanism.joints, j, data.q)
         update_forward_kinematics(mechanism, data)
         bound = least_residual(mechanism, target)
         criteria, past = mechanism_criteria(mechanism, bound, limits), history[i % len(history)]
