@@ -132,7 +132,8 @@ def test_the_list_of_a_suite_names_each_problem_once_and_lines_up(folder):
         assert len({line.rindex("  ") for line in group.splitlines()}) == 1
     mine = next(problems for problems, group in groups.items() if "  my_ik.py" in group)
     assert mine == "chain (4); published (2)"
-    lm = next(problems for problems, group in groups.items() if "  Plumbob LM, 14 restarts  " in group)
+    ours = "  Plumbob LM, 14 restarts  "
+    lm = next(problems for problems, group in groups.items() if ours in group)
     assert re.fullmatch(r"robots \(\d+\); unreachable \(\d+\); published \(\d\)", lm)
 
 
