@@ -36,7 +36,6 @@ from ..quaternion import (
     cross,
     dot,
     exponential,
-    magnitude,
     multiply,
     norm,
     normalised,
@@ -55,6 +54,7 @@ from .robot import (
     assemble,
     centre_of,
     mass_of,
+    unit_quaternion,
     upright,
 )
 from .source import warn
@@ -222,11 +222,7 @@ class _CompilerSettings(NamedTuple):
             raise element.error(f"expected one orientation, got {' and '.join(present)}")
         match present:
             case ["quat"]:
-                q = element.numbers("quat", IDENTITY)
-                if not 0.0 < magnitude(q) < math.inf:
-                    got = repr(element.word("quat"))
-                    raise element.error(f"expected a quaternion in 'quat', got {got:.80}")
-                return normalised(q)
+                return unit_quaternion(element, "quat", element.numbers("quat", IDENTITY))
             case ["axisangle"]:
                 x, y, z, angle = element.numbers("axisangle", (0.0, 0.0, 0.0, 0.0))
                 axis = _direction(element, "axisangle", (x, y, z))

@@ -9,7 +9,7 @@ import numpy as np
 from ..arguments import FloatArray, frozen
 from ..articulation import Articulation, Mimic
 from ..inverse_kinematics.tasks import IKTask
-from ..quaternion import IDENTITY, between
+from ..quaternion import IDENTITY, between, magnitude, normalised
 from ..skeleton import Skeleton
 from .xml import Element
 
@@ -53,6 +53,14 @@ class RobotLink(NamedTuple):
     cone: float = INFINITY
     mass: float = 0.0
     centre: Vector = ORIGIN
+
+
+def unit_quaternion(element: Element, name: str, q: Quaternion) -> Quaternion:
+    """Return the quaternion of an attribute, scaled to unit length."""
+    if not 0.0 < magnitude(q) < INFINITY:
+        got = repr(element.attributes[name])
+        raise element.error(f"expected a quaternion in {name!r}, got {got:.80}")
+    return normalised(q)
 
 
 def upright(axis: Vector) -> Quaternion:

@@ -6,6 +6,8 @@ their descendants, and siblings keep the order of the file. A planar joint becom
 after the joint with " x" and " y" added, and a hinge. A revolute or prismatic joint whose limit has
 neither `lower` nor `upper` is locked at zero, with a FormatWarning; a mimic joint without these
 numbers follows its leader anywhere. Links without an inertial have no mass.
+The quat_xyzw of an origin is read in files of version 1.1 or 1.2, and passed over with a warning
+in those of version 1.0, like Pinocchio.
 Shapes, transmissions and safety controllers are ignored.
 """
 
@@ -16,9 +18,20 @@ from typing import NamedTuple
 from .. import arguments
 from ..arguments import LARGEST_COORDINATE, distinct_texts
 from ..articulation import Articulation, Mimic
-from ..quaternion import exponential, multiply, rotate
+from ..quaternion import IDENTITY, exponential, multiply, rotate
 from . import xml
-from .robot import INFINITY, ORIGIN, Robot, RobotLink, assemble, centre_of, mass_of, upright
+from .robot import (
+    INFINITY,
+    ORIGIN,
+    Quaternion,
+    Robot,
+    RobotLink,
+    assemble,
+    centre_of,
+    mass_of,
+    unit_quaternion,
+    upright,
+)
 from .source import warn
 from .xml import Element
 
@@ -33,6 +46,7 @@ KINDS = {
 # Treatments of limits with lower > upper. MuJoCo drops them; Pinocchio keeps both as they are, so
 # that no coordinate is within them.
 CROSSED_LIMITS = ("unlimited", "ordered", "refused")
+VERSIONS = ("1.0", "1.1", "1.2")  # of URDF; quaternions are read from the second on
 LIMITED_TYPES = "revolute", "prismatic"
 SCALAR_TYPES = (*LIMITED_TYPES, "continuous")
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -44,6 +58,7 @@ class _Joint(NamedTuple):
     parent: str
     child: str
     element: Element
+    frame: Quaternion
 
 
 def read(path: str | Path, *, mimic: bool = True, crossed_limits: str = "unlimited") -> Robot:
@@ -76,7 +91,7 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
         if any(name.startswith("xacro:") for name in (element.tag, *element.attributes)):
             raise element.error("expected a URDF file, got xacro: run xacro first")
     joints: dict[str, _Joint] = {}
-    for joint in map(_joint, root.children_named("joint")):
+    for joint in (_joint(root, element) for element in root.children_named("joint")):
         if joint.name in joints:
             raise joint.element.error("expected a joint's name once, got it twice")
         joints[joint.name] = joint
@@ -140,12 +155,33 @@ def _with_mass(link: RobotLink, element: Element) -> RobotLink:
     return link._replace(mass=mass_of(mass, "value"), centre=centre_of(origin, "xyz"))
 
 
-def _joint(element: Element) -> _Joint:
+def _joint(root: Element, element: Element) -> _Joint:
     kind = element.word("type")
     if kind not in KINDS:
         raise element.error(f"expected one of {', '.join(KINDS)} for a type, got {kind!r:.80}")
     parent, child = _link_of(element, "parent"), _link_of(element, "child")
-    return _Joint(element.word("name"), kind, parent, child, element)
+    frame = _orientation(root, element.single("origin"))
+    return _Joint(element.word("name"), kind, parent, child, element, frame)
+
+
+def _orientation(root: Element, origin: Element | None) -> Quaternion:
+    """Return the rotation of an <origin>: its rpy or, from version 1.1 on, its quat_xyzw."""
+    if origin is None:
+        return IDENTITY
+    if "quat_xyzw" in origin.attributes:
+        version = root.word("version", "1.0")
+        if version not in VERSIONS:
+            expected = "one of " + ", ".join(VERSIONS)
+            raise root.error(f"expected {expected} for the version of a file, got {version!r:.40}")
+        if version != VERSIONS[0]:
+            if "rpy" in origin.attributes:
+                raise origin.error("expected one orientation, got rpy and quat_xyzw")
+            x, y, z, w = origin.numbers("quat_xyzw", (0.0, 0.0, 0.0, 0.0))
+            return unit_quaternion(origin, "quat_xyzw", (w, x, y, z))
+        warn(str(origin.error("expected version 1.1 for quat_xyzw, got 1.0; it is passed over")))
+    roll, pitch, yaw = origin.numbers("rpy", ORIGIN)
+    pitch_roll = multiply(exponential((0.0, pitch, 0.0)), exponential((roll, 0.0, 0.0)))
+    return multiply(exponential((0.0, 0.0, yaw)), pitch_roll)
 
 
 def _link_of(joint: Element, tag: str) -> str:
@@ -193,11 +229,8 @@ def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list
     """Return the links that a joint becomes, numbered from `number` on."""
     origin = joint.element.single("origin")
     offset = origin.numbers("xyz", ORIGIN) if origin else ORIGIN
-    roll, pitch, yaw = origin.numbers("rpy", ORIGIN) if origin else ORIGIN
-    pitch_roll = multiply(exponential((0.0, pitch, 0.0)), exponential((roll, 0.0, 0.0)))
-    frame = multiply(exponential((0.0, 0.0, yaw)), pitch_roll)
     if joint.type in ("fixed", "floating"):
-        return [RobotLink(joint.child, parent, offset, frame, KINDS[joint.type])]
+        return [RobotLink(joint.child, parent, offset, joint.frame, KINDS[joint.type])]
     tag = joint.element.single("axis")
     axis = tag.numbers("xyz", X) if tag else X
     if axis == ORIGIN:
@@ -205,12 +238,12 @@ def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list
     if joint.type == "planar":
         plane = upright(axis)
         return [
-            RobotLink(f"{joint.name} x", parent, offset, frame, "slide", rotate(plane, X)),
+            RobotLink(f"{joint.name} x", parent, offset, joint.frame, "slide", rotate(plane, X)),
             RobotLink(f"{joint.name} y", number, kind="slide", axis=rotate(plane, Y)),
             RobotLink(joint.child, number + 1, kind="hinge", axis=axis),
         ]
     limits = _limits(joint, crossed_limits)
-    return [RobotLink(joint.child, parent, offset, frame, KINDS[joint.type], axis, *limits)]
+    return [RobotLink(joint.child, parent, offset, joint.frame, KINDS[joint.type], axis, *limits)]
 
 
 def _limits(joint: _Joint, crossed: str) -> tuple[float, float]:

@@ -257,3 +257,55 @@ WRONG = {
 def test_what_is_no_robot_is_refused_and_named(name, refusal):
     text, message = WRONG[name]
     assert message in refusal(robot, text)
+
+
+OFFSET = '<origin xyz="1 0 0"/>'
+QUATERNION = 'quat_xyzw="0 0 1.2 1.6"'  # of length 2, about z by 2 atan2(3, 4)
+TURNS = {
+    "1.0": ("", [1.0, 0.0, 0.0]),
+    "1.1": ("", [0.28, 0.96, 0.0]),
+    "1.2": ("", [0.28, 0.96, 0.0]),
+    "1.0 with rpy": (' rpy="0 0 1.5707963267948966"', [0.0, 1.0, 0.0]),
+}
+
+
+@pytest.mark.filterwarnings("ignore::plumbob.reference.formats.FormatWarning")
+@pytest.mark.parametrize("name", TURNS)
+def test_the_quaternion_of_an_origin_is_read_as_pinocchio_reads_it(name, tmp_path):
+    """From version 1.1 on, of any length; the tip is at a place computed by hand."""
+    pinocchio = pytest.importorskip("pinocchio")
+    rpy, tip = TURNS[name]
+    origin = f'<origin xyz="0 0 0" {QUATERNION}{rpy}/>'
+    joints = joint("j", "a", "b", "fixed", origin, "") + joint("k", "b", "c", "fixed", OFFSET, "")
+    text = f'<robot name="r" version="{name[:3]}">{link(*"abc")}{joints}</robot>'
+    np.testing.assert_allclose(pose(urdf.parse(text), "c")[0], tip, atol=1e-15)
+    model = pinocchio.buildModelFromXML(text)
+    data = model.createData()
+    pinocchio.framesForwardKinematics(model, data, pinocchio.neutral(model))
+    theirs = data.oMf[model.getFrameId("c")].translation
+    np.testing.assert_allclose(theirs, tip, atol=1e-15)
+
+
+def test_a_quaternion_that_is_passed_over_gets_a_warning():
+    text = (
+        f"<robot>{link('a', 'b')}{joint('j', 'a', 'b', inside=f'<origin {QUATERNION}/>')}</robot>"
+    )
+    with pytest.warns(FormatWarning, match=r"<origin>: expected version 1\.1 for quat_xyzw, got"):
+        urdf.parse(text)
+
+
+NO_QUATERNIONS = {
+    "three numbers": ("1.1", 'quat_xyzw="0 0 1"', "expected 4 numbers in 'quat_xyzw', got '0 0 1'"),
+    "zero": ("1.1", 'quat_xyzw="0 0 0 0"', "expected a quaternion in 'quat_xyzw', got '0 0 0 0'"),
+    "empty": ("1.2", 'quat_xyzw=""', "expected a quaternion in 'quat_xyzw', got ''"),
+    "two": ("1.1", f'{QUATERNION} rpy="0 0 0"', "expected one orientation, got rpy and quat_xyzw"),
+    "a version to come": ("2.0", QUATERNION, "expected one of 1.0, 1.1, 1.2 for the version"),
+}
+
+
+@pytest.mark.parametrize("name", NO_QUATERNIONS)
+def test_other_quaternions_of_origins_are_refused_by_name(name, refusal):
+    version, attributes, problem = NO_QUATERNIONS[name]
+    inside = joint("j", "a", "b", inside=f"<origin {attributes}/>")
+    text = f'<robot version="{version}">{link("a", "b")}{inside}</robot>'
+    assert problem in refusal(urdf.parse, text)
