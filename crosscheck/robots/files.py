@@ -156,13 +156,12 @@ def _compare_motions(file: ModelFile) -> float:
     extent = float(np.ptp(pose.positions.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
     largest, joints = 0.0, 0
     try:
-        for name, x, R in global_poses(read_text(file.path)):
-            if name in motion.skeleton.names:
-                j = motion.skeleton.index(name)
-                joints += 1
-                errors = [np.abs(x - pose.positions[:, j]) / extent]
-                errors += [np.abs(R - rotation.to_matrix(pose.rotations[:, j]))]
-                largest = np.max([largest, *(part.max(initial=0.0) for part in errors)])
+        poses = zip(motion.skeleton.names, global_poses(read_text(file.path)), strict=False)
+        for j, (ours, (name, x, R)) in enumerate(poses):
+            joints += ours.startswith(name)  # of end sites one reader numbers names
+            errors = [np.abs(x - pose.positions[:, j]) / extent]
+            errors += [np.abs(R - rotation.to_matrix(pose.rotations[:, j]))]
+            largest = np.max([largest, *(part.max(initial=0.0) for part in errors)])
     except Exception as error:
         raise UnreadableError(f"it ends in {type(error).__name__}: {error}") from None
     return float(largest) if joints == motion.skeleton.joint_count else np.nan

@@ -14,7 +14,8 @@ FRAMES = re.compile(r"Frames:\s*(\d+)\s*Frame Time:\s*\S+", re.IGNORECASE)
 def global_poses(text: str) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """Yield each joint's name, positions, (frame, 3), and rotation matrices, (frame, 3, 3).
 
-    Rows beyond the count of `Frames:` are ignored.
+    Rows beyond the count of `Frames:` are ignored, and end sites that coincide with their parents.
+    Other end sites are named after these, several of one joint alike.
     """
     head, tail = MOTION.split(text, maxsplit=1)
     words = re.sub(r"([{}])", r" \1 ", head).split()[1:]
@@ -26,6 +27,7 @@ def global_poses(text: str) -> Iterator[tuple[str, FloatArray, FloatArray]]:
             del words[0]
             continue
         name, x, channels = _joint(words)
+        is_distinct = name != "" or x.any()
         if not name and path:
             name = f"{path[-1][0]} end"
         offset, local = _local_pose(x, channels, columns)
@@ -34,7 +36,8 @@ def global_poses(text: str) -> Iterator[tuple[str, FloatArray, FloatArray]]:
             _, x, R = path[-1]
             offset, local = x + np.einsum("nij,nj->ni", R, offset), R @ local
         path.append((name, offset, local))
-        yield path[-1]
+        if is_distinct:
+            yield path[-1]
 
 
 def _local_pose(

@@ -1,7 +1,8 @@
 """BVH, the Biovision hierarchy: motions of a skeleton, a common format of animation programs.
 
 The joints follow the order of the file, depth first. An end site becomes a joint without channels,
-named after its parent with " end" added; an end that coincides with its parent is left out.
+named after its parent with " end" added, or " end 2" and so on where a joint has that name; an end
+that coincides with its parent is left out.
 Rotation channels compose in their order, R = R_1 R_2 R_3, about moving axes. Position channels
 replace the OFFSET, axis by axis, as animation programs write them; a program that adds the two
 reads the same from a file whose root has OFFSET zero. Lengths are in the unit of the file; angles
@@ -147,6 +148,7 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
                 path = [tree.joints[joint].name for joint in tree.path]
                 got = f"{path[-1]!r:.40} still open" if path else "none"
                 raise ValueError(f"expected complete joints before MOTION, got {got}")
+            tree.name_ends()
             return tree.joints
         if len(line) > MAX_CHARACTERS:
             raise ValueError(f"expected lines of at most {MAX_CHARACTERS:,} characters")
@@ -196,13 +198,15 @@ class _Tree:
         parent = self.path[-1] if self.path else -1
         if self.joints and self.joints[parent].is_end:
             raise ValueError(f"expected nothing in an end site, got {word} {name!r:.40}")
-        name = f"{self.joints[parent].name} end" if word == "END" else name
-        if not name or name in self.names:
+        if word == "END":
+            name = f"{self.joints[parent].name} end"
+        elif not name or name in self.names:
             raise ValueError(f"expected a name of its own, got {name!r:.40}")
+        else:
+            self.names.add(name)
         if len(self.joints) == MAX_JOINTS:
             raise ValueError(f"expected at most {MAX_JOINTS:,} joints, got more")
         self.path.append(len(self.joints))
-        self.names.add(name)
         self.joints.append(_Joint(name, parent, word == "END"))
         self.unopened = True
 
@@ -212,7 +216,18 @@ class _Tree:
             raise ValueError(f"expected an OFFSET in {joint.name!r:.40}, got none")
         self.path.pop()
         if joint.is_end and joint.offset == ORIGIN:
-            self.names.remove(self.joints.pop().name)
+            self.joints.pop()
+
+    def name_ends(self) -> None:
+        """Give each end site a name that no joint has."""
+        counts: dict[int, int] = {}
+        for joint in self.joints:
+            stem, count = joint.name, counts.get(joint.parent, 1)
+            while joint.is_end and joint.name in self.names:
+                count += 1
+                joint.name = f"{stem} {count}"
+            self.names.add(joint.name)
+            counts[joint.parent] = count
 
 
 def _set_channels(joint: _Joint, text: str = "") -> None:

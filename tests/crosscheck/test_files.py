@@ -458,6 +458,13 @@ def test_a_call_that_waits_for_the_processor_is_not_lost():
         assert child.call(os.getpid) == process
 
 
+def test_both_readers_of_motions_agree_on_several_end_sites_of_a_joint(folder, here):
+    ends = "End Site { OFFSET 0 1 0 } End Site { OFFSET 1 0 0 } End Site"
+    text = motion().replace("joint1", "joint3 end").replace("End Site", ends)
+    reading = outcomes(folder(a_bvh=text))["a.bvh"][SECOND_READER]
+    assert (reading.outcome, reading.why) == (AGREES, "")
+
+
 def test_the_second_reader_reads_what_the_first_wrote(rng):
     skeleton = Skeleton([-1, 0, 1, 0], rng.uniform(-1, 1, (4, 3)), ["a", "b c", "b c end", "d"])
     local = rotation.random(rng, 5, 4)

@@ -291,6 +291,43 @@ def test_a_chain_of_thousands_is_no_trouble():
     assert bvh.parse(text).skeleton.names == skeleton.names
 
 
+SITES = {
+    "two end sites": (
+        WALK.replace("{ OFFSET 0 0 0 }", "{ OFFSET 0 1 0 } End Site { OFFSET 1 0 0 }"),
+        ("hip", "left leg", "left leg end", "head", "head end", "head end 2"),
+        {4: [0, 1, 0], 5: [1, 0, 0]},
+    ),
+    "a joint of that name, later": (
+        WALK.replace("JOINT head", "JOINT left leg end"),
+        ("hip", "left leg", "left leg end 2", "left leg end"),
+        {2: [0, -2, 0], 3: [0, 1, 0]},
+    ),
+    "three, one of them at its parent": (
+        WALK.replace(
+            "{ OFFSET 0 0 0 }", "{ OFFSET 1 0 0 } End { OFFSET 0 0 0 } End { OFFSET 2 0 0 }"
+        ),
+        ("hip", "left leg", "left leg end", "head", "head end", "head end 2"),
+        {4: [1, 0, 0], 5: [2, 0, 0]},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SITES)
+def test_an_end_site_gets_a_name_that_no_joint_has(case):
+    """The joints are where the second reader has them, and stay there when written and read."""
+    text, names, offsets = SITES[case]
+    motion = bvh.parse(text)
+    assert motion.skeleton.names == names
+    for j, x in offsets.items():
+        assert motion.skeleton.offsets[j].tolist() == x
+    pose = motion.pose()
+    for j, (_, x, _) in enumerate(global_poses(text)):
+        np.testing.assert_allclose(pose.positions[:, j], x, atol=1e-13)
+    back = bvh.parse(bvh.format(*motion))
+    assert back.skeleton.names == names
+    np.testing.assert_allclose(back.pose().positions, pose.positions, atol=1e-5)
+
+
 WRONG = {
     "empty": ("", "line 1: expected HIERARCHY, got the end of the file"),
     "no joints": ("HIERARCHY\nMOTION", "line 2: expected complete joints before MOTION, got none"),
