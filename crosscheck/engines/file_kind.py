@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-from plumbob.reference.formats.source import read_bytes
+from plumbob.reference.formats.source import read_bytes, xml_encoding
 
 URDF, MJCF, BVH = "URDF", "MJCF", "BVH"
 # The content of an <include> in other files, not a model by itself.
@@ -37,7 +37,8 @@ def file_kind(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix in BY_SUFFIX or suffix not in XML:
         return BY_SUFFIX.get(suffix, "")
-    text = read_bytes(path).decode(errors="replace").removeprefix("\ufeff")
+    content = read_bytes(path)
+    text = content.decode(xml_encoding(content), errors="replace")
     root = FIRST.match(text)
     kind = BY_ROOT.get(root[1], "") if root else ""
     if kind == MJCF and not ("<worldbody" in text or "<include" in text):

@@ -1,12 +1,21 @@
 """Text from untrusted files, with limits on its size and encoding."""
 
+import codecs
 import os
+import re
 import warnings
 from pathlib import Path
 
 from ..arguments import shown
 
 LARGEST = 256 * 2**20  # bytes
+UTF_8, UTF_16 = "utf-8-sig", "utf-16"
+# Of an XML file in an encoding of one byte per character; the others are declared for UTF-8.
+DECLARATION = re.compile(
+    rb"""\s*<\?xml\s[^<>]{0,200}?\sencoding\s*=\s*["']"""
+    rb"""(iso-8859-(?:1[013456]?|[2-9])|latin-?1|windows-125[0-8])["']""",
+    re.IGNORECASE,
+)
 
 
 class FormatWarning(UserWarning):
@@ -18,22 +27,33 @@ def warn(problem: str) -> None:
     warnings.warn(problem, FormatWarning, stacklevel=3)
 
 
-def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:
+def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST, is_xml: bool = False) -> str:
     r"""Return the text of a file with line ends \n and without a byte order mark.
 
+    XML may be in UTF-16 or an encoding that it declares (`xml_encoding`), other text is UTF-8.
+
     Raises:
-        ValueError: as for `read_bytes`, or if it contains a NUL byte or is not UTF-8.
+        ValueError: as for `read_bytes`, or if it contains a NUL byte or is in another encoding.
     """
     content = read_bytes(path, largest=largest)
-    if b"\0" in content:
+    encoding = xml_encoding(content) if is_xml else UTF_8
+    if b"\0" in content and encoding != UTF_16:
         raise ValueError(f"{path}: expected text, got a NUL byte at offset {content.index(0)}")
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode(encoding)
     except UnicodeDecodeError as error:
-        raise ValueError(
-            f"{path}: expected UTF-8, got byte {content[error.start]:#04x} at offset {error.start}"
-        ) from None
+        expected = encoding.upper().removesuffix("-SIG")
+        got = f"byte {content[error.start]:#04x} at offset {error.start}"
+        raise ValueError(f"{path}: expected {expected}, got {got}") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def xml_encoding(content: bytes) -> str:
+    """Return UTF-16 if a byte order mark says so, else the declared encoding of bytes, or UTF-8."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return UTF_16
+    declaration = DECLARATION.match(content)
+    return declaration[1].decode() if declaration else UTF_8
 
 
 def checked_path(path: str | os.PathLike[str]) -> str:

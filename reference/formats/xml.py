@@ -1,5 +1,6 @@
 """A reader of untrusted XML files: elements and attributes with their line numbers.
 
+Files are in UTF-8, in UTF-16 with a byte order mark, or in ISO-8859-n or Windows-125n as declared.
 A document type declaration is refused, and with it entities that expand without bound or read other
 files.
 """
@@ -96,7 +97,7 @@ class Element(NamedTuple):
 
 def read(path: str | Path) -> Element:
     """Return the root element of a file; see `parse`."""
-    return parse(read_text(path), str(path))
+    return parse(read_text(path, is_xml=True), str(path))
 
 
 def parse(text: str, origin: str) -> Element:

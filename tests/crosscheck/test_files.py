@@ -114,6 +114,11 @@ KINDS = {
 }
 
 
+def test_the_kind_of_a_file_in_utf_16_is_that_of_its_text(tmp_path):
+    (tmp_path / "a.xml").write_bytes(character(TRUNK).encode("utf-16"))
+    assert file_kind(tmp_path / "a.xml") == MJCF
+
+
 @pytest.mark.parametrize("name", KINDS)
 def test_the_kind_of_a_file_follows_from_its_name_and_root_element(name, tmp_path):
     (tmp_path / name).write_text(KINDS[name][0])
@@ -155,6 +160,17 @@ def test_all_readers_agree_on_valid_files(folder, here):
             assert reading.outcome == AGREES, reading
             assert reading.difference < 1e-14
             assert (reading.why, reading.notes) == ("", ())
+
+
+@pytest.mark.parametrize(("encoding", "by"), [("iso-8859-1", AGREES), ("utf-16", UNREAD)])
+def test_files_in_a_declared_encoding_are_compared(encoding, by, tmp_path, here):
+    """MuJoCo's own reader of MJCF refuses UTF-16; of URDF it gets the text."""
+    for name, text in {"a.urdf": ARM(-1), "b.xml": character(TRUNK)}.items():
+        text = f'<?xml version="1.0" encoding="{encoding}"?><!-- \xfc -->{text}'
+        (tmp_path / name).write_bytes(text.encode(encoding))
+    said = outcomes(tmp_path)
+    assert said["a.urdf"]["MuJoCo"].outcome == AGREES
+    assert {reading.outcome for reading in said["b.xml"].values()} == {by}
 
 
 def test_a_refused_file_names_the_reader_and_the_reason(folder, here):

@@ -136,3 +136,42 @@ def test_white_space_before_the_declaration_is_read_with_a_warning(reader, space
 def test_nothing_else_comes_before_the_declaration(reader, before, refusal):
     assert "well-formed XML" in refusal(reader.parse, before + GOOD[reader])
     assert "well-formed XML" in refusal(reader.parse, " <?xml version='1.0' " + "a" * 10**6)
+
+
+ENCODINGS = {
+    "ISO-8859-1": "ISO-8859-1",
+    "Latin1": "latin1",
+    "iso-8859-2": "iso-8859-2",
+    "windows-1252": "windows-1252",
+    "UTF-16": "utf-16",  # with a byte order mark
+    "utf-16": "utf-8",  # which some programs declare for UTF-8
+    "US-ASCII": "utf-8",
+}
+
+
+@pytest.mark.parametrize("reader", GOOD)
+@pytest.mark.parametrize("name", ENCODINGS)
+def test_a_file_in_the_encoding_that_it_declares_is_read(reader, name, tmp_path):
+    """Names have the same letters, and poses are the same as those of the text."""
+    text = GOOD[reader].partition("?>")[2].replace("upper", "Füße")
+    path = tmp_path / "a.xml"
+    path.write_bytes(f'<?xml version="1.0" encoding="{name}"?>{text}'.encode(ENCODINGS[name]))
+    robot, expected = reader.read(path), reader.parse(text)
+    assert "Füße" in robot.articulation.names
+    assert robot.articulation.names == expected.articulation.names
+    assert robot.home.tolist() == expected.home.tolist()
+
+
+@pytest.mark.parametrize("encoding", ["utf-7", "unicode_escape", "hex", "iso-8859-12", "gb2312"])
+def test_other_encodings_than_utf_8_are_refused(encoding, refusal, tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_bytes(
+        f'<?xml version="1.0" encoding="{encoding}"?><robot name="\xfc"/>'.encode("l1")
+    )
+    assert "expected UTF-8, got byte 0xfc at offset" in refusal(urdf.read, path)
+
+
+def test_a_byte_that_the_declared_encoding_lacks_is_refused(refusal, tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_bytes(b'<?xml version="1.0" encoding="windows-1252"?><robot name="\x81"/>')
+    assert "expected WINDOWS-1252, got byte 0x81" in refusal(urdf.read, path)
