@@ -10,9 +10,9 @@ its type and its index in the body.
 `home` is the configuration in the file, with each joint at its `ref`. A free joint moves in the
 world's frame. MuJoCo limits the total angle of a ball; here its tilt and its twist about z are each
 limited by that angle, which allows all that MuJoCo does, and more. Frames, nested defaults and
-includes from one folder are supported. Active equalities `connect` and `weld` between bodies, and
-`joint`, become tasks (`Robot.equalities`); those between sites, tendons and flexes, and elements
-that do not affect forward kinematics, such as sites and keyframes, are ignored. A body's mass is
+includes from one folder are supported. Active equalities `connect`, `weld` and `joint` become
+tasks (`Robot.equalities`); those between tendons and flexes, and elements that do not affect
+forward kinematics, such as keyframes, are ignored. A body's mass is
 that of its `inertial`, else of its geoms, by their mass or density; NaN if one of them is a mesh or
 a shell of a density. Elements that generate bodies (replicate, attach, composite, flexcomp) are
 refused, except for a replicate without bodies, which is ignored with a warning.
@@ -66,12 +66,14 @@ MOVING = ("body", "joint", "freejoint", *GENERATORS[1:])
 Z = (0.0, 0.0, 1.0)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 POLYNOMIAL = (0.0, 1.0, 0.0, 0.0, 0.0)  # of a coupling, where the file gives no coefficients
+ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 # The attributes of a default class that are read, by the tag of the elements they are for.
 DEFAULTS = {
     "joint": ("type", "pos", "axis", "range", "limited", "ref"),
     "geom": (
         "type", "size", "fromto", "pos", "mass", "density", "mesh", "shellinertia", "group",
     ),
+    "site": ("pos", "fromto", *ORIENTATIONS),
 }  # fmt: skip
 # The volumes of geoms [m³] by the three numbers of their size: a radius and half a length, three
 # semi-axes, or half of three edges. A plane has none.
@@ -85,7 +87,6 @@ VOLUMES: dict[str, Callable[[float, float, float], float]] = {
     "box": lambda a, b, c: 8.0 * a * b * c,
 }
 DENSITY = 1000.0  # of a geom that has none [kg/m³]
-ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
 
 def read(path: str | Path, *, root: str | Path | None = None) -> Robot:
@@ -212,7 +213,7 @@ class _CompilerSettings(NamedTuple):
         return name
 
     def with_defaults(self, element: Element, inherited: str) -> Element:
-        """Return a joint or a geom with missing attributes taken from its class."""
+        """Return a joint, a geom or a site with missing attributes taken from its class."""
         defaults = self.classes[self.class_of(element, "class", inherited)][element.tag]
         return element._replace(attributes=_merged(defaults, element.attributes))
 
@@ -362,11 +363,11 @@ def _robot(root: Element, origin: str) -> Robot:
     if total > 0.0 and masses.any():
         masses = frozen(masses * (total / masses.sum()))
     built = built._replace(home=frozen(home), masses=masses)
-    return built._replace(equalities=tuple(_equalities(root, built)))
+    return built._replace(equalities=tuple(_equalities(root, tree, built)))
 
 
-def _equalities(root: Element, robot: Robot) -> Iterator[IKTask]:
-    """Yield the active equalities between bodies, and between joints."""
+def _equalities(root: Element, tree: "_Tree", robot: Robot) -> Iterator[IKTask]:
+    """Yield the active equalities between bodies, between sites, and between joints."""
     elements = [e for part in root.children_named("equality") for e in part.children]
     elements = [e for e in elements if e.attributes.get("active") != "false"]
     if not elements:
@@ -383,6 +384,10 @@ def _equalities(root: Element, robot: Robot) -> Iterator[IKTask]:
                 for name in ("body1", "body2")
             )
             yield _closure(element, first, second, poses)
+        elif element.tag in ("connect", "weld"):
+            (first, outer), (second, inner) = (tree.site(element, f"site{i}") for i in (1, 2))
+            turn = multiply(outer.R, conjugate(inner.R)) if element.tag == "weld" else None
+            yield FrameTask(second, outer.x, turn, relative_to=first, point=inner.x)
 
 
 def _index(element: Element, attribute: str, indices: Mapping[str, int]) -> int:
@@ -435,10 +440,12 @@ class _Tree:
         self.bodies = {"world"}
         self.joints: dict[str, int] = {}
         self.homes: dict[int, tuple[float, ...]] = {}
+        self.sites: dict[str, tuple[int, _Part]] = {}  # with the index of the body's link
 
     def add_world(self, world: Element) -> None:
         """Add all bodies of a <worldbody>."""
-        joints, bodies, _ = self.parts(_Part(world, _Transform(), "main"))
+        joints, bodies, _, sites = self.parts(_Part(world, _Transform(), "main"))
+        self.add_sites(sites, 0)
         if joints:
             raise joints[0].element.error("expected no joint in the world, which cannot move")
         waiting = [(body, 0) for body in reversed(bodies)]
@@ -456,7 +463,7 @@ class _Tree:
         self.bodies.add(name)
         pose = part.frame.compose(self.settings.transform(body))
         inherited = self.settings.class_of(body, "childclass", part.inherited)
-        tags, bodies, geoms = self.parts(_Part(body, _Transform(), inherited))
+        tags, bodies, geoms, sites = self.parts(_Part(body, _Transform(), inherited))
         joints = [self.joint(tag, index) for index, tag in enumerate(tags)]
         is_free = any(joint.kind == "free" for joint in joints)
         if is_free and (len(joints) > 1 or parent != 0):
@@ -464,6 +471,7 @@ class _Tree:
         for number, (joint, tag) in enumerate(zip(joints, tags, strict=True), len(self.links)):
             self.record(tag.element, joint, f"{name}/{joint.label}", number, pose)
         self.links += _chain(name, parent, len(self.links), pose, joints)
+        self.add_sites(sites, len(self.links) - 1)
         inertial = body.single("inertial")
         leaves_mass = inertial is None or self.settings.from_geoms
         mass, centre = self.mass_of_geoms(geoms if leaves_mass else [])
@@ -472,6 +480,21 @@ class _Tree:
         mass = max(mass, self.settings.smallest_mass)
         self.links[-1] = self.links[-1]._replace(mass=mass, centre=centre)
         return bodies
+
+    def add_sites(self, sites: list[_Part], link: int) -> None:
+        """Add the sites of a body that have a name."""
+        self.sites |= {site.element.attributes.get("name", ""): (link, site) for site in sites}
+
+    def site(self, equality: Element, attribute: str) -> tuple[int, _Transform]:
+        """Return the link and the frame in it of a site that an equality names."""
+        name = equality.word(attribute)
+        if name not in self.sites:
+            raise equality.error(f"expected a site in the file for {attribute}, got {name!r:.80}")
+        link, (element, frame, inherited) = self.sites[name]
+        site = self.settings.with_defaults(element, inherited)
+        if "fromto" in site.attributes:
+            raise element.error("expected pos of a site that an equality names, got fromto")
+        return link, frame.compose(self.settings.transform(site))
 
     def mass_of_geoms(self, geoms: list[_Part]) -> tuple[float, Vector]:
         """Return the mass of geoms [kg], NaN if one is not known, and its centre [m]."""
@@ -488,19 +511,16 @@ class _Tree:
                 total, moment = total + mass, add(moment, scale(mass, frame.apply(centre)))
         return total, scale(1.0 / total, moment) if total > 0.0 else ORIGIN
 
-    def parts(self, body: _Part) -> tuple[list[_Part], list[_Part], list[_Part]]:
-        """Return the joints, the child bodies and the geoms of a body, also inside frames."""
-        joints, bodies, geoms = [], [], []
+    def parts(self, body: _Part) -> tuple[list[_Part], list[_Part], list[_Part], list[_Part]]:
+        """Return the joints, child bodies, geoms and sites of a body, also inside frames."""
+        parts: dict[str, list[_Part]] = {tag: [] for tag in ("joint", "body", "geom", "site")}
+        parts["freejoint"] = parts["joint"]
         waiting = [body._replace(element=child) for child in reversed(body.element.children)]
         while waiting:
             part = waiting.pop()
             element, frame, inherited = part
-            if element.tag in ("joint", "freejoint"):
-                joints.append(part)
-            elif element.tag == "body":
-                bodies.append(part)
-            elif element.tag == "geom":
-                geoms.append(part)
+            if element.tag in parts:
+                parts[element.tag].append(part)
             elif element.tag == "frame":
                 frame = frame.compose(self.settings.transform(element))
                 inherited = self.settings.class_of(element, "childclass", inherited)
@@ -510,7 +530,7 @@ class _Tree:
                 warn(str(element.error("expected bodies or joints, got none: passed over")))
             elif element.tag in GENERATORS:
                 raise element.error("expected every body to be written out, got a rule for some")
-        return joints, bodies, geoms
+        return parts["joint"], parts["body"], parts["geom"], parts["site"]
 
     def joint(self, part: _Part, index: int) -> _Joint:
         """Return a joint, the default attributes of its class included."""

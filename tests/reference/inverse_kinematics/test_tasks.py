@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 
 import mujoco
 import numpy as np
@@ -229,8 +230,8 @@ LOOP = """
 </equality></mujoco>"""
 
 
-def test_equalities_of_a_file_have_the_residuals_of_mujoco():
-    robot, model = mjcf.parse(LOOP), mujoco.MjModel.from_xml_string(LOOP)
+def assert_residuals_of_mujoco(text):
+    robot, model = mjcf.parse(text), mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     data.qpos[:] = q = robot.articulation.random(np.random.default_rng(0))
     mujoco.mj_forward(model, data)
@@ -246,6 +247,39 @@ def test_equalities_of_a_file_have_the_residuals_of_mujoco():
         if len(residual) == 6:  # MuJoCo takes the vector of the quaternion
             angle = np.linalg.norm(residual[3:])
             assert np.sin(angle / 2.0) == pytest.approx(np.linalg.norm(expected[3:]), abs=1e-12)
+
+
+def test_equalities_of_a_file_have_the_residuals_of_mujoco():
+    assert_residuals_of_mujoco(LOOP)
+
+
+def test_equalities_between_sites_have_the_residuals_of_mujoco():
+    """Sites in frames, with the place of their class, and in the world."""
+    text = re.sub(' (anchor|relpose)="[^"]*"', "", LOOP)
+    for pattern, instead in {
+        'body1="rod" body2="rocker"': 'site1="s" site2="t"',
+        'body1="gear" body2="twin"': 'site1="t" site2="u"',
+        '<body name="rod" pos=".3 0 0">': """<body name="rod" pos=".3 0 0">
+            <frame pos="1 2 3" euler="10 20 30"><site name="s" pos=".1 .2 .3"/></frame>""",
+        '<body name="twin" pos="0 3 0">': """<body name="twin" pos="0 3 0">
+            <site name="u" class="c"/>""",
+        "<worldbody>": """<default><default class="c"><site pos="3 2 1" euler="40 50 60"/></default>
+            </default><worldbody><site name="t" pos="1 1 1" quat="1 2 3 4"/>""",
+    }.items():
+        assert pattern in text
+        text = text.replace(pattern, instead)
+    assert_residuals_of_mujoco(text)
+
+
+SITES = """<mujoco><worldbody><site name="s"/>{}<body name="a"><joint/><geom size=".1"/></body>
+</worldbody><equality><connect site1="s" site2="t"/></equality></mujoco>"""
+
+
+def test_equalities_between_other_sites_are_refused():
+    with pytest.raises(ValueError, match=r"<connect>: expected a site in the file for site2, got"):
+        mjcf.parse(SITES.format(""))
+    with pytest.raises(ValueError, match=r"<site name='t'>: expected pos of a site that an equal"):
+        mjcf.parse(SITES.format('<site name="t" type="capsule" size="1" fromto="0 0 0 0 0 1"/>'))
 
 
 def test_loop_closures_are_solved():
