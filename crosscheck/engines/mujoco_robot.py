@@ -19,6 +19,7 @@ from .robot_engine import LinkPoses, RobotEngine
 LEFT_OUT = ("visual", "collision", "inertial")
 UNIT_INERTIA = """<inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"""
+PLANAR = "joint[@type='planar']"
 SETTINGS = '<mujoco><compiler fusestatic="false" balanceinertia="true"/></mujoco>'
 # Elements to remove from an MJCF file that MuJoCo refuses, those that refer to others first.
 SHAPES = (
@@ -60,6 +61,9 @@ class MujocoRobot(RobotEngine):
         bodies = [self.model.body(body).name or f"body#{body}" for body in range(self.model.nbody)]
         self.links = {name: body for body, name in enumerate(bodies)}
         self.joints = {_joint_name(self.model, bodies, i): i for i in range(self.model.njnt)}
+        if is_urdf:  # a planar joint has three, of which the first stands for all
+            planar = [joint.get("name") for joint in xml_root(path).iterfind(PLANAR)]
+            self.joints |= {name: self.joints[f"{name}_TX"] for name in planar if name}
         at = self.model.jnt_dofadr
         self.columns = {name: int(at[joint]) for name, joint in self.joints.items()}
 

@@ -35,9 +35,9 @@ class PinocchioRobot(RobotEngine):
     """The kinematics of a file as Pinocchio reads it, with a root fixed to the world.
 
     Its links are Pinocchio's body frames. The coordinates of a hinge without limits in a URDF are
-    cosine and sine, quaternions are (x, y, z, w), and the linear velocity of a free joint is in its
-    own, moving frame. Several joints of one body in an MJCF file form one composite joint, whose
-    parts are found from the file.
+    cosine and sine, quaternions are (x, y, z, w), and the linear velocity of a free or planar joint
+    is in its own, moving frame. Several joints of one body in an MJCF file form one composite
+    joint, whose parts are found from the file.
     """
 
     def _read(self, path: Path, mimic: bool) -> None:
@@ -72,9 +72,9 @@ class PinocchioRobot(RobotEngine):
             indices = self.joints[name]
             q[indices.q : indices.q + indices.nq] = _pinocchio_coordinates(values[name], indices.nq)
         self._free_rotations = {
-            name: rotation.to_matrix(value[3:])
+            name: rotation.to_matrix(value[3:] if len(value) == 7 else _about_z(value[2]))
             for name, value in values.items()
-            if len(value) == 7 and name in self.joints
+            if len(value) in (3, 7) and name in self.joints
         }
         self._q = q
         pinocchio.computeJointJacobians(self.model, self.data, q)
@@ -137,8 +137,8 @@ def _check_mjcf(root: ElementTree.Element) -> None:
 
 def _pinocchio_coordinates(q: FloatArray, nq: int) -> FloatArray:
     """Return our coordinates of one joint as Pinocchio's, nq of them."""
-    if nq == 2:
-        return np.array([np.cos(q[0]), np.sin(q[0])])
+    if nq == 2 or len(q) == 3:
+        return np.array([*q[:-1], np.cos(q[-1]), np.sin(q[-1])])
     if nq in (4, 7):
         return np.concatenate([q[:-4], np.roll(q[-4:], -1)])
     return q
@@ -157,6 +157,10 @@ def _joints_by_body(
             parts = joint.extract().joints if joint.shortname() == COMPOSITE else [joint]
             for i, (element, part) in enumerate(zip(elements, parts, strict=True), 1):
                 yield element.get("name") or f"{name}/{_kind(part)}{i}", part
+
+
+def _about_z(angle: float) -> FloatArray:
+    return np.array([np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)])
 
 
 def _kind(joint: pinocchio.JointModel) -> str:

@@ -1,12 +1,13 @@
-"""Known deviations of Pinocchio 4.1 from MuJoCo in reading MJCF, detected from the file.
+"""Known deviations of Pinocchio 4.1 and MuJoCo 4.0 in reading files, detected from the file.
 
 A test reproduces each deviation with a minimal file.
 """
 
+import math
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from ..engines.file_kind import MJCF, file_kind, xml_root
+from ..engines.file_kind import MJCF, URDF, file_kind, xml_root
 
 JOINTS = ("joint", "freejoint")
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
@@ -19,20 +20,37 @@ FRAME = "a <frame> is passed over with the joints and bodies in it"
 INCLUDE = "included files are not read"
 NAMELESS = "bodies without a name are passed over, or taken for each other"
 
+FIXED_AXES = "the capitals of an eulerseq are not read as fixed axes"
+COMPILERS = "several <compiler>, or one behind <worldbody>, do not hold for the whole file"
+LONG_AXIS = "the axis of an axisangle is not scaled to length 1"
+FREE_ANCHOR = "the pos of a free joint, which has no anchor, shifts the body"
+PLANE = "the axis of a planar joint is not read"
+QUATERNION = "the quat_xyzw of an origin is not read"
 
-def known_deviations(path: Path) -> list[str]:
-    """Return a sentence for each known deviation that affects a file; none for a URDF."""
+
+def known_deviations(path: Path, engine: str = "Pinocchio") -> list[str]:
+    """Return a sentence for each known deviation of an engine that affects a file."""
     try:
-        if file_kind(path) != MJCF:
-            return []
-        root = xml_root(path)
+        kind, root = file_kind(path), xml_root(path)
+        deviations = DEVIATIONS[kind, engine](root) if (kind, engine) in DEVIATIONS else {}
     except (ValueError, OSError):
         return []
-    return [sentence for sentence, is_affected in _deviations(root).items() if is_affected]
+    return [sentence for sentence, is_affected in deviations.items() if is_affected]
 
 
-def _deviations(root: Element) -> dict[str, bool]:
-    """Return whether each deviation affects the file of a root element."""
+def _of_planes(root: Element) -> dict[str, bool]:
+    axes = [joint.find("axis") for joint in root.iterfind("joint[@type='planar']")]
+    xyz = [_numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0")) for axis in axes]
+    return {PLANE: any(x or y or z < 0.0 for x, y, z in xyz)}
+
+
+def _of_origins(root: Element) -> dict[str, bool]:
+    return {QUATERNION: root.find("joint/origin[@quat_xyzw]") is not None}
+
+
+def _of_characters(root: Element) -> dict[str, bool]:
+    tags = [*(child.tag for child in root), "worldbody"]
+    axes = [_numbers(e.get("axisangle", ""))[:3] for e in root.iter() if _has(e, "axisangle")]
     first = root.find("worldbody/body")
     defaults = root.findall(".//default/joint")
     bodies = [
@@ -58,7 +76,24 @@ def _deviations(root: Element) -> dict[str, bool]:
         ),
         INCLUDE: root.find(".//include") is not None,
         NAMELESS: any(not body.get("name") for body, _ in bodies),
+        FIXED_AXES: any(not e.get("eulerseq", "x").islower() for e in root.iter("compiler")),
+        COMPILERS: tags.count("compiler") > 1 or "compiler" in tags[tags.index("worldbody") :],
+        LONG_AXIS: any(abs(math.hypot(*axis) - 1.0) > 1e-12 for axis in axes),
+        FREE_ANCHOR: any(
+            joint.get("type") == "free" and _has(joint, "pos") for joint in root.iter("joint")
+        ),
     }
+
+
+DEVIATIONS = {
+    (MJCF, "Pinocchio"): _of_characters,
+    (URDF, "Pinocchio"): _of_planes,
+    (URDF, "MuJoCo"): _of_origins,
+}
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(word) for word in text.split()]
 
 
 def _has(element: Element, *attributes: str) -> bool:

@@ -37,10 +37,10 @@ UNREAD, REFUSED, NEITHER, CRASHED = "not read", "not read by us", "read by neith
 class FileReading(NamedTuple):
     """The comparison of the reference and an engine on a file.
 
-    The outcome is AGREES or DIFFERS if both read it, DEVIATES if they differ for a known reason;
-    UNREAD if only the engine does not read it, REFUSED if only the reference does not, NEITHER if
-    both do not; CRASHED if the process crashed or took too long. The difference is the largest
-    of positions and linear velocities, relative to the extent of the links, and of rotation
+    The outcome is AGREES or DIFFERS if both read it, DEVIATES if they differ and another engine
+    agrees; UNREAD if only the engine does not read it, REFUSED if only the reference does not,
+    NEITHER if both do not; CRASHED if the process crashed or took too long. The difference is the
+    largest of positions and linear velocities, relative to the extent of the links, and of rotation
     matrices and angular velocities; None unless both read it.
     """
 
@@ -157,8 +157,8 @@ def _compare_motions(file: ModelFile) -> float:
     largest, joints = 0.0, 0
     try:
         poses = zip(motion.skeleton.names, global_poses(read_text(file.path)), strict=False)
-        for j, (ours, (name, x, R)) in enumerate(poses):
-            joints += ours.startswith(name)  # of end sites one reader numbers names
+        for j, (joint, (name, x, R)) in enumerate(poses):
+            joints += joint.startswith(name)  # of end sites one reader numbers names
             errors = [np.abs(x - pose.positions[:, j]) / extent]
             errors += [np.abs(R - rotation.to_matrix(pose.rotations[:, j]))]
             largest = np.max([largest, *(part.max(initial=0.0) for part in errors)])
@@ -189,23 +189,24 @@ def _read(child: CallProcess, engine: str, file: ModelFile) -> FileReading:
 def _with_causes(
     child: CallProcess, file: ModelFile, readings: list[FileReading]
 ) -> tuple[FileReading, ...]:
-    """Explain a difference of Pinocchio by known causes if MuJoCo agrees with the reference.
+    """Explain a difference of an engine if the other engine agrees with the reference.
 
     Where MuJoCo refuses the file, it reads a copy without settings, which kinematics does not need.
     """
     outcomes = {reading.engine: reading.outcome for reading in readings}
-    causes = "; ".join(known_deviations(file.path))
-    if not causes or outcomes["Pinocchio"] != DIFFERS:
-        return tuple(readings)
-    if outcomes["MuJoCo"] == UNREAD:
+    if file.kind == MJCF and (outcomes["Pinocchio"], outcomes["MuJoCo"]) == (DIFFERS, UNREAD):
         with tempfile.TemporaryDirectory() as folder:
             copy = _without_settings(file, Path(folder))
             outcomes["MuJoCo"] = _read(child, "MuJoCo", copy).outcome
-    is_excused = outcomes["MuJoCo"] == AGREES
-    return tuple(
-        r._replace(outcome=DEVIATES, why=causes) if is_excused and r.outcome == DIFFERS else r
-        for r in readings
-    )
+    agreeing = [f"{e} agrees with the reference" for e, o in outcomes.items() if o == AGREES]
+
+    def explained(reading: FileReading) -> FileReading:
+        if reading.outcome != DIFFERS or not agreeing:
+            return reading
+        causes = known_deviations(file.path, reading.engine) or ["the file shows no known cause"]
+        return reading._replace(outcome=DEVIATES, why="; ".join([*causes, *agreeing]))
+
+    return tuple(map(explained, readings))
 
 
 def _without_settings(file: ModelFile, folder: Path) -> ModelFile:

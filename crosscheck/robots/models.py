@@ -101,7 +101,10 @@ def left_out() -> str:
 
 
 class JointSlices(NamedTuple):
-    """A joint of the file with the slices of its coordinates and of its freedoms."""
+    """A joint of the file with the slices of its coordinates and of its freedoms.
+
+    A planar joint of a URDF has three of each: two slides and an angle.
+    """
 
     name: str
     coordinates: slice
@@ -111,11 +114,13 @@ class JointSlices(NamedTuple):
 def moving_joints(robot: Robot) -> list[JointSlices]:
     """Return the joints with coordinates of their own, in the order of their freedoms."""
     model = robot.articulation
-    joints = [
-        JointSlices(name, model.coordinates_of(index), model.freedoms_of(index))
-        for name, index in robot.joints.items()
-        if model.kinds[index] != "fixed" and index not in model.mimics
-    ]
+    joints = []
+    for name, index in robot.joints.items():
+        if model.kinds[index] != "fixed" and index not in model.mimics:
+            is_planar = model.names[index - 2 : index] == (f"{name} x", f"{name} y")
+            q, v = model.coordinates_of(index), model.freedoms_of(index)
+            q, v = (slice(part.start - 2 * is_planar, part.stop) for part in (q, v))
+            joints.append(JointSlices(name, q, v))
     return sorted(joints, key=lambda joint: joint.freedoms.start)
 
 

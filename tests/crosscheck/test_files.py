@@ -14,7 +14,7 @@ from plumbob.crosscheck.child_process import CallProcess, LostError
 from plumbob.crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
 from plumbob.crosscheck.robots import comparisons, files, independent_bvh
 from plumbob.crosscheck.robots.comparisons import sweep_in_parts
-from plumbob.crosscheck.robots.deviations import FRAME, INCLUDE
+from plumbob.crosscheck.robots.deviations import FRAME, INCLUDE, PLANE, QUATERNION
 from plumbob.crosscheck.robots.files import (
     AGREES,
     CRASHED,
@@ -222,23 +222,54 @@ def test_shapes_in_files_that_are_not_there_do_not_matter(folder, here):
     assert outcomes(root)["a.xml"]["MuJoCo"].outcome == AGREES
 
 
-def test_a_difference_is_excused_only_by_a_known_cause_where_mujoco_agrees(
-    folder, here, monkeypatch
-):
+def test_a_difference_is_excused_only_where_the_other_engine_agrees(folder, here, monkeypatch):
     inner = '<include file="part.xml"/>'
     root = folder(
         a_xml=character(BODY("b", 0, inner)),
         part_xml='<x><joint name="k" type="slide" axis="1 0 0" range="0 1"/></x>',
     )
     reading = outcomes(root)["a.xml"]["Pinocchio"]
-    assert (reading.outcome, reading.why) == (DEVIATES, INCLUDE)
+    confirmed = "; MuJoCo agrees with the reference"
+    assert (reading.outcome, reading.why) == (DEVIATES, INCLUDE + confirmed)
     assert reading.difference > 0.01
-    monkeypatch.setattr(files, "known_deviations", lambda path: [])
-    assert outcomes(root)["a.xml"]["Pinocchio"].outcome == DIFFERS
+    monkeypatch.setattr(files, "known_deviations", lambda *_: [])
+    reading = outcomes(root)["a.xml"]["Pinocchio"]
+    assert (reading.outcome, reading.why) == (DEVIATES, "the file shows no known cause" + confirmed)
     file = find([root]).files[0]
     theirs = files.FileReading("Pinocchio", DIFFERS, 0.5), files.FileReading("MuJoCo", CRASHED)
     monkeypatch.undo()
     assert files._with_causes(Here(None, 60.0), file, list(theirs)) == theirs
+
+
+PLANE_JOINT = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="p" type="planar"><parent link="a"/><child link="b"/>
+<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/>{}</joint>
+<joint name="k" type="continuous"><parent link="b"/><child link="c"/><origin xyz="1 0 0"/></joint>
+</robot>""".format
+
+
+def test_planar_joints_agree_and_their_axes_are_read_otherwise_by_pinocchio(folder, here):
+    """In all three coordinates and their Jacobians; Pinocchio takes every axis for z."""
+    root = folder(
+        a_urdf=PLANE_JOINT('<axis xyz="0 0 2"/>'), b_urdf=PLANE_JOINT('<axis xyz="1 2 2"/>'),
+        c_urdf=PLANE_JOINT('<axis xyz="0 0 -1"/>'), d_urdf=PLANE_JOINT(""),
+    )  # fmt: skip
+    for name, readings in outcomes(root).items():
+        assert readings["MuJoCo"].outcome == AGREES, readings
+        theirs = readings["Pinocchio"]
+        why = f"{PLANE}; MuJoCo agrees with the reference"
+        expected = (AGREES, "") if name == "a.urdf" else (DEVIATES, why)
+        assert (theirs.outcome, theirs.why) == expected
+        assert min(readings["MuJoCo"].difference, theirs.difference) < 1e-14
+
+
+def test_a_quaternion_that_mujoco_passes_over_is_confirmed_by_pinocchio(folder, here):
+    turned = ARM(-1).replace('name="arm"', 'name="arm" version="1.1"', 1)
+    turned = turned.replace("<origin", '<origin quat_xyzw="0 0 0.6 0.8"')
+    readings = outcomes(folder(a_urdf=turned))["a.urdf"]
+    assert readings["Pinocchio"].outcome == AGREES
+    assert readings["MuJoCo"].outcome == DEVIATES
+    assert readings["MuJoCo"].why == f"{QUATERNION}; Pinocchio agrees with the reference"
 
 
 OLD = '<option collision="all"/>'

@@ -25,8 +25,12 @@ from plumbob.crosscheck.robots.comparisons import (
 )
 from plumbob.crosscheck.robots.deviations import (
     CLASS_ANCHOR,
+    COMPILERS,
+    FIXED_AXES,
     FRAME,
+    FREE_ANCHOR,
     INCLUDE,
+    LONG_AXIS,
     NAMELESS,
     OUTER_ROOT,
     ROTATED_ROOT,
@@ -229,6 +233,8 @@ BODY = '<geom size="0.1"/>'
 B = f'<body name="b" pos="1 0 0">{BODY}<joint name="j" axis="0 1 0" pos="0.1 0 0"/></body>'
 FREE = f"""<mujoco>{{}}<worldbody><body name="a">{BODY}<freejoint name="r"/>{{}}</body>
     </worldbody></mujoco>"""
+TURNED = f'<body name="t" {{}}><body name="u" pos="1 0 0">{BODY}<joint name="k"/></body></body>'
+TURNED = TURNED.format
 DEVIATES = {
     OUTER_ROOT: f"""<mujoco><worldbody><body name="a" pos="0 0 0.5">{BODY}{B}</body></worldbody>
         </mujoco>""",
@@ -243,14 +249,24 @@ DEVIATES = {
     FRAME: FREE.format("", f"{B[:-7]}<frame><joint name='k'/></frame></body>"),
     INCLUDE: FREE.format("", f"{B[:-7]}<include file='j.xml'/></body>"),
     NAMELESS: FREE.format("", f"<body>{BODY}<joint name='k'/>{B}</body>"),
+    FIXED_AXES: FREE.format('<compiler eulerseq="XYZ"/>', TURNED('euler="10 20 30"')),
+    COMPILERS: FREE.format(
+        '<compiler angle="radian"/><compiler angle="degree"/>', TURNED('euler="10 20 30"')
+    ),
+    LONG_AXIS: FREE.format("", TURNED('axisangle="0 0 2 30"')),
+    FREE_ANCHOR: FREE.format("", B).replace(
+        '<freejoint name="r"', '<joint name="r" type="free" pos=".1 .2 .3"'
+    ),
 }
+LATE = FREE.format("", TURNED('euler=".1 .2 .3"'))
+LATE = LATE.replace("</mujoco>", '<compiler angle="radian"/></mujoco>')
 
 
-@pytest.mark.parametrize("cause", DEVIATES)
-def test_pinocchio_departs_from_mujoco_and_us_by_a_cause_that_is_named(cause, tmp_path):
+@pytest.mark.parametrize(("cause", "text"), [*DEVIATES.items(), (COMPILERS, LATE)])
+def test_pinocchio_departs_from_mujoco_and_us_by_a_cause_that_is_named(cause, text, tmp_path):
     """If this fails, Pinocchio has learnt something: the cause and its entries in CAUSES can go."""
     (tmp_path / "j.xml").write_text('<x><joint name="k"/></x>')
-    model = written(tmp_path, DEVIATES[cause])
+    model = written(tmp_path, text)
     assert known_deviations(model.path) == [cause]
     assert max(differences([sweep("MuJoCo", model)])) < 1e-14
     assert max(differences([sweep("Pinocchio", model)])) > 0.01
