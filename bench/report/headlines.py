@@ -176,8 +176,8 @@ def _recorded_names() -> dict[str, set[str]]:
 
 
 def _robot_groups(results: Results) -> Iterator[tuple[str, str, dict[str, list[Score]]]]:
-    """Yield group, start and solvers on each robot; robots held out from tuning come first."""
-    by_start = {start: fields_of(results, start) for start in STARTS}
+    """Yield group, start and solvers on each robot: robots held out and restarts come first."""
+    by_start = {start: fields_of(results, start) for start in reversed(STARTS)}
     groups = {robot: f[robot][0].group for f in by_start.values() for robot in f}
     for group in sorted(set(groups.values()), key=_GROUPS.index):
         for start, fields in by_start.items():

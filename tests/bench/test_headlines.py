@@ -151,8 +151,8 @@ def test_robots_that_no_setting_has_seen_come_first_and_are_never_mixed_with_oth
     ]  # fmt: skip
     made = headlines.headlines(Results(records))
     groups = [h.question.split(", ", 1)[1] for h in made if h.question.startswith("Most")]
-    assert groups == [f"{g}, {start}" for g in ("held out", "tuning") for start in STARTS]
-    assert all(h.sentence.startswith("On the 2 held-out robots from one start, ") for h in made[:3])
+    assert groups == [f"{g}, {start}" for g in ("held out", "tuning") for start in STARTS[::-1]]
+    assert all(h.sentence.startswith("On the 2 held-out robots with restarts, ") for h in made[:3])
     assert "50 % of 400" in made[2].sentence
     assert "95 % of 200" in sentence(records, "Most poses solved, tuning, restarts")
 
