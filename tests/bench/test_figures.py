@@ -20,7 +20,7 @@ from plumbob.bench.tables.results import Results
 OURS = "Plumbob LM, first phase"
 
 ENTRANT = "my very own solver, a name of some length"
-CHARTS = 20
+CHARTS = 18
 
 
 def with_solvers(records, count):

@@ -167,7 +167,7 @@ def test_records_of_other_targets_are_marked_and_not_ranked(run):
     table = robot_by_robot(results)
     assert by_solver(table, "mark")["few"] == "other targets, 30"
     assert "few" not in " ".join(table.summary.points)
-    assert [one.solver for one in FIGURES[9](results).data.panels[0].series] == ["a", "b"]
+    assert [one.solver for one in FIGURES[8](results).data.panels[0].series] == ["a", "b"]
 
 
 def test_outcomes_are_told_apart(run):
@@ -307,7 +307,7 @@ def test_the_map_has_a_field_for_each_robot_that_a_solver_takes(run, cut):
     assert svg.count(">100<") == 5
     assert svg.count(">10k<") == 1
     assert drawn(heat_map(cut)).svg.count("*<") == 2  # both fields of the solver cut short
-    assert [figure(Results([])) for figure in FIGURES] == [None] * 12
+    assert [figure(Results([])) for figure in FIGURES] == [None] * 10
 
 
 def test_missing_and_refused_solvers_are_listed_with_the_reason(make):

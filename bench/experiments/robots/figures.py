@@ -230,8 +230,12 @@ def _draw_map(ax: "Axes", rows: Sequence[Sequence[MapCell | None]], robots: Sequ
     ax.spines[:].set_visible(False)
 
 
-FIGURES: tuple[Figure, ...] = tuple(
-    partial(draw, start)
-    for draw in (group_budgets, heat_map, budgets, performance_profiles)
-    for start in STARTS
+# Portfolios have no charts of each robot: the page would be half as large again.
+FIGURES: tuple[Figure, ...] = (
+    *(partial(draw, start) for draw in (group_budgets, heat_map) for start in STARTS),
+    *(
+        partial(draw, start)
+        for draw in (budgets, performance_profiles)
+        for start in (registry.ONE_START, registry.RESTARTS)
+    ),
 )
