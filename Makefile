@@ -54,17 +54,17 @@ bench: .venv/installed
 
 sample: .venv/peers/installed
 	$(BIN)/plumbob bench --quick --seeds 4 --output build/sample
-	$(BIN)/python docs/write_sample.py build/sample
+	$(BIN)/python tools/write_sample.py build/sample
 
 docs: .venv/docs-installed
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html docs build/docs
 
 drawing: .venv/installed
-	$(BIN)/python docs/draw_architecture.py
-	$(BIN)/python docs/draw_lab.py
+	$(BIN)/python tools/draw_architecture.py
+	$(BIN)/python tools/draw_lab.py
 
 messages: .venv/installed
-	$(BIN)/python -m plumbob.crosscheck.verify.catalogue
+	$(BIN)/python tools/translate.py
 
 .venv/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and \

@@ -4,7 +4,7 @@ import functools
 import re
 from collections.abc import Sequence
 
-from plumbob.crosscheck.verify.sentence import all_visible, harmless, visible
+from plumbob.verify.sentence import all_visible, harmless, visible
 
 __all__ = ["all_visible", "chunks", "harmless", "shortened", "visible"]
 

@@ -7,7 +7,7 @@ terminal a line on stderr says what is compiled, once it takes more than a secon
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-# Git on Windows may write the links to `reference`, `crosscheck` and `bench` as text files.
+# Git on Windows may write the links to `reference` and other rooms as text files.
 if Path(__file__).with_name("reference").is_file():
     __path__.append(str(Path(__file__).parents[1]))
 

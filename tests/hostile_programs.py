@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers import ProcessLimits
-from plumbob.crosscheck.verify.solvers.program import ProgramContestant
+from plumbob.verify.case import Case
+from plumbob.verify.sentence import sentence
+from plumbob.verify.solvers import ProcessLimits
+from plumbob.verify.solvers.program import ProgramContestant
 
 # The first request may wait for a busy machine; the others come when the program is warm.
 LIMITS = ProcessLimits(

@@ -2,15 +2,15 @@
 
 import conformance_students as students
 
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.functions import FunctionContestant
-from plumbob.crosscheck.verify.greeting import Greeting
-from plumbob.crosscheck.verify.judgement import Verdict
-from plumbob.crosscheck.verify.kinematics.faults import switches
-from plumbob.crosscheck.verify.kinematics.predictions import predict_forward, predict_track, solve
-from plumbob.crosscheck.verify.laws import HOLDS
-from plumbob.crosscheck.verify.verify import verify
 from plumbob.reference import Skeleton, forward_kinematics, solve_ik, track
+from plumbob.verify.case import Case
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics.faults import switches
+from plumbob.verify.kinematics.predictions import predict_forward, predict_track, solve
+from plumbob.verify.laws import HOLDS
+from plumbob.verify.verify import verify
 
 FORWARD, INVERSE = "forward_kinematics", "inverse_kinematics"
 TRACK, RESAMPLE = "track", "resample"

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from plumbob.crosscheck.verify import templates
+from plumbob.verify import templates
 
-ROOM = Path(__file__).parent / "crosscheck" / "verify" / "programs"
+ROOM = Path(__file__).parent / "verify" / "programs"
 TEMPLATES = Path(templates.__file__).parent
 FK, IK, TRACK, RESAMPLE = "forward_kinematics", "inverse_kinematics", "track", "resample"
 FORCES, ENERGY, STEP = "mass_spring_forces", "energy", "mass_spring_step"

@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Answer, Exchange
-from plumbob.crosscheck.verify.explain import Variant, difference, explain
-from plumbob.crosscheck.verify.judgement import (
+from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes, solve_ik
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.explain import Variant, difference, explain
+from plumbob.verify.judgement import (
     CaseJudgement,
     Diagnosis,
     Finding,
     TaskReport,
     Verdict,
 )
-from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes, solve_ik
+from plumbob.verify.sentence import sentence
 
 TOLERANCE = 1e-12
 

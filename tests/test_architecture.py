@@ -1,26 +1,14 @@
 """The drawing of the house is what the imports say now."""
 
-import importlib.util
-from pathlib import Path
-
+import draw_architecture as draw
 import pytest
 
-SCRIPT = Path(__file__).parents[1] / "docs" / "draw_architecture.py"
 
-
-@pytest.fixture(scope="module")
-def draw():
-    spec = importlib.util.spec_from_file_location("draw_architecture", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_the_committed_drawing_is_what_the_imports_say(draw):
+def test_the_committed_drawing_is_what_the_imports_say():
     assert draw.DRAWING.read_text(encoding="utf-8") == draw.drawing(), "run `make drawing`"
 
 
-def test_every_package_and_module_of_a_room_has_a_box(draw):
+def test_every_package_and_module_of_a_room_has_a_box():
     for room in draw.ROOMS:
         folder = draw.ROOT / room
         parents = [path.parent for path in folder.glob("*/__init__.py")]
@@ -38,17 +26,17 @@ def test_every_package_and_module_of_a_room_has_a_box(draw):
     ],
     ids=["a chain replaces an arrow", "a cycle keeps all"],
 )
-def test_arrows_are_reduced(draw, arrows, expected):
+def test_arrows_are_reduced(arrows, expected):
     found = draw.reduced({name: set(below) for name, below in arrows.items()})
     assert found == {name: set(below) for name, below in expected.items()}
 
 
-def test_a_box_stands_above_what_it_imports(draw):
+def test_a_box_stands_above_what_it_imports():
     arrows = {"r/a": {"r/b", "r/c"}, "r/b": {"r/c"}, "r/c": set(), "r/d": set()}
     assert draw.rows(arrows) == [["r/a"], ["r/b"], ["r/c", "r/d"]]
 
 
-def test_relative_imports_are_resolved(draw, tmp_path):
+def test_relative_imports_are_resolved(tmp_path):
     code = "from . import near\nfrom ..room import far\nimport plumbob.reference.curve\n"
     file = tmp_path / "module.py"
     file.write_text(code)

@@ -75,7 +75,7 @@ def forward_kinematics(parents, offsets, local_rotations):
 
 def test_a_module_of_the_same_name_where_one_works_is_left_alone(tmp_path):
     """A user's own bench.py neither breaks the import nor stops the judge."""
-    for name in ("bench.py", "reference/__init__.py", "crosscheck/__init__.py"):
+    for name in ("bench.py", "reference/__init__.py", "verify/__init__.py"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(SHADOW)
     (tmp_path / "solver.py").write_text(SOLVER)
@@ -94,7 +94,7 @@ def test_a_checkout_without_links_works(tmp_path):
     (tmp_path / "plumbob").mkdir()
     shutil.copy(ROOT / "plumbob" / "__init__.py", tmp_path / "plumbob")
     shutil.copy(ROOT / "plumbob" / "compile_notice.py", tmp_path / "plumbob")
-    for folder in ("reference", "crosscheck", "bench"):
+    for folder in ("reference", "crosscheck", "verify", "bench"):
         (tmp_path / "plumbob" / folder).write_text(f"../{folder}")
         (tmp_path / folder).symlink_to(ROOT / folder)
     code = "import plumbob; print(plumbob.__file__, plumbob.solve_ik.__module__)"

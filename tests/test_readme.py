@@ -6,13 +6,13 @@ import sys
 from pathlib import Path
 
 import pytest
+import translate as catalogue
 
 from plumbob import cli
-from plumbob.crosscheck.verify import catalogue
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Answer
-from plumbob.crosscheck.verify.greeting import Greeting
-from plumbob.crosscheck.verify.judgement import (
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.judgement import (
     CaseJudgement,
     Diagnosis,
     Explanation,
@@ -21,10 +21,10 @@ from plumbob.crosscheck.verify.judgement import (
     TaskReport,
     Verdict,
 )
-from plumbob.crosscheck.verify.language import translator
-from plumbob.crosscheck.verify.message import decode_greeting
-from plumbob.crosscheck.verify.output import json_file
-from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.verify.language import translator
+from plumbob.verify.message import decode_greeting
+from plumbob.verify.output import json_file
+from plumbob.verify.sentence import sentence
 
 README = Path(__file__).parents[1] / "README.md"
 CHINESE = README.with_name("README.zh-CN.md")

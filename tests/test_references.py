@@ -17,7 +17,7 @@ ENTRY = re.compile(r"^- \*\*(.+?) (\d{4})\.\*\* \*(.+?)\.\* (.+?)\. In (.+?)\.$"
 
 
 def sources():
-    for folder in ("reference", "crosscheck", "bench", "tests"):
+    for folder in ("reference", "crosscheck", "verify", "bench", "tests"):
         for ending in ("py", "toml"):
             yield from sorted((ROOT / folder).rglob(f"*.{ending}"))
     yield from [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -9,9 +9,9 @@ from plumbob.bench.experiments.check import files
 from plumbob.bench.experiments.robots.readings import OUTCOMES
 from plumbob.bench.experiments.self_test.tables import self_test
 from plumbob.bench.tables.results import Results
-from plumbob.crosscheck.verify.judgement import Verdict
-from plumbob.crosscheck.verify.output.words import VERDICTS
 from plumbob.reference.outcome import Outcome
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.output.words import VERDICTS
 
 PAGE = Path(__file__).parents[1] / "docs" / "verdicts.md"
 WORDS = {

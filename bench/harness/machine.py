@@ -22,11 +22,11 @@ PACKAGES = (
     *("gymnasium", "dm_control", "matplotlib"),
 )
 ROOT = Path(__file__).resolve().parents[2]
-_PACKAGES = ("reference", "crosscheck", "bench")
+_PACKAGES = ("reference", "crosscheck", "verify", "bench")
 # Folders that only show numbers; all others may change one. Nothing that measures imports them.
 PRESENTATION = (
     *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),
-    *("bench/tables", "crosscheck/verify/output"),
+    *("bench/tables", "verify/output"),
 )
 # Likewise in every experiment.
 PRESENTATION_FILES = (

@@ -15,7 +15,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from plumbob.crosscheck.verify.output.html import environment
+from plumbob.verify.output.html import environment
 
 from ..figures.style import COLOURS
 from ..text import visible

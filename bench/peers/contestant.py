@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Failure
-from plumbob.crosscheck.verify.greeting import Greeting
-from plumbob.crosscheck.verify.message import NO_SECONDS
-from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers import ProcessLimits, open_contestant
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Failure
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.message import NO_SECONDS
+from plumbob.verify.sentence import sentence
+from plumbob.verify.solvers import ProcessLimits, open_contestant
 
 from .entrant import Spec
 from .protocol import NoAnswerError, OwnTime

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from plumbob.crosscheck.verify.contestant import NoGreetingError
-from plumbob.crosscheck.verify.greeting import Greeting
-from plumbob.crosscheck.verify.message import shown
-from plumbob.crosscheck.verify.solvers import LIMITS, open_contestant
+from plumbob.verify.contestant import NoGreetingError
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.message import shown
+from plumbob.verify.solvers import LIMITS, open_contestant
 
 from ..problems.own import clean
 from . import registry

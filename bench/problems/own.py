@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from plumbob.crosscheck.verify.message import shown
 from plumbob.reference import MassSpring, State
+from plumbob.verify.message import shown
 
 from ..text import visible
 from .chains import TargetsForSkeleton

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.verify.functions import FunctionContestant
-from plumbob.crosscheck.verify.greeting import PROTOCOL, Greeting
-from plumbob.crosscheck.verify.mass_spring.model import Integrator, StepModel
-from plumbob.crosscheck.verify.self_test import STEP, Stepper, Subject, subjects
 from plumbob.reference import forward_kinematics, rotation, scenes, solve_ik
 from plumbob.reference.arguments import FloatArray
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.mass_spring.model import Integrator, StepModel
+from plumbob.verify.self_test import STEP, Stepper, Subject, subjects
 
 from ..figures.view import ARM_VIEW
 from ..motion.motion import Moving, Scene

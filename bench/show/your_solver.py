@@ -5,13 +5,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Contestant, Failure, NoGreetingError
-from plumbob.crosscheck.verify.message import shown
-from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers import open_contestant
 from plumbob.reference import MassSpring, Skeleton, State, forward_kinematics
 from plumbob.reference.arguments import FloatArray
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Contestant, Failure, NoGreetingError
+from plumbob.verify.message import shown
+from plumbob.verify.sentence import sentence
+from plumbob.verify.solvers import open_contestant
 
 TRACK, REACH = "track", "inverse_kinematics"
 STEP, MOTION = "mass_spring_step", "mass_spring_motion"

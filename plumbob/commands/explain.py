@@ -15,9 +15,9 @@ def explain(
 
     With words: list the faults that have all of them. Without: list the families of faults.
     """
-    from plumbob.crosscheck.verify.language import language_of
-    from plumbob.crosscheck.verify.output.fault_text import fault_help
-    from plumbob.crosscheck.verify.output.words import speaker
+    from plumbob.verify.language import language_of
+    from plumbob.verify.output.fault_text import fault_help
+    from plumbob.verify.output.words import speaker
 
     for line in fault_help(words or (), speaker(language_of(lang))):
         print(line, flush=True)

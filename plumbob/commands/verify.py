@@ -14,13 +14,13 @@ from ..help_text import Command
 from .options import FAILED, SUCCESS, File, Text, Texts, argument, flag, option
 
 if TYPE_CHECKING:
-    from plumbob.crosscheck.verify.judgement import Report
-    from plumbob.crosscheck.verify.output.files import Files
-    from plumbob.crosscheck.verify.output.question import Question
-    from plumbob.crosscheck.verify.output.words import Presentation, Say
-    from plumbob.crosscheck.verify.sentence import Sentence
-    from plumbob.crosscheck.verify.solvers import ProcessLimits
-    from plumbob.crosscheck.verify.verify import Notify
+    from plumbob.verify.judgement import Report
+    from plumbob.verify.output.files import Files
+    from plumbob.verify.output.question import Question
+    from plumbob.verify.output.words import Presentation, Say
+    from plumbob.verify.sentence import Sentence
+    from plumbob.verify.solvers import ProcessLimits
+    from plumbob.verify.verify import Notify
 
 PROGRAM = "plumbob.program"
 # The seconds between lines on progress in a pipe: a service that waits longer may take it for hung.
@@ -95,10 +95,10 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         bar = work.enter_context(progress())
         work.enter_context(lines_in_a_pipe(bar, (LINE_PAUSE, LINE_PAUSE)))
         bar.add_task("starting", total=None)
-        from plumbob.crosscheck.verify.language import language_of
-        from plumbob.crosscheck.verify.output.files import Files
-        from plumbob.crosscheck.verify.output.question import ANSWERS, Question, limits
-        from plumbob.crosscheck.verify.output.words import Presentation, speaker
+        from plumbob.verify.language import language_of
+        from plumbob.verify.output.files import Files
+        from plumbob.verify.output.question import ANSWERS, Question, limits
+        from plumbob.verify.output.words import Presentation, speaker
 
         language = language_of(lang)
         question = Question(tuple(task or ()), rerun, thorough, seed)
@@ -120,7 +120,7 @@ def _listed(
     question: "Question", names: bool, template: str | None, export: Path | None, say: "Say"
 ) -> Iterable[str]:
     """Return lines on the tasks, or on the starter or cases that it writes."""
-    from plumbob.crosscheck.verify.output import listings
+    from plumbob.verify.output import listings
 
     if template and not names:
         return listings.starter(template, Path(), say)
@@ -138,11 +138,11 @@ def _judge(
 ) -> Callable[[], int]:
     """Judge a solver; return what prints the verdict, writes the files and gives the exit code."""
     from plumbob.bench.harness.record import check_regular
-    from plumbob.crosscheck.verify.contestant import NoGreetingError
-    from plumbob.crosscheck.verify.output.files import UNJUDGED
-    from plumbob.crosscheck.verify.output.question import ask, opened, suited
-    from plumbob.crosscheck.verify.sentence import sentence
-    from plumbob.crosscheck.verify.verify import failed
+    from plumbob.verify.contestant import NoGreetingError
+    from plumbob.verify.output.files import UNJUDGED
+    from plumbob.verify.output.question import ask, opened, suited
+    from plumbob.verify.sentence import sentence
+    from plumbob.verify.verify import failed
 
     from .options import writable
 
@@ -187,7 +187,7 @@ def _publisher(
     bar: Any, files: "Files", question: "Question", context: "Presentation"
 ) -> Callable[["Report"], None]:
     """Return what prints the newest verdict and writes the files, before any cause is sought."""
-    from plumbob.crosscheck.verify.output.words import verdict_line
+    from plumbob.verify.output.words import verdict_line
 
     def publish(report: "Report") -> None:
         if report.tasks:
@@ -210,8 +210,8 @@ def _self_test(words: list[str], say: "Say") -> int:
     from rich.console import Console
     from rich.progress import track
 
-    from plumbob.crosscheck.verify.output.listings import self_test
-    from plumbob.crosscheck.verify.self_test import attempt, subjects
+    from plumbob.verify.output.listings import self_test
+    from plumbob.verify.self_test import attempt, subjects
 
     console = Console(stderr=True)
     solvers = track(

@@ -8,14 +8,14 @@ import pytest
 from plumbob.bench.comparison.answers import compare_answers
 from plumbob.bench.comparison.rows import Pair, row_key
 from plumbob.bench.experiments.check import tables as check
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.kinematics import pose_laws, resample
-from plumbob.crosscheck.verify.kinematics.polylines import Polyline
-from plumbob.crosscheck.verify.laws import HOLDS
-from plumbob.crosscheck.verify.output import comparison
 from plumbob.reference import Skeleton, arguments
 from plumbob.reference.articulation import Articulation
 from plumbob.reference.formats import mjcf, urdf
+from plumbob.verify.case import Case
+from plumbob.verify.kinematics import pose_laws, resample
+from plumbob.verify.kinematics.polylines import Polyline
+from plumbob.verify.laws import HOLDS
+from plumbob.verify.output import comparison
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 CLOSE = 1.0 + 1e-9

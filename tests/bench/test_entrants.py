@@ -22,9 +22,9 @@ from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results, printable
 from plumbob.cli import run_command
-from plumbob.crosscheck.verify.solvers import open_contestant
 from plumbob.reference import forward_kinematics
 from plumbob.reference.formats import mjcf, urdf
+from plumbob.verify.solvers import open_contestant
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK, CLOTH, ROBOT, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
@@ -325,8 +325,8 @@ def test_the_link_of_the_tool_is_where_poses_are_evaluated(name):
     """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
     from plumbob.bench.peers.ik.entrant import robot_inputs
     from plumbob.bench.problems.evaluate import evaluator_of
-    from plumbob.crosscheck.verify.kinematics.robot_models import tool_pose
-    from plumbob.crosscheck.verify.task import TASKS
+    from plumbob.verify.kinematics.robot_models import tool_pose
+    from plumbob.verify.task import TASKS
 
     inputs = robot_inputs(robot(name))
     (field,) = [field for field in TASKS["robot_inverse_kinematics"].inputs if field.name == "urdf"]

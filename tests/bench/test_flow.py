@@ -39,7 +39,7 @@ def test_only_runs_the_stopwatch_and_timing_read_a_clock():
 def test_only_record_names_the_result_file():
     namers = {name(path) for path in SOURCES if ".jsonl" in path.read_text(encoding="utf-8")}
     # The results of the search over settings are no records.
-    assert namers == {"harness/record.py", "experiments/robots/tuning.py"}
+    assert namers == {"harness/record.py"}
 
 
 SHOWS = ["tables/table.py", "report/report.py", "experiments/chain/tables.py"]

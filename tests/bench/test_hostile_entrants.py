@@ -25,13 +25,13 @@ from plumbob.bench.peers import registry
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.protocol import NoAnswerError
 from plumbob.bench.problems.chains import TargetsForSkeleton
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Answer
-from plumbob.crosscheck.verify.greeting import Greeting
-from plumbob.crosscheck.verify.message import NO_SECONDS
-from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers import export, open_contestant
 from plumbob.reference import Skeleton
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.message import NO_SECONDS
+from plumbob.verify.sentence import sentence
+from plumbob.verify.solvers import export, open_contestant
 
 NOT_TIMED = sentence('Not timed: the answers hold no valid "seconds".')
 TASK = "inverse_kinematics"

@@ -10,7 +10,7 @@ import pytest
 
 from plumbob.bench.harness import machine
 
-PACKAGES = ("reference", "crosscheck", "bench")
+PACKAGES = ("reference", "crosscheck", "verify", "bench")
 ROOT = Path(machine.__file__).resolve().parents[2]
 
 

@@ -16,8 +16,8 @@ from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import is_blank, without_empty, words
 from plumbob.crosscheck.claims import CLAIMS
 from plumbob.crosscheck.verdict import ClaimVerdict
-from plumbob.crosscheck.verify.judgement import Verdict as TaskVerdict
-from plumbob.crosscheck.verify.output import terminal as verify_terminal
+from plumbob.verify.judgement import Verdict as TaskVerdict
+from plumbob.verify.output import terminal as verify_terminal
 
 # Of a terminal; None is a pipe.
 WIDTHS = (80, 120, 200, None)

@@ -1,25 +1,25 @@
 """The search of settings: it is complete, and the bench uses what it chose and nothing else."""
 
-import importlib.util
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from plumbob.bench.experiments.robots import tuning
-from plumbob.bench.experiments.robots.tuning import (
+import search_settings as tuning
+import write_settings
+from search_settings import (
     COUNT,
     MAXIMUM,
     SCREENED,
     SettingsSearch,
     SettingsTrial,
 )
+
 from plumbob.bench.problems import robots
 from plumbob.bench.problems.robot_targets import robot_targets
 
 ROOT = Path(__file__).parents[2]
-TRIALS = tuning.read(ROOT / tuning.RESULTS)
+TRIALS = tuning.read(tuning.RESULTS)
 
 
 @pytest.fixture(params=tuning.searches(), ids=lambda search: f"{search.solver}, {search.start}")
@@ -57,13 +57,10 @@ def test_tuning_shares_no_robot_with_those_held_out_and_no_target_with_the_table
 
 
 def test_the_tables_of_the_pages_are_those_of_the_results():
-    spec = importlib.util.spec_from_file_location("tables", ROOT / "docs/peers/write_tables.py")
-    pages = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(pages)
-    parts = pages.contents()
+    parts = write_settings.contents()
     for page in (ROOT / "docs/peers").glob("*.md"):
         text = page.read_text(encoding="utf-8")
-        assert pages.filled(text, parts) == text, f"{page.name}: run docs/peers/write_tables.py"
+        assert write_settings.filled(text, parts) == text, f"{page}: run write_settings.py"
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,10 @@ import pytest
 from small_discipline import SMALL
 
 from plumbob import cli
-from plumbob.crosscheck.verify import verify
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.output import saved
-from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.verify import verify
+from plumbob.verify.case import Case
+from plumbob.verify.output import saved
+from plumbob.verify.sentence import sentence
 
 RIGHT = """
 import numpy as np
@@ -265,7 +265,7 @@ def templates(monkeypatch):
     module = ModuleType("templates")
     module.LANGUAGES = languages
     module.template = lambda language: {name: f"// {name}\n" for name in languages[language].files}
-    monkeypatch.setitem(sys.modules, "plumbob.crosscheck.verify.templates", module)
+    monkeypatch.setitem(sys.modules, "plumbob.verify.templates", module)
 
 
 def test_template_is_written_once_with_its_next_commands(capsys, folder, templates):
@@ -322,7 +322,7 @@ def test_misuse_exits_2_with_one_sentence(capsys, folder, arguments, words):
 LAWS = """
 from plumbob.testing import laws
 import right, wrong
-from plumbob.crosscheck.verify import verify
+from plumbob.verify import verify
 from small_discipline import SMALL
 
 verify.DISCIPLINES.update(SMALL)

@@ -12,12 +12,13 @@ from html_page import Page
 from rich.cells import cell_len
 from small_discipline import SMALL, own_rotation
 
-from plumbob.crosscheck.verify import verify
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Answer, Failure, FailureKind
-from plumbob.crosscheck.verify.functions import FunctionContestant
-from plumbob.crosscheck.verify.greeting import Greeting
-from plumbob.crosscheck.verify.judgement import (
+from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.verify import verify
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer, Failure, FailureKind
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.judgement import (
     CaseJudgement,
     Diagnosis,
     Explanation,
@@ -26,8 +27,8 @@ from plumbob.crosscheck.verify.judgement import (
     TaskReport,
     Verdict,
 )
-from plumbob.crosscheck.verify.language import translator
-from plumbob.crosscheck.verify.output import (
+from plumbob.verify.language import translator
+from plumbob.verify.output import (
     comparison,
     drawing,
     json_file,
@@ -36,9 +37,8 @@ from plumbob.crosscheck.verify.output import (
     saved,
     terminal,
 )
-from plumbob.crosscheck.verify.output.words import GOOD, Presentation, digits, explanations, speaker
-from plumbob.crosscheck.verify.sentence import Sentence, sentence, with_code
-from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.verify.output.words import GOOD, Presentation, digits, explanations, speaker
+from plumbob.verify.sentence import Sentence, sentence, with_code
 
 HOSTILE = '<script>alert(1)</script>\x1b[31m\u202e & "quotes" \' ]]>'
 TASKS = tuple(SMALL)

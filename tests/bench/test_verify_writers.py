@@ -7,20 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plumbob.crosscheck.verify.functions import FunctionContestant
-from plumbob.crosscheck.verify.judgement import Verdict
-from plumbob.crosscheck.verify.output import files, json_file, junit, page, saved, terminal
-from plumbob.crosscheck.verify.output.files import Files
-from plumbob.crosscheck.verify.output.question import Question
-from plumbob.crosscheck.verify.output.words import (
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.output import files, json_file, junit, page, saved, terminal
+from plumbob.verify.output.files import Files
+from plumbob.verify.output.question import Question
+from plumbob.verify.output.words import (
     VERDICTS,
     Presentation,
     passed,
     speaker,
     title,
 )
-from plumbob.crosscheck.verify.self_test import subjects
-from plumbob.crosscheck.verify.verify import verify
+from plumbob.verify.self_test import subjects
+from plumbob.verify.verify import verify
 
 FAULTY = {f"{one.family}, {one.name}": one for one in subjects() if one.fault}
 SOME = (

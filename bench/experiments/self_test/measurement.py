@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from plumbob.crosscheck.verify.self_test import HONEST, Subject, attempt, subjects
+from plumbob.verify.self_test import HONEST, Subject, attempt, subjects
 
 from ...harness.block import Block, Measured, Scale
 from .values import TrialValues

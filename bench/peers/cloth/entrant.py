@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
+from plumbob.verify.greeting import Greeting
 
 from ..contestant import opened, remark
 from ..entrant import MOTION_TASK, STEP_TASK, Spec

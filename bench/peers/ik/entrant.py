@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.crosscheck.verify.kinematics import robot_models
 from plumbob.reference import rotation
+from plumbob.verify.kinematics import robot_models
 
 from ...problems.robots import links
 from ..contestant import opened, remark

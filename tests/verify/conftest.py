@@ -1,0 +1,40 @@
+"""Programs of other languages, built once a session."""
+
+import functools
+import sys
+
+import planted_programs
+import pytest
+
+import plumbob.verify.verify  # noqa: F401
+
+
+@pytest.fixture(autouse=True)
+def without_changed_lines(request, monkeypatch):
+    """Leave the search of changed lines, seconds for each unknown mistake, to the tests of it."""
+    if not request.module.__name__.endswith("test_one_line"):
+        module = sys.modules["plumbob.verify.verify"]
+        monkeypatch.setattr(module, "with_changed_line", lambda report, greeting: report)
+
+
+@pytest.fixture(scope="session")
+def program(tmp_path_factory):
+    """Return what runs a right program by language; skip where its compiler is missing."""
+    build = functools.cache(planted_programs.command)
+    folder = tmp_path_factory.mktemp("programs")
+
+    def built(language):
+        run = build(language, folder)
+        if run is None:
+            pytest.skip(f"no compiler or interpreter for {language} on this machine")
+        return run
+
+    return built
+
+
+@pytest.fixture(scope="session")
+def right_answers(program):
+    """Return the answers of a right program to `planted_programs.requests()`, by language."""
+    return functools.cache(
+        lambda language: planted_programs.ask(program(language), planted_programs.requests())[0]
+    )

@@ -1,0 +1,263 @@
+"""Laws of the folder of cases and of the answers beside them."""
+
+import csv
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer, FailureKind, NoGreetingError
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.sentence import sentence
+from plumbob.verify.solvers import export, open_contestant
+from plumbob.verify.solvers.export import export_cases, write_cases
+from plumbob.verify.solvers.files import FileContestant, place_of
+from plumbob.verify.solvers.tables import read_table, write_table
+from plumbob.verify.task import TASKS, Field
+
+TABLE = Field("positions", ("frame", "particle", 3))
+POINTS = Field("points", ("joint", 3))
+
+
+def chain(name="two joints", **more):
+    inputs = {
+        "parents": np.array([-1, 0]),
+        "offsets": np.array([[0.1, 1 / 3, 5e-324], [1e300, -0.0, np.nan]]),
+        "local_rotations": np.eye(4)[:2],
+    }
+    return Case(name, "forward_kinematics", inputs | more, "", sentence("one"))
+
+
+def inverse(method):
+    inputs = dict(chain().inputs) | {"target": np.ones(3), "effector": 1, "method": method}
+    return Case("two joints", "inverse_kinematics", inputs, "", sentence("one"))
+
+
+CASES = [chain(), chain("3 joints, bent / ü"), inverse("ccd"), inverse("my own")]
+GREETING = Greeting(1, ("forward_kinematics", "inverse_kinematics"), name="mine")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_cases(tmp_path / "cases", CASES, GREETING, seed=3)
+    return tmp_path / "cases"
+
+
+def test_a_folder_holds_every_case_as_json_and_csv(folder):
+    places = (folder / "cases.txt").read_text(encoding="utf-8").splitlines()
+    assert places == [place_of(case) for case in CASES]
+    assert places[1:] == [
+        "forward_kinematics/3_joints_bent",
+        "inverse_kinematics_ccd/two_joints",
+        "inverse_kinematics_my_own/two_joints",
+    ]
+    for place, case in zip(places, CASES, strict=True):
+        request = json.loads((folder / place / "request.json").read_text(encoding="utf-8"))
+        assert request.keys() == {"id", "task", *case.inputs}
+        assert {path.stem for path in (folder / place).glob("*.csv")} == case.inputs.keys()
+    assert (folder / places[2] / "method.csv").read_text(encoding="utf-8") == "ccd\n"
+    assert (folder / places[2] / "effector.csv").read_text(encoding="utf-8") == "1\n"
+    assert (folder / places[2] / "parents.csv").read_text(encoding="utf-8") == "-1\n0\n"
+
+
+def test_the_tables_of_a_case_are_what_a_csv_reader_reads(folder):
+    with open(folder / place_of(CASES[0]) / "offsets.csv", encoding="utf-8") as file:
+        rows = [[float(cell) for cell in row] for row in csv.reader(file)]
+    np.testing.assert_array_equal(rows, CASES[0].inputs["offsets"])
+
+
+def test_the_readme_names_every_file_and_output(folder):
+    words = (folder / "README.txt").read_text(encoding="utf-8")
+    for task in ("forward_kinematics", "inverse_kinematics"):
+        assert all(field.name in words for field in (*TASKS[task].inputs, *TASKS[task].outputs))
+    assert "mass_spring_step" not in words
+    for name in ("cases.txt", "request.json", "answer.json", "greeting.json", "answer_"):
+        assert name in words
+
+
+def test_a_folder_without_answers_says_what_to_write(folder):
+    contestant = FileContestant(folder)
+    assert contestant.greeting == GREETING
+    assert (contestant.seed, contestant.thorough) == (3, False)
+    failure = contestant.answer(CASES[0])
+    assert failure.kind is FailureKind.ABSENT
+    assert "expected answer.json or answer_positions.csv or" in str(failure.sentence)
+
+
+@pytest.mark.parametrize(
+    ("answered", "tasks", "methods", "left_out"),
+    [
+        ((), GREETING.tasks, ("",), False),
+        ((CASES[0],), ("forward_kinematics",), ("",), True),
+        ((CASES[2],), ("inverse_kinematics",), ("ccd",), True),
+        ((CASES[0], CASES[3]), GREETING.tasks, ("my own",), False),
+    ],
+    ids=["none", "one task", "one method", "a method of each task"],
+)
+def test_only_tasks_that_have_answers_are_judged(tmp_path, answered, tasks, methods, left_out):
+    greeting = Greeting(1, GREETING.tasks, methods=("ccd", "my own")) if answered else GREETING
+    write_cases(tmp_path / "cases", CASES, greeting)
+    contestant = FileContestant(tmp_path / "cases")
+    for case in answered:
+        (contestant.folder / place_of(case) / "anwser.json").write_text("{}")  # as people write
+    (contestant.folder / place_of(CASES[1]) / ".hidden").write_text("")
+    assert contestant.greeting.tasks == tasks
+    assert contestant.greeting.methods == (methods if methods != ("",) else greeting.methods)
+    assert any("Left out" in str(one) for one in contestant.remarks) == left_out
+
+
+ANSWER = {"positions": [[1, 2, 3], [4, 5, None]], "seconds": 0.5}
+POSITIONS = np.array([[1, 2, 3], [4, 5, np.nan]])
+JSON = {
+    "plain": json.dumps(ANSWER).encode(),
+    "pretty": json.dumps(ANSWER, indent=4).replace("\n", "\r\n").encode(),
+    "marked": json.dumps(ANSWER).encode("utf-8-sig"),
+    "utf-16": json.dumps(ANSWER).encode("utf-16"),
+    "NaN": json.dumps(ANSWER).replace("null", "NaN").encode(),
+}
+
+
+@pytest.mark.parametrize("name", JSON)
+def test_answers_in_json_are_read_each_time_the_same(folder, name):
+    (folder / place_of(CASES[0]) / "answer.json").write_bytes(JSON[name])
+    contestant = FileContestant(folder)
+    for _ in range(2):
+        answer = contestant.answer(CASES[0])
+        np.testing.assert_array_equal(answer.values["positions"], POSITIONS)
+        assert answer.seconds == 0.5
+    assert contestant.answer(CASES[1]).kind is FailureKind.ABSENT
+    assert "whether equal requests have equal answers is not known" in str(contestant.remarks[0])
+
+
+DATA = tomllib.loads(Path(__file__).with_name("answer_files.toml").read_text("utf-8"))
+ENCODINGS = ["utf-8", "utf-8-sig", "utf-16"]
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("name", DATA["csv"])
+def test_answers_in_csv_are_understood(folder, name, encoding):
+    place = folder / place_of(CASES[0])
+    (place / "answer_positions.csv").write_bytes(DATA["csv"][name].encode(encoding))
+    answer = FileContestant(folder).answer(CASES[0])
+    assert isinstance(answer, Answer), answer.sentence
+    np.testing.assert_array_equal(answer.values["positions"], POSITIONS)
+    assert answer.seconds == 0.0
+
+
+WRONG_TABLES = [
+    *DATA["wrong_table"],
+    {"data": "\udcff\0", "words": "expected a text file in UTF-8"},
+]
+
+
+@pytest.mark.parametrize("row", WRONG_TABLES, ids=lambda row: row["words"])
+def test_tables_that_are_not_understood_say_where(folder, row):
+    data = row["data"].encode(errors="surrogateescape")
+    (folder / place_of(CASES[0]) / "answer_positions.csv").write_bytes(data)
+    failure = FileContestant(folder).answer(CASES[0])
+    assert failure.kind is FailureKind.GARBAGE
+    assert f"positions: {row['words']}" in str(failure.sentence)
+
+
+@pytest.mark.parametrize("row", DATA["wrong_json"], ids=lambda row: row["words"])
+def test_json_that_is_not_understood_says_why(folder, row):
+    (folder / place_of(CASES[0]) / "answer.json").write_text(row["data"])
+    failure = FileContestant(folder).answer(CASES[0])
+    assert failure.kind == row["kind"]
+    assert row["words"] in str(failure.sentence)
+
+
+@pytest.mark.parametrize("name", ["answers.json", "answer_position.csv", "Answer.JSON"])
+def test_a_file_beside_its_name_is_named(folder, name):
+    (folder / place_of(CASES[0]) / name).write_text("1,2,3", encoding="utf-8")
+    failure = FileContestant(folder).answer(CASES[0])
+    assert failure.kind is FailureKind.ABSENT
+    assert f"but {name}; did you mean answer" in str(failure.sentence)
+
+
+@pytest.mark.parametrize(
+    "case", [chain(offsets=np.zeros((2, 3))), chain("unknown"), inverse("fabrik")]
+)
+def test_answers_to_other_cases_are_not_judged(folder, case):
+    (folder / place_of(CASES[0]) / "answer.json").write_bytes(JSON["plain"])
+    failure = FileContestant(folder).answer(case)
+    assert failure.kind is FailureKind.ABSENT
+    assert "holds another case: export again" in str(failure.sentence)
+
+
+def test_a_second_export_keeps_answers_and_what_the_folder_says_of_the_solver(
+    tmp_path, monkeypatch
+):
+    class Discipline:
+        @staticmethod
+        def cases(greeting, method, seed, thorough):
+            return [chain(f"{greeting.precision} {seed} {thorough}")]
+
+    monkeypatch.setattr(export, "DISCIPLINES", {"forward_kinematics": Discipline})
+    monkeypatch.setattr("plumbob.verify.verify.DISCIPLINES", export.DISCIPLINES)
+    assert export_cases(tmp_path / "a") == 1
+    answer = tmp_path / "a/forward_kinematics/double_0_False/answer.json"
+    answer.write_bytes(JSON["plain"])
+    said = (tmp_path / "a/greeting.json").read_text(encoding="utf-8")
+    (tmp_path / "a/greeting.json").write_text(said.replace("double", "single"), encoding="utf-8")
+    export_cases(tmp_path / "a", seed=5, thorough=True)
+    assert (tmp_path / "a/cases.txt").read_text(encoding="utf-8") == (
+        "forward_kinematics/single_5_True\n"
+    )
+    assert answer.exists()
+    contestant = open_contestant(tmp_path / "a")
+    assert contestant.greeting.precision == "single"
+    assert (contestant.seed, contestant.thorough) == (5, True)
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path):
+    (tmp_path / "thesis.txt").write_text("words")
+    with pytest.raises(ValueError, match="expected a new folder"):
+        write_cases(tmp_path, CASES, GREETING)
+    with pytest.raises(ValueError, match="expected a folder, got the file"):
+        write_cases(tmp_path / "thesis.txt", CASES, GREETING)
+    with pytest.raises(ValueError, match="expected a folder of exported cases"):
+        FileContestant(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_two_cases_never_share_a_folder(tmp_path):
+    with pytest.raises(ValueError, match=r"expected different names, got \S+/a_b twice"):
+        write_cases(tmp_path, [chain("a b"), chain("a, b")], GREETING)
+
+
+def test_a_greeting_that_is_not_understood_says_so(folder):
+    (folder / "greeting.json").write_text('{"protocol": 1, "tasks": ["x"]}')
+    with pytest.raises(NoGreetingError, match=r"greeting\.json: tasks: expected one of"):
+        _ = FileContestant(folder).greeting
+
+
+@given(arrays.arrays(np.float64, (2, 4, 3), elements=st.floats()))
+def test_tables_hold_every_double(array):
+    found = read_table(TABLE, {"particle": 4}, write_table(array).encode())
+    np.testing.assert_array_equal(found, array)
+    assert (np.signbit(found) == np.signbit(array))[~np.isnan(array)].all()
+
+
+@pytest.mark.parametrize("frames", [0, 1, 5])
+def test_frames_need_not_be_announced(frames):
+    array = np.random.default_rng(1).random((frames, 4, 3))
+    for rows in (array.reshape(-1, 3), array.reshape(frames, 12), array.reshape(-1, 1)):
+        found = read_table(TABLE, {"particle": 4}, write_table(rows).encode())
+        np.testing.assert_array_equal(found, array)
+
+
+@pytest.mark.parametrize(("text", "value"), [("2.5\n", 2.5), ("2,5", 2.5), ("x\n2.5", 2.5)])
+def test_a_single_number_is_a_file_of_one(text, value):
+    assert read_table(Field("residual", ()), {}, text.encode()) == value
+
+
+@pytest.mark.parametrize(("text", "value"), [("1", True), ("true", True), ("False", False)])
+def test_a_boolean_is_a_word_or_a_digit(text, value):
+    assert read_table(Field("converged", (), "boolean"), {}, text.encode()) is value

@@ -1,0 +1,353 @@
+"""Every fault has a code of its own, and the code stands in each form of a report."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+import write_faults
+from rich.cells import cell_len
+
+from plumbob.verify.fault_programs import (
+    PROGRAMS,
+    coded_faults,
+    contestant_of,
+    source_of,
+)
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics.predictions import forward
+from plumbob.verify.kinematics.switches import Switches
+from plumbob.verify.one_line import search
+from plumbob.verify.output import comparison, json_file, junit, page, terminal
+from plumbob.verify.output.fault_text import (
+    cause_and_remedy,
+    explained,
+    failure_of,
+    fault_help,
+)
+from plumbob.verify.output.words import Presentation, advice, reservations, speaker
+from plumbob.verify.sentence import codes_in, sentence
+from plumbob.verify.verify import verify
+
+REMEDY = sentence("Remedy")
+FAMILIES = (
+    "FK",
+    "QUAT",
+    "CCD",
+    "FABRIK",
+    "JACOBIAN",
+    "STOP",
+    "CLAIM",
+    "TRACK",
+    "LIMIT",
+    "VELOCITY",
+    "RESAMPLE",
+    "ROBOT",
+    "STEP",
+    "FORCE",
+    "ENERGY",
+    "STATE",
+    "LINE",
+)
+CODE = re.compile(rf"PB-({'|'.join(FAMILIES)})-(\d{{3}})")
+
+
+def entries():
+    """Yield the file, the table and the content of each fault."""
+    for path in sorted((Path(__file__).parents[2] / "verify").rglob("faults.toml")):
+        for table, faults in tomllib.loads(path.read_text(encoding="utf-8")).items():
+            for entry in faults.values() if isinstance(faults, dict) else faults:
+                yield path, table, entry
+
+
+def complaints(found):
+    """Return what is wrong with the codes of faults."""
+    codes = [entry.get("code") for _, _, entry in found]
+    ill_formed = [code for code in codes if not code or not CODE.fullmatch(code)]
+    return ill_formed + [code for code in set(codes) if codes.count(code) > 1]
+
+
+def test_every_fault_has_a_code_of_its_own():
+    assert len(list(entries())) > 170
+    assert not complaints(list(entries()))
+
+
+@pytest.mark.parametrize("code", [None, "", "PB-CCD-1", "PB-IK-001", "CCD-001", "PB-CCD-0001"])
+def test_missing_and_ill_formed_codes_are_noticed(code):
+    assert complaints([("", "", {"code": code} if code is not None else {})]) == [code]
+
+
+def test_a_code_that_stands_twice_is_noticed():
+    assert complaints([("", "", {"code": "PB-FK-001"})] * 2) == ["PB-FK-001"]
+
+
+def report_of(**switches):
+    def solve(**inputs):
+        positions, rotations = forward(inputs, Switches(**switches))
+        return {"positions": positions, "rotations": rotations}
+
+    task = "forward_kinematics"
+    return verify(FunctionContestant({task: solve}, Greeting(PROTOCOL, (task,))))
+
+
+@pytest.mark.parametrize(
+    ("switches", "codes"),
+    [({"frame": 1}, ("PB-FK-001",)), ({"product": 3, "root": 1}, ("PB-FK-006", "PB-FK-013"))],
+)
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_the_code_stands_on_screen_on_the_page_in_json_and_in_junit(switches, codes, language):
+    report = report_of(**switches)
+    context = Presentation(speaker(language), language, ["solver.py"])
+    explanation = json.loads(json_file.text(report, context.say))["tasks"][0]["explanations"][0]
+    assert tuple(explanation["codes"]) == codes
+    texts = [
+        explanation["text"],
+        "\n".join(terminal.lines(report, context)),
+        junit.text(report, context.say),
+        page.render(report, context),
+    ]
+    assert all(f"[{code}]" in text for code in codes for text in texts)
+
+
+@pytest.mark.parametrize(("switches", "is_open"), [({}, True), ({"frame": 1}, False)])
+def test_cases_are_folded_where_a_mistake_is_shown(switches, is_open):
+    text = page.render(report_of(**switches), Presentation(speaker("en"), "en", ["solver.py"]))
+    assert ("<details open>" in text) is is_open
+
+
+# ---- the short programs of each code
+
+
+# So many programs are judged for one that is quick to test; the others are slow tests.
+QUICK = 40
+
+
+def reports(program, task):
+    (report,) = verify(contestant_of(program), [task]).tasks
+    return report
+
+
+# These no switch of the reference makes: the lines of a program alone show them.
+BY_LINES = (
+    "PB-LIMIT-024", "PB-LIMIT-025", "PB-CCD-064", "PB-FABRIK-092", "PB-FABRIK-093",
+    "PB-FABRIK-094", "PB-LIMIT-028", "PB-LIMIT-029", "PB-LIMIT-030",
+    "PB-ROBOT-184", "PB-ROBOT-185", "PB-QUAT-039", "PB-QUAT-040", "PB-QUAT-041", "PB-CCD-065",
+    "PB-FABRIK-095", "PB-QUAT-042", "PB-ROBOT-193", "PB-ROBOT-194",
+)  # fmt: skip
+
+
+def samples():
+    own_tests = [f for f in coded_faults().values() if f.family == "LINE" or f.code in BY_LINES]
+    faults = [fault for fault in coded_faults().values() if fault not in own_tests]
+    for number, fault in enumerate(faults):
+        is_quick = number % QUICK == 0 and fault.family not in ("LIMIT", "ROBOT", "STEP")
+        marks = () if is_quick else pytest.mark.slow
+        yield pytest.param(fault, id=fault.code, marks=marks)
+
+
+def test_no_cause_has_figures_of_the_answers_of_a_run():
+    """A code stands for one cause, whatever solver and in however many cases it is found."""
+    counted = [
+        code
+        for code, fault in coded_faults().items()
+        if re.search(r"\d+ of \d+ ", str(fault.sentence))
+        or {"count", "total"} & fault.sentence.values.keys()
+    ]
+    assert counted == []
+
+
+def test_every_fault_has_lines():
+    assert all(fault.lines for fault in coded_faults().values())
+
+
+# No answer of forward kinematics tells a reversed product from conjugates on both ways; others are
+# known by the positions of any method and by the method, or as a relation and as a factor.
+EQUAL = {
+    "PB-QUAT-001": "PB-FK-041", "PB-TRACK-016": "PB-CLAIM-055", "PB-TRACK-018": "PB-TRACK-015",
+    "PB-TRACK-021": "PB-TRACK-006", "PB-STEP-119": "PB-STEP-191",
+    "PB-JACOBIAN-006": "PB-JACOBIAN-003",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", list(samples()))
+def test_a_wrong_program_is_named_by_its_code(fault):
+    report = reports(fault.wrong_program, fault.task)
+    assert report.verdict > Verdict.RIGHT
+    names = [explanation.sentence for explanation in report.diagnosis.explanations[:1]]
+    names += report.diagnosis.hints
+    if report.verdict == Verdict.RIGHT_EXCEPT:  # it may be on purpose
+        names += [words for judgement in report.judgements for words in judgement.complaints]
+    code = EQUAL.get(fault.code, fault.code)
+    assert code in {code for words in names for code in codes_in(words)}
+
+
+# What hides these from most laws: a claim that only few cases refute, pins that have no step, and
+# an answer that is also the start of an iteration.
+HIDDEN = ("PB-CLAIM-024", "PB-CLAIM-032", "PB-STEP-080", "PB-STEP-082")
+
+
+@pytest.mark.parametrize("code", HIDDEN)
+def test_a_mistake_that_few_answers_show_is_named_by_its_code(code):
+    test_a_wrong_program_is_named_by_its_code(coded_faults()[code])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("code", BY_LINES)
+def test_a_mistake_that_lines_alone_show_is_named_by_its_code(code, monkeypatch):
+    module = sys.modules["plumbob.verify.verify"]
+    monkeypatch.setattr(module, "with_changed_line", search.with_changed_line)
+    test_a_wrong_program_is_named_by_its_code(coded_faults()[code])
+
+
+RIGHT_PROGRAMS = {name: entry["task"] for name, entry in PROGRAMS.items() if "task" in entry}
+STEPS = (
+    "step", "substeps", "local-global step", "Newton iterations", "change of velocity",
+    "damped change of velocity", "particle by particle", "motion", "conjugate gradients",
+    "Newton's method with a line search", "implicit step", "implicit motion", "linearised motion",
+)  # fmt: skip
+SLOW = ("limited ccd", "robot", "robot_track", "newton step", *STEPS[2:])
+RESERVED = ("robot", "robot_track")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in RIGHT_PROGRAMS],
+)
+def test_a_right_program_is_right(name):
+    tasks = verify(contestant_of(source_of(name)), [RIGHT_PROGRAMS[name]]).tasks
+    # A start from which a robot finds no solution, or a single iteration in each frame.
+    expected = Verdict.RIGHT_EXCEPT if name in RESERVED else Verdict.RIGHT
+    assert {report.verdict for report in tasks} == {expected}
+    assert not any(report.diagnosis.explanations for report in tasks)
+
+
+def test_a_mistake_in_right_answers_is_said_before_all_else():
+    fault = coded_faults()["PB-JACOBIAN-035"]
+    report = reports(fault.wrong_program, fault.task)
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    assert [codes_in(words) for words in reservations(report)] == [(fault.code,), ()]
+
+
+def test_a_line_that_the_program_lacks_is_refused():
+    fault = next(iter(coded_faults().values()))._replace(lines=(("no such line", ""),))
+    with pytest.raises(ValueError, match="expected 'no such line' once"):
+        _ = fault.wrong_program
+
+
+@pytest.mark.parametrize("code", ["PB-STEP-120", "PB-STEP-097"])
+def test_a_known_mistake_of_a_step_stands_beside_the_right_numbers(code):
+    """The step is undeclared, and recognised with its mistake alone."""
+    fault = coded_faults()[code]
+    report = reports(fault.wrong_program, fault.task)
+    assert report.diagnosis.explanations[0].share == 1.0
+    for failure in (j for j in report.judgements if j.verdict is Verdict.WRONG):
+        differences = [np.subtract(row.answer, row.expected) for row in comparison.rows(failure)]
+        assert differences
+        assert np.abs(differences[0]).max() > 0.0
+
+
+# ---- plumbob explain
+
+
+def printed(*words):
+    run = subprocess.run(
+        [sys.executable, "-m", "plumbob", "explain", *words], capture_output=True, text=True
+    )
+    return run.returncode, run.stdout + run.stderr
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_a_code_in_small_letters_is_explained_with_lines_and_a_failing_case(language):
+    fault, say = coded_faults()["PB-FK-003"], speaker(language)
+    code, text = printed("pb-fk-003", "--lang", language)
+    assert code == 0
+    flat = re.sub(r"\s+", "", text)
+    assert re.sub(r"\s+", "", say(fault.sentence)) in re.sub(f"{say(REMEDY)}", "", flat, count=1)
+    ((right, wrong),) = fault.lines
+    assert re.search(rf"^  -.*{re.escape(wrong)}", text, re.MULTILINE)
+    assert re.search(rf"^  \+.*{re.escape(right)}", text, re.MULTILINE)
+    assert "positions[" in text or "rotations[" in text
+
+
+def test_a_program_whose_answers_are_no_numbers_is_explained():
+    code, text = printed("PB-FABRIK-014")
+    assert code == 0
+    assert "Warning" not in text
+    assert "NaN" in text
+
+
+def test_an_unknown_code_is_refused_with_the_nearest():
+    code, text = printed("PB-FORCE-999")
+    assert code == 2
+    assert text.count("\n") == 1
+    assert re.search(r"nearest: PB-FORCE-\d{3}$", text.strip())
+
+
+def listed(*words, language="en"):
+    """The lines of a list of faults, and what each begins with."""
+    lines = list(fault_help(words, speaker(language)))
+    assert max(map(cell_len, lines)) <= 80
+    return lines, [line.split()[0] for line in lines if line.startswith("  PB-")]
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_without_a_code_each_family_has_a_line_and_is_listed_by_its_name(language):
+    lines, families = listed(language=language)
+    assert sorted(families) == sorted(f"PB-{family}" for family in FAMILIES)
+    assert sum(int(line.split()[1]) for line in lines[: len(families)]) == len(coded_faults())
+    codes = [code for family in families for code in listed(family.lower(), language=language)[1]]
+    assert codes == list(coded_faults())
+
+
+def test_words_list_the_faults_that_have_all_of_them():
+    codes = listed("Parent", "rotation")[1]
+    causes = {code: cause_and_remedy(f, str)[0].lower() for code, f in coded_faults().items()}
+    assert codes == [c for c, text in causes.items() if "parent" in text and "rotation" in text]
+    with pytest.raises(ValueError, match="got 'parent qqq'; `plumbob explain` lists the families"):
+        fault_help(("parent", "qqq"), str)
+
+
+def test_a_cause_does_not_end_at_the_dot_of_a_product():
+    texts = [cause_and_remedy(fault, str)[0] for fault in coded_faults().values()]
+    assert [text for text in texts if text.endswith((" .", "..."))] == []
+    assert cause_and_remedy(coded_faults()["PB-QUAT-002"], str)[0].endswith(
+        "w = a.w b.w - a.v . b.v."
+    )
+
+
+def test_a_remedy_is_told_apart_from_its_cause_in_both_languages():
+    for fault in coded_faults().values():
+        english, chinese = (cause_and_remedy(fault, speaker(name)) for name in ("en", "zh"))
+        assert bool(english[1]) == bool(chinese[1]), (fault.code, english, chinese)
+
+
+def test_the_verdict_points_to_the_explanation():
+    report = report_of(frame=1)
+    assert "plumbob explain PB-FK-001" in str(advice(report.tasks))
+
+
+def test_a_fault_without_lines_claims_nothing_of_its_laws():
+    fault = coded_faults()["PB-FK-003"]._replace(lines=())
+    text = "\n".join(explained(fault, speaker("en")))
+    assert "Remedy" in text
+    assert "No law" not in text
+
+
+def test_a_fault_that_may_be_on_purpose_breaks_no_law():
+    assert failure_of(coded_faults()["PB-TRACK-001"]) is None
+
+
+def test_each_code_has_a_section_of_its_page():
+    pages = {
+        family: write_faults.page(family, list(faults))
+        for family, faults in groupby(coded_faults().values(), key=lambda fault: fault.family)
+    }
+    for code, fault in coded_faults().items():
+        assert pages[fault.family].count(f"## {code}\n") == 1

@@ -1,0 +1,344 @@
+"""What a solver takes without declaring it is inferred and said; diagnoses name no accident."""
+
+import json
+import shutil
+import subprocess
+
+import msgspec
+import numpy as np
+import pytest
+
+from plumbob.reference import Skeleton, solve_ik
+from plumbob.reference.rotation import exponential, multiply, rotate
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import Greeting, Step, System
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics.predictions import forward, path_to, solve
+from plumbob.verify.mass_spring.problem import all_forces, problem_of
+from plumbob.verify.output.terminal import lines
+from plumbob.verify.output.words import Presentation, speaker
+from plumbob.verify.self_test import DECLARED, Stepper
+from plumbob.verify.solvers import open_contestant
+from plumbob.verify.templates import template
+from plumbob.verify.verify import verify
+
+FK, IK, FORCES, STEP = (
+    "forward_kinematics", "inverse_kinematics", "mass_spring_forces", "mass_spring_step",
+)  # fmt: skip
+
+
+def chain(inputs):
+    return inputs | {"parents": np.arange(-1, len(inputs["parents"]) - 1)}
+
+
+def last(inputs):
+    return inputs | {"effector": len(inputs["parents"]) - 1}
+
+
+def solved(method="ccd", change=dict):
+    return lambda **inputs: dict(
+        zip(("local_rotations", "positions"), solve(method, change(inputs)), strict=False)
+    )
+
+
+def refuse_branches(**inputs):
+    if (np.diff(inputs["parents"]) != 1).any():
+        raise ValueError("it takes no branches")
+    return forward(inputs)
+
+
+def move_points(offsets, target, tolerance, max_iterations):
+    """FABRIK on points, which knows no rotations, no parents and no effector but the last."""
+    x, lengths = np.cumsum(offsets, axis=0), np.linalg.norm(offsets, axis=1)
+    for _ in range(max_iterations):
+        if np.linalg.norm(x[-1] - target) <= tolerance:
+            break
+        x[-1] = target
+        for ends in ((range(len(x) - 2, -1, -1), 1), (range(1, len(x)), -1)):
+            for i in ends[0]:
+                d = x[i] - x[i + ends[1]]
+                x[i] = x[i + ends[1]] + lengths[max(i, i + ends[1])] * d / np.linalg.norm(d)
+            x[0] = offsets[0]
+    return {"positions": x}
+
+
+def turn_in_plane(parents, offsets, local_rotations, target, effector, tolerance, max_iterations):
+    """CCD with an angle for each joint; z is ignored."""
+    angles = 2.0 * np.arctan2(local_rotations[:, 3], local_rotations[:, 0])
+
+    def placed():
+        local = np.zeros((len(parents), 4))
+        local[:, 0], local[:, 3] = np.cos(angles / 2.0), np.sin(angles / 2.0)
+        arm = {"parents": parents, "offsets": offsets * [1, 1, 0], "local_rotations": local}
+        return forward(arm)[0], local
+
+    for _ in range(max_iterations):
+        x, _ = placed()
+        if np.linalg.norm((x[effector] - target)[:2]) <= tolerance:
+            break
+        for j in path_to(parents, effector)[-2::-1]:
+            a, b = x[effector] - x[j], target - x[j]
+            angles[j] += np.arctan2(a[0] * b[1] - a[1] * b[0], a[:2] @ b[:2])
+            x, _ = placed()
+    return dict(zip(("positions", "local_rotations"), placed(), strict=True))
+
+
+def alike(*names):
+    return lambda inputs: inputs | {n: np.resize(inputs[n][:1], len(inputs[n])) for n in names}
+
+
+def refuse_different(*names):
+    def checked(inputs):
+        if any(np.ptp(inputs[name]) for name in names if len(inputs[name])):
+            raise ValueError("all alike, please")
+        return inputs
+
+    return checked
+
+
+def along_y(inputs):
+    return inputs | {"gravity": inputs["gravity"] * [0, 1, 0]}
+
+
+def flat(inputs):
+    vectors = ("positions", "velocities", "gravity")
+    return inputs | {name: inputs[name] * [1, 1, 0] for name in vectors}
+
+
+def forces(change):
+    return lambda **inputs: {"forces": all_forces(problem_of(change(inputs)))}
+
+
+def step(change, name="linearised"):
+    stepper = Stepper(DECLARED[name][0])
+    return lambda **inputs: stepper(**change(inputs))
+
+
+def measure(rest_positions, springs, **inputs):
+    ends = rest_positions[springs]
+    inputs["rest_lengths"] = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+    return Stepper(DECLARED["linearised"][0])(springs=springs, **inputs)
+
+
+def verlet(previous_positions, **inputs):
+    inputs["velocities"] = (inputs["positions"] - previous_positions) / inputs["h"]
+    return Stepper(DECLARED["linearised"][0])(**inputs)
+
+
+KINDS = {
+    "no branches": (FK, lambda **i: forward(chain(i)), {"chains_only": True}),
+    "refuses branches": (FK, refuse_branches, {"chains_only": True}),
+    "chains, CCD": (IK, solved(change=chain), {"chains_only": True}),
+    "last joint": (IK, solved(change=last), {"effector": "last"}),
+    "points": (
+        IK, move_points, {"chains_only": True, "effector": "last", "rotations": False}),
+    "plane, CCD": (IK, turn_in_plane, {"planar": True}),
+    "one stiffness": (FORCES, forces(alike("stiffnesses")), {"stiffnesses": "one"}),
+    "one mass and rest length": (
+        FORCES, forces(alike("masses", "rest_lengths")), {"masses": "one", "rest_lengths": "one"}),
+    "refuses masses and dampings": (
+        FORCES, forces(refuse_different("masses", "dampings")),
+        {"masses": "one", "dampings": "one"}),
+    "gravity along y": (FORCES, forces(along_y), {"gravity": "number"}),
+    "plane, forces": (FORCES, forces(flat), {"planar": True}),
+    "one mass": (STEP, step(alike("masses")), {"masses": "one"}),
+    "no pins": (STEP, step(lambda i: i | {"pinned": i["pinned"][:0]}), {"pinned": False}),
+    "rest shape": (STEP, measure, {"rest_lengths": "measured"}),
+    "Verlet": (STEP, verlet, {"state": "previous_positions"}),
+}  # fmt: skip
+
+
+def judged(task, function, **declared):
+    if task == STEP:
+        declared = {"step": DECLARED["linearised"][1]} | declared
+    return verify(FunctionContestant({task: function}, Greeting(1, (task,), **declared)))
+
+
+def screen(report):
+    text = lines(report, Presentation(speaker("en"), "en", ["x"]), 10**9)
+    assert max(map(len, text)) <= 80
+    return " ".join(" ".join(text).split())
+
+
+# The others take seconds each.
+QUICK = ("no branches", "last joint", "points", "one stiffness", "no pins")
+
+
+@pytest.mark.parametrize(
+    "kind", [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in KINDS]
+)
+def test_an_undeclared_restriction_is_inferred_and_its_field_is_named(kind):
+    task, function, fields = KINDS[kind]
+    report = judged(task, function)
+    is_asked = bool({"stiffnesses", "rest_lengths", "pinned"} & fields.keys())
+    is_asked &= fields != {"rest_lengths": "measured"}
+    assert report.verdict is (Verdict.UNDECIDED if is_asked else Verdict.RIGHT_EXCEPT)
+    assert report.tasks[0].assumptions
+    text = screen(report)
+    assert ("if not, it is a mistake" in text) is is_asked
+    assert ("Next: declare what is meant in the greeting" in text) is is_asked
+    assert "eclare it with" in text
+    assert all(f'"{name}": {json.dumps(value)}' in text for name, value in fields.items())
+    known = [field.name for kind in (Greeting, System) for field in msgspec.structs.fields(kind)]
+    assert {name for name in known if f'"{name}"' in text} - {"system", "methods"} == fields.keys()
+
+
+@pytest.mark.parametrize("kind", ["chains, CCD", "one mass"])
+def test_a_declared_restriction_needs_no_inference(kind):
+    task, function, fields = KINDS[kind]
+    declared = fields if task == IK else {"system": System(**fields)}
+    assert not judged(task, function, **declared).tasks[0].assumptions
+
+
+@pytest.mark.parametrize(("task", "function"), [
+    (FORCES, forces(lambda i: i | {"masses": np.ones(len(i["masses"]))})),  # no mass at all
+    (FORCES, forces(lambda i: i | {"masses": i["masses"][::-1]})),  # right if all are equal
+    (FORCES, forces(lambda i: alike("masses")(i) | {"stiffnesses": 2.0 * i["stiffnesses"]})),
+    (STEP, step(lambda i: i | {"pinned": i["pinned"][:1]})),  # right without pins
+    (FK, lambda **i: forward(chain(i | {"offsets": 2.0 * i["offsets"]}))),
+])  # fmt: skip
+def test_inference_hides_no_fault(task, function):
+    assert judged(task, function).verdict is Verdict.WRONG
+
+
+def test_the_fault_that_explains_the_other_answers_is_still_named():
+    task, function, _ = KINDS["no branches"]
+    (report,) = judged(task, function).tasks
+    assert report.diagnosis.explanations[0].faults == ("parent by index",)
+
+
+def by_method(method, **inputs):
+    return solved({"ccd": "ccd", "fabrik": "fabrik"}.get(method, "fabrik"))(**inputs)
+
+
+def named_only(method, **inputs):
+    return solved({"ccd": "ccd"}[method])(**inputs)
+
+
+@pytest.mark.parametrize(("function", "methods"), [
+    (by_method, ["ccd", "fabrik"]), (named_only, ["ccd"]), (solved(), [""])])  # fmt: skip
+def test_methods_are_inferred_from_answers(function, methods):
+    report = judged(IK, function)
+    assert [task.method for task in report.tasks] == methods
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    assert ("Judged by the methods" in screen(report)) == (methods != [""])
+
+
+def returning(change):
+    def solver(local_rotations, **inputs):
+        return {"local_rotations": change(local_rotations)}
+
+    return solver
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda local: np.tile([1.0, 0.0, 0.0, 0.0], (len(local), 1)), "are the identity"),
+    (lambda local: local, "repeat the local rotations of the start"),
+])  # fmt: skip
+@pytest.mark.parametrize("method", ["", "ccd", "fabrik"])
+def test_a_solver_that_writes_no_result_is_told_so_and_accused_of_no_combination(
+    change, words, method
+):
+    report = judged(IK, returning(change), methods=(method,))
+    (task,) = report.tasks
+    assert report.verdict is Verdict.WRONG
+    assert words in screen(report)
+    assert all(" + " not in key for e in task.diagnosis.explanations for key in e.faults)
+
+
+def biased(how):
+    """Reach the target from a bent start that depends on the origin or on an axis."""
+
+    def solver(parents, offsets, local_rotations, tolerance, max_iterations, method, **inputs):
+        w = offsets[0] if how == "shifted" else rotate(local_rotations[0], [0.0, 0.0, 1.0])
+        bent = multiply(exponential(0.3 * np.sin(w)), local_rotations)
+        solution = solve_ik(
+            Skeleton(parents, offsets), bent, solver="levenberg_marquardt", tolerance=1e-8, **inputs
+        )
+        return {"local_rotations": solution.local_rotations}
+
+    return solver
+
+
+@pytest.mark.parametrize(("how", "verdict"), [
+    ("shifted", Verdict.WRONG), ("rotated", Verdict.RIGHT_EXCEPT)])  # fmt: skip
+def test_another_answer_in_another_world_is_not_right(how, verdict):
+    report = judged(IK, biased(how), methods=("mine",))
+    found = [f for j in report.tasks[0].judgements for f in j.findings if f.law == "equal worlds"]
+    assert max(finding.verdict for finding in found) is verdict
+    assert report.verdict >= verdict
+
+
+def test_wrong_cases_are_shown_beside_broken_ones():
+    def crash_on_trees(**inputs):
+        if (np.diff(inputs["parents"]) != 1).any():
+            raise IndexError("out of range")
+        x, rotations = forward(inputs)
+        return {
+            "positions": x + (len(x) > 3) * np.arange(len(x))[:, None] ** 2,
+            "rotations": rotations,
+        }
+
+    text = screen(judged(FK, crash_on_trees))
+    assert "BROKEN cases: 6; the smallest" in text
+    assert "WRONG cases: " in text
+    assert "yours expected" in text
+
+
+# Forward kinematics of a chain in single precision, for the C++ starter.
+FLOAT_CHAIN = """
+    auto rotate = [](Quat q, Vec3 v) {
+        Vec3 u{q[1], q[2], q[3]}, t, out;
+        for (int i = 0; i < 3; ++i)
+            t[i] = 2 * (u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]);
+        for (int i = 0; i < 3; ++i)
+            out[i] = v[i] + q[0] * t[i] + u[(i + 1) % 3] * t[(i + 2) % 3]
+                     - u[(i + 2) % 3] * t[(i + 1) % 3];
+        return out;
+    };
+    auto times = [](Quat p, Quat q) {
+        return Quat{p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+                    p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+                    p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+                    p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]};
+    };
+    x[0] = offsets[0], r[0] = local_rotations[0];
+    for (size_t i = 1; i < x.size(); ++i) {
+        x[i] = rotate(r[i - 1], offsets[i]), r[i] = times(r[i - 1], local_rotations[i]);
+        for (int k = 0; k < 3; ++k) x[i][k] += x[i - 1][k];
+    }
+"""
+
+
+def test_a_program_in_floats_without_branches_and_nothing_else_written(tmp_path):
+    if shutil.which("g++") is None:
+        pytest.skip("g++ is not on this machine")
+    for name, text in template("cpp").items():
+        code = text.replace('throw plumbob::missing("forward_kinematics");', FLOAT_CHAIN)
+        code = code.replace("std::array<double, ", "std::array<float, ")
+        (tmp_path / name).write_text(code)
+    command = ["g++", "-std=c++17", "-O1", "solver.cpp", "-o", "solver"]
+    subprocess.run(command, cwd=tmp_path, check=True, timeout=180, capture_output=True)
+    contestant = open_contestant([str(tmp_path / "solver")])
+    try:
+        report = verify(contestant)
+    finally:
+        contestant.close()
+    assert [task.verdict for task in report.tasks] == [
+        Verdict.RIGHT_EXCEPT, *[Verdict.BROKEN] * 4]  # fmt: skip
+    text = screen(report)
+    assert text.count("ot written yet") == 1
+    assert "Not written yet: inverse_kinematics, mass_spring_step, robot_inverse" in text
+    for field in ('"precision": "single"', '"chains_only": true', "Next: write inverse_kinematics"):
+        assert field in text
+
+
+@pytest.mark.parametrize("name", ["linearised", pytest.param("symplectic", marks=pytest.mark.slow)])
+def test_an_inferred_step_is_declared_as_the_report_says(name):
+    stepper = Stepper(DECLARED[name][0])
+    (report,) = judged(STEP, stepper, step=Step()).tasks
+    declaration = report.diagnosis.behaviour.values["declaration"]
+    step = msgspec.convert(json.loads(f"{{{declaration}}}")["step"], Step)
+    (report,) = judged(STEP, stepper, step=step).tasks
+    assert report.verdict <= Verdict.RIGHT_EXCEPT
+    assert report.diagnosis.behaviour is None

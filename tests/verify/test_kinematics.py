@@ -1,0 +1,671 @@
+"""Kinematics: faults are named also by few outputs and in pairs, and honest solvers are right.
+
+`test_self_test.py` plants every fault on its own.
+"""
+
+import itertools
+
+import conformance_students as students
+import numpy as np
+import pytest
+from kinematics_solvers import (
+    FORWARD,
+    HONEST,
+    INVERSE,
+    METHODS,
+    RESAMPLE,
+    TRACK,
+    broken,
+    case_of,
+    judged,
+    named,
+    reference,
+    textbook,
+    told,
+)
+
+from plumbob.reference import IK_SOLVERS, resample, rotation
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics import report as report_of_task
+from plumbob.verify.kinematics.faults import FAULTS, by_key, combinations
+from plumbob.verify.kinematics.polylines import Polyline
+from plumbob.verify.kinematics.predictions import forward, solve, variants
+from plumbob.verify.kinematics.resample_faults import FAULTS as RESAMPLE_FAULTS
+from plumbob.verify.verify import DISCIPLINES
+
+RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG
+HONEST_FAULTS = [(m, fault) for m in METHODS for fault in FAULTS[m] if fault.honest]
+
+
+def faulty(method, *keys, declared=True, outputs=None):
+    """Return the report on a textbook's method with some faults."""
+    task = FORWARD if method == "forward" else INVERSE
+    faults = [by_key(method)[key] for key in keys]
+    function = textbook(task, faults, method, outputs)
+    return judged(task, function, method if declared and task == INVERSE else "")
+
+
+def some(names, quick):
+    """Return parameters; those that are not quick run in the slow sweep only."""
+    return [pytest.param(name, marks=() if name in quick else pytest.mark.slow) for name in names]
+
+
+# ---- faults
+
+
+@pytest.mark.parametrize(("method", "fault"), HONEST_FAULTS)
+def test_honest_fault_is_named_and_right(method, fault):
+    report = faulty(method, fault.key)
+    assert report.verdict is RIGHT_EXCEPT
+    assert broken(report, RIGHT_EXCEPT) - {"target reached"}
+    assert named(report) == [{fault.key}]
+
+
+# Without the shared faults of quaternions and arcs, which have tests of their own.
+OWN = {
+    method: [fault for fault in faults if fault.part not in ("quaternion", "arc")]
+    for method, faults in FAULTS.items()
+}
+# Faults of the rotations in answers, which positions do not show.
+WRITTEN = ("xyzw written", "conjugates written", "local rotations written", "signs lost")
+# Faults that cannot be told apart by one output.
+TWINS = {
+    "local_rotations": [
+        {"target from the root", "root offset dropped"},
+        {"root not put back", "forward pass begins late"},
+        {"reach without the last link", "reach without the first link"},
+    ],
+    "positions": [
+        {"xyzw read", "xyzw throughout"},
+        {"reach without the last link", "reach without the first link"},
+    ],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("output", ["local_rotations", "positions"])
+@pytest.mark.parametrize("method", METHODS)
+def test_fault_is_named_by_one_output(method, output):
+    for fault in OWN[method]:
+        if output != "positions" or fault.key not in WRITTEN:
+            report = faulty(method, fault.key, outputs=(output,))
+            assert report.verdict is (RIGHT_EXCEPT if fault.honest else WRONG)
+            twins = next((t for t in TWINS[output] if fault.key in t), {fault.key})
+            assert named(report) == [twins & by_key(method).keys()]
+
+
+def test_forward_fault_is_named_by_positions():
+    for fault in OWN["forward"]:
+        report = faulty("forward", fault.key, outputs=["positions"])
+        if report.verdict is RIGHT:
+            assert fault.key in WRITTEN
+        else:
+            assert fault.key in named(report)[0] | {"own rotation missing"}
+
+
+# Faults that leave the start's rotations as they are, which shows no method.
+IDLE = ("no backward pass", "no sweep", "rotations not stored")
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("every", [29, pytest.param(1, marks=pytest.mark.slow)])
+def test_fault_is_named_without_a_declared_method(method, every):
+    for fault in OWN[method][::every]:
+        report = faulty(method, fault.key, declared=False)
+        if fault.key in IDLE:
+            assert any("repeat the local rotations" in str(hint) for hint in report.diagnosis.hints)
+        else:
+            assert named(report)[0] == {fault.key}
+
+
+@pytest.mark.parametrize(
+    ("method", "pairs", "allowed"),
+    [("forward", slice(None, None, 24), 0.0)]
+    + [(method, slice(5, None, 397), 0.0) for method in METHODS]
+    + [pytest.param("forward", slice(None), 0.0, marks=pytest.mark.slow)]
+    + [pytest.param(method, slice(None), 0.02, marks=pytest.mark.slow) for method in METHODS],
+)
+def test_pair_is_named(method, pairs, allowed):
+    """Another variant of as few faults that reproduces all answers also counts."""
+    chosen = [faults for faults in combinations(method) if len(faults) == 2][pairs]
+    missed = []
+    for faults in chosen:
+        report = faulty(method, *(fault.key for fault in faults))
+        explanations = report.diagnosis.explanations
+        if not explanations or explanations[0].share < 1.0 or report.verdict < RIGHT_EXCEPT:
+            missed.append(faults)
+    assert len(missed) <= allowed * len(chosen), missed
+
+
+@pytest.mark.parametrize(
+    ("method", "fault"),
+    [
+        pytest.param(
+            method,
+            fault,
+            id=f"{fault.key}-{method}",
+            marks=pytest.mark.slow if fault.is_rare else (),
+        )
+        for method in METHODS
+        for fault in FAULTS["track ccd"]
+        # points alone do not show what becomes of rotations
+        if fault.part == "follow"
+        and (method, fault.switch, fault.number) != ("fabrik", "frame_saved", 2)
+        and (method == "ccd" or not fault.key.startswith(("global", "iterations", "positions of")))
+    ],
+)
+def test_fault_of_tracking_is_caught_and_named(method, fault):
+    report = judged(TRACK, textbook(TRACK, [fault], method), method)
+    is_harmless = fault.honest or (method == "fabrik" and fault.key == "frames start at rest")
+    assert report.verdict is (RIGHT_EXCEPT if is_harmless else WRONG)
+    assert fault.key in named(report)[0]
+
+
+@pytest.mark.parametrize(
+    ("key", "law"),
+    [
+        ("target from the origin", "equal worlds"),
+        ("world rotation on the right", "distance does not grow"),
+    ],
+)
+def test_fault_breaks_a_law_of_its_own(key, law):
+    assert law in broken(faulty("ccd", key))
+
+
+def test_one_iteration_too_many_that_is_reported_is_wrong_and_named():
+    solve = textbook(INVERSE, [by_key("ccd")["one sweep more"]])
+
+    def ccd(max_iterations, **inputs):
+        answer = solve(max_iterations=max_iterations, **inputs)
+        return {**answer, "iterations": max_iterations + 1}
+
+    report = judged(INVERSE, ccd, "ccd")
+    assert report.verdict is WRONG
+    assert "claims" in broken(report)
+    assert "one sweep more" in named(report)[0]
+
+
+def test_sixty_faults_and_their_likely_triples_are_known():
+    assert len({(f.part, f.key) for method in METHODS for f in FAULTS[method]}) >= 60
+    report = faulty("ccd", "xyzw read", "gap as direction", "one sweep more")
+    assert report.diagnosis.variant_count > 1300
+
+
+@pytest.mark.parametrize("key", ["world rotation on the left", "joints not placed anew"])
+def test_inferred_behaviour_does_not_contradict_findings(key):
+    report = faulty("ccd", key, declared=False)
+    assert any("not a sweep of CCD" in words for words in told(report))
+    assert "resemble those of CCD" in str(report.diagnosis.behaviour)
+    right = faulty("ccd", declared=False)
+    assert "are those of CCD" in str(right.diagnosis.behaviour)
+
+
+# ---- honest solvers
+
+
+def test_students_forward_kinematics_is_right():
+    report = judged(FORWARD, students.forward_kinematics)
+    assert report.verdict is RIGHT
+    assert report.digits > 13
+    assert report.slowdown > 0.0
+    assert report.diagnosis.explanations == ()
+    single = students.in_single(students.forward_kinematics)
+    assert judged(FORWARD, single, precision="single").verdict is RIGHT
+    assert judged(FORWARD, single).verdict is RIGHT_EXCEPT
+
+
+@pytest.mark.parametrize("task", [INVERSE, TRACK])
+@pytest.mark.parametrize("solver", IK_SOLVERS)
+def test_reference_is_not_accused(task, solver):
+    report = judged(task, reference(task, solver), solver)
+    assert report.verdict <= (RIGHT if (task, solver) == (INVERSE, "ccd") else RIGHT_EXCEPT)
+    assert not report.diagnosis.explanations
+
+
+@pytest.mark.parametrize("solver", some(IK_SOLVERS, {"ccd", "levenberg_marquardt"}))
+def test_undeclared_reference_is_not_accused(solver):
+    report = judged(INVERSE, reference(INVERSE, solver))
+    assert report.verdict <= RIGHT_EXCEPT
+    assert not report.diagnosis.explanations
+    if solver in METHODS:
+        assert "sweeps are those of" in str(report.diagnosis.behaviour)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    "name", some(HONEST, {"half-way vector", "root to tip", "FABRIK", "rotations from rest"})
+)
+def test_honest_variant_is_not_accused(name):
+    method, function, options = HONEST[name]
+    report = judged(INVERSE, students.with_options(function, **options), method)
+    assert report.verdict is RIGHT_EXCEPT  # it is stuck at least on collinear targets
+    assert all(e.faults == ("root to tip",) for e in report.diagnosis.explanations)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("declared", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", some(HONEST, {"half-way vector", "FABRIK"}))
+def test_honest_variant_in_single_precision_is_not_accused(name, declared):
+    method, function, options = HONEST[name]
+    single = students.in_single(function, **options)
+    report = judged(INVERSE, single, method if declared else "", precision="single")
+    assert report.verdict is RIGHT_EXCEPT
+
+
+def test_helper_that_drops_small_rotations_stalls():
+    single = students.in_single(students.ccd, dead=5e-4)
+    report = judged(INVERSE, single, "ccd", precision="single")
+    assert report.verdict is RIGHT_EXCEPT
+    assert sum("small rotations are lost" in words for words in told(report)) >= 5
+
+
+@pytest.mark.parametrize(
+    ("from_targets", "part"),
+    [
+        (False, 0.5),
+        *(pytest.param(*case, marks=pytest.mark.slow) for case in [(True, 0.75), (False, 0.9)]),
+    ],
+)
+def test_a_part_of_the_way_to_each_target_is_told(from_targets, part):
+    def function(curve, local_rotations, effector, **inputs):
+        frames, q = [], local_rotations
+        x, _ = forward({**inputs, "local_rotations": q})
+        for before, target in zip([x[effector], *curve], curve, strict=False):
+            start = before if from_targets else x[effector]
+            inputs["target"] = start + part * (target - start)
+            q, x, _ = solve("ccd", {**inputs, "local_rotations": q, "effector": effector})
+            frames.append((q, x))
+        return {
+            "local_rotations": np.array([q for q, _ in frames]),
+            "positions": np.array([x for _, x in frames]),
+        }
+
+    report = judged(TRACK, function, "ccd")
+    assert report.verdict is Verdict.WRONG
+    assert named(report) == [{"targets blended"}]
+    (words,) = (str(one.sentence) for one in report.diagnosis.explanations)
+    assert (
+        f"{part:.0%} of the way from {'the target before' if from_targets else 'where it'}" in words
+    )
+
+
+def test_solver_that_continues_to_the_target_has_a_reservation():
+    def function(**inputs):
+        return {
+            "positions": solve("fabrik", inputs | {"max_iterations": 500, "tolerance": 1e-9})[1]
+        }
+
+    report = judged(INVERSE, function, "fabrik")
+    assert report.verdict is RIGHT_EXCEPT
+    assert any("goes on to the target" in words for words in told(report))
+
+
+@pytest.mark.parametrize("method", ["", *METHODS])
+def test_solver_that_does_not_move_is_wrong_and_not_slow(method):
+    report = judged(INVERSE, lambda local_rotations: {"local_rotations": local_rotations}, method)
+    assert report.verdict is WRONG
+    sentences = [*told(report), report.diagnosis.behaviour, report.diagnosis.first_broken]
+    assert not any("slower" in str(words) for words in sentences)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("method", METHODS)
+def test_right_solvers_are_right_with_any_seed(seed, method):
+    assert judged(INVERSE, textbook(INVERSE, (), method), method, seed).verdict <= RIGHT_EXCEPT
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_student_follows_curves():
+    def function(parents, offsets, local_rotations, curve, **inputs):
+        inputs.pop("method")
+        local, frames = local_rotations, []
+        for target in curve:
+            local, _ = students.ccd(parents, offsets, local, target, **inputs)
+            frames.append(local)
+        return {"local_rotations": np.array(frames)}
+
+    assert judged(TRACK, function, "ccd").verdict is RIGHT
+
+
+# ---- lies
+
+
+def bent(x, R):
+    x[1:] += 0.01 * np.sin(x[1:])
+    return x, R
+
+
+def nan_at_the_end(x, R):
+    R[-1] = np.nan
+    return x, R
+
+
+def rotated_at_the_end(x, R):
+    R[-1] = rotation.multiply(R[-1], rotation.exponential([0.2, 0.0, 0.0]))
+    return x, R
+
+
+CALLS = itertools.count()
+FORWARD_LIES = {
+    "a rotation that is NaN": (nan_at_the_end, WRONG, {"rotations"}),
+    "positions that are NaN": (lambda x, R: x * np.nan, Verdict.BROKEN, {"positions"}),
+    "long quaternions": (lambda x, R: (x, 1.001 * R), RIGHT_EXCEPT, {"unit quaternions"}),
+    "state left over": (
+        lambda x, R: (x + 1e-3 * next(CALLS), R), WRONG, {"equal answers", "positions"}
+    ),
+    "unknown fault": (bent, WRONG, {"positions"}),
+}  # fmt: skip
+
+
+def changed_forward(change):
+    return lambda parents, offsets, local_rotations: change(
+        *students.forward_kinematics(parents, offsets, local_rotations)
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda x, R: (0.0 * x, R), "are zero"),
+        (lambda x, R: (0.01 * x, R), "0.01 times the right"),
+        (lambda x, R: (x[:, [0, 2, 1]] * [1.0, -1.0, 1.0], R), "written as (x, -z, y)"),
+        (lambda x, R: (np.round(x, 2), R), "at most 2 decimals"),
+        (lambda x, R: (x, np.vstack([R[:1], 0.0 * R[1:] + R[-1]])), "do they share one array"),
+    ],
+    ids=["zero", "factor", "axes", "decimals", "shared"],
+)
+def test_a_relation_to_the_right_answers_is_reported(change, words):
+    report = judged(FORWARD, changed_forward(change))
+    assert [words in str(hint) for hint in report.diagnosis.hints] == [True]
+
+
+def test_a_rotation_without_w_is_not_a_number_at_half_a_turn_only():
+    def divided_by_w(x, R):
+        R[np.abs(R[:, 0]) < 1e-9] = np.nan
+        return x, R
+
+    report = judged(FORWARD, changed_forward(divided_by_w))
+    assert report.verdict is WRONG
+    assert "half a turn" in str(report.diagnosis.first_broken)
+
+
+@pytest.mark.parametrize("name", FORWARD_LIES)
+def test_law_of_forward_kinematics_catches_a_lie(name):
+    change, verdict, laws = FORWARD_LIES[name]
+    report = judged(FORWARD, changed_forward(change))
+    diagnosis = report.diagnosis
+    assert report.verdict is verdict
+    assert broken(report, RIGHT_EXCEPT) == laws
+    if name == "state left over":
+        assert "sanitizer" in str(diagnosis.hints[0])
+        assert diagnosis.first_broken is not None
+    if name == "unknown fault":
+        assert not diagnosis.explanations
+        assert "Joint 1 is" in str(diagnosis.first_broken)
+        assert diagnosis.variant_count > 150
+
+
+def test_digits_count_rotations_too():
+    assert judged(FORWARD, changed_forward(rotated_at_the_end)).digits == pytest.approx(1, abs=0.5)
+    assert judged(FORWARD, changed_forward(lambda x, R: (x, -2.0 * R))).digits > 14.0
+
+
+def test_changed_offsets_are_wrong():
+    def function(parents, offsets, local_rotations):
+        answer = students.forward_kinematics(parents, offsets, local_rotations)
+        offsets *= 2.0
+        return answer
+
+    assert broken(judged(FORWARD, function)) == {"untouched inputs"}
+
+
+def changed_inverse(**changes):
+    """Return a right solver with outputs changed by functions of answer and inputs."""
+
+    def function(**inputs):
+        local, positions, _ = solve("ccd", inputs)
+        answer = {"local_rotations": local, "positions": positions}
+        return answer | {name: change(answer, inputs) for name, change in changes.items()}
+
+    return function
+
+
+def off_path(answer, inputs):
+    local, path = answer["local_rotations"].copy(), set()
+    j = inputs["effector"]
+    while j >= 0:
+        path.add(j)
+        j = inputs["parents"][j]
+    local[[j for j in range(len(local)) if j not in path]] = [0.6, 0.8, 0.0, 0.0]
+    return local
+
+
+def branch_rotated(answer, inputs):
+    """Rotate the last joint about its parent, which keeps its link's length."""
+    x, p = answer["positions"].copy(), inputs["parents"][-1]
+    x[-1] = x[p] + (x[-1] - x[p]) * [1.0, -1.0, -1.0]
+    return x
+
+
+NOISE = np.random.default_rng(0)
+INVERSE_LIES = {
+    "link lengths": {"positions": lambda a, i: 1.001 * a["positions"]},
+    "root in place": {"positions": lambda a, i: a["positions"] + 1e-6},
+    "rotations agree with positions": {"positions": lambda a, i: a["positions"] + 1e-3},
+    "joints off the path": {"local_rotations": off_path},
+    "branches": {"positions": branch_rotated},
+    "numbers": {"positions": lambda a, i: a["positions"] * np.nan},
+    "claims": {"converged": lambda a, i: True},
+    "claims of a residual": {"residual": lambda a, i: 0.0},
+    "equal answers": {"positions": lambda a, i: a["positions"] + 1e-6 * NOISE.uniform()},
+}
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("law", INVERSE_LIES)
+def test_law_of_inverse_kinematics_catches_a_lie(law, monkeypatch):
+    def few_variants(method, max_faults, base):
+        return itertools.islice(variants(method), 60)
+
+    monkeypatch.setattr(report_of_task, "variants", few_variants)
+    report = judged(INVERSE, changed_inverse(**INVERSE_LIES[law]), "ccd")
+    assert law.split(" of ")[0] in broken(report)
+    assert report.verdict >= WRONG
+
+
+def nan_effector(answer, inputs):
+    local, effector = answer["local_rotations"], inputs["effector"]
+    if not (inputs["parents"] == effector).any():
+        local[effector] = np.nan
+    return local
+
+
+def nan_at_the_root(answer, inputs):
+    is_at_root = np.allclose(inputs["target"], inputs["offsets"][0])
+    return answer["local_rotations"] * (np.nan if is_at_root else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict", "law"),
+    [
+        ({"local_rotations": nan_effector}, RIGHT_EXCEPT, "numbers"),
+        ({"local_rotations": nan_at_the_root}, RIGHT_EXCEPT, "numbers"),
+        ({"local_rotations": lambda a, i: a["local_rotations"], "converged": lambda a, i: False},
+         RIGHT_EXCEPT, "claims"),
+    ],
+)  # fmt: skip
+def test_nan_of_the_effector_and_denied_arrival_void_nothing(changes, verdict, law):
+    def function(**inputs):
+        answer = changed_inverse(**changes)(**inputs)
+        return {name: answer[name] for name in changes}
+
+    report = judged(INVERSE, function, "ccd")
+    assert report.verdict is verdict
+    assert law in broken(report, RIGHT_EXCEPT)
+
+
+def test_jump_breaks_continuity():
+    follow = textbook(TRACK, (), "fabrik")
+
+    def jumping(**inputs):
+        positions = follow(**inputs)["positions"]
+        root, x = positions[4, 0], positions[4]
+        axis = inputs["curve"][4] - root
+        axis = axis / np.linalg.norm(axis)
+        positions[4] = root + 2.0 * np.outer((x - root) @ axis, axis) - (x - root)
+        return {"positions": positions}
+
+    assert "continuity" not in broken(judged(TRACK, follow), RIGHT_EXCEPT)
+    assert "continuity" in broken(judged(TRACK, jumping), RIGHT_EXCEPT)
+
+
+# ---- cases
+
+
+def test_quarter_turns_have_the_expected_pose():
+    half = np.sqrt(0.5)
+    x, R = forward({
+        "parents": np.array([-1, 0]),
+        "offsets": np.array([[1.0, 2.0, 3.0], [0.5, 0.0, 0.0]]),
+        "local_rotations": np.array([[half, 0, 0, half], [half, 0, 0, half]]),
+    })  # fmt: skip
+    assert x == pytest.approx(np.array([[1.0, 2.0, 3.0], [1.0, 2.5, 3.0]]))
+    assert rotation.angle(R[1], [0, 0, 0, 1]) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("task", [FORWARD, INVERSE])
+def test_cases_suit_the_greeting_and_are_the_same_in_every_run(task):
+    greeting = Greeting(1, (task,), chains_only=True, max_joints=5)
+    first, second = (DISCIPLINES[task].cases(greeting, "", 7, False) for _ in range(2))
+    assert len({case.name for case in first}) == len(first) > 10
+    for a, b in zip(first, second, strict=True):
+        parents = a.inputs["parents"]
+        assert len(parents) <= 5
+        assert (parents == np.arange(-1, len(parents) - 1)).all()
+        assert a.name == b.name
+        assert all(np.array_equal(a.inputs[key], b.inputs[key]) for key in a.inputs)
+
+
+@pytest.mark.parametrize("method", ["ccd", "fabrik"])
+@pytest.mark.parametrize("planar", [False, True])
+def test_one_sweep_ends_where_a_false_claim_of_success_shows(method, planar):
+    """Within the tolerance, or at so many tolerances that ten of them or a square root pass."""
+    greeting = Greeting(1, (INVERSE,), planar=planar)
+    for seed in range(3):
+        for case in DISCIPLINES[INVERSE].cases(greeting, method, seed, False):
+            if case.family in ("last sweep", "near miss", "miss"):
+                _, x, _ = solve(method, case.inputs)
+                tolerance = case.inputs["tolerance"]
+                distance = np.linalg.norm(x[case.inputs["effector"]] - case.inputs["target"])
+                assert (distance <= tolerance) == (case.family == "last sweep")
+                assert distance <= 10.0 * tolerance
+                if case.family != "last sweep":
+                    assert (distance**2 <= tolerance) == (case.family == "near miss")
+
+
+# ---- resampling
+
+
+def resampler(make):
+    def function(curve, strokes, closed, count=None, spacing=None):
+        inputs = {"curve": curve, "strokes": strokes, "closed": closed}
+        inputs |= {"count": count} if count is not None else {"spacing": spacing}
+        line = Polyline(curve, tuple(int(i) for i in strokes), closed)
+        return make(case_of(RESAMPLE, inputs, line=line))
+
+    return function
+
+
+@pytest.mark.parametrize(
+    ("key", "number"),
+    [
+        pytest.param(key, i, marks=pytest.mark.slow if i else ())
+        for key, choices in RESAMPLE_FAULTS.items()
+        for i in range(len(choices))
+    ],
+)
+def test_fault_of_resampling_is_caught_and_named(key, number):
+    report = judged(RESAMPLE, resampler(RESAMPLE_FAULTS[key][number]))
+    # corners that are cut are a reservation
+    assert report.verdict >= (RIGHT_EXCEPT if key == "strokes shortened" else WRONG)
+    assert key in named(report)[0]
+
+
+def even(line, inputs, closed):
+    count = inputs["count"] if "count" in inputs else line.count(inputs["spacing"], closed)
+    return line.even_points(count, closed)
+
+
+def bridged(case):
+    return even(case.facts["line"], case.inputs, case.inputs["closed"])
+
+
+def kept(case):
+    """Return even points within each stroke, with both ends of each and none between strokes."""
+    curve, strokes = case.inputs["curve"], [*case.inputs["strokes"], len(case.inputs["curve"])]
+    if len(strokes) == 2:
+        return bridged(case)
+    lines = [Polyline(curve[a:b], (0,), False) for a, b in itertools.pairwise(strokes)]
+    if "spacing" in case.inputs:
+        return np.concatenate([even(line, case.inputs, False) for line in lines])
+    total, count = sum(line.length for line in lines), case.inputs["count"]
+    shares = np.maximum(2, np.round([count * line.length / total for line in lines]).astype(int))
+    shares[np.argmax(shares)] += count - shares.sum()
+    parts = zip(lines, shares, strict=True)
+    return np.concatenate([line.even_points(n, False) for line, n in parts])
+
+
+def by_reference_spacing(case):
+    if "count" in case.inputs:
+        return bridged(case)
+    spacing, closed = case.inputs["spacing"], bool(case.inputs["closed"])
+    return resample(
+        case.inputs["curve"], min_spacing=0.5 * spacing, max_spacing=spacing, closed=closed
+    )
+
+
+def start_repeated(case):
+    points = bridged(case)
+    return np.concatenate([points, points[:1]]) if case.inputs["closed"] else points
+
+
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [(bridged, "joins"), (kept, "keeps"), (by_reference_spacing, ""), (start_repeated, "")],
+)
+def test_honest_rule_is_not_accused(make, word):
+    report = judged(RESAMPLE, resampler(make))
+    assert report.verdict <= (RIGHT if make is bridged else RIGHT_EXCEPT)
+    assert word in str(report.diagnosis.behaviour)
+
+
+def test_points_in_single_precision_are_right_if_declared():
+    function = resampler(lambda case: bridged(case).astype(np.float32))
+    assert judged(RESAMPLE, function, precision="single").verdict is RIGHT
+
+
+RESAMPLE_LIES = {
+    "on the line": lambda x: x + np.array([0.0, 1e-6, 0.0]),
+    "ends": lambda x: x[1:],
+    "order": lambda x: np.concatenate([x[:1], x[2:0:-1], x[3:]]),
+    "count": lambda x: x[[0, *range(len(x))]],
+    "spacing": lambda x: np.delete(x, 1, axis=0),
+    "numbers": lambda x: x * np.nan,
+}
+
+
+@pytest.mark.parametrize("law", RESAMPLE_LIES)
+def test_law_of_resampling_catches_a_lie(law):
+    report = judged(RESAMPLE, resampler(lambda case: RESAMPLE_LIES[law](bridged(case))))
+    assert law in broken(report)
+
+
+def test_a_single_point_is_wrong_and_not_an_error_of_the_judge():
+    assert judged(RESAMPLE, resampler(lambda case: bridged(case)[:1])).verdict is WRONG
+
+
+def test_points_off_the_curve_tell_nothing_about_strokes():
+    report = judged(RESAMPLE, resampler(lambda case: np.full((case.inputs.get("count", 9), 3), 50)))
+    assert report.diagnosis.behaviour is None

@@ -1,0 +1,661 @@
+"""Faults of mass-spring solvers are caught by laws and named; honest solvers are not accused."""
+
+import dataclasses
+import re
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
+from plumbob.reference.explicit import runge_kutta, symplectic_euler
+from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer, Failure, FailureKind
+from plumbob.verify.fault_programs import contestant_of, source_of
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import Greeting, Step, System
+from plumbob.verify.judgement import CaseJudgement, Finding, Report, Verdict
+from plumbob.verify.mass_spring import energy, search, stepping
+from plumbob.verify.mass_spring.cases import task_cases, trace_of
+from plumbob.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, apply
+from plumbob.verify.mass_spring.model import (
+    Integrator,
+    StepModel,
+    first_equation,
+    is_positive_definite,
+    simulate,
+    stopped_cholesky,
+)
+from plumbob.verify.mass_spring.problem import (
+    all_forces,
+    problem_of,
+    state_of,
+    system_of,
+)
+from plumbob.verify.output import terminal
+from plumbob.verify.output.words import Presentation, speaker
+from plumbob.verify.self_test import (
+    CONVERGED,
+    DECLARED,
+    LINEARISED,
+    LOCAL_GLOBAL,
+    Stepper,
+)
+from plumbob.verify.sentence import sentence
+from plumbob.verify.verify import MAX_HANGS, verify
+
+EVERYTHING = System(external_forces=True, tension_only=True)
+BY_KEY = {fault.key: fault for fault in reversed(STEP_FAULTS) if not fault.part}
+# Faults that a linearised step cannot have, or has under another name.
+NOT_LINEARISED = ("h not divided", "pins free until the end", "velocity over the whole h",
+                  "pins at the origin", "moved in place", "Cholesky unchecked",
+                  *(f"damping matrix with h^{n} too much" for n in (1, -1)))  # fmt: skip
+
+
+def report(function, task="mass_spring_step", step=None, **greeting):
+    """Return the report on a function."""
+    hello = Greeting(1, (task,), step=step or Step(), **greeting)
+    return verify(FunctionContestant({task: function}, hello)).tasks[0]
+
+
+def named(report):
+    """Return the sets of faults that the diagnosis names."""
+    keys = (key for explanation in report.diagnosis.explanations for key in explanation.faults)
+    return [set(key.split(" + ")) for key in keys]
+
+
+def mark(names, quick):
+    """Return parameters of which only some run by default."""
+    return [
+        pytest.param(name, marks=() if name in quick else pytest.mark.slow, id=str(name))
+        for name in names
+    ]
+
+
+def broken_laws(report):
+    findings = (finding for judgement in report.judgements for finding in judgement.findings)
+    return {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
+
+
+def assert_not_accused(report):
+    assert report.verdict <= Verdict.RIGHT_EXCEPT, broken_laws(report)
+    assert report.diagnosis.explanations == ()
+
+
+def wrapped(stepper, change):
+    """Return a step whose positions are changed by a function of the request's inputs."""
+
+    def step(**inputs):
+        state = stepper(**inputs)
+        return state | {"positions": state["positions"] + change(**inputs)}
+
+    return step
+
+
+def _solver(name, **options):
+    return lambda s, state, h: ImplicitEuler(s, h=h, solver=name, **options).step(state).state
+
+
+# A step of the reference, and the dense model that is the same.
+STEPS = {
+    "converged": (_solver("newton", tolerance=0.0), CONVERGED),
+    "local_global": (_solver("local_global", tolerance=0.0, max_iterations=3),
+                     StepModel(Integrator("local_global", "y", 3))),
+    "newton": (_solver("newton", tolerance=0.0, max_iterations=2),
+               StepModel(Integrator("newton", "y", 2))),
+    "gauss_newton": (_solver("gauss_newton", tolerance=0.0, max_iterations=1),
+                     StepModel(Integrator("newton", "x_n", 1, "gauss"))),
+    "symplectic": (symplectic_euler,
+                   StepModel(Integrator("symplectic"), 1, "explicit", velocity="separate")),
+    "runge_kutta": (runge_kutta,
+                    StepModel(Integrator("runge_kutta"), 1, "explicit", velocity="separate")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_the_dense_step_is_the_reference_s(name):
+    for case in task_cases("mass_spring_step", Greeting(1, ("mass_spring_step",)), 0, False):
+        if case.family == "compression" or case.name == "stiff cloth":
+            continue  # there Newton's safeguards act, which nobody declares
+        p, (step, model) = problem_of(case.inputs), STEPS[name]
+        judged, wanted = simulate(p, model), step(system_of(p), state_of(p), p.h)
+        moved = np.abs(wanted.positions - p.positions).max()
+        np.testing.assert_allclose(
+            judged["positions"], wanted.positions, rtol=0, atol=1e-13 + 1e-9 * moved
+        )
+
+
+@pytest.mark.parametrize("task", ["mass_spring_step", "mass_spring_motion"])
+def test_a_solution_is_reproduced_from_itself_and_others_are_told_apart(task):
+    compared = 0
+    for case in task_cases(task, Greeting(1, (task,)), 0, False):
+        if case.family == "compression" or case.name == "stiff cloth":
+            continue  # several minima
+        p = problem_of(case.inputs)
+        solution = simulate(p, CONVERGED)["positions"]
+        moved = np.abs(solution - p.positions).max()
+        near = simulate(p, CONVERGED, solution)["positions"]
+        np.testing.assert_allclose(near, solution, rtol=0, atol=1e-13 + 1e-9 * moved)
+        free = np.setdiff1d(np.arange(p.count), p.pinned)
+        if moved > 1e-3 and free.size:
+            other = solution.copy()
+            other[..., free, 1] += 0.1 * moved
+            away = np.abs(simulate(p, CONVERGED, other)["positions"] - other).max()
+            assert away > 1e-3 * moved, case.name
+            compared += 1
+    assert compared > 10
+
+
+def test_no_key_has_what_joins_keys():
+    assert not [
+        f.key for f in (*FORCE_FAULTS, *energy.ENERGY_FAULTS, *STEP_FAULTS) if " + " in f.key
+    ]
+
+
+PAIRS = [
+    (first, second)
+    for i, first in enumerate(BY_KEY)
+    for second in [list(BY_KEY)[(7 * i + 13) % len(BY_KEY)]]
+    if BY_KEY[first].aspect != BY_KEY[second].aspect
+    and "frames" not in (BY_KEY[first].aspect, BY_KEY[second].aspect)
+    and not (BY_KEY[first].rare or BY_KEY[second].rare or BY_KEY[first].at or BY_KEY[second].at)
+    and not {first, second} & {*NOT_LINEARISED, "springs missing", "factor kept", "matrix L",
+                               "matrix L without h²", "tension only ignored"}
+    and not any(BY_KEY[one].aspect == "integrator" for one in (first, second))
+]  # fmt: skip
+
+
+THREE = ("gravity doubled", "matrix doubled beside", "velocity over 2h")
+
+
+@pytest.mark.parametrize("keys", mark([*PAIRS[::4], THREE], [PAIRS[8], THREE]))
+def test_faults_at_once_are_named(keys):
+    model, declared = DECLARED["linearised"]
+    stepper = Stepper(model, [BY_KEY[key] for key in keys])
+    judged = report(stepper, step=declared, system=EVERYTHING if len(keys) == 2 else System())
+    assert judged.verdict >= Verdict.WRONG
+    assert any(faults <= set(keys) for faults in named(judged))
+    assert len(keys) == 2 or named(judged) == [set(keys)]
+
+
+# Honest steps besides those of the self-test, and what they declare.
+HONEST = {
+    "explicit, undeclared": (
+        StepModel(Integrator("explicit"), 100, "explicit", velocity="separate"), Step()),
+    "overwritten pins": (
+        LOCAL_GLOBAL._replace(pins="overwritten"),
+        Step("local_global", "y", 10, 1, "length_rate", None, "overwritten")),
+    "overwritten pins, undeclared": (LINEARISED._replace(pins="overwritten"), Step()),
+    "penalty, undeclared": (LINEARISED._replace(pins="penalty 1e10"), Step()),
+    "end velocity": (CONVERGED._replace(damper="end_velocity"), Step("converged")),
+    "no damping": (CONVERGED._replace(damper="none"), Step("converged", damper="none")),
+    "global factor": (
+        CONVERGED._replace(damper="none", scaling=0.98),
+        Step("converged", damper="global_factor", damping_factor=0.98)),
+    "substeps": (CONVERGED._replace(substeps=3), Step("converged", substeps=3)),
+    "from x_n": (
+        StepModel(Integrator("local_global", "x_n", 10), damper="none"),
+        Step("local_global", "x_n", 10)),
+    "from s_n": (StepModel(Integrator("local_global", "s_n", 20), damper="none"), Step()),
+    "from s_n, which it calls y": (
+        StepModel(Integrator("local_global", "s_n", 20), damper="none"),
+        Step("local_global", "y", 20)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", mark(HONEST, ("global factor", "from s_n, which it calls y")))
+def test_an_honest_step_is_not_accused(name):
+    model, declared = HONEST[name]
+    assert_not_accused(report(Stepper(model), step=declared))
+
+
+def reference_step(p, solver):
+    euler = ImplicitEuler(system_of(p), h=p.h, solver=solver, tolerance=1e-12, max_iterations=20000)
+    return euler.step(state_of(p)).state
+
+
+def mujoco_step(p, integrator):
+    return MujocoMassSpring(system_of(p), h=p.h, integrator=integrator).step(state_of(p))
+
+
+OTHERS = {
+    name: (reference_step, Step("converged", damper="length_rate", pins="eliminated"))
+    for name in STEP_SOLVERS
+    if name != "gauss_newton"
+} | {name: (mujoco_step, Step()) for name in ("implicitfast", "implicit", "RK4")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OTHERS)
+def test_steps_of_the_reference_and_of_mujoco_are_not_accused(name):
+    function, declared = OTHERS[name]
+
+    def step(**inputs):
+        state = function(problem_of(inputs), name)
+        return {"positions": state.positions, "velocities": state.velocities}
+
+    assert_not_accused(report(step, step=declared))
+
+
+def test_one_iteration_is_not_taken_for_convergence():
+    judged = report(Stepper(StepModel(Integrator("local_global"))), step=DECLARED["converged"][1])
+    assert judged.verdict is Verdict.WRONG
+    keys = str(named(judged))
+    assert "local_global x_n 1" in keys or "newton x_n 1" in keys
+
+
+ONE_ITERATION = StepModel(Integrator("local_global", "x_n", 1), damper="none")
+THOUSAND = StepModel(Integrator("explicit"), 1000, "explicit", velocity="separate")
+LAB = System("one", "one", "one", "measured", "number")
+# Faults of public programs that declare nothing: model, faults, system, whether in floats.
+UNDECLARED = {
+    "linearised, pins overwritten": (
+        LINEARISED._replace(pins="overwritten"), ("gravity g/m",), LAB, True),
+    "one iteration, penalty": (
+        ONE_ITERATION._replace(pins="penalty 1e10"), ("gravity doubled",), System(), False),
+    "one iteration, springs": (
+        ONE_ITERATION._replace(pins="springs 5e5"), ("gravity of its own 0.3",), LAB, True),
+    "factor kept": (ONE_ITERATION, ("factor kept",), System(), True),
+    "a thousand substeps": (THOUSAND, ("pins free until the end",), System(), False),
+    "two faults": (LINEARISED, ("gravity g/m", "velocity kept"), System(), False),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", mark(UNDECLARED, ("one iteration, penalty",)))
+def test_faults_of_a_solver_that_declares_nothing_are_named(name):
+    model, keys, system, single = UNDECLARED[name]
+    step = Stepper(model, [BY_KEY[key] for key in keys], np.float32 if single else np.float64)
+    judged = report(step, system=system, precision="single" if single else "double")
+    assert judged.verdict is Verdict.WRONG
+    assert set(keys) in named(judged)
+
+
+def extended_position_based(**inputs):
+    """A step of extended position-based dynamics, which is none of those that are known."""
+    p = problem_of(inputs)
+    weights = 1.0 / p.masses
+    weights[p.pinned] = 0.0
+    x = p.positions + p.h * (p.velocities + p.h * p.gravity) * (weights > 0.0)[:, None]
+    multipliers = np.zeros(len(p.springs))
+    for _ in range(7):
+        for s, (i, j) in enumerate(p.springs):
+            d = x[i] - x[j]
+            length = np.linalg.norm(d)
+            compliance = 1.0 / max(p.stiffnesses[s] * p.h**2, 1e-9)
+            gap = length - p.rest_lengths[s] + compliance * multipliers[s]
+            change = -gap / (weights[i] + weights[j] + compliance)
+            multipliers[s] += change
+            x[i] += weights[i] * change * d / length
+            x[j] -= weights[j] * change * d / length
+    return {"positions": x, "velocities": (x - p.positions) / p.h}
+
+
+def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told(monkeypatch):
+    monkeypatch.setattr(search, "MAX_FAULTS", 0)  # no pair or triple explains it either
+    judged = report(extended_position_based)
+    assert judged.verdict is Verdict.UNDECIDED
+    nearest, holds = map(str, judged.diagnosis.hints)
+    assert re.search(r"nearest known step is \d+ local/global iterations from s_n", nearest)
+    median, worst = (float(x) for x in re.search(r"by (\S+) in .* by (\S+) in", nearest).groups())
+    assert 0.0 < median <= worst < 0.1
+    laws_that_hold = set(holds.removesuffix(".").partition(": ")[2].split(", "))
+    assert laws_that_hold == {"pins", "momentum", "equal answers", "symmetry", "consistency"}
+    screen = " ".join(" ".join(terminal.lines(
+        Report(Greeting(1, ("mass_spring_step",)), [judged], 0),
+        Presentation(speaker("en"), "en", ["x.py"]), terminal.ENDLESS,
+    )).split())  # fmt: skip
+    assert nearest in screen
+    assert holds in screen
+    assert "Next: compare your step with the nearest known one" in screen
+    sentences = {str(f.sentence) for one in judged.judgements for f in one.findings if f.verdict}
+    assert not any("inf" in words.split() for words in sentences)
+    assert not any("Another model than converged" in words for words in sentences)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(0.0, "positions in its answers are zero"), (1.0, "nothing moves")]
+)
+def test_of_a_step_that_gives_no_new_state_just_that_is_told(factor, words):
+    judged = report(lambda **inputs: {"positions": factor * inputs["positions"]},
+                    step=Step(method="symplectic"))  # fmt: skip
+    told = (judged.diagnosis.first_broken, *judged.diagnosis.hints)
+    assert judged.verdict is Verdict.WRONG
+    assert not judged.diagnosis.explained
+    assert any(words in str(line) for line in told)
+
+
+def test_a_solver_that_hangs_is_asked_no_more_and_the_cases_left_out_are_told():
+    class Hung(FunctionContestant):
+        def answer(self, case):
+            asked.append(case)
+            return Failure(FailureKind.HUNG, sentence("It computed."))
+
+    asked, task = [], "mass_spring_step"
+    (judged,) = verify(Hung({task: None}, Greeting(1, (task,)))).tasks
+    assert len(asked) == len(judged.judgements) == MAX_HANGS
+    assert "cases were not sent" in str(judged.diagnosis.hints[-1])
+    assert judged.diagnosis.behaviour is None
+
+
+@pytest.mark.slow
+def test_a_step_that_is_wrong_in_large_systems_is_not_said_to_behave_like_a_right_one():
+    right = Stepper(LINEARISED)
+    wrong = wrapped(right, lambda masses, **inputs: 0.01 * (len(masses) > 8))
+    for function, words in ((wrong, "In small cases it behaves like"), (right, "It behaves like")):
+        judged = report(function)
+        assert str(judged.diagnosis.behaviour).startswith(f"{words} one linearised implicit step")
+        assert (judged.verdict is Verdict.WRONG) is (function is wrong)
+
+
+@pytest.mark.parametrize("first", [Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.UNDECIDED])
+@pytest.mark.parametrize("family", ["springs", "dampers", "pins", "h changes", "cloth"])
+def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family):
+    def judged(name, family, verdict):
+        case = Case(name, "mass_spring_step", {}, family, sentence(""))
+        finding = Finding("a law", verdict, 1.0, 0.0, "m", sentence("It is off."))
+        return CaseJudgement(case, Answer({}, 0.0), (finding,), {})
+
+    told = str(stepping._first_broken([
+        judged("one", "flight", first), judged("two", family, Verdict.WRONG),
+        judged("three", "cloth", Verdict.WRONG),
+    ]))  # fmt: skip
+    assert "in the case 'two': It is off." in told
+    assert (str(trace_of(family)) in told) is (first is not Verdict.UNDECIDED)
+    assert stepping._first_broken([judged("one", "flight", first)]) is None
+
+
+@pytest.mark.slow
+def test_noise_is_named():
+    rng = np.random.default_rng(3)
+    noise = wrapped(
+        Stepper(LINEARISED), lambda positions, **inputs: 7e-4 * rng.standard_normal(positions.shape)
+    )
+    judged = report(noise, step=DECLARED["linearised"][1])
+    assert "equal answers" in broken_laws(judged)
+    assert any("-fsanitize" in str(hint) for hint in judged.diagnosis.hints)
+
+
+SYSTEMS = {
+    "the lab's": System("one", "one", "one", "measured", "number", state="previous_positions"),
+    "without pins": System(pinned=False),
+}
+
+
+@pytest.mark.parametrize("name", mark(SYSTEMS, ("the lab's",)))
+def test_a_solver_gets_the_systems_that_it_takes(name):
+    system = SYSTEMS[name]
+    cases = task_cases("mass_spring_step", Greeting(1, (), system=system), 0, False)
+    assert len(cases) >= 15
+    for case in cases:
+        assert ("previous_positions" in case.inputs) == (system.state != "velocities")
+        if system.masses == "one":
+            assert np.ptp(case.inputs["masses"]) == 0 != case.inputs["masses"][0] - 1
+    model, declared = DECLARED["linearised"]
+    judged = report(Stepper(model, [BY_KEY["gravity g/m"]]), step=declared, system=system)
+    assert {"gravity g/m"} in named(judged)
+
+
+class GoesOn:
+    """A solver that starts a case that follows another from its own last answer."""
+
+    def __init__(self, step, declared):
+        hello = Greeting(1, ("mass_spring_step",), system=System(continues=True), step=declared)
+        self.door = FunctionContestant({"mass_spring_step": step}, hello)
+        self.greeting, self.last = hello, {}
+
+    def answer(self, case):
+        state = self.last if case.follows else {}
+        judged = self.door.answer(dataclasses.replace(case, inputs={**case.inputs, **state}))
+        self.last = judged.values
+        return judged
+
+    def close(self):
+        """Nothing was started."""
+
+
+def test_a_solver_that_goes_on_is_judged_from_its_own_state():
+    model, declared = DECLARED["linearised"]
+    judged = verify(GoesOn(Stepper(model), declared)).tasks[0]
+    assert judged.verdict is Verdict.RIGHT, broken_laws(judged)
+
+
+@pytest.mark.parametrize("key", mark([None, "velocity kept", "gravity g/m"], [None]))
+def test_a_motion_is_judged_as_its_steps(key):
+    model, declared = DECLARED["linearised"]
+    faults = [BY_KEY[key]] if key else []
+    judged = report(Stepper(model, faults), "mass_spring_motion", declared)
+    if key:
+        assert judged.verdict is Verdict.WRONG
+        assert {key} in named(judged)
+    else:
+        assert judged.verdict <= Verdict.RIGHT_EXCEPT, broken_laws(judged)
+
+
+def force_function(faults, precision=np.float64):
+    def function(**inputs):
+        p, _ = apply(faults, problem_of(inputs), StepModel())
+        return all_forces(p).astype(precision)
+
+    return function
+
+
+# Faults of what forces are not asked for.
+NO_FORCES = ("tension only ignored",)
+LAST_ONLY = "last spring of a particle only"
+FORCES = {fault.key: fault for fault in FORCE_FAULTS if fault.key not in NO_FORCES}
+
+
+def test_forces_that_numpy_does_not_add_up_are_named():
+    def forces(
+        masses, springs, rest_lengths, stiffnesses, dampings, gravity, positions, velocities
+    ):
+        i, j = springs.T
+        d, v = positions[i] - positions[j], velocities[i] - velocities[j]
+        length = np.maximum(np.linalg.norm(d, axis=1), 1e-300)[:, None]
+        rate = (v * d).sum(1, keepdims=True) / length
+        pull = stiffnesses[:, None] * (length - rest_lengths[:, None]) + dampings[:, None] * rate
+        total = masses[:, None] * gravity
+        total[i] -= pull * d / length
+        total[j] += pull * d / length
+        return total
+
+    assert named(report(forces, "mass_spring_forces")) == [{LAST_ONLY}]
+
+
+# Faults that together are one of another name.
+AS_ONE = {frozenset({"stiffness doubled", "damping doubled"}): "springs twice"}
+
+
+@pytest.mark.slow
+def test_pairs_of_faults_of_forces_are_named():
+    pairs = [
+        (FORCES[a], FORCES[b])
+        for a in list(FORCES)[::3]
+        for b in list(FORCES)[1::4]
+        if FORCES[a].aspect != FORCES[b].aspect
+    ]
+    for pair in islice(pairs, 0, None, 3):
+        judged = report(force_function(pair), "mass_spring_forces")
+        keys = frozenset(fault.key for fault in pair)
+        expected = {AS_ONE[keys]} if keys in AS_ONE else keys
+        assert any(faults <= expected for faults in named(judged)), keys
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_right_forces_are_not_accused(precision):
+    kind = np.float32 if precision == "single" else np.float64
+    judged = report(force_function([], kind), "mass_spring_forces", precision=precision)
+    assert judged.verdict is Verdict.RIGHT
+
+
+def test_forces_left_over_from_the_request_before_are_told():
+    right, kept = force_function([], np.float64), [np.zeros((1, 3))]
+
+    def leaking(**inputs):
+        forces = right(**inputs)
+        total = forces + kept[0] if kept[0].shape == forces.shape else forces
+        kept[0] = forces
+        return total
+
+    judged = report(leaking, "mass_spring_forces")
+    assert "'equal answers'" in str(judged.diagnosis.first_broken)
+    assert not judged.diagnosis.explanations
+
+
+def test_of_energies_that_are_all_zero_just_that_is_told():
+    judged = report(lambda **inputs: dict.fromkeys(energy.PARTS, 0.0), "energy")
+    assert str(judged.diagnosis.first_broken) == "Every energy is 0 in all cases."
+
+
+def energies(faults, shift=0.0):
+    def function(**inputs):
+        values = energy.predict(faults, problem_of(inputs))
+        for name in ("total", "potential", "gravitational"):
+            values[name] += shift
+        return values
+
+    return function
+
+
+ENERGY_FAULTS = {fault.key: fault for fault in energy.ENERGY_FAULTS if fault.key not in NO_FORCES}
+
+
+# Whose energies do not depend on gravity, which a greeting may declare.
+OF_CONSTANT_GRAVITY = (
+    "gravitational missing", "gravitational along", "gravitational from a moving height",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("key", mark(ENERGY_FAULTS, [*ENERGY_FAULTS][::12]))
+def test_every_fault_of_energies_is_caught_and_named(key):
+    judged = report(energies([ENERGY_FAULTS[key]]), "energy")
+    is_asked = key.startswith("first ") and key.endswith("for all")  # what a greeting may declare
+    is_asked |= key.startswith(OF_CONSTANT_GRAVITY)
+    assert judged.verdict is (Verdict.UNDECIDED if is_asked else Verdict.WRONG)
+    assert {key} in named(judged)
+
+
+def test_the_zero_of_gravity_is_free():
+    assert report(energies([], shift=42.0), "energy").verdict is Verdict.RIGHT
+
+
+UNDECLARED_LINEARISED = LINEARISED._replace(damper="none", pins="overwritten")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["LLT", "displacement", "change of velocity"])
+def test_a_failed_factorisation_that_nobody_checks_is_named(kind):
+    judged = report(Stepper(UNDECLARED_LINEARISED._replace(factorisation=kind)))
+    assert judged.verdict is Verdict.WRONG
+    assert named(judged) == [{"Cholesky unchecked"}]
+    assert judged.diagnosis.explanations[0].share == 1.0
+
+
+def solved_otherwise(solve):
+    """Return a linearised step that solves otherwise where its matrix is indefinite."""
+
+    def step(**inputs):
+        p, right = problem_of(inputs), Stepper(UNDECLARED_LINEARISED)(**inputs)
+        model = UNDECLARED_LINEARISED._replace(damper="none")
+        equation = first_equation(p.changed(dampings=0.0 * p.dampings), model)
+        A = equation.matrix(p.positions, "exact")
+        if is_positive_definite(A):
+            return right
+        x = p.positions + solve(A, -equation.gradient(p.positions))
+        x[p.pinned] = p.positions[p.pinned]
+        return {"positions": x, "velocities": (x - p.positions) / p.h}
+
+    return step
+
+
+def shifted(A, right):
+    """Solve with a matrix made positive definite."""
+    shift = 0.5 - np.linalg.eigvalsh(A).min()
+    return np.linalg.solve(A + shift * np.eye(len(A)), right.ravel()).reshape(right.shape)
+
+
+def test_what_is_left_of_a_failed_factorisation_is_named_by_its_pattern():
+    judged = report(solved_otherwise(lambda A, right: -0.1 * right))
+    assert judged.verdict is Verdict.WRONG
+    assert named(judged) == [{"Cholesky unchecked"}]
+    assert judged.diagnosis.explanations[0].share < 1.0
+
+
+@pytest.mark.slow
+def test_a_step_that_corrects_an_indefinite_matrix_is_not_accused():
+    judged = report(solved_otherwise(shifted))
+    assert judged.verdict < Verdict.WRONG
+    assert judged.diagnosis.explanations == ()
+
+
+@pytest.mark.parametrize("count", [5, 40])
+def test_cholesky_stops_where_eigen_does(count):
+    rng = np.random.default_rng(count)
+    A = rng.standard_normal((count, count))
+    A = A @ A.T + np.eye(count)
+    np.testing.assert_allclose(stopped_cholesky(A), np.linalg.cholesky(A), rtol=0, atol=1e-12)
+    wrong = count - 2
+    A[wrong, wrong] = -1.0
+    L, kept = stopped_cholesky(A), np.linalg.cholesky(A[:wrong, :wrong])
+    np.testing.assert_allclose(L[:wrong, :wrong], kept, rtol=0, atol=1e-12)
+    first = 0 if count < 32 else wrong // 8 * 8
+    taken_off = np.linalg.solve(kept[:first, :first], A[wrong:, :first].T).T
+    np.testing.assert_allclose(
+        L[wrong:, wrong:], np.tril(A[wrong:, wrong:] - taken_off @ taken_off.T), rtol=0, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("method", ["explicit", "symplectic", "taylor"])
+def test_substeps_of_free_fall_are_taken_at_once(method):
+    case = task_cases("mass_spring_step", Greeting(1, ("mass_spring_step",)), 0, False)[0]
+    p = problem_of(case.inputs)
+    assert not p.stiff
+    model = StepModel(Integrator(method), 7, "explicit", velocity="separate")
+    at_once = simulate(p, model)
+    for _ in range(7):
+        state = simulate(p.changed(h=case.inputs["h"] / 7), model._replace(substeps=1))
+        p = p.changed(**state)
+    np.testing.assert_allclose(at_once["positions"], p.positions, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(at_once["velocities"], p.velocities, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("pins", "words"),
+    [([0], "Without pins all is right"), ([], "others with pins and without are not")],
+)
+def test_pins_are_looked_at_where_nothing_else_is_wrong(pins, words):
+    judgements = []
+    for name, family, pinned in (("rope", "pins", [0]), ("small h", "small h", pins)):
+        inputs = {"pinned": np.array(pinned, dtype=int)}
+        case = Case(name, "mass_spring_step", inputs, family, sentence("It is all."))
+        broken = Finding("law", Verdict.WRONG, 1.0, 0.0, "m", sentence("Off."))
+        judgements.append(CaseJudgement(case, Answer({}, 0.0), (broken,), {}, None, 0.0))
+    assert words in str(stepping._first_broken(judgements))
+
+
+GRADIENTS = """
+def conjugate_gradients(A, b, goal=1e-6):
+    blocks = A * (np.arange(len(b))[:, None] // 3 == np.arange(len(b)) // 3)
+    x, r = np.zeros(len(b)), b.copy()
+    p = z = np.linalg.solve(blocks, r)
+    while r @ z > goal:
+        rate = (r @ z) / (p @ A @ p)
+        x, rest = x + rate * p, r - rate * A @ p
+        after = np.linalg.solve(blocks, rest)
+        p, r, z = after + (rest @ after) / (r @ z) * p, rest, after
+    return x
+"""
+
+
+def test_conjugate_gradients_with_blocks_that_end_at_a_constant_are_named():
+    """The errors are small, but springs move the centre of mass."""
+    right = "np.linalg.solve(A[np.ix_(free, free)], b[free])"
+    source = source_of("change of velocity")
+    wrong = source.replace(right, "conjugate_gradients(A[np.ix_(free, free)], b[free])")
+    assert wrong != source
+    report = verify(contestant_of(wrong + GRADIENTS), ["mass_spring_step"]).tasks[0]
+    assert report.verdict is Verdict.WRONG
+    (explanation,) = report.diagnosis.explanations
+    assert explanation.codes == ("PB-STEP-168",)
+    assert "change of velocity is below about 0.001" in str(explanation.sentence)

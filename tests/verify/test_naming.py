@@ -1,0 +1,120 @@
+"""Programs that the catalogue never saw: their faults show in answers, are caught and named.
+
+`python -m pytest tests/verify/test_naming.py -m slow -s` prints the matrix.
+"""
+
+import numpy as np
+import planted_programs
+import pytest
+from planted_programs import FAULTS, IN
+
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.solvers import open_contestant
+from plumbob.verify.verify import verify
+
+QUICK = [
+    ("cpp", "ccd_world_left"),
+    ("cpp", "forces_damping_sign"),
+    ("javascript", "fk_local_rotation"),
+    ("javascript", "step_pins_overwritten"),
+    ("python", "fk_w_last"),
+    ("python", "energy_kinetic"),
+]
+
+
+def judged(run, fault):
+    """Return the report of the fault's task, of its method if it has one."""
+    contestant = open_contestant([*run, "--fault", fault])
+    try:
+        report = verify(contestant, [FAULTS[fault]["task"]])
+    finally:
+        contestant.close()
+    method = fault.partition("_")[0]
+    return next(one for one in report.tasks if one.method in ("", method) or method == "track")
+
+
+def first_names(report):
+    explanations = report.diagnosis.explanations
+    return explanations[0].faults if explanations else ()
+
+
+def is_named(report, fault):
+    if hint := FAULTS[fault].get("hint"):
+        findings = [finding for one in report.judgements for finding in one.findings]
+        sentences = [*report.diagnosis.hints, *(finding.sentence for finding in findings)]
+        return any(hint in str(words) for words in sentences)
+    return FAULTS[fault].get("name") in first_names(report)
+
+
+@pytest.mark.parametrize(("language", "fault"), QUICK)
+def test_a_planted_fault_is_named(language, fault, program):
+    report = judged(program(language), fault)
+    assert report.verdict > Verdict.RIGHT
+    assert is_named(report, fault), first_names(report)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("language", IN)
+def test_every_planted_fault_is_named_but_for_known_ones(language, program):
+    for fault in IN[language]:
+        report = judged(program(language), fault)
+        names = " | ".join(first_names(report)) or "(none)"
+        print(f"{language:10} {fault:27} {report.verdict.name:9} {names}")
+        known = FAULTS[fault]
+        assert report.verdict > Verdict.RIGHT or known.get("missed")
+        assert is_named(report, fault) or not {"name", "hint"} & known.keys()
+
+
+@pytest.mark.parametrize(
+    "language", ["cpp", "javascript", "python", pytest.param("single", marks=pytest.mark.slow)]
+)
+def test_right_program_is_not_accused(language, program):
+    contestant = open_contestant(program(language))
+    try:
+        report = verify(contestant)
+    finally:
+        contestant.close()
+    verdicts = {one.task: one.verdict for one in report.tasks}
+    assert set(verdicts.values()) == {Verdict.RIGHT}
+    assert not [one for task in report.tasks for one in task.diagnosis.explanations]
+
+
+# ---- what is planted shows in answers
+
+
+REQUESTS = planted_programs.requests()
+
+
+def same(a, b):
+    return a.shape == b.shape and np.allclose(a, b, rtol=0.0, atol=1e-9, equal_nan=True)
+
+
+def unlike(one, other):
+    """The tasks whose answers differ by more than rounding."""
+    found = set()
+    for request, a, b in zip(REQUESTS[1:], one[1:], other[1:], strict=True):
+        a, b = planted_programs.values(a), planted_programs.values(b)
+        if not all(same(a[name], b[name]) for name in a.keys() - {"iterations"}):
+            found.add(request["task"])
+    return found
+
+
+PLANTED = [(language, fault) for language in IN for fault in IN[language]]
+# The compiled program starts at once; of those that an interpreter runs, every sixth is quick.
+CHOSEN = [
+    pytest.param(*pair, marks=[] if pair[0] == "cpp" or n % 6 == 0 else [pytest.mark.slow])
+    for n, pair in enumerate(PLANTED)
+]
+
+
+@pytest.mark.parametrize(("language", "fault"), CHOSEN)
+def test_a_planted_fault_changes_its_tasks_answers(language, fault, program, right_answers):
+    answers, _ = planted_programs.ask([*program(language), "--fault", fault], REQUESTS)
+    assert FAULTS[fault]["task"] in unlike(right_answers(language), answers)
+
+
+def test_each_program_has_twenty_faults_and_other_names_change_nothing(program, right_answers):
+    assert all(len(faults) >= 20 for faults in IN.values())
+    assert set().union(*IN.values()) == set(FAULTS)
+    answers, _ = planted_programs.ask([*program("cpp"), "--fault", "none"], REQUESTS)
+    assert not unlike(right_answers("cpp"), answers)

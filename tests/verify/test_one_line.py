@@ -1,0 +1,328 @@
+"""A right program with one line changed explains answers that no known mistake explains."""
+
+from dataclasses import replace
+from functools import partial
+
+import conformance_students as students
+import numpy as np
+import pytest
+from kinematics_solvers import HONEST, judged, reference
+
+from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.fault_programs import (
+    FAMILIES,
+    PROGRAMS,
+    coded_faults,
+    contestant_of,
+    source_of,
+)
+from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics.limits import solve_within
+from plumbob.verify.one_line import search
+from plumbob.verify.one_line.mutants import Program
+from plumbob.verify.output import terminal
+from plumbob.verify.output.words import Presentation, speaker
+from plumbob.verify.verify import DISCIPLINES, judge_cases, trials, verify
+
+# Of these kinds the programs are judged in half a second; the others are slow tests.
+QUICK = ("term", "order", "condition", "loop")
+
+
+def report_on(source, task):
+    """Judge a program by its task's laws, and name no mistakes by lines."""
+    contestant = contestant_of(source)
+    ((task, method),) = trials(contestant.greeting, [task])
+    cases = DISCIPLINES[task].cases(contestant.greeting, method, 0, False)
+    return judge_cases(contestant, task, method, cases), contestant.greeting
+
+
+def changed_lines(source, task):
+    report, greeting = report_on(source, task)
+    return search.changed_lines(report, greeting)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(fault, id=fault.name, marks=() if fault.name in QUICK else pytest.mark.slow)
+        for fault in coded_faults().values()
+        if fault.family == "LINE"
+    ],
+)
+def test_a_changed_line_is_named(fault, monkeypatch):
+    monkeypatch.setattr(search, "SELF_NAMED", FAMILIES)  # lines that are known faults as well
+    (explanation,) = changed_lines(fault.wrong_program, fault.task)
+    assert explanation.codes == (fault.code,)
+    assert explanation.share == 1.0
+
+
+def test_a_known_fault_of_another_program_is_named():
+    fault = coded_faults()["PB-LIMIT-010"]
+    source = source_of("hinges and cones").replace(*fault.lines[0])
+    explanation = changed_lines(source, fault.task)[0]
+    assert fault.program != "hinges and cones"
+    assert explanation.codes == (fault.code,)
+    assert explanation.share == 1.0
+
+
+def test_every_known_fault_of_every_program_compiles():
+    sources = {name: source_of(name) for name in PROGRAMS if "task" in PROGRAMS[name]}
+    planted = {
+        fault.planted_in(source): f"{fault.code} in {name}"
+        for name, source in sources.items()
+        for method in ("", "ccd", "fabrik")
+        if f"def {method}" in source
+        for fault in search._faults_in(source, PROGRAMS[name]["task"], method)
+    }
+    assert len(planted) > 3_000
+    for program, name in planted.items():
+        compile(program, name, "exec")
+
+
+def test_a_fault_is_indented_as_the_line_that_it_replaces():
+    fault = coded_faults()["PB-STEP-053"]  # two lines in place of a line
+    depths = {
+        name: {
+            len(line) - len(line.lstrip())
+            for line in fault.planted_in(source_of(name)).splitlines()
+            if "masses, h = " in line or "forces = masses[:, None] * gravity" in line
+        }
+        for name in ("step", "motion")
+    }
+    assert depths == {"step": {4}, "motion": {8}}
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in ("root to tip", "capped") else pytest.mark.slow)
+     for name in HONEST],
+)  # fmt: skip
+def test_another_honest_choice_is_no_mistake_of_a_program(name):
+    method, function, options = HONEST[name]
+    report = judged("inverse_kinematics", students.with_options(function, **options), method)
+    assert all(e.faults == ("root to tip",) for e in report.diagnosis.explanations)
+
+
+@pytest.mark.parametrize("method", ["ccd", pytest.param("fabrik", marks=pytest.mark.slow)])
+def test_another_honest_way_to_keep_limits_is_no_mistake(method):
+    without_limits = reference("inverse_kinematics", method)
+
+    def solver(**inputs):
+        if inputs.get("cones") is not None:
+            return {"local_rotations": solve_within(method, inputs)}
+        return without_limits(**inputs)
+
+    report = judged("inverse_kinematics", solver, method, limits=True)
+    assert report.verdict <= Verdict.RIGHT_EXCEPT
+    assert not report.diagnosis.explanations
+
+
+# Lines of programs of screws, and what is said of them.
+SCREWS = [
+    ("angular = np.zeros(3) if slides[j] else w", "angular = w", "`angular = w`"),
+    ("hat(p) @ R", "R @ hat(p)", "`A[3:, :3] = R @ hat(p)`"),
+    ("A[3:, :3] = hat(p) @ R", "A[:3, 3:] = hat(p) @ R", "`A[:3, 3:] = hat(p) @ R`"),
+    ("terms(1 - c, angle - s, K)", "terms(angle - s, 1 - c, K)", "terms(angle - s, 1 - c, K)`"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("right", "wrong", "words"), SCREWS)
+def test_a_line_of_screws_is_named_whichever_part_comes_first(right, wrong, words):
+    source = source_of("Jacobian of the tool by screws").replace(right, wrong)
+    source = source.replace('"jacobian": ', '"jacobian": np.roll(np.eye(6), 3, axis=0) @ ')
+    (explanation,) = changed_lines(source, "robot_jacobian")
+    assert words in str(explanation.sentence)
+    assert explanation.share == 1.0
+
+
+@pytest.mark.parametrize(
+    "program",
+    ["Jacobian by screws", "Jacobian of the tool by screws",
+     "Jacobian of the tool's origin by screws"],
+)  # fmt: skip
+def test_programs_of_screws_are_right(program):
+    report, _ = report_on(source_of(program), "robot_jacobian")
+    assert report.verdict is Verdict.RIGHT
+
+
+def test_jacobians_are_compared_whichever_part_comes_first():
+    case = DISCIPLINES["robot_jacobian"].cases(Greeting(PROTOCOL, ()), "", 0, False)[0]
+    J = np.arange(12.0).reshape(6, 2)
+    answers = [Answer({"jacobian": np.roll(J, shift, axis=0)}, 0.0) for shift in (0, 3)]
+    first, second = (search._comparable(Exchange(case, a, a)).answer.values for a in answers)
+    np.testing.assert_array_equal(first["jacobian"], second["jacobian"])
+
+
+def test_neighbours_in_a_list_change_places():
+    program = Program("def stack(a, b):\n    return [a, b]\n")
+    program.observe(partial(program.names["stack"], 1.0, 2.0))
+    assert "return [b, a]" in [mutant.wrong for mutant in program.mutants(set())]
+
+
+@pytest.mark.slow
+def test_another_line_that_gives_the_same_answers_is_named_as_well():
+    """The sign of all positions may be lost in the adjoint, or where exponentials are computed."""
+    source = source_of("Jacobian by screws").replace("hat(p) @ R", "-hat(p) @ R")
+    (explanation,) = changed_lines(source, "robot_jacobian")
+    text = str(explanation.sentence)
+    assert "`A[3:, :3] = -hat(p) @ R`" in text
+    assert "`return pose(R, -G @ v)`" in text
+
+
+@pytest.mark.parametrize("program", ["energy in loops", "forces term by term"])
+def test_right_answers_need_no_changed_line(program):
+    task = "energy" if program.startswith("energy") else "mass_spring_forces"
+    assert changed_lines(source_of(program), task) == ()
+
+
+def test_the_line_is_printed_where_the_catalogue_knows_no_mistake():
+    right, wrong = "length - rest_lengths[s]", "length - stiffnesses[s]"
+    source = source_of("energy in loops").replace(right, wrong)
+    report = verify(contestant_of(source))
+    screen = " ".join(
+        "\n".join(terminal.lines(report, Presentation(speaker("en"), "en", ["solver.py"]))).split()
+    )
+    assert (
+        "a right program has `rest_lengths`, your answers are as if yours had `stiffnesses`"
+        in screen
+    )
+    assert "[PB-LINE-013]" in screen
+
+
+def test_a_mistake_of_the_catalogue_is_named_rather_than_a_line():
+    fault = coded_faults()["PB-ENERGY-003"]
+    (report,) = verify(contestant_of(fault.wrong_program)).tasks
+    assert report.diagnosis.explanations[0].codes == (fault.code,)
+
+
+def test_answers_of_a_right_program_speak_for_no_change():
+    """A line that may be left out without effect would explain all answers."""
+    report, greeting = report_on(source_of("energy in loops"), "energy")
+    (judgement, *_) = report.judgements
+    broken = replace(judgement.findings[0], verdict=Verdict.WRONG)
+    judgements = [replace(each, findings=(broken,)) for each in report.judgements]
+    report = replace(report, judgements=judgements)
+    assert search._compared(report, [])
+    assert search.changed_lines(report, greeting) == ()
+
+
+@pytest.mark.parametrize("factor", [0.0, 1.0])
+def test_answers_that_repeat_the_request_tell_nothing(factor):
+    """Many lines may be missing where nothing is computed."""
+    source = source_of("newton step").replace(
+        'return {"positions": x, "velocities": (x - positions) / h}',
+        f'return {{"positions": {factor} * positions}}',
+    )
+    assert changed_lines(source, "mass_spring_step") == ()
+
+
+def test_a_second_mistake_makes_no_line_likely():
+    source = source_of("energy in loops")
+    source = source.replace("- rest_lengths[s]", "- stiffnesses[s]").replace("0.5 * st", "0.3 * st")
+    assert changed_lines(source, "energy") == ()
+
+
+LOOP = """
+def count(end):
+    i, total = 0, 0
+    while i < end:
+        total = total + i
+        i = i + 1
+    return total
+"""
+
+
+def test_a_changed_program_without_end_is_stopped():
+    program = Program(LOOP)
+    run = partial(program.names["count"], 4)
+    program.observe(run)
+    answer, passes = program.count_passes(run)
+    assert (answer, passes) == (6, 4)
+    endless = next(m for m in program.mutants(set()) if m.right == "i = i + 1" and m.wrong == "")
+    with program.changed(endless, passes), pytest.raises(ArithmeticError, match="without end"):
+        program.names["count"](4)
+    assert program.names["count"](4) == 6  # the right function is back
+
+
+def test_the_program_is_as_it_was_after_all_changes():
+    program = Program(LOOP)
+    program.observe(partial(program.names["count"], 4))
+    first = [(mutant.kind, mutant.wrong) for mutant in program.mutants(set())]
+    assert first == [(mutant.kind, mutant.wrong) for mutant in program.mutants(set())]
+    assert {kind for kind, _ in first} <= set(search.FAULTS)
+
+
+def test_lines_with_braces_are_moved_out_of_a_loop():
+    program = Program(LOOP.replace("i = i + 1", "i = {'next': i + 1}['next']"))
+    program.observe(partial(program.names["count"], 4))
+    moved = [mutant.wrong for mutant in program.mutants(set()) if mutant.kind == "moved line"]
+    assert any("{'next': i + 1}" in line and "before the loop" in line for line in moved)
+
+
+def test_long_lines_are_cut_to_what_differs():
+    line = "result = " + " + ".join(f"term_{i}" for i in range(30))
+    right, wrong = search.excerpts(line, line.replace("term_15", "term_51"))
+    assert "term_15" in right
+    assert "term_51" in wrong
+    assert len(right) < 75
+    assert (right[0], right[-1]) == ("…", "…")
+    assert search.excerpts("a = b", "a = c") == ("a = b", "a = c")
+
+
+@pytest.mark.slow
+def test_poses_are_compared_as_the_laws_read_them():
+    """Rotations of a joint that move nothing, and the sign of a quaternion, are a free choice."""
+    fault = coded_faults()["PB-CCD-003"]
+    source = fault.wrong_program.replace('{"local_rotations": q,', '{"local_rotations": -q,')
+    assert source != fault.wrong_program
+    (explanation,) = changed_lines(source, "inverse_kinematics")
+    assert "`P = R[parents[joint]] * [1, -1, -1, -1]`" in str(explanation.sentence)
+    assert explanation.share == 1.0
+
+
+@pytest.mark.parametrize(
+    ("program", "method", "right", "wrong", "code"),
+    [
+        ("resample by arc lengths", "", "while k < len", "if k < len", "PB-LINE-010"),
+        pytest.param("forward kinematics by angles one after the other", "", "2 * (y * z - w * x)]",
+                     "2 * (y * z + w * x)]", "PB-QUAT-039", marks=pytest.mark.slow),
+        ("forward kinematics by matrices, from the largest component", "",
+         "2 * (y * z - w * x), 0", "2 * (y * z + w * x), 0", "PB-LINE-005"),
+        pytest.param("fabrik", "fabrik", "        P = R[parents[joint]]\n",
+                     "        P = R[joint]\n", "PB-QUAT-042", marks=pytest.mark.slow),
+        pytest.param("scene graph", "ccd", "        descendants += children_of(parents, k)\n", "",
+                     "PB-CCD-063", marks=pytest.mark.slow),
+        pytest.param("scene graph", "fabrik", "offsets[path[k + 1]]", "offsets[path[k]]",
+                     "PB-LINE-012", marks=pytest.mark.slow),
+        pytest.param("hinges and cones", "ccd", "multiply(tilt, twist)", "multiply(twist, tilt)",
+                     "PB-LIMIT-030", marks=pytest.mark.slow),
+        pytest.param("ccd", "ccd", "between(x[effector] - x[joint]",
+                     "between(x[effector] - x[max(parents[joint], 0)]", "PB-LINE-012",
+                     marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_lines_of_kinematics_are_named(program, method, right, wrong, code):
+    """Positions kept by a scene graph, limits of joints, Euler angles and resampling in loops."""
+    source = source_of(program)
+    assert source.count(right) == 1
+    source = source.replace(right, wrong)
+    if method:
+        limits = "within" in source
+        source += f'\nPLUMBOB = {{"methods": ["{method}"], "limits": {limits}}}\n'
+    (explanation,) = changed_lines(source, PROGRAMS[program]["task"])
+    assert explanation.codes == (code,)
+
+
+def test_a_missing_placement_is_told_for_programs_that_keep_positions():
+    mutants = {"": search.Mutant("missing line", "ccd", "x, R = kinematics(p, o, q)", "", None)}
+    assert "mark all of them as out of date" in str(search._describe(mutants, [""]))
+
+
+def test_no_module_stands_for_a_value():
+    """NumPy in an array of numbers crashes Python."""
+    program = Program("import numpy as np\n\n\ndef energy(x):\n    return np.sin(x)\n")
+    program.observe(lambda: program.names["energy"](1.0))
+    assert "return np" not in {mutant.wrong for mutant in program.mutants(set())}

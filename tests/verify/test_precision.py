@@ -1,0 +1,269 @@
+"""Whatever the greeting says, answers are judged by the precision that their numbers show."""
+
+import itertools
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+from kinematics_solvers import textbook
+
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.judgement import (
+    CaseJudgement,
+    Diagnosis,
+    Report,
+    TaskReport,
+    Verdict,
+)
+from plumbob.verify.kinematics import report as kinematics_report
+from plumbob.verify.kinematics.faults import FAULTS
+from plumbob.verify.mass_spring import forces as force_report
+from plumbob.verify.mass_spring import search
+from plumbob.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, apply
+from plumbob.verify.mass_spring.model import StepModel
+from plumbob.verify.mass_spring.problem import all_forces, problem_of
+from plumbob.verify.output import json_file, junit, page, terminal
+from plumbob.verify.output.words import Presentation, speaker
+from plumbob.verify.precision import has_double
+from plumbob.verify.self_test import DECLARED, Stepper
+from plumbob.verify.sentence import sentence
+from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
+
+
+def options_of(faults, key):
+    return [fault for fault in faults if fault.key == key][:1]
+
+
+def forward_kinematics(key):
+    return textbook("forward_kinematics", options_of(FAULTS["forward"], key))
+
+
+def ccd(key):
+    return textbook("inverse_kinematics", options_of(FAULTS["ccd"], key))
+
+
+def forces(key):
+    return lambda **inputs: {
+        "forces": all_forces(
+            apply(options_of(FORCE_FAULTS, key), problem_of(inputs), StepModel())[0]
+        )
+    }
+
+
+def step(key):
+    return Stepper(DECLARED["linearised"][0], options_of(STEP_FAULTS, key))
+
+
+# What makes a solver by the key of its fault, a fault, and what the greeting says besides.
+TASKS = {
+    "forward_kinematics": (forward_kinematics, "own rotation on own offset", {}),
+    "inverse_kinematics": (ccd, "world rotation on the left", {"methods": ("ccd",)}),
+    "mass_spring_forces": (forces, "gravity g/m", {}),
+    "mass_spring_step": (step, "gravity g/m", {"step": DECLARED["linearised"][1]}),
+}
+EACH_TASK = pytest.mark.parametrize("task", TASKS)
+
+
+def printed(pattern):
+    return np.vectorize(lambda x: float(pattern % x), otypes=[float])
+
+
+def as_float(x):
+    return np.asarray(x, dtype=np.float32).astype(float)
+
+
+SINGLE = "are single-precision values"
+# The printed numbers of programs, and the remark about them.
+PRINTERS = {
+    "float": (as_float, SINGLE),
+    "float, nine digits": (lambda x: printed("%.9g")(as_float(x)), SINGLE),
+    "float, shortest": (np.vectorize(lambda x: float(str(np.float32(x))), otypes=[float]), SINGLE),
+    "cout": (printed("%g"), "have only 6 significant digits"),
+    "float, cout": (lambda x: printed("%g")(as_float(x)), "have only 6 significant digits"),
+    "to_string": (printed("%f"), "have only 6 significant digits"),
+    "twelve digits": (printed("%.12g"), "have only 12 significant digits"),
+}
+
+
+def of_each_task(printers, quick=()):
+    """Parametrise over tasks and printers; steps take seconds and run by default with some."""
+    return pytest.mark.parametrize(
+        ("task", "printer"),
+        [
+            pytest.param(
+                task, printer,
+                marks=pytest.mark.slow if task == "mass_spring_step" and printer not in quick
+                else (),
+            )
+            for task in TASKS for printer in printers
+        ],
+    )  # fmt: skip
+
+
+def contestant(task, function, rounded=np.asarray, **greeting):
+    def rounding(**inputs):
+        return {name: rounded(value) for name, value in function(**inputs).items()}
+
+    return FunctionContestant({task: rounding}, Greeting(1, (task,), **TASKS[task][2], **greeting))
+
+
+def judged(*arguments, **greeting):
+    return verify(contestant(*arguments, **greeting)).tasks[0]
+
+
+@of_each_task(PRINTERS, ("float", "cout"))
+def test_a_right_solver_is_right_to_the_digits_that_it_prints(task, printer):
+    rounded, words = PRINTERS[printer]
+    report = judged(task, TASKS[task][0](None), rounded)
+    assert words in str(report.assumptions[0])
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    assert max(one.verdict for one in report.judgements) <= Verdict.RIGHT_EXCEPT
+    assert report.diagnosis.explanations == ()
+
+
+@of_each_task(["float", "float, nine digits", "cout", "to_string"], ("cout",))
+def test_a_wrong_solver_stays_wrong_and_its_fault_is_named(task, printer):
+    make, key, _ = TASKS[task]
+    rounded, words = PRINTERS[printer]
+    report = judged(task, make(key), rounded)
+    assert words in str(report.assumptions[0])
+    assert report.verdict is Verdict.WRONG
+    assert key in report.diagnosis.explanations[0].faults
+
+
+@EACH_TASK
+def test_double_precision_is_believed_of_every_case_alone(task):
+    """As --rerun asks them: some requests have short numbers, and answers as short."""
+    door = contestant(task, TASKS[task][0](None))
+    method = door.greeting.methods[0]
+    for case in DISCIPLINES[task].cases(door.greeting, method, 0, False):
+        assert not judge_cases(door, task, method, [case]).assumptions, case.name
+
+
+@pytest.fixture
+def few_variants(monkeypatch):
+    """Try few faults, where laws alone decide the verdict."""
+
+    def first(variants, *arguments):
+        return itertools.islice(variants(*arguments), 20)
+
+    for module in (kinematics_report, force_report):
+        monkeypatch.setattr(module, "variants", partial(first, module.variants))
+    monkeypatch.setattr(search, "MAX_FAULTS", 0)
+
+
+@of_each_task(["float", "cout"])
+def test_one_answer_of_few_digits_excuses_nothing(task, printer, few_variants):
+    make, rounded = TASKS[task][0](None), PRINTERS[printer][0]
+    asked = []
+
+    def function(**inputs):
+        asked.append(inputs)
+        return {k: rounded(v) if len(asked) % 9 == 0 else v for k, v in make(**inputs).items()}
+
+    report = judged(task, function)
+    assert not report.assumptions
+    assert report.verdict is Verdict.WRONG
+
+
+def test_a_fault_as_small_as_single_precision_in_some_cases_is_no_precision(few_variants):
+    right = forward_kinematics(None)
+
+    def function(**inputs):
+        answer = right(**inputs)
+        return answer | {"positions": answer["positions"] + 1e-7 * (len(inputs["parents"]) > 5)}
+
+    report = judged("forward_kinematics", function)
+    assert not report.assumptions
+    assert report.verdict is Verdict.WRONG
+
+
+@pytest.mark.parametrize(
+    ("task", "is_right"),
+    [(task, True) for task in TASKS]
+    + [
+        pytest.param(task, False, marks=[pytest.mark.slow] * task.startswith("mass_spring"))
+        for task in TASKS
+    ],
+)
+def test_answers_of_inputs_in_single_precision_are_judged_so_and_a_float_is_hinted_at(
+    task, is_right
+):
+    make, key, _ = TASKS[task]
+    solver = make(None if is_right else key)
+
+    def function(**inputs):
+        arrays = {
+            name: as_float(value)
+            for name, value in inputs.items()
+            if isinstance(value, np.ndarray) and value.dtype.kind == "f"
+        }
+        return solver(**(inputs | arrays))
+
+    report = judged(task, function)
+    assert "Look for a float" in str(report.assumptions[0])
+    if is_right:
+        assert report.verdict is Verdict.RIGHT_EXCEPT
+        assert report.diagnosis.explanations == ()
+    else:
+        assert report.verdict is Verdict.WRONG
+        assert key in report.diagnosis.explanations[0].faults
+
+
+@EACH_TASK
+def test_declared_single_precision_is_right_without_a_word(task):
+    report = judged(task, TASKS[task][0](None), as_float, precision="single")
+    assert not report.assumptions
+    assert report.verdict <= Verdict.RIGHT_EXCEPT
+    assert judged(task, TASKS[task][0](None), printed("%g"), precision="single").assumptions
+
+
+@pytest.mark.parametrize(("digits", "is_double"), [
+    ([15.0, 14.0, 12.0, 1.0], True), ([15.0, 14.0, 1.0, None], False), ([7.0, 8.0, 6.0], False),
+])  # fmt: skip
+def test_several_answers_of_many_digits_are_in_double_precision(digits, is_double):
+    case = Case("one", "mass_spring_step", {}, "x", sentence("It is all."))
+    judgements = [CaseJudgement(case, Answer({}, 0.0), (), {}, count, 0.0) for count in digits]
+    assert has_double(TaskReport("mass_spring_step", "", judgements, Diagnosis())) is is_double
+
+
+def test_residual_in_single_precision_is_no_evidence():
+    right = ccd(None)
+
+    def function(**inputs):
+        answer = right(**inputs)
+        distance = np.linalg.norm(answer["positions"][inputs["effector"]] - inputs["target"])
+        return answer | {"residual": as_float(distance)}
+
+    assert not judged("inverse_kinematics", function).assumptions
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_the_precision_is_said_once_for_all_tasks_and_nothing_contradicts_it(language):
+    greeting = Greeting(1, ("forward_kinematics", "mass_spring_forces"), name="mine")
+    functions = {task: TASKS[task][0](None) for task in greeting.tasks}
+
+    def rounding(task, **inputs):
+        return {name: as_float(value) for name, value in functions[task](**inputs).items()}
+
+    door = FunctionContestant(
+        {task: lambda task=task, **inputs: rounding(task, **inputs) for task in functions}, greeting
+    )
+    report = verify(door)
+    say = speaker(language)
+    context = Presentation(say, language, ["my.py"])
+    told = say(report.tasks[0].assumptions[0])
+    assert '"precision": "single"' in told
+    screen = "".join(" ".join(terminal.lines(report, context)).split())
+    assert screen.count("".join(told.split())) == 1
+    assert {"en": "doubleprecision", "zh": "双精度"}[language] not in screen
+    assert json.loads(json_file.text(report, say))["remarks"] == [told]
+    assert told.replace('"', "&#34;") in page.render(report, context)
+    assert junit.text(report, say).count(told) == 2
+    one = Report(greeting, [report.tasks[0], verify(door, ["mass_spring_forces"]).tasks[0]], 0)
+    object.__setattr__(one.tasks[1], "assumptions", ())
+    assert f"forward_kinematics: {told}" in json.loads(json_file.text(one, say))["remarks"]

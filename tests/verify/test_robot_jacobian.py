@@ -1,0 +1,99 @@
+"""Jacobians of robots: every convention is right, every fault is named, derivatives agree."""
+
+import numpy as np
+import pytest
+
+from plumbob.verify.fault_programs import coded_faults, contestant_of
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics.robot_jacobian import (
+    CONVENTIONS,
+    FAULTS,
+    TASK,
+    cases,
+    right_jacobian,
+)
+from plumbob.verify.kinematics.robot_models import tool_pose
+from plumbob.verify.kinematics.trajectories import twists_between
+from plumbob.verify.verify import verify
+
+GREETING = Greeting(PROTOCOL, (TASK,))
+CASES = cases(GREETING, "", 0, False)
+# Without those of a changed line, which count where the catalogue knows no mistake.
+PROGRAMS = {
+    fault.name: fault
+    for fault in coded_faults().values()
+    if fault.task == TASK and fault.family != "LINE"
+}
+
+
+def world(inputs):
+    return right_jacobian(inputs, CONVENTIONS["world, linear part first"])
+
+
+def report_of(predict):
+    functions = {TASK: lambda **inputs: {"jacobian": predict(inputs)}}
+    return verify(FunctionContestant(functions, GREETING)).tasks[0]
+
+
+@pytest.mark.parametrize("case", CASES[::3], ids=lambda case: case.name)
+def test_columns_are_derivatives_of_the_tool_s_pose(case):
+    """Central differences of 1e-5 are wrong by 1e-10, and rounding adds 1e-11."""
+    q, h = case.inputs["q"], 1e-5
+    steps = h * np.eye(len(q))
+    before, after = tool_pose(case.inputs, q - steps), tool_pose(case.inputs, q + steps)
+    differences = twists_between(before, after).T / (2.0 * h)
+    np.testing.assert_allclose(world(case.inputs), differences, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", CONVENTIONS)
+def test_every_convention_is_right_and_reported(name):
+    report = report_of(lambda inputs: right_jacobian(inputs, CONVENTIONS[name]))
+    assert report.verdict is Verdict.RIGHT
+    assert report.diagnosis.behaviour.values == {"convention": name}
+
+
+# Every tenth program is judged quickly; test_fault_codes judges all of them.
+@pytest.mark.parametrize("name", list(PROGRAMS)[::10])
+def test_a_fault_is_named_by_its_code(name):
+    report = verify(contestant_of(PROGRAMS[name].wrong_program)).tasks[0]
+    assert report.verdict is Verdict.WRONG
+    assert [one.faults for one in report.diagnosis.explanations] == [(name,)]
+    assert PROGRAMS[name].code in str(report.diagnosis.explanations[0].sentence.values)
+
+
+def test_a_fault_is_named_in_another_convention():
+    fault, spatial = FAULTS["origins not rotated"], CONVENTIONS["spatial, angular part first"]
+
+    def predict(inputs):
+        frames = fault.frames(inputs, inputs["q"])
+        return spatial(next(fault.jacobians(inputs, inputs["q"])), frames.position, frames.rotation)
+
+    (explanation,) = report_of(predict).diagnosis.explanations
+    assert explanation.faults == ("origins not rotated",)
+
+
+def test_an_unknown_mistake_is_wrong_but_has_no_name():
+    report = report_of(lambda inputs: 1.01 * world(inputs))
+    assert report.verdict is Verdict.WRONG
+    assert not report.diagnosis.explanations
+
+
+def test_conventions_are_not_to_change_between_answers():
+    conventions = list(CONVENTIONS.values())
+    report = report_of(lambda inputs: right_jacobian(inputs, conventions[len(inputs["q"]) % 2]))
+    assert report.verdict is Verdict.WRONG
+
+
+def test_numbers_are_finite_and_single_precision_is_enough():
+    assert (
+        report_of(lambda inputs: np.full((6, len(inputs["q"])), np.nan)).verdict is Verdict.BROKEN
+    )
+    single = report_of(lambda inputs: world(inputs).astype(np.float32))
+    assert single.verdict is Verdict.RIGHT_EXCEPT
+
+
+def test_a_transposed_jacobian_has_another_shape():
+    report = report_of(lambda inputs: world(inputs).T)
+    assert report.verdict is Verdict.BROKEN

@@ -1,0 +1,218 @@
+"""Robots that follow targets: laws at their edges, honest controllers, faults with their names."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from plumbob.reference.jacobians import jacobian
+from plumbob.reference.skeleton import Pose
+from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.fault_programs import coded_faults, contestant_of
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics import robot_motions
+from plumbob.verify.kinematics.robot_faults import FAULTS as POSE_FAULTS
+from plumbob.verify.kinematics.robot_models import mechanism, tool_at
+from plumbob.verify.kinematics.robot_motions import TASK, followed
+from plumbob.verify.kinematics.robot_track import judge
+from plumbob.verify.kinematics.trajectories import twists_between
+from plumbob.verify.verify import verify
+
+GREETING = Greeting(PROTOCOL, (TASK,), velocity_limits=True)
+CASES = {case.family: case for case in robot_motions.cases(GREETING, "", 0, False)}
+PROGRAMS = {fault.name: fault for fault in coded_faults().values() if fault.task == TASK}
+
+
+def tool_of(case):
+    return Pose(case.inputs["target_positions"], case.inputs["target_rotations"])
+
+
+def right(case):
+    return followed(case.inputs, case.inputs["start"], tool_of(case))
+
+
+def broken(case, q, **outputs):
+    """The laws that coordinates break, with their verdicts."""
+    answer = Answer({"q": q, **outputs}, 0.0)
+    (judgement,) = judge([Exchange(case, answer, answer)], GREETING, "").judgements
+    return {found.law: found.verdict for found in judgement.findings if found.verdict}
+
+
+def step(J, e, damping):
+    return J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), e)
+
+
+def controller(gain, damping, iterations=None, posture=0.0, weights=1.0):
+    """A solver with a gain, a damping, weights of the joints and a posture in the null space."""
+
+    def track(start, lower, upper, max_iterations, **inputs):
+        robot, q, frames = mechanism({**inputs, "lower": lower, "upper": upper}), start, []
+        for target in zip(inputs["target_positions"], inputs["target_rotations"], strict=True):
+            for _ in range(iterations or max_iterations):
+                e = twists_between(tool_at(robot, q), Pose(*target))
+                if np.abs(e).max() < 0.5 * inputs["tolerance_rotation"]:
+                    break
+                J = jacobian(robot, q, -1) * np.sqrt(weights)
+                rest = 0.5 * (lower + upper) - q
+                rest = posture * (rest - step(J, J @ rest, damping))
+                q = np.clip(q + np.sqrt(weights) * step(J, gain * e, damping) + rest, lower, upper)
+            frames.append(q)
+        return {"q": np.array(frames)}
+
+    return track
+
+
+HONEST = {
+    "damped least squares": controller(1.0, 1e-3),
+    "one step in a frame": controller(1.0, 1e-3, 1),
+    "strongly damped, one step": controller(1.0, 0.04, 1),
+    "gain of a half": controller(0.5, 1e-3, 1),
+    "weighted joints": controller(1.0, 1e-3, None, 0.0, np.array([1, 1, 2, 1, 0.3, 0.5, 0.3])),
+    "posture in the null space": controller(1.0, 1e-3, 1, 0.05),
+    "Levenberg-Marquardt": lambda **i: {
+        "q": followed(i, i["start"], Pose(i["target_positions"], i["target_rotations"]))
+    },
+    "fixed damping": lambda **i: {
+        "q": followed(i, i["start"], Pose(i["target_positions"], i["target_rotations"]),
+                      "damped_least_squares")
+    },
+}  # fmt: skip
+
+
+# Faults that other ones resemble.
+QUICK = ("frames start anew", "coordinates not kept", "speed limits of iterations")
+
+
+def some(names, stride):
+    """Names of which only some are tried quickly: each takes seconds."""
+    return [
+        pytest.param(name, marks=() if i % stride == 0 or name in QUICK else pytest.mark.slow)
+        for i, name in enumerate(names)
+    ]
+
+
+@pytest.mark.parametrize("name", some(HONEST, 3))
+def test_no_honest_controller_is_accused(name):
+    contestant = FunctionContestant({TASK: HONEST[name]}, Greeting(PROTOCOL, (TASK,)))
+    report = verify(contestant).tasks[0]
+    assert report.verdict <= Verdict.RIGHT_EXCEPT
+    assert not report.diagnosis.explanations
+
+
+@pytest.mark.parametrize("name", some(PROGRAMS, 12))
+def test_a_fault_is_named_by_its_code(name):
+    report = verify(contestant_of(PROGRAMS[name].wrong_program)).tasks[0]
+    assert report.verdict is Verdict.WRONG
+    (explanation,) = report.diagnosis.explanations
+    assert explanation.faults == (name,)
+    assert PROGRAMS[name].code in str(explanation.sentence.values)
+
+
+def test_the_program_without_a_fault_is_right():
+    program = next(iter(PROGRAMS.values())).right_program
+    assert verify(contestant_of(program)).tasks[0].verdict <= Verdict.RIGHT_EXCEPT
+
+
+@pytest.mark.parametrize("key", ["degrees", "rotation sense", "relative", "tool ignored"])
+def test_requests_that_are_misread_are_named(key):
+    fault, inputs = POSE_FAULTS[key], CASES["curve"].inputs
+    q = followed(fault.read(inputs), inputs["start"], tool_of(CASES["curve"]))
+    answer = Answer({"q": (q - inputs["start"] if fault.relative else q) / fault.scale}, 0.0)
+    report = judge([Exchange(CASES["curve"], answer, answer)], GREETING, "")
+    assert [one.faults for one in report.diagnosis.explanations] == [(key,)]
+
+
+@pytest.mark.parametrize("family", CASES)
+def test_the_reference_breaks_no_law(family):
+    case = CASES[family]
+    laws = broken(case, right(case))
+    allowed = {"velocity limits kept"} if "speeds" in family else {"no drift over laps"}
+    assert laws.keys() <= allowed
+
+
+def test_speeds_are_limited_where_the_request_says_so():
+    case = CASES["jump, limited speeds"]
+    assert broken(case, right(case)) == {"velocity limits kept": Verdict.WRONG}
+    frames, q = [], case.inputs["start"]
+    longest = case.inputs["h"] * case.inputs["velocity_limits"]
+    for target in right(case):
+        q = q + np.clip(target - q, -longest, longest)
+        frames.append(q)
+    assert set(broken(case, np.array(frames)).values()) <= {Verdict.RIGHT_EXCEPT}
+
+
+def test_a_joint_beyond_its_limit_is_seen_and_a_start_beyond_may_return():
+    case = CASES["start beyond a limit"]
+    q = right(case)
+    slow = q.copy()
+    slow[:4, 1] = case.inputs["lower"][1] - [0.2, 0.1, 0.05, 0.02]
+    assert broken(case, slow)["limits kept"] is Verdict.RIGHT_EXCEPT
+    slow[-1, 1] = case.inputs["lower"][1] - 0.01
+    assert broken(case, slow)["limits kept"] is Verdict.WRONG
+
+
+def test_an_arm_that_does_not_rest_with_its_target_is_seen():
+    case = CASES["rest"]
+    q = right(case)
+    tremor = q + 2e-4 * (-1.0) ** np.arange(len(q))[:, None]
+    assert broken(case, tremor)["rest"] is Verdict.WRONG
+    fading = q + 0.01 * 0.9 ** np.arange(len(q))[:, None]
+    assert broken(case, fading)["rest"] is Verdict.RIGHT_EXCEPT
+
+
+def test_speeds_that_are_reported_are_those_of_the_coordinates():
+    case = CASES["curve"]
+    q, h = right(case), case.inputs["h"]
+    v = np.diff(q, axis=0, prepend=case.inputs["start"][None]) / h
+    assert "velocities and coordinates" not in broken(case, q, velocities=v)
+    later = np.concatenate([v[1:], v[-1:]])
+    for wrong in (later, 1.2 * v):
+        assert broken(case, q, velocities=wrong)["velocities and coordinates"] is Verdict.WRONG
+
+
+def test_answers_without_numbers_are_broken():
+    case = CASES["rest"]
+    assert broken(case, np.full((32, 7), np.nan)) == {"numbers": Verdict.BROKEN}
+    contestant = FunctionContestant({TASK: lambda h: {"velocities": np.zeros((1, 7))}}, GREETING)
+    assert verify(contestant).verdict is Verdict.BROKEN
+
+
+def test_quaternions_of_either_sign_are_compared_with_the_same_curve():
+    exchanges = []
+    for family in ("curve", "opposite quaternions"):
+        case = replace(CASES[family], name=f"arm, {family}")
+        q = right(case) + (0.02 if family == "curve" else 0.0)
+        exchanges.append(Exchange(case, Answer({"q": q}, 0.0), Answer({"q": q}, 0.0)))
+    report = judge(exchanges, GREETING, "")
+    laws = {found.law for found in report.judgements[1].findings if found.verdict}
+    assert "both signs of a quaternion" in laws
+    assert [one.faults for one in report.diagnosis.explanations] == [("long way round",)]
+
+
+def test_few_cases_are_asked_unless_speeds_are_limited():
+    names = partial(map, lambda case: case.family)
+    plain = robot_motions.cases(Greeting(PROTOCOL, (TASK,)), "", 0, False)
+    assert set(CASES) - set(names(plain)) == {"jump, limited speeds"}
+
+
+def test_an_arm_that_never_moves_skips_more_than_slow_frames():
+    exchanges = []
+    for case in (CASES["curve"], CASES["singularity"], CASES["more than half a turn"]):
+        q = np.tile(case.inputs["start"], (len(case.inputs["target_positions"]), 1))
+        answer = Answer({"q": q}, 0.0)
+        exchanges.append(Exchange(case, answer, answer))
+    likely = judge(exchanges, GREETING, "").diagnosis.explanations
+    assert all("slow frames skipped" not in explanation.faults for explanation in likely)
+
+
+def test_another_constant_limit_of_speeds_is_not_taken_for_one_of_iterations():
+    right = "np.clip(q - last, -limits, limits)"
+    source = PROGRAMS["speed limits as steps"].wrong_program
+    assert source.count(right) == 1
+    source = source.replace(right, "np.clip(q - last, -2.0 * h * limits, 2.0 * h * limits)")
+    report = verify(contestant_of(source), [TASK]).tasks[0]
+    assert report.verdict is Verdict.WRONG
+    assert not report.diagnosis.explanations

@@ -1,0 +1,159 @@
+"""Speeds for a velocity of the tool: right ways are right, damping is told, faults are named."""
+
+import numpy as np
+import pytest
+
+from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.fault_programs import coded_faults, contestant_of
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics import robot_jacobian
+from plumbob.verify.kinematics.robot_models import tool_pose
+from plumbob.verify.kinematics.robot_velocity import (
+    SINGULAR,
+    TASK,
+    cases,
+    judge,
+    solving,
+)
+from plumbob.verify.kinematics.trajectories import twists_between
+from plumbob.verify.verify import verify
+
+GREETING = Greeting(PROTOCOL, (TASK,))
+CASES = cases(GREETING, "", 0, False)
+PROGRAMS = {fault.name: fault for fault in coded_faults().values() if fault.task == TASK}
+WORLD = robot_jacobian.CONVENTIONS["world, linear part first"]
+
+
+def equation(inputs):
+    twist = np.concatenate([inputs["linear_velocity"], inputs["angular_velocity"]])
+    return robot_jacobian.right_jacobian(inputs, WORLD), twist
+
+
+def shortest(J, twist):
+    return np.linalg.pinv(J, 1e-6) @ twist
+
+
+def damped(J, twist, damping):
+    return np.linalg.solve(J.T @ J + damping**2 * np.eye(J.shape[1]), J.T @ twist)
+
+
+def report_of(solve):
+    functions = {TASK: lambda **inputs: {"velocities": solve(*equation(inputs))}}
+    return verify(FunctionContestant(functions, GREETING)).tasks[0]
+
+
+def test_speeds_of_least_length_are_right_and_said_to_be():
+    report = report_of(shortest)
+    assert report.verdict is Verdict.RIGHT
+    assert "least length" in str(report.diagnosis.behaviour)
+
+
+def test_motion_in_the_null_space_is_right():
+    def solve(J, twist):
+        speeds = shortest(J, twist)
+        return speeds + np.ones_like(speeds) - np.linalg.pinv(J, 1e-6) @ J @ np.ones_like(speeds)
+
+    report = report_of(solve)
+    assert report.verdict is Verdict.RIGHT
+    assert "does not move the tool" in str(report.diagnosis.behaviour)
+
+
+@pytest.mark.parametrize("damping", [1e-3, 0.02])
+def test_damping_is_told_and_no_fault(damping):
+    report = report_of(lambda J, twist: damped(J, twist, damping))
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    values = [found.sentence.values["damping"]
+              for judged in report.judgements for found in judged.findings
+              if found.law == "velocity of the tool" and "damping" in found.sentence.values
+              and judged.case.family != SINGULAR and len(judged.case.inputs["q"]) > 1]  # fmt: skip
+    np.testing.assert_allclose(values, damping, rtol=1e-3)
+
+
+def test_an_inverse_that_fails_in_singular_poses_alone_is_right_except():
+    def solve(J, twist):
+        if np.linalg.matrix_rank(J, 1e-6) < min(6, np.count_nonzero(J.any(axis=0))):
+            raise ValueError("singular matrix")
+        return shortest(J, twist)
+
+    report = report_of(solve)
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    text = str([str(one) for judged in report.judgements for one in judged.complaints])
+    assert "singular matrix" in text
+
+
+@pytest.mark.parametrize("case", CASES[::4], ids=lambda case: case.name)
+def test_the_tool_moves_as_asked_by_the_speeds(case):
+    """Forward differences of 1e-6 are wrong by 1e-6 times the speeds' square."""
+    J, twist = equation(case.inputs)
+    q, h = case.inputs["q"], 1e-6
+    after = tool_pose(case.inputs, q + h * shortest(J, twist))
+    np.testing.assert_allclose(
+        twists_between(tool_pose(case.inputs, q), after) / h, twist, atol=1e-4
+    )
+
+
+def test_the_nearest_solution_is_the_answer_itself_if_that_solves():
+    J, twist = equation(CASES[-1].inputs)
+    for damping in (0.0, 0.1):
+        answer = damped(J, twist, damping) if damping else shortest(J, twist)
+        nearest, found = solving((J, twist), answer)
+        np.testing.assert_allclose(nearest, answer, atol=1e-12)
+        assert found == pytest.approx(damping, abs=1e-6)
+
+
+# The other programs are judged by the slow test_fault_codes.
+@pytest.mark.parametrize("name", list(PROGRAMS)[::12])
+def test_a_fault_is_named_by_its_code(name):
+    report = verify(contestant_of(PROGRAMS[name].wrong_program)).tasks[0]
+    assert report.verdict >= Verdict.WRONG
+    assert name in report.diagnosis.explanations[0].faults
+    assert PROGRAMS[name].code in report.diagnosis.explanations[0].codes
+
+
+@pytest.mark.parametrize("key", ["axes not rotated"])
+def test_a_wrong_jacobian_is_named(key):
+    fault = robot_jacobian.FAULTS[key]
+
+    def predict(**inputs):
+        J = next(iter(fault.jacobians(inputs, inputs["q"])))
+        return {"velocities": shortest(J, equation(inputs)[1])}
+
+    report = verify(FunctionContestant({TASK: predict}, GREETING)).tasks[0]
+    assert report.verdict is Verdict.WRONG
+    assert any(key in one.faults for one in report.diagnosis.explanations)
+
+
+def test_of_equal_explanations_that_of_the_jacobian_alone_is_named():
+    fault = robot_jacobian.FAULTS["arms to the last joint"]
+    exchanges = []
+    for case in CASES[::4]:
+        J = next(iter(fault.jacobians(case.inputs, case.inputs["q"])))
+        answer = Answer({"velocities": shortest(J, equation(case.inputs)[1])}, 0.0)
+        exchanges.append(Exchange(case, answer, answer))
+    (alone,) = judge(exchanges, GREETING, "").diagnosis.explanations
+    assert len(alone.faults) > 1
+    (known,) = judge(exchanges, GREETING, "", ["arms to the last joint"]).diagnosis.explanations
+    assert known.faults == ("arms to the last joint",)
+
+
+@pytest.mark.slow
+def test_an_unknown_mistake_is_wrong_but_has_no_name():
+    report = report_of(lambda J, twist: 1.3 * shortest(J, twist))
+    assert report.verdict is Verdict.WRONG
+    assert not report.diagnosis.explanations
+    assert "1.3 times the right ones" in " ".join(map(str, report.diagnosis.hints))
+
+
+def test_where_the_jacobian_is_wrong_other_mistakes_have_to_explain_all():
+    """Of speeds that are right for some robots only a part speaks for another mistake."""
+    exchanges = []
+    for case in CASES[::8]:
+        J, twist = equation(case.inputs)
+        is_turned = len(case.inputs["q"]) > 6
+        answer = Answer({"velocities": shortest(J, -twist if is_turned else 1.5 * twist)}, 0.0)
+        exchanges.append(Exchange(case, answer, answer))
+    likely = judge(exchanges, GREETING, "").diagnosis.explanations
+    assert all(one.share < 1.0 for one in likely)
+    assert judge(exchanges, GREETING, "", ["slides not rotated"]).diagnosis.explanations == ()

@@ -1,0 +1,295 @@
+"""Robots with limits: right solvers pass, wrong ones are told by a law and named by their fault."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plumbob.crosscheck.engines import MujocoRobot
+from plumbob.reference import forward_kinematics, jacobians, rotation
+from plumbob.reference.formats import urdf
+from plumbob.reference.skeleton import Pose
+from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics import robot_models, robot_targets
+from plumbob.verify.kinematics.motion_faults import STEP_FAULTS
+from plumbob.verify.kinematics.robot_faults import FAULTS, RIGHT
+from plumbob.verify.kinematics.robot_inverse_kinematics import (
+    TASK,
+    judge,
+    solve_by_reference,
+)
+from plumbob.verify.kinematics.robot_models import tool_pose
+from plumbob.verify.kinematics.robot_targets import AT_A_LIMIT, CLOSE, STEP
+from plumbob.verify.kinematics.robot_textbook import UNROTATED, rotation_error
+from plumbob.verify.kinematics.trajectories import twists_between
+from plumbob.verify.verify import judge_cases
+
+GREETING = Greeting(PROTOCOL, (TASK,), name="robots")
+CASES = robot_targets.cases(GREETING, "", 0, False)
+FEW = [
+    case for case in CASES
+    if case.name.startswith(("two", "seven")) and case.family != robot_targets.ANYWHERE
+]  # fmt: skip
+SOLVERS = ("levenberg_marquardt", "damped_least_squares")
+
+
+def misled(case, key):
+    """The case with a target that a solver with this fault believes to have reached."""
+    inputs, fault = dict(case.inputs), FAULTS[key]
+    q = 0.7 * inputs["upper"] + 0.2 - 0.1 * np.arange(len(inputs["upper"]))
+    q = np.clip(q, inputs["lower"], inputs["upper"])
+    frames = fault.frames({**inputs, "target_rotation": np.eye(4)[0]}, q)
+    target = rotation.from_matrix(frames.rotation)
+    if key in ("scalar last", "every scalar last"):
+        target = np.roll(target, -1)
+    elif key in ("inverse rotations", "inverse target"):
+        target = rotation.conjugate(target)
+    inputs |= {"target_position": frames.position, "target_rotation": target}
+    answer = Answer({"q": q}, 0.0)
+    return Exchange(replace(case, inputs=inputs), answer, answer)
+
+
+def judged(function, cases=FEW):
+    return judge_cases(FunctionContestant({TASK: function}, GREETING), TASK, "", cases)
+
+
+def broken(report):
+    return {f.law for one in report.judgements for f in one.findings if f.verdict >= Verdict.WRONG}
+
+
+def test_a_right_solver_is_right_or_stuck_somewhere():
+    report = judged(lambda **inputs: solve_by_reference(SOLVERS[1], **inputs))
+    assert report.verdict <= Verdict.RIGHT_EXCEPT
+    assert broken(report) == set()
+    assert len(report.judgements) == len(FEW) > 20
+
+
+# Whose matrices are no rotations, or who leaves rotations out, single iterations show; who takes
+# chains only is judged on them; one robot has a slide in a rotated frame, which Jacobians show;
+# targets half a turn off show branches.
+ELSEWHERE = (
+    "parents ignored", "effector ignored", "slides not rotated", "slides not rotated 2",
+    "position only", "slides along z", "slides along z 2",
+    "joints along the chain", *(key for key in FAULTS if key.startswith("branch of")),
+)  # fmt: skip
+KEYS = [
+    key for key, one in FAULTS.items()
+    if not (UNROTATED & one.rules.keys() or key in ELSEWHERE)
+]  # fmt: skip
+QUICK = 6
+SAMPLES = [pytest.param(k, marks=pytest.mark.slow if i % QUICK else ()) for i, k in enumerate(KEYS)]
+NEAR = [case for case in CASES if case.family in (robot_targets.AT, CLOSE)]
+
+
+@pytest.mark.parametrize("key", SAMPLES)
+def test_a_fault_breaks_a_law_and_is_named(key):
+    report = judge([misled(case, key) for case in NEAR], GREETING, "")
+    assert broken(report) & {"target reached", "rotation reached"}
+    assert [one.faults for one in report.diagnosis.explanations] == [(key,)]
+
+
+@pytest.mark.parametrize(("turns", "is_wrapped"), [(1, True), (-2, True), (0.3, False)])
+def test_angle_beyond_its_limits_by_whole_turns_is_said_to_be(turns, is_wrapped):
+    case = next(case for case in FEW if case.family == CLOSE)
+    q = 0.5 * (case.inputs["lower"] + case.inputs["upper"])
+    joint = int(np.argmin(case.inputs["slides"]))
+    q[joint] = case.inputs["upper"][joint] + 0.1 if turns == 0.3 else q[joint] + turns * 2.0 * np.pi
+    answer = Answer({"q": q}, 0.0)
+    (judgement,) = judge([Exchange(case, answer, answer)], GREETING, "").judgements
+    limits = next(finding for finding in judgement.findings if finding.law == "limits kept")
+    assert limits.verdict is Verdict.WRONG
+    assert ("whole turns" in str(limits.sentence)) is is_wrapped
+
+
+def test_limits_that_are_left_aside_are_seen():
+    assert "limits kept" in broken(judged(lambda upper, **_: {"q": upper + 0.01}, FEW[:4]))
+
+
+def test_a_claim_that_is_not_so_is_seen_beyond_reach():
+    claiming = judged(
+        lambda **inputs: {**solve_by_reference(SOLVERS[1], **inputs), "converged": True}
+    )
+    assert broken(claiming) == {"claims"}
+
+
+@pytest.mark.parametrize("number", [np.nan, 1e300])
+def test_what_is_no_coordinate_is_wrong(number):
+    report = judged(lambda start, **_: {"q": np.full_like(start, number)}, FEW[:4])
+    assert report.verdict is (Verdict.BROKEN if np.isnan(number) else Verdict.WRONG)
+
+
+@pytest.mark.parametrize("case", CASES[::4], ids=lambda case: case.name)
+def test_kinematics_are_those_of_the_same_text_by_the_reference_and_by_mujoco(case, tmp_path):
+    inputs, q = case.inputs, 0.5 * (case.inputs["lower"] + case.inputs["upper"])
+    pose = tool_pose(inputs, q)
+    robot = urdf.parse(inputs["urdf"]).articulation
+    links = [robot.names.index(f"link_{joint}") for joint in range(len(q))]
+    order = np.argsort([robot.coordinates_of(link).start for link in links])
+    ours = forward_kinematics(robot, q[order])
+    at = robot.names.index("tool")
+    np.testing.assert_allclose(ours.positions[at], pose.positions, atol=1e-12)
+    np.testing.assert_allclose(rotation.angle(ours.rotations[at], pose.rotations), 0, atol=1e-12)
+    (tmp_path / "robot.urdf").write_text(inputs["urdf"])
+    engine = MujocoRobot(tmp_path / "robot.urdf")
+    engine.update_kinematics({f"joint_{j}": q[j : j + 1] for j in range(len(q))})
+    theirs = engine.link_poses(["tool"])
+    np.testing.assert_allclose(theirs.positions[0], pose.positions, atol=1e-12)
+    matrix = rotation.to_matrix(pose.rotations)
+    np.testing.assert_allclose(theirs.matrices[0], matrix, atol=1e-12)
+
+
+@pytest.mark.parametrize("case", CASES[::5], ids=lambda case: case.name)
+def test_kinematics_of_the_textbook_without_faults_are_those_of_the_reference(case):
+    """Central differences of 1e-6 are wrong by 1e-10, and rounding adds 1e-10."""
+    inputs = case.inputs
+    q = np.random.default_rng(4).uniform(inputs["lower"], inputs["upper"])
+    frames, pose = RIGHT.frames(inputs, q), tool_pose(inputs, q)
+    np.testing.assert_allclose(frames.position, pose.positions, atol=1e-12)
+    np.testing.assert_allclose(frames.rotation, rotation.to_matrix(pose.rotations), atol=1e-12)
+    (J,) = RIGHT.jacobians(inputs, q)
+    expected = jacobians.jacobian(robot_models.mechanism(inputs), q, -1)
+    np.testing.assert_allclose(J, expected, atol=1e-12)
+    moved = RIGHT.frames(inputs, q + 1e-6).rotation
+    turned = rotation_error(frames.rotation, moved)
+    np.testing.assert_allclose(turned, 1e-6 * expected[3:].sum(axis=1), atol=1e-9)
+
+
+def exchange_of(case, q, **claims):
+    answer = Answer({"q": q, **claims}, 0.0)
+    return Exchange(case, answer, answer)
+
+
+def named(exchanges):
+    report = judge(exchanges, GREETING, "")
+    return report.verdict, [one.faults[0] for one in report.diagnosis.explanations]
+
+
+@pytest.mark.parametrize("key", ["axes not rotated", "z columns", "plus the cosine"])
+def test_wrong_kinematics_are_named_by_single_iterations(key):
+    exchanges = [exchange_of(FEW[0], FEW[0].inputs["start"] + 0.5)]
+    for case in [case for case in CASES if case.family == STEP][:3]:
+        inputs, q, fault = case.inputs, case.inputs["start"], STEP_FAULTS[key]
+        frames, J = fault.frames(inputs, q), next(fault.jacobians(inputs, q))
+        error = rotation_error(frames.rotation, rotation.to_matrix(inputs["target_rotation"]))
+        e = np.concatenate([inputs["target_position"] - frames.position, error])
+        step = J.T @ np.linalg.solve(J @ J.T + 0.01 * np.eye(6), e)
+        exchanges.append(exchange_of(case, q + 0.1 * step / np.abs(step).max()))
+    assert named(exchanges) == (Verdict.WRONG, [key])
+
+
+def test_limits_that_are_kept_only_after_the_solve_are_named():
+    limited = [case for case in CASES if case.family == AT_A_LIMIT]
+    exchanges = []
+    for case in limited[:4]:
+        free = {name: np.full(7, x) for name, x in (("lower", -9.0), ("upper", 9.0))}
+        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
+        q, _ = robot_models.solved({**case.inputs, **free}, case.inputs["start"], tool)
+        clamped = np.clip(q, case.inputs["lower"], case.inputs["upper"])
+        exchanges.append(exchange_of(case, clamped))
+        right, is_reached = robot_models.solved(case.inputs, case.inputs["start"], tool)
+        assert is_reached
+        assert broken(judge([exchange_of(case, right)], GREETING, "")) == set()
+    assert named(exchanges) == (Verdict.WRONG, ["clamped after the solve"])
+
+
+def test_angles_from_zero_to_two_pi_are_named():
+    near = [case for case in FEW if case.family == robot_targets.AT]
+    exchanges = [exchange_of(case, case.inputs["start"] % (2.0 * np.pi)) for case in near]
+    assert named(exchanges) == (Verdict.WRONG, ["angles from zero"])
+
+
+def test_success_that_is_always_claimed_is_named():
+    beyond = [case for case in FEW if case.family == robot_targets.BEYOND]
+    exchanges = [exchange_of(case, case.inputs["start"], converged=True) for case in beyond]
+    assert named(exchanges) == (Verdict.WRONG, ["success always claimed"])
+
+
+def test_a_single_step_where_a_solve_is_asked_is_named():
+    exchanges = []
+    for case in [case for case in CASES if case.family == CLOSE]:
+        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
+        e = twists_between(tool_pose(case.inputs, case.inputs["start"]), tool)
+        exchanges.append(exchange_of(case, case.inputs["start"] + damped_step(case, e)))
+    assert named(exchanges) == (Verdict.WRONG, ["single step"])
+
+
+def damped_step(case, twist):
+    (J,) = RIGHT.jacobians(case.inputs, case.inputs["start"])
+    return J.T @ np.linalg.solve(J @ J.T + 1e-3 * np.eye(6), twist)
+
+
+@pytest.mark.parametrize(
+    ("key", "limit"), [("limits mirrored", -2.4), ("limits of half a turn", np.pi)]
+)
+def test_other_limits_than_the_request_s_are_named(key, limit):
+    near = [case for case in FEW if case.family == CLOSE]
+    exchanges = [exchange_of(case, np.full_like(case.inputs["start"], limit)) for case in near]
+    assert named(exchanges) == (Verdict.WRONG, [key])
+
+
+PASSES = {
+    "looser tolerance": lambda errors, tolerances: (errors <= 10.0 * tolerances).all(),
+    "squared errors": lambda errors, tolerances: (errors**2 <= tolerances).all(),
+}
+
+
+@pytest.mark.parametrize("key", PASSES)
+def test_another_test_of_convergence_is_named(key):
+    """Starts near their targets that the test accepts, and right single iterations."""
+    exchanges = []
+    for case in [c for c in CASES if c.family in (robot_targets.TOLERANCE, STEP)]:
+        start, inputs = case.inputs["start"], case.inputs
+        tool = Pose(inputs["target_position"], inputs["target_rotation"])
+        e = twists_between(tool_pose(inputs, start), tool)
+        tolerances = np.array([inputs["tolerance"], inputs["tolerance_rotation"]])
+        if case.family == STEP:
+            exchanges.append(exchange_of(case, start + damped_step(case, e)))
+        elif PASSES[key](np.linalg.norm(e.reshape(2, 3), axis=-1), tolerances):
+            exchanges.append(exchange_of(case, start, converged=True))
+        else:
+            q, _ = robot_models.solved(inputs, start, tool)
+            exchanges.append(exchange_of(case, q, converged=True))
+    assert named(exchanges) == (Verdict.WRONG, [key])
+
+
+def test_an_answer_that_does_not_depend_on_the_start_is_reported():
+    answers = {}
+    for case in [c for c in CASES if c.family in (robot_targets.AT, CLOSE, robot_targets.ANYWHERE)]:
+        answers.setdefault(case.inputs["target_position"].tobytes(), case.inputs["start"])
+    exchanges = [
+        exchange_of(case, answers[case.inputs["target_position"].tobytes()])
+        for case in CASES
+        if case.inputs["target_position"].tobytes() in answers and case.inputs["max_iterations"] > 1
+    ]
+    assert "start" in str(judge(exchanges, GREETING, "").diagnosis.behaviour)
+
+
+def test_failure_at_the_target_alone_says_what_divides_by_zero():
+    near = [case for case in CASES if case.family in (robot_targets.AT, CLOSE)]
+    exchanges = []
+    for case in near:
+        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
+        q, _ = robot_models.solved(case.inputs, case.inputs["start"], tool)
+        exchanges.append(exchange_of(case, q, converged=case.family == CLOSE))
+    report = judge(exchanges, GREETING, "")
+    assert report.verdict is Verdict.RIGHT_EXCEPT
+    assert "0 / 0" in str([words for one in report.judgements for words in one.complaints])
+
+
+def test_a_jacobian_that_stays_that_of_the_start_is_told_by_solves_of_few_iterations():
+    def solve(start, max_iterations, **inputs):
+        q, J = start, next(RIGHT.jacobians(inputs, start))
+        for _ in range(min(max_iterations, robot_targets.MOST)):
+            here = tool_pose(inputs, q)
+            target = Pose(inputs["target_position"], inputs["target_rotation"])
+            q = q + J.T @ np.linalg.solve(J @ J.T + 1e-2 * np.eye(6), twists_between(here, target))
+        return {"q": np.clip(q, inputs["lower"], inputs["upper"])}
+
+    families = (robot_targets.FEW, CLOSE)
+    cases = [case for case in CASES if case.family in families and case.name.startswith("seven")]
+    report = judged(solve, cases)
+    assert report.verdict is Verdict.WRONG
+    assert report.diagnosis.explanations[0].codes == ("PB-ROBOT-178",)

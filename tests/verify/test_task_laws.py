@@ -1,0 +1,333 @@
+"""The laws of forces, energies, curves and robots at the edges of their tolerances.
+
+The faults of the other files are gross, and most are in every frame and at every joint.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.explain import Match, Variant, _telling, explain
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.judgement import (
+    CaseJudgement,
+    Diagnosis,
+    Finding,
+    TaskReport,
+    Verdict,
+    smallest_failure,
+)
+from plumbob.verify.kinematics import (
+    resample,
+    robot_inverse_kinematics,
+    robot_models,
+    robot_targets,
+    track,
+)
+from plumbob.verify.kinematics.polylines import Polyline
+from plumbob.verify.kinematics.predictions import predict_track
+from plumbob.verify.kinematics.switches import Switches
+from plumbob.verify.laws import HOLDS, equal_answers
+from plumbob.verify.mass_spring import energy, forces
+from plumbob.verify.mass_spring.problem import all_forces, problem_of
+from plumbob.verify.precision import AS_SINGLE, is_off_by_single, judging_greeting
+from plumbob.verify.sentence import sentence
+
+EPSILON = 2.0**-52
+RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG
+EDGES = [(0.5, RIGHT), (2.0, WRONG)]
+
+
+def by_law(findings):
+    return {finding.law: finding for finding in findings}
+
+
+# ---- forces and energies
+
+
+@pytest.fixture
+def spring():
+    """A stretched spring, one kilogram at each end, one of them moving."""
+    return problem_of(
+        {
+            "masses": [1.0, 1.0],
+            "springs": [[0, 1]],
+            "rest_lengths": [1.0],
+            "stiffnesses": [100.0],
+            "dampings": [2.0],
+            "gravity": [0.0, -10.0, 0.0],
+            "positions": [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]],
+            "velocities": [[0.0, 0.0, 0.0], [0.0, 3.0, 0.0]],
+        }
+    )
+
+
+def test_rounding_of_a_force_and_of_an_energy_is_that_of_their_terms(spring):
+    """Eight epsilons of k (|x| + r) + c |v| + m g: 300, 6 and 10 N; and sixteen of
+    k (|x| + r) (|l| + r), m v² and m |x| g of each: 900, 9 and 20 J.
+    """
+    assert forces.tolerance(spring, EPSILON) == pytest.approx(8 * EPSILON * 316.0)
+    assert energy.tolerance(spring, EPSILON) == pytest.approx(16 * EPSILON * 929.0)
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+def test_forces_are_those_of_the_formula_and_add_up_to_the_weight_to_rounding(
+    spring, share, verdict
+):
+    """The sum to twice the rounding of one, times the root of the number of particles."""
+    expected, allowed = all_forces(spring), forces.tolerance(spring, EPSILON)
+    given = expected.copy()
+    given[1, 2] += share * allowed
+    found = forces._formula(spring, given, expected, allowed)
+    assert (found.verdict, found.index) == (verdict, 1)
+    given = expected.copy()
+    given[:, 1] += share * allowed * np.sqrt(2.0)
+    assert forces._balance(spring, given, allowed).verdict is verdict
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+@pytest.mark.parametrize("name", ["total", "potential"])
+def test_parts_of_the_energy_add_up_to_rounding(spring, name, share, verdict):
+    """Four times the rounding of one part."""
+    allowed = energy.tolerance(spring, EPSILON)
+    given = energy.predict((), spring)
+    shift = share * 4.0 * allowed
+    given[name] += shift
+    if name == "potential":
+        given["total"] += shift
+    wrong = {name for name, gap in energy._sums(given).items() if gap > 4.0 * allowed}
+    assert wrong == (set() if verdict is RIGHT else {name})
+
+
+# ---- resampled polylines
+
+
+GREETING = Greeting(1, ("resample",))
+
+
+@pytest.fixture
+def segments():
+    """A request for eleven points on a line of five metres with a corner."""
+    curve = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 2.0, 0.0]])
+    line = Polyline(curve, (0,), False)
+    inputs = {"curve": curve, "strokes": np.array([0]), "closed": False, "count": 11}
+    case = Case("", "resample", inputs, "", HOLDS, facts={"line": line, "size": 3.0})
+    return case, line.even_points(11, False)
+
+
+# Sixteen epsilons of three points of three metres and of the line's length.
+ON_LINE = 16 * EPSILON * (3 * 3.0 + 5.0)
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+@pytest.mark.parametrize(
+    ("law", "point", "direction"),
+    [("ends", 0, [1, 0, 0]), ("ends", -1, [0, -1, 0])]
+    + [("on the line", point, [0, 0, 1]) for point in (2, 8)],
+)
+def test_points_and_ends_are_kept_to_rounding(segments, law, point, direction, share, verdict):
+    case, points = segments
+    points[point] += share * ON_LINE * np.array(direction)
+    found = by_law(resample.point_laws(points, case, GREETING))
+    assert found[law].verdict is verdict
+    assert {found[other].verdict for other in {"ends", "on the line"} - {law}} == {RIGHT}
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.015, RIGHT), (0.025, WRONG)])
+def test_gaps_differ_from_the_mean_by_a_fiftieth_at_most(segments, share, verdict):
+    case, points = segments
+    points[2, 0] += share * 0.5  # a gap is half a metre long
+    found = by_law(resample.point_laws(points, case, GREETING))
+    assert found["spacing"].verdict is verdict
+    assert found["spacing"].error == pytest.approx(share)
+
+
+def test_the_last_side_of_a_closed_curve_counts():
+    """It may be a fiftieth longer than the others, and is not if the start comes again."""
+    curve = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    line = Polyline(curve, (0,), True)
+    inputs = {"curve": curve, "strokes": np.array([0]), "closed": True, "count": 8}
+    case = Case("", "resample", inputs, "", HOLDS, facts={"line": line, "size": 1.0})
+    points = line.even_points(8, True)
+    for shortened, verdict in ((0.0, RIGHT), (0.001, RIGHT), (0.005, WRONG)):
+        uneven = line.point_at(np.arange(8) * (0.5 - shortened))
+        found = by_law(resample.point_laws(uneven, case, GREETING))
+        assert found["closing side"].verdict is verdict
+    found = by_law(resample.point_laws(np.concatenate([points, points[:1]]), case, GREETING))
+    assert found["closing side"].verdict is RIGHT
+    for other, verdict in ((np.roll(points[::-1], 1, axis=0), RIGHT), (points[::-1], WRONG)):
+        findings = resample.point_laws(other, case, GREETING)  # either way round, from the start
+        assert max(found.verdict for found in findings) is verdict
+
+
+# ---- motions
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """The request for a chain's small circle, and the textbook's answer by FABRIK."""
+    case = track.cases(Greeting(1, ("track",)), "fabrik", 0, False)[0]
+    found = predict_track("fabrik", Switches(), case)
+    return case, np.array(found["path_positions"])
+
+
+@pytest.mark.parametrize("frame", [0, 4, -1])
+def test_a_single_frame_that_breaks_a_law_breaks_it(motion, frame):
+    case, positions = motion
+    lengthened = positions.copy()
+    lengthened[frame, -1] += 1e-6
+    findings = []
+    for x in (positions, lengthened):
+        asked = Exchange(case, Answer({"positions": x}, 0.0), Answer({"positions": x}, 0.0))
+        poses = track.frames_of(asked)
+        findings.append(by_law(track._frame_laws(poses, Greeting(1, ("track",)))))
+    assert findings[0]["link lengths"].verdict is RIGHT
+    assert findings[1]["link lengths"].verdict is WRONG
+    number = range(len(positions))[frame]
+    assert str(findings[1]["link lengths"].sentence).startswith(f"Frame {number}: ")
+
+
+@pytest.mark.parametrize(("distance", "verdict"), [(0.99, RIGHT), (1.01, RIGHT_EXCEPT)])
+def test_a_joint_that_moves_more_than_a_metre_in_a_frame_has_jumped(motion, distance, verdict):
+    case, positions = motion
+    moved = np.repeat(positions[:1], len(positions), axis=0)
+    moved[5:, 2, 1] += distance
+    asked = Exchange(case, Answer({"positions": moved}, 0.0), None)
+    poses = [posed for _, posed in track.frames_of(asked)]
+    (found,) = track._continuity(poses)
+    assert (found.verdict, found.index) == (verdict, 2)
+    assert found.error == pytest.approx(distance)
+
+
+# ---- robots
+
+
+ROBOTS = Greeting(1, (robot_inverse_kinematics.TASK,))
+
+
+@pytest.fixture(scope="module")
+def robot():
+    """A request for a robot of seven hinges, from where its target is."""
+    cases = robot_targets.cases(ROBOTS, "", 0, False)
+    return next(c for c in cases if c.name.startswith("seven") and c.family == robot_targets.AT)
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+@pytest.mark.parametrize(("side", "sign"), [("lower", -1.0), ("upper", 1.0)])
+def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verdict):
+    """Sixteen epsilons of the largest limit, 2.4 rad."""
+    q = robot.inputs["start"].copy()
+    q[3] = robot.inputs[side][3] + sign * share * 16 * EPSILON * 2.4
+    motions = {robot.name: robot_inverse_kinematics.trajectory_of(robot, {"q": q})}
+    (found, *_) = robot_inverse_kinematics._findings(robot, motions, ROBOTS, False, {"q": q})
+    assert (found.law, found.verdict, found.index) == ("limits kept", verdict, 3)
+
+
+@pytest.mark.parametrize(
+    ("distance", "angle", "claim", "verdicts"),
+    [
+        (0.9, 0.9, True, []),
+        (1.1, 0.9, True, [WRONG]),
+        (0.9, 1.1, True, [WRONG]),
+        (0.9, 0.9, False, [RIGHT_EXCEPT]),
+        (1.1, 0.9, False, []),
+        (0.9, 1.1, False, []),
+    ],
+)
+def test_a_claim_is_about_the_position_and_the_rotation(robot, distance, angle, claim, verdicts):
+    pose = SimpleNamespace(distance=distance, angle=angle, tolerance=1.0, tolerance_rotation=1.0)
+    found = robot_inverse_kinematics._target_laws(
+        pose, {"converged": claim}, robot, ROBOTS, False, False
+    )
+    assert [finding.verdict for finding in found if finding.law == "claims"] == verdicts
+
+
+def test_a_target_s_quaternion_may_have_either_sign(robot):
+    for sign in (1.0, -1.0):
+        inputs = {**robot.inputs, "target_rotation": sign * robot.inputs["target_rotation"]}
+        found = robot_models.judgement_of(inputs, robot.inputs["start"])
+        assert found.distance <= 1e-12
+        assert found.angle <= 1e-12
+
+
+# ---- reports
+
+
+def judgement(size, verdict, digits=None):
+    """Return a judgement of a case of so many numbers."""
+    case = Case(str(size), "", {"x": np.zeros(size)}, "", sentence(""))
+    finding = Finding("a law", verdict, 1.0, 0.0, "", sentence(""))
+    return CaseJudgement(case, Answer({}, 0.0), (finding,), {}, digits)
+
+
+def test_smallest_failure_has_the_worst_verdict_if_unexplained():
+    sizes = {1: RIGHT, 7: WRONG, 5: WRONG, 9: Verdict.BROKEN}
+    judgements = [judgement(size, verdict) for size, verdict in sizes.items()]
+    assert smallest_failure(judgements, explained=True) is judgements[2]
+    assert smallest_failure(judgements, explained=False) is judgements[3]
+    assert smallest_failure(judgements[:3], explained=False) is judgements[2]
+    assert smallest_failure(judgements[:1], explained=False) is None
+
+
+@pytest.mark.parametrize(
+    ("digits", "is_single"),
+    [([5.1, 8.9, 8.9], True), ([4.9, 8.0, 8.0], False), ([5.1, 9.1, 9.1], False), ([], False)],
+)
+def test_errors_of_five_to_nine_digits_are_those_of_single_precision(digits, is_single):
+    """The least decides where a fault is small in most cases, the median where it is in few."""
+    judgements = [judgement(1, WRONG, count) for count in (*digits, None)]
+    report = TaskReport("", "", judgements, Diagnosis())
+    assert is_off_by_single(report) is is_single
+    assert report.digits == min(digits, default=None)
+
+
+@pytest.mark.parametrize("single", ["positions", "velocities"])
+def test_least_precise_output_decides(rng, single):
+    case = Case("", "mass_spring_step", {"positions": rng.standard_normal(30)}, "", sentence(""))
+    outputs = {name: rng.standard_normal(30) for name in ("positions", "velocities")}
+    greeting = Greeting(1, ("mass_spring_step",))
+    exchange = Exchange(case, Answer(outputs, 0.0), None)
+    assert judging_greeting([exchange], greeting) == (greeting, None)
+    outputs[single] = outputs[single].astype(np.float32).astype(float)
+    coarse, reason = judging_greeting([exchange], greeting)
+    assert coarse.epsilon == pytest.approx(2.0**-23, rel=0.1)
+    assert reason is AS_SINGLE
+
+
+def test_faults_are_named_only_if_they_explain_more_than_a_part_of_them():
+    def match(share, *faults):
+        return Match(Variant(faults, lambda case: {}), share, 0.0, [])
+
+    right, as_good, better, whole = match(0.6), match(0.6, "a"), match(0.7, "b"), match(1.0, "c")
+    assert _telling([right, as_good, better]) == [better]
+    assert _telling([right, as_good, better, whole]) == [whole]
+    perfect, pair = match(1.0), match(0.95, "b", "e")
+    assert _telling([perfect, whole]) == [perfect]
+    # A combination that explains few answers, or hardly more than its parts, may be chance.
+    needless = [match(0.7, "b", "d"), match(0.85, "b", "f"), match(0.65, "g", "h")]
+    assert _telling([better, *needless, pair]) == [better, pair]
+
+
+@pytest.mark.parametrize(("again", "verdict"), [(np.nan, Verdict.RIGHT), (0.0, Verdict.WRONG)])
+def test_equal_answers_without_numbers_are_equal(again, verdict):
+    """What rounding allows of them is no number either."""
+    answers = [Answer({"positions": np.full((2, 3), x)}, 1e-3) for x in (np.nan, again)]
+    one = Exchange(Case("one", "mass_spring_step", {}, "x", sentence("It is all.")), *answers)
+    assert equal_answers(one, np.nan).verdict is verdict
+
+
+def test_a_fault_is_named_once_for_all_programs_that_it_may_be_in():
+    numbers = [{"energy": float(i)} for i in range(1, 5)]
+    cases = [Case(str(i), "energy", {"i": i}, "", sentence("")) for i in range(4)]
+    asked = [Exchange(case, Answer(x, 0.0), None) for case, x in zip(cases, numbers, strict=True)]
+
+    def variant(last, *faults):
+        right = {case.inputs["i"]: x for case, x in zip(cases, numbers, strict=True)}
+        return Variant(faults, lambda case: right[min(case.inputs["i"], last)])
+
+    variants = [variant(2, "a"), variant(1, "a"), variant(1, "b")]
+    told, _ = explain(variants, asked, lambda case: 1e-9, lambda keys: sentence("It is wrong."))
+    assert [(one.faults, one.share) for one in told] == [(("a",), 0.75), (("b",), 0.5)]

@@ -1,0 +1,364 @@
+"""Test the judge: laws catch every known fault, the search names it, honest solvers are right.
+
+A fault is caught if a law calls an answer wrong, or if the solver is judged by less than what it is
+sent; a mere reservation (RIGHT EXCEPT) does not count.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from plumbob.crosscheck.engines import SKELETON_ENGINES, forward_kinematics_by
+from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
+from plumbob.reference import Skeleton, forward_kinematics, solve_ik
+from plumbob.reference.explicit import symplectic_euler
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.skeleton import Pose
+
+from .case import Case
+from .fault_programs import coded_faults, contestant_of
+from .functions import FunctionContestant
+from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
+from .judgement import Verdict
+from .kinematics.faults import FAULTS, switches
+from .kinematics.limits import solve_within
+from .kinematics.predictions import predict_forward, predict_track, solve
+from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
+from .kinematics.robot_inverse_kinematics import solve_by_reference
+from .kinematics.robot_jacobian import TASK as ROBOT_JACOBIAN
+from .kinematics.robot_motions import TASK as ROBOT_TRACK
+from .kinematics.robot_motions import followed
+from .kinematics.robot_velocity import TASK as ROBOT_VELOCITY
+from .kinematics.switches import Switches
+from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
+from .mass_spring.forces import forces_with
+from .mass_spring.model import Integrator, StepModel, simulate
+from .mass_spring.problem import problem_of, state_of, system_of
+from .one_line.search import BY_LINES
+from .sentence import sentence
+from .verify import verify
+
+HONEST = "honest solvers"
+# The pins of models, and how they declare them.
+PINS: dict[str, Literal["overwritten", "penalty", "heavy"]] = {
+    "overwritten": "overwritten",
+    "penalty 1e10": "penalty",
+    "heavy 1e8": "heavy",
+}
+PRECISIONS: dict[Precision, type] = {"double": np.float64, "single": np.float32}
+FK, IK, STEP = "forward_kinematics", "inverse_kinematics", "mass_spring_step"
+MOTION = "mass_spring_motion"
+FAMILIES = {"forward": "forward kinematics", "ccd": "CCD", "fabrik": "FABRIK"}
+ALL_SYSTEMS = System(external_forces=True, tension_only=True)
+
+
+class Subject(NamedTuple):
+    """A solver with a known fault, or an honest one."""
+
+    name: str
+    family: str  # "CCD", "steps", "honest solvers"
+    task: str
+    function: Callable[..., Any]
+    greeting: Greeting
+    fault: str = ""  # its key; "" of an honest solver
+
+
+class Trial(NamedTuple):
+    """The judgement of a subject."""
+
+    subject: Subject
+    verdict: Verdict
+    laws: frozenset[str]  # that were broken
+    # whether the first explanation includes the fault; of an honest solver, whether there is none
+    named: bool
+
+    @property
+    def caught(self) -> bool:
+        """Whether a law is broken."""
+        return bool(self.laws)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the fault is caught and named, or the honest solver is not accused."""
+        if self.subject.fault:
+            return self.caught and self.named
+        return self.verdict <= Verdict.RIGHT_EXCEPT and self.named
+
+
+def attempt(subject: Subject) -> Trial:
+    """Judge a subject as `verify` judges any solver."""
+    contestant = FunctionContestant({subject.task: subject.function}, subject.greeting)
+    report = verify(contestant).tasks[0]
+    laws = frozenset(
+        finding.law
+        for judgement in report.judgements
+        for finding in judgement.findings
+        if finding.verdict >= Verdict.WRONG
+    )
+    if report.assumptions and (report.is_asked or report.verdict is Verdict.RIGHT_EXCEPT):
+        laws |= {"takes what is sent"}
+    explanations = report.diagnosis.explanations
+    keys = explanations[0].faults if explanations else ()
+    covered = {
+        key for faults in FAULTS.values() for f in faults if f.key in keys for key in f.covers
+    }
+    known = {*keys, *covered, *(NUMBER.sub("", key) for key in keys)}
+    is_named = subject.fault in known if subject.fault else not keys
+    return Trial(subject, report.verdict, laws, is_named)
+
+
+# The number of one of several rules of a robot's fault, at the end of its key.
+NUMBER = re.compile(r" \d+$")
+# Faults that show only in programs of another form, which the lines of their code make.
+ELSEWHERE = {
+    "positions before the last rotation", "positions before the last sweep",
+    "positions of the start", "product of quaternions reversed", "link rotated by the parent",
+    "parent by index",
+}  # fmt: skip
+
+
+def subjects() -> Iterator[Subject]:
+    """Yield every fault on its own, then the honest solvers."""
+    families = (_kinematic_faults, _mass_spring_faults, _robots, _right_kinematics, _right_steps)
+    for make in (*families, _limits):
+        yield from make()
+
+
+def _subjects(
+    family: str, task: str, functions: Mapping[str, Callable[..., Any]], **declared: Any
+) -> Iterator[Subject]:
+    """Yield a subject for each function; the name of a faulty function is its fault."""
+    greeting = Greeting(PROTOCOL, (task,), **declared)
+    for name, function in functions.items():
+        yield Subject(name, family, task, function, greeting, "" if family == HONEST else name)
+
+
+def _kinematic_faults() -> Iterator[Subject]:
+    for part, family in FAMILIES.items():
+        task, method = (FK, "") if part == "forward" else (IK, part)
+        faults = {
+            fault.key: switches([fault])._replace(rotating=fault.part == "quaternion")
+            for fault in FAULTS[part]
+            if not fault.honest and fault.key not in ELSEWHERE
+        }
+        functions = {key: partial(_textbook, method, setting) for key, setting in faults.items()}
+        yield from _subjects(family, task, functions, methods=(method,))
+
+
+def _limits() -> Iterator[Subject]:
+    programs = [fault for fault in coded_faults().values() if fault.family == "LIMIT"]
+    wrong = {fault.name: _function("ccd", fault.wrong_program) for fault in programs}
+    yield from _subjects("limits", IK, wrong, methods=("ccd",), limits=True)
+    right = {"program, limits": _function("ccd", programs[0].right_program)}
+    yield from _subjects(HONEST, IK, right, methods=("ccd",), limits=True)
+    for solver in ("ccd", "fabrik"):
+        function = {f"reference, {solver}, limits": partial(_solved, solver)}
+        yield from _subjects(HONEST, IK, function, methods=(solver,), limits=True)
+
+
+def _robots() -> Iterator[Subject]:
+    for task in (ROBOTS, ROBOT_TRACK, ROBOT_JACOBIAN, ROBOT_VELOCITY):
+        faults = [fault for fault in coded_faults().values() if fault.task == task]
+        programs = [fault for fault in faults if fault.name not in BY_LINES]
+        for fault in programs:
+            function = _function(task, fault.wrong_program)
+            greeting = contestant_of(fault.wrong_program).greeting
+            yield Subject(fault.name, "robots", task, function, greeting, fault.name)
+        right = {f"program, {task}": _function(task, programs[0].right_program)}
+        yield from _subjects(HONEST, task, right)
+    yield from _subjects(HONEST, ROBOT_TRACK, {"reference, tracking": _followed})
+    solvers = ("levenberg_marquardt", "damped_least_squares")
+    robots = {f"reference, {solver}, robots": partial(solve_by_reference, solver)
+              for solver in solvers}  # fmt: skip
+    yield from _subjects(HONEST, ROBOTS, robots)
+
+
+def _function(task: str, program: str) -> Callable[..., Any]:
+    """Return the function of a program."""
+    names: dict[str, Any] = {}
+    exec(compile(program, "program", "exec"), names)
+    return names[task]
+
+
+def _followed(**inputs: Any) -> Mapping[str, Any]:
+    tool = Pose(inputs["target_positions"], inputs["target_rotations"])
+    return {"q": followed(inputs, inputs["start"], tool)}
+
+
+def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str, Any]:
+    if not method:
+        return predict_forward(switched, Case("", "", inputs, "", sentence("")))
+    local, positions, _ = solve(method, inputs, switched)
+    return {"local_rotations": local, "positions": positions}
+
+
+def _track(method: str, /, **inputs: Any) -> Mapping[str, Any]:
+    outputs = predict_track(method, switches([]), Case("", "", inputs, "", sentence("")))
+    answer = {"positions": outputs["all_positions"]}
+    return answer | {name: outputs[name] for name in outputs if name == "local_rotations"}
+
+
+# Models of the step, and their declarations.
+LINEARISED = StepModel(Integrator("newton", "x_n", 1), damper="explicit")
+DAMPED = LINEARISED._replace(damper="end_velocity")
+CONVERGED = StepModel(Integrator("converged", "y"))
+LOCAL_GLOBAL = StepModel(Integrator("local_global", "y", 10))
+SYMPLECTIC = StepModel(Integrator("symplectic"), 10, "explicit", velocity="separate")
+
+
+def _declared(model: StepModel, method: Method, iterations: int | None = None) -> Step:
+    velocity: Any = "separate" if model.velocity == "separate" else "displacement"
+    fields: Any = {"start": model.integrator.start} if method != "symplectic" else {}
+    fields |= {"damper": model.damper, "substeps": model.substeps, "iterations": iterations}
+    return Step(method, pins="eliminated", velocity=velocity, **fields)
+
+
+DECLARED: dict[str, tuple[StepModel, Step]] = {
+    "linearised": (LINEARISED, _declared(LINEARISED, "linearised", 1)),
+    "linearised, implicit damping": (DAMPED, _declared(DAMPED, "linearised", 1)),
+    "converged": (CONVERGED, _declared(CONVERGED, "converged")),
+    "local/global": (LOCAL_GLOBAL, _declared(LOCAL_GLOBAL, "local_global", 10)),
+    "symplectic": (SYMPLECTIC, _declared(SYMPLECTIC, "symplectic")),
+}
+# Faults that requests for forces cannot show: these mark no tension-only springs.
+NO_FORCES = ("tension only ignored",)
+# The models that have a fault; the other faults are tried on a linearised step.
+_BASES = {
+    "h not divided": "symplectic",
+    "a substep missing": "symplectic",
+    "pins free until the end": "symplectic",
+    "velocity over the whole h": "symplectic",
+    "moved in place": "symplectic",
+    "pins at the origin": "local/global",
+    "damping matrix with h^1 too much": "linearised, implicit damping",
+    "damping matrix with h^-1 too much": "linearised, implicit damping",
+}
+
+
+class Stepper:
+    """A step with faults, which keeps the first h of each system for cached factors."""
+
+    def __init__(
+        self, model: StepModel, faults: Sequence[Option] = (), precision: type = np.float64
+    ) -> None:
+        self.model, self.faults, self.precision = model, tuple(faults), precision
+        self.first_h: dict[tuple[bytes, bytes], float] = {}
+
+    def __call__(self, **inputs: Any) -> dict[str, Any]:
+        """Return positions and velocities, rounded to the precision."""
+        system = inputs["masses"].tobytes(), inputs["stiffnesses"].tobytes()
+        p = problem_of(self._rounded(inputs), self.first_h.setdefault(system, inputs["h"]))
+        p, model = apply(self.faults, p, self.model)
+        with np.errstate(all="ignore"):
+            return self._rounded(simulate(p, model))
+
+    def _rounded(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            name: value.astype(self.precision).astype(float)
+            if isinstance(value, np.ndarray) and value.dtype.kind == "f"
+            else value
+            for name, value in values.items()
+        }
+
+
+def _mass_spring_faults() -> Iterator[Subject]:
+    options = _by_key([fault for fault in FORCE_FAULTS if fault.key not in NO_FORCES])
+    functions = {key: partial(_evaluated, option) for key, option in options.items()}
+    yield from _subjects("forces", "mass_spring_forces", functions, system=ALL_SYSTEMS)
+    # The short programs of faults have those of the forces or of the matrix alone.
+    for key, option in _by_key([fault for fault in STEP_FAULTS if not fault.part]).items():
+        base = "converged" if key.startswith("dampers at rest") else "linearised"
+        model, step = DECLARED[_BASES.get(key, base)]
+        stepper = {key: Stepper(model, [option])}
+        task = MOTION if option.aspect == "frames" else STEP
+        yield from _subjects("steps", task, stepper, system=ALL_SYSTEMS, step=step)
+
+
+def _by_key(options: Sequence[Option]) -> dict[str, Option]:
+    """Return the first option of each key."""
+    first: dict[str, Option] = {}
+    for option in options:
+        first.setdefault(option.key, option)
+    return first
+
+
+def _evaluated(option: Option, /, **inputs: Any) -> Mapping[str, Any]:
+    return {"forces": forces_with((option,), problem_of(inputs))}
+
+
+def _right_kinematics() -> Iterator[Subject]:
+    for precision, kind in PRECISIONS.items():
+        function = {f"reference, {precision}": partial(_placed, kind)}
+        yield from _subjects(HONEST, FK, function, precision=precision)
+    engines = {engine: partial(_placed_by, engine) for engine in SKELETON_ENGINES}
+    yield from _subjects(HONEST, FK, engines)
+    for solver in ("ccd", "fabrik", "levenberg_marquardt"):
+        function = {f"reference, {solver}": partial(_solved, solver)}
+        yield from _subjects(HONEST, IK, function, methods=(solver,))
+    for method in ("ccd", "fabrik"):
+        function = {f"textbook, {method}": partial(_track, method)}
+        yield from _subjects(HONEST, "track", function, methods=(method,))
+
+
+def _placed(kind: type, /, parents: Any, offsets: Any, local_rotations: Any) -> Any:
+    pose = forward_kinematics(Skeleton(parents, offsets), local_rotations)
+    return pose.positions.astype(kind), pose.rotations.astype(kind)
+
+
+def _placed_by(engine: str, /, parents: Any, offsets: Any, local_rotations: Any) -> Any:
+    skeleton = SKELETON_ENGINES[engine](Skeleton(parents, offsets))
+    return tuple(forward_kinematics_by(skeleton, local_rotations))
+
+
+def _solved(solver: str, /, parents: Any, offsets: Any, method: str, **inputs: Any) -> Any:
+    if "cones" in inputs:
+        return {
+            "local_rotations": solve_within(
+                solver, inputs | {"parents": parents, "offsets": offsets}
+            )
+        }
+    solution = solve_ik(Skeleton(parents, offsets), solver=solver, **inputs)
+    return {"local_rotations": solution.local_rotations, "positions": solution.positions}
+
+
+# Steps of the reference and of MuJoCo, and their declarations. The reference's damper and MuJoCo's
+# discrete step are part of the energy; see docs/verify.md.
+_REFERENCE: dict[str, tuple[Callable[..., Any], Step]] = {
+    "implicit Euler by Newton": (
+        lambda s, state, h: ImplicitEuler(s, h=h, solver="newton", tolerance=0.0).step(state).state,
+        Step("converged", damper="length_rate")),
+    "ten local/global iterations": (
+        lambda s, state, h: ImplicitEuler(
+            s, h=h, solver="local_global", tolerance=0.0, max_iterations=10).step(state).state,
+        Step("local_global", "y", 10, damper="length_rate")),
+    "symplectic Euler": (
+        symplectic_euler, Step("symplectic", damper="explicit", velocity="separate")),
+    "MuJoCo Euler": (
+        lambda s, state, h: MujocoMassSpring(s, h=h, integrator="Euler").step(state),
+        Step("symplectic")),
+    "MuJoCo discrete": (
+        lambda s, state, h: MujocoMassSpring(s, h=h, integrator="discrete").step(state),
+        Step("linearised")),
+}  # fmt: skip
+
+
+def _right_steps() -> Iterator[Subject]:
+    for name, (model, step) in DECLARED.items():
+        for precision, kind in PRECISIONS.items():
+            stepper = {f"{name}, {precision}": Stepper(model, (), kind)}
+            yield from _subjects(HONEST, STEP, stepper, step=step, precision=precision)
+        yield from _subjects(HONEST, STEP, {f"{name}, undeclared": Stepper(model)})
+    for pins, declared in PINS.items():
+        stepper = {f"linearised, pins {pins}": Stepper(LINEARISED._replace(pins=pins))}
+        yield from _subjects(HONEST, STEP, stepper, step=Step(pins=declared))
+    for name, (function, step) in _REFERENCE.items():
+        yield from _subjects(HONEST, STEP, {name: partial(_stepped, function)}, step=step)
+
+
+def _stepped(function: Callable[..., Any], /, **inputs: Any) -> dict[str, Any]:
+    p = problem_of(inputs)
+    state = function(system_of(p), state_of(p), p.h)
+    return {"positions": state.positions, "velocities": state.velocities}
