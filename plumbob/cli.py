@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from plumbob.bench.text import visible
+from plumbob.text.printable import visible
 
 from . import compile_notice, entry_point
 from .commands import bench, check, records, report, show, which

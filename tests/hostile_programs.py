@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.sentence import sentence
 from plumbob.verify.solvers import ProcessLimits
 from plumbob.verify.solvers.program import ProgramContestant
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes, solve_ik
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.explain import Variant, difference, explain
@@ -13,7 +14,6 @@ from plumbob.verify.judgement import (
     TaskReport,
     Verdict,
 )
-from plumbob.verify.sentence import sentence
 
 TOLERANCE = 1e-12
 

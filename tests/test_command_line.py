@@ -308,8 +308,8 @@ CHARACTER = "<mujoco><worldbody>{}</worldbody></mujoco>".format
 @pytest.fixture
 def robots(empty_folder, monkeypatch):
     """A folder of files, read without a process of their own."""
-    from plumbob.crosscheck import child_process
     from plumbob.crosscheck.robots import files
+    from plumbob.process import child as child_process
 
     monkeypatch.setattr(
         child_process.CallProcess, "call", lambda self, function, *given: function(*given)

@@ -9,6 +9,8 @@ import pytest
 import translate as catalogue
 
 from plumbob import cli
+from plumbob.text.language import translator
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer
 from plumbob.verify.greeting import Greeting
@@ -21,10 +23,8 @@ from plumbob.verify.judgement import (
     TaskReport,
     Verdict,
 )
-from plumbob.verify.language import translator
 from plumbob.verify.message import decode_greeting
 from plumbob.verify.output import json_file
-from plumbob.verify.sentence import sentence
 
 README = Path(__file__).parents[1] / "README.md"
 CHINESE = README.with_name("README.zh-CN.md")

@@ -12,11 +12,11 @@ from babel.messages import Catalog
 from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
 
-from plumbob.verify.language import DOMAIN, LANGUAGES, LOCALES
+from plumbob.text.language import DOMAIN, LANGUAGES, LOCALES
 
 ROOT = Path(__file__).resolve().parents[1]
 # The folders and files that call `sentence`.
-SOURCES = ("verify", "plumbob/commands/verify.py")
+SOURCES = ("verify", "plumbob/text", "plumbob/commands/verify.py")
 _UNIT = re.compile(r"\[[^\]]*\]")
 
 

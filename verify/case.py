@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .sentence import Sentence
+from plumbob.text.sentence import Sentence
 
 # What a solver owes a case: a right answer; an answer or a failure, since textbooks divide by zero
 # there; or any of several answers that the laws allow, or a failure.

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from .sentence import Sentence, sentence
+from plumbob.text.sentence import Sentence, sentence
 
 T = TypeVar("T")
 # The processor time that the search for the cause of one task's answers may take [s]: wall time

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Protocol
 
+from plumbob.text.sentence import Sentence
+
 from .case import Case
 from .greeting import Greeting
-from .sentence import Sentence
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from plumbob.text.sentence import Sentence, sentence
+
 from .case import Case
 from .contestant import Answer, Exchange
 from .judgement import LEAST_SHARE, CaseJudgement, Explanation, Verdict
-from .sentence import Sentence, sentence
 
 # A variant is compared with all answers only if it reproduces one of the first, most telling ones.
 TRIAL = 4

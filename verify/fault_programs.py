@@ -11,9 +11,10 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from plumbob.text.sentence import Sentence
+
 from .functions import FunctionContestant
 from .message import decode_greeting
-from .sentence import Sentence
 from .solvers.host import PythonSolver
 
 FOLDER = Path(__file__).parent

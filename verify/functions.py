@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from plumbob.text.sentence import Sentence, did_you_mean, sentence
+
 from .case import Case
 from .contestant import Answer, Failure, FailureKind, Functions
 from .greeting import Greeting
-from .sentence import Sentence, did_you_mean, sentence
 from .task import TASKS, Field, Task
 
 # The limit of points where a request leaves their number open: no case needs a tenth of them, and

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from plumbob.text.sentence import Sentence, sentence
+
 from .case import Case
 from .constants import MEASURES, is_unread
 from .contestant import Answer, Contestant, Failure, is_hung
@@ -23,7 +25,6 @@ from .explain import largest_gap
 from .greeting import Greeting
 from .judgement import Explanation, TaskReport, Verdict
 from .kinematics.robot_models import urdf
-from .sentence import Sentence, sentence
 from .task import TASKS
 
 # The largest requests in which an input is changed; all answers must stay the same.

@@ -6,10 +6,11 @@ from enum import IntEnum
 from functools import cached_property
 from typing import Any
 
+from plumbob.text.sentence import Sentence, codes_in, sentence
+
 from .case import Case
 from .contestant import Answer, Failure
 from .greeting import Greeting
-from .sentence import Sentence, codes_in, sentence
 
 # The least share of the answers that a likely fault reproduces.
 LEAST_SHARE = 0.5

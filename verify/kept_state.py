@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from plumbob.text.sentence import Sentence, with_code
+
 from .contestant import Answer, Contestant, is_hung
 from .explain import difference
 from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
-from .sentence import Sentence, with_code
 
 NAME = "state kept between requests"
 FAULT = tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8"))["state"][NAME]

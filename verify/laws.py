@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import Sentence, sentence
 
 from .contestant import Answer, Exchange
 from .explain import largest_gap
 from .judgement import CaseJudgement, Finding, Verdict
-from .sentence import Sentence, sentence
 from .timing import time_call
 
 # Numbers that differ by less than this share are alike, in single precision too.

@@ -19,11 +19,12 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 import msgspec
 import numpy as np
 
+from plumbob.text.sentence import Sentence, did_you_mean, sentence
+
 from .case import Case
 from .contestant import Answer, Failure, FailureKind
 from .functions import checked, raised, understand
 from .greeting import MOST_ITERATIONS, PROTOCOL, Greeting
-from .sentence import Sentence, did_you_mean, sentence
 from .task import TASKS, Task
 
 GREETING = "greeting"

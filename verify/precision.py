@@ -7,10 +7,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from plumbob.text.sentence import Sentence, sentence
+
 from .contestant import Answer, Exchange
 from .greeting import Greeting
 from .judgement import TaskReport
-from .sentence import Sentence, sentence
 
 # The numbers of an output that suffice, since 99 % of doubles have 15 digits or more; requests with
 # no larger share of such numbers are left out.

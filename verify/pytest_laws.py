@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
+from plumbob.text.printable import harmless, visible
+
 from .functions import FunctionContestant
 from .judgement import LEAST_SHARE, TaskReport, Verdict
 from .message import decode_greeting
-from .sentence import harmless, visible
 from .solvers.host import PythonSolver
 from .verify import DISCIPLINES, judge_cases, trials
 

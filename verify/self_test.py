@@ -17,6 +17,7 @@ from plumbob.reference import Skeleton, forward_kinematics, solve_ik
 from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.skeleton import Pose
+from plumbob.text.sentence import sentence
 
 from .case import Case
 from .fault_programs import coded_faults, contestant_of
@@ -38,7 +39,6 @@ from .mass_spring.forces import forces_with
 from .mass_spring.model import Integrator, StepModel, simulate
 from .mass_spring.problem import problem_of, state_of, system_of
 from .one_line.search import BY_LINES
-from .sentence import sentence
 from .verify import verify
 
 HONEST = "honest solvers"

@@ -7,6 +7,8 @@ from typing import NamedTuple, Protocol
 
 import msgspec
 
+from plumbob.text.sentence import Sentence, codes_in, sentence
+
 from . import precision
 from .case import Case
 from .cause_search import SECONDS, CauseSearch, NoSearch
@@ -32,7 +34,6 @@ from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
 from .mass_spring.stepping import Stepping
 from .one_line.search import with_changed_line
-from .sentence import Sentence, codes_in, sentence
 from .task import BUILDS_ON
 from .timing import with_lesser_time
 

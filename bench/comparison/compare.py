@@ -8,12 +8,13 @@ from dataclasses import replace
 from textwrap import wrap
 from typing import NamedTuple
 
+from plumbob.text.printable import visible
+
 from ..harness.metrics import adjusted
 from ..harness.record import Record
 from ..tables.columns import text
 from ..tables.results import counted
 from ..tables.table import Summary, Table, cells
-from ..text import visible
 from . import times
 from .answers import (
     ERROR,

@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from plumbob.text.printable import visible
+
 from ..harness.record import Record, on_record
 from ..tables.columns import text
 from ..tables.results import counted, printable
 from ..tables.table import Column, Table, cells
-from ..text import visible
 from .rows import RowKey, by_row, contains_any, distinguishing
 
 BLOCKS = "▁▂▃▄▅▆▇█"

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.child_process import ChildProcess, LostError, one_thread
+from plumbob.process.child import ChildProcess, LostError, one_thread
 
 from ..harness.metrics import adjusted
 from ..harness.record import Record, untyped

@@ -18,9 +18,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from plumbob.text.printable import shortened
+
 from ..peers.registry import Style
 from ..tables.results import label
-from ..text import shortened
 from .chart import GREY, LINE, SPAN, Axis, Chart, Panel, Series, looks
 from .style import COLOURS, PARAMETERS, plain_label
 

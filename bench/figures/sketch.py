@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..harness.record import check_regular
+from plumbob.process.paths import check_regular
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

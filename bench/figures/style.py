@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from ..text import shortened
+from plumbob.text.printable import shortened
 
 _STYLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 COLOURS: dict[str, str] = _STYLE["colours"]

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from .record import check_regular
+from plumbob.process.paths import check_regular
 
 LOCK_NAME = "records.lock"
 

@@ -6,14 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from plumbob.crosscheck.child_process import (
-    SILENT,
-    ChildProcess,
-    Loss,
-    LostError,
-    pickled,
-    python_process,
-)
+from plumbob.process.child import SILENT, ChildProcess, Loss, LostError, pickled, python_process
 
 from .progress import Progress, announce
 from .worker import Calculation, Finished, Lap, Message, Numbers, Ready, Solved, Started

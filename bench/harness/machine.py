@@ -22,7 +22,7 @@ PACKAGES = (
     *("gymnasium", "dm_control", "matplotlib"),
 )
 ROOT = Path(__file__).resolve().parents[2]
-_PACKAGES = ("reference", "crosscheck", "verify", "bench")
+_PACKAGES = ("reference", "crosscheck", "verify", "bench", "plumbob/process")
 # Folders that only show numbers; all others may change one. Nothing that measures imports them.
 PRESENTATION = (
     *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),

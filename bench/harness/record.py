@@ -10,7 +10,6 @@ import io
 import json
 import mmap
 import os
-import stat
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,12 +18,12 @@ from typing import Annotated, Any, Literal, NamedTuple, TypedDict
 import msgspec
 import numpy as np
 
+from plumbob.process.paths import check_folder, check_regular
+
 from . import values
 
 FORMAT = 3
 FILE_NAME = "records.jsonl"
-# Reading a file takes several times its size of memory; the whole bench writes a hundredth of this.
-LARGEST = 1 << 30
 # The suite of the records that say of each other suite that it was run to its end.
 FINISHED = "finished"
 # The fact that counts the targets of a slow solver, which got the first targets only.
@@ -357,38 +356,6 @@ def _write_errors_named(path: Path) -> Iterator[None]:
     except OSError as error:
         why = f"{error.strerror}; what was finished before is on record"
         raise OSError(error.errno, why, str(path)) from None
-
-
-def check_regular(path: Path) -> None:
-    """Make sure that a path is a file that can be read to its end, or does not exist.
-
-    Raises:
-        ValueError: if it is a folder, a pipe or a device, or larger than `LARGEST`.
-    """
-    try:
-        mode, size = path.stat().st_mode, path.stat().st_size
-    except (FileNotFoundError, NotADirectoryError):
-        return
-    if not stat.S_ISREG(mode):
-        raise ValueError(f"{path}: expected a file, got a {_kind_of_file(mode)}")
-    if size > LARGEST:
-        raise ValueError(f"{path}: expected at most {LARGEST} bytes, got {size}")
-
-
-def check_folder(path: Path) -> None:
-    """Make sure that a path is a folder, or does not exist.
-
-    Raises:
-        ValueError: if it is a file, a pipe or a device.
-    """
-    if path.exists() and not path.is_dir():
-        raise ValueError(f"{path}: expected a folder, got a {_kind_of_file(path.stat().st_mode)}")
-
-
-def _kind_of_file(mode: int) -> str:
-    kinds = {stat.S_IFDIR: "folder", stat.S_IFIFO: "pipe", stat.S_IFREG: "file"}
-    kinds |= {stat.S_IFCHR: "device", stat.S_IFBLK: "device", stat.S_IFSOCK: "socket"}
-    return kinds.get(stat.S_IFMT(mode), "special file")
 
 
 def _is_unfinished(line: bytes) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.child_process import connect
+from plumbob.process.child import connect
 
 from ..peers.protocol import OwnTime, describe
 from .progress import Progress, listening

@@ -15,10 +15,10 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from plumbob.verify.output.html import environment
+from plumbob.text.html import environment
+from plumbob.text.printable import visible
 
 from ..figures.style import COLOURS
-from ..text import visible
 
 Floats = NDArray[np.float64]
 

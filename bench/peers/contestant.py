@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Failure
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.message import NO_SECONDS
-from plumbob.verify.sentence import sentence
 from plumbob.verify.solvers import ProcessLimits, open_contestant
 
 from .entrant import Spec

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from plumbob.reference import MassSpring, State
+from plumbob.text.printable import visible
 from plumbob.verify.message import shown
 
-from ..text import visible
 from .chains import TargetsForSkeleton
 from .robots import BenchRobot
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterable, Sequence
 
+from plumbob.text.printable import visible
+
 from ..peers.registry import peers_command
 from ..tables.aligned import filled
 from ..tables.entered import remarks_of_entrants
 from ..tables.results import Results, counted, grouped
 from ..tables.table import is_blank, words
-from ..text import visible
 from .headlines import ClaimCount, Overview, overview
 from .report import BenchReport
 from .sections import tables

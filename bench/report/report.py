@@ -4,17 +4,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from plumbob.process.paths import check_regular
+from plumbob.text.printable import shortened, visible
+
 from ..experiments import SUITES
 from ..experiments.robots.figures import robot_maps
 from ..figures.sketch import Drawing, drawn
-from ..harness.record import FINISHED, Record, check_regular
+from ..harness.record import FINISHED, Record
 from ..peers.registry import peers_command
 from ..tables.latex import latex
 from ..tables.layout import Figure
 from ..tables.results import Results, listed, results_of
 from ..tables.table import Table
 from ..tables.writers import comma_separated, markdown
-from ..text import shortened, visible
 from .headlines import Overview, absent, not_asked, overview
 from .page.page import Contents, render
 from .sections import MOTIONS, SECTIONS

@@ -9,7 +9,8 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text
 
-from ..text import harmless
+from plumbob.text.printable import harmless
+
 from .table import Table, best_cells, column_widths, naming, without_empty, words
 
 GAP = 2

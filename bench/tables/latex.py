@@ -13,8 +13,9 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 
+from plumbob.text.printable import shortened
+
 from ..harness.metrics import Share
-from ..text import shortened
 from .table import Cell, Table, best_cells, column_widths, naming, without_empty, words
 from .tex_text import breakable, escaped, word_parts
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from plumbob.text.printable import all_visible
+
 from ..harness.metrics import Ranking
 from ..harness.record import Record, on_record
 from ..peers import registry
-from ..text import all_visible
 from .table import words
 
 # The relative precision of a displayed time, given the drift of its machine.

@@ -3,7 +3,8 @@
 import re
 import unicodedata
 
-from ..text import chunks
+from plumbob.text.printable import chunks
+
 from .writers import POWER
 
 # Between letters that TeX would join.

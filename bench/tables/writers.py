@@ -8,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-from plumbob.verify.output import html
+from plumbob.text import html
 
 from ..harness.metrics import Share
 from .table import Cell, Table, best_cells, words

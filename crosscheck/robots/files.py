@@ -11,11 +11,11 @@ from xml.etree.ElementTree import ElementTree
 
 import numpy as np
 
+from plumbob.process.child import CallProcess, LostError
 from plumbob.reference import Articulation, Skeleton, forward_kinematics, jacobians, rotation
 from plumbob.reference.formats import bvh
 from plumbob.reference.formats.source import read_text
 
-from ..child_process import CallProcess, LostError
 from ..engines import ROBOT_ENGINES
 from ..engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind, xml_root
 from ..engines.robot_engine import UnreadableError

@@ -14,7 +14,7 @@ import typer
 from plumbob.bench.experiments import EXPERIMENTS, SUITES
 from plumbob.bench.harness.compile_ahead import compiling_ahead
 from plumbob.bench.harness.progress import TROUBLE, Progress, listening
-from plumbob.bench.text import visible
+from plumbob.text.printable import visible
 
 from .. import terminal
 from ..help_text import fitted

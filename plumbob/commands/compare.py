@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from plumbob.bench.text import visible
+from plumbob.text.printable import visible
 
 from ..terminal import print_aligned, width
 from .options import (

@@ -15,7 +15,7 @@ def explain(
 
     With words: list the faults that have all of them. Without: list the families of faults.
     """
-    from plumbob.verify.language import language_of
+    from plumbob.text.language import language_of
     from plumbob.verify.output.fault_text import fault_help
     from plumbob.verify.output.words import speaker
 

@@ -62,7 +62,7 @@ def writable(folder: Path) -> None:
         OSError: if the folder is not writable.
         ValueError: if it is not a folder.
     """
-    from plumbob.bench.harness.record import check_folder
+    from plumbob.process.paths import check_folder
 
     check_folder(folder)
     try:
@@ -75,7 +75,7 @@ def writable(folder: Path) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a file, and make its folder if necessary."""
-    from plumbob.bench.harness.record import check_regular
+    from plumbob.process.paths import check_regular
 
     check_regular(path)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -64,7 +64,8 @@ def merge(
     A failed measurement never replaces a successful one. The folders are not changed.
     """
     from plumbob.bench.harness.folder_lock import locked
-    from plumbob.bench.harness.record import RecordFile, check_folder
+    from plumbob.bench.harness.record import RecordFile
+    from plumbob.process.paths import check_folder
 
     candidates = [record for folder in folders for record in _read(folder)]
     check_folder(into)
@@ -140,7 +141,7 @@ def _rank(record: "Record") -> tuple[bool, str]:
 def _machines(records: "Iterable[Record]") -> set[str]:
     """Return the machines on which records were measured."""
     from plumbob.bench.tables.results import counted
-    from plumbob.bench.text import visible
+    from plumbob.text.printable import visible
 
     machines = (record.stamp.get("machine", {}) for record in records if record.stamp)
     forms = {"cores": lambda number: counted(number, "core"), "memory_gib": "{} GiB".format}

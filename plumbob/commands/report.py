@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from plumbob.bench.text import visible
+from plumbob.text.printable import visible
 
 from ..terminal import print_lines, print_outcome
 from .options import REPORT, SUCCESS, File, Texts, argument, flag, option, valid_name
@@ -113,7 +113,7 @@ def formatted(table: "Table", form: str, width: str = "page") -> str:
 
 def _write(text: str, output: Path | None) -> int:
     """Write a text to standard output or a file."""
-    from plumbob.bench.harness.record import check_regular
+    from plumbob.process.paths import check_regular
 
     if output is None:
         print(text, end="")

@@ -14,8 +14,8 @@ from plumbob.bench.peers import opening, registry
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.problems import files
 from plumbob.bench.problems.own import OwnProblem
-from plumbob.bench.text import visible
 from plumbob.reference.arguments import name_list
+from plumbob.text.printable import visible
 
 # The tasks whose problems are robots.
 ROBOT_TASKS = (REACHABLE, UNREACHABLE, TRAC_IK, TOOLBOX)

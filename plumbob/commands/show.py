@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from plumbob.bench.text import visible
+from plumbob.text.printable import visible
 
 from ..terminal import progress
 from .options import REPORT, SUCCESS, File, Text, argument, flag, option, valid_name, writable
@@ -72,8 +72,8 @@ def _draw(
     name: str, path: Path, solver: str | None, coherent: bool, entrant: "YourSolver | None"
 ) -> None:
     """Write a scene to a file with a progress bar."""
-    from plumbob.bench.harness.record import check_regular
     from plumbob.bench.show.scenes import write
+    from plumbob.process.paths import check_regular
 
     check_regular(path)
     writable(path.parent)

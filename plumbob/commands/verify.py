@@ -14,11 +14,11 @@ from ..help_text import Command
 from .options import FAILED, SUCCESS, File, Text, Texts, argument, flag, option
 
 if TYPE_CHECKING:
+    from plumbob.text.sentence import Sentence
     from plumbob.verify.judgement import Report
     from plumbob.verify.output.files import Files
     from plumbob.verify.output.question import Question
     from plumbob.verify.output.words import Presentation, Say
-    from plumbob.verify.sentence import Sentence
     from plumbob.verify.solvers import ProcessLimits
     from plumbob.verify.verify import Notify
 
@@ -86,7 +86,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     3 if Plumbob itself failed at a task and the other tasks are right.
     """
     # Solver and reference are timed on one thread each; NumPy is not imported yet.
-    from plumbob.crosscheck.child_process import one_thread
+    from plumbob.process.child import one_thread
 
     os.environ |= {**one_thread(), **os.environ}
     from ..terminal import lines_in_a_pipe, progress
@@ -95,7 +95,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         bar = work.enter_context(progress())
         work.enter_context(lines_in_a_pipe(bar, (LINE_PAUSE, LINE_PAUSE)))
         bar.add_task("starting", total=None)
-        from plumbob.verify.language import language_of
+        from plumbob.text.language import language_of
         from plumbob.verify.output.files import Files
         from plumbob.verify.output.question import ANSWERS, Question, limits
         from plumbob.verify.output.words import Presentation, speaker
@@ -137,11 +137,11 @@ def _judge(
     bar: Any,
 ) -> Callable[[], int]:
     """Judge a solver; return what prints the verdict, writes the files and gives the exit code."""
-    from plumbob.bench.harness.record import check_regular
+    from plumbob.process.paths import check_regular
+    from plumbob.text.sentence import sentence
     from plumbob.verify.contestant import NoGreetingError
     from plumbob.verify.output.files import UNJUDGED
     from plumbob.verify.output.question import ask, opened, suited
-    from plumbob.verify.sentence import sentence
     from plumbob.verify.verify import failed
 
     from .options import writable

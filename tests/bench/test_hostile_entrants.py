@@ -26,11 +26,11 @@ from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.protocol import NoAnswerError
 from plumbob.bench.problems.chains import TargetsForSkeleton
 from plumbob.reference import Skeleton
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.message import NO_SECONDS
-from plumbob.verify.sentence import sentence
 from plumbob.verify.solvers import export, open_contestant
 
 NOT_TIMED = sentence('Not timed: the answers hold no valid "seconds".')

@@ -10,7 +10,7 @@ import pytest
 
 from plumbob.bench.harness import machine
 
-PACKAGES = ("reference", "crosscheck", "verify", "bench")
+PACKAGES = ("reference", "crosscheck", "verify", "bench", "plumbob/process")
 ROOT = Path(machine.__file__).resolve().parents[2]
 
 

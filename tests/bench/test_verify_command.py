@@ -13,10 +13,10 @@ import pytest
 from small_discipline import SMALL
 
 from plumbob import cli
+from plumbob.text.sentence import sentence
 from plumbob.verify import verify
 from plumbob.verify.case import Case
 from plumbob.verify.output import saved
-from plumbob.verify.sentence import sentence
 
 RIGHT = """
 import numpy as np

@@ -13,6 +13,8 @@ from rich.cells import cell_len
 from small_discipline import SMALL, own_rotation
 
 from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.text.language import translator
+from plumbob.text.sentence import Sentence, sentence, with_code
 from plumbob.verify import verify
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, FailureKind
@@ -27,7 +29,6 @@ from plumbob.verify.judgement import (
     TaskReport,
     Verdict,
 )
-from plumbob.verify.language import translator
 from plumbob.verify.output import (
     comparison,
     drawing,
@@ -38,7 +39,6 @@ from plumbob.verify.output import (
     terminal,
 )
 from plumbob.verify.output.words import GOOD, Presentation, digits, explanations, speaker
-from plumbob.verify.sentence import Sentence, sentence, with_code
 
 HOSTILE = '<script>alert(1)</script>\x1b[31m\u202e & "quotes" \' ]]>'
 TASKS = tuple(SMALL)

@@ -13,7 +13,7 @@ import pytest
 from plumbob.bench.harness import isolation
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.worker import Ready
-from plumbob.crosscheck.child_process import ChildProcess
+from plumbob.process.child import ChildProcess
 
 ROOT = Path(isolation.__file__).resolve().parents[2]
 PATIENCE = 3.0

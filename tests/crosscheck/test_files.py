@@ -10,7 +10,6 @@ from functools import partial
 import numpy as np
 import pytest
 
-from plumbob.crosscheck.child_process import CallProcess, LostError
 from plumbob.crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
 from plumbob.crosscheck.robots import comparisons, files, independent_bvh
 from plumbob.crosscheck.robots.comparisons import sweep_in_parts
@@ -31,6 +30,7 @@ from plumbob.crosscheck.robots.files import (
 )
 from plumbob.crosscheck.robots.models import RobotFile
 from plumbob.crosscheck.tolerances import POSITION
+from plumbob.process.child import CallProcess, LostError
 from plumbob.reference import Skeleton, rotation
 from plumbob.reference.formats import bvh, mjcf
 

@@ -6,10 +6,10 @@ import sys
 import numpy as np
 import pytest
 
-from plumbob.crosscheck.process_tree import main_thread_seconds
+from plumbob.process.tree import main_thread_seconds
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer
-from plumbob.verify.sentence import sentence
 from plumbob.verify.solvers import ProcessLimits, open_contestant
 from plumbob.verify.solvers.claimed_time import contradicts
 

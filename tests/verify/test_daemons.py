@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hostile_programs import case, program, running
 
-from plumbob.crosscheck import process_tree
+from plumbob.process import tree as process_tree
 from plumbob.verify.contestant import Answer
 from plumbob.verify.solvers import open_contestant
 

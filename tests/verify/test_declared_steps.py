@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.explain import Variant, explain
@@ -15,7 +16,6 @@ from plumbob.verify.mass_spring.model import Integrator, StepModel, simulate
 from plumbob.verify.mass_spring.pin_strength import measured_pins
 from plumbob.verify.mass_spring.problem import problem_of
 from plumbob.verify.self_test import Stepper
-from plumbob.verify.sentence import sentence
 from plumbob.verify.verify import DISCIPLINES, judge_cases
 
 STEP, MOTION = "mass_spring_step", "mass_spring_motion"

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, FailureKind, NoGreetingError
 from plumbob.verify.greeting import Greeting
-from plumbob.verify.sentence import sentence
 from plumbob.verify.solvers import export, open_contestant
 from plumbob.verify.solvers.export import export_cases, write_cases
 from plumbob.verify.solvers.files import FileContestant, place_of

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hostile_programs import LIMITS, case, running
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, NoGreetingError
 from plumbob.verify.functions import call
@@ -23,7 +24,6 @@ from plumbob.verify.message import (
     encode_answer,
     encode_case,
 )
-from plumbob.verify.sentence import sentence
 from plumbob.verify.solvers import ProcessLimits, host, open_contestant
 from plumbob.verify.solvers.files import FileContestant
 from plumbob.verify.solvers.program import ProgramContestant

@@ -13,6 +13,7 @@ import pytest
 import write_faults
 from rich.cells import cell_len
 
+from plumbob.text.sentence import codes_in, sentence
 from plumbob.verify.fault_programs import (
     PROGRAMS,
     coded_faults,
@@ -33,7 +34,6 @@ from plumbob.verify.output.fault_text import (
     fault_help,
 )
 from plumbob.verify.output.words import Presentation, advice, reservations, speaker
-from plumbob.verify.sentence import codes_in, sentence
 from plumbob.verify.verify import verify
 
 REMEDY = sentence("Remedy")

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from hostile_programs import LIMITS, LOOP, case, program, running
 
-from plumbob.crosscheck import child_process
-from plumbob.crosscheck.child_process import ChildProcess
+from plumbob.process import child as child_process
+from plumbob.process.child import ChildProcess
 from plumbob.verify.contestant import Answer, Failure, FailureKind, NoGreetingError
 from plumbob.verify.judgement import Diagnosis, TaskReport
 from plumbob.verify.solvers.program import ProgramContestant

@@ -5,6 +5,7 @@ import itertools
 import pytest
 from kinematics_solvers import FORWARD, INVERSE, METHODS, named, textbook
 
+from plumbob.text.sentence import Sentence, sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer
 from plumbob.verify.functions import FunctionContestant
@@ -17,7 +18,6 @@ from plumbob.verify.judgement import (
 )
 from plumbob.verify.kinematics.faults import by_key
 from plumbob.verify.laws import finding
-from plumbob.verify.sentence import Sentence, sentence
 from plumbob.verify.verify import _with_cause, verify
 
 # Faults of forward kinematics: one, two, and one that is never tried together with others.

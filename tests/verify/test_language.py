@@ -5,9 +5,9 @@ import gettext
 import pytest
 import translate as catalogue
 
+from plumbob.text.language import LANGUAGES, language_of, translator
+from plumbob.text.sentence import sentence
 from plumbob.verify.explain import either
-from plumbob.verify.language import LANGUAGES, language_of, translator
-from plumbob.verify.sentence import sentence
 
 TRANSLATED = [name for name in LANGUAGES if LANGUAGES[name]]
 TEMPLATES = catalogue.templates()

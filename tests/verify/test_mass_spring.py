@@ -10,6 +10,7 @@ import pytest
 from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
 from plumbob.reference.explicit import runge_kutta, symplectic_euler
 from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, FailureKind
 from plumbob.verify.fault_programs import contestant_of, source_of
@@ -42,7 +43,6 @@ from plumbob.verify.self_test import (
     LOCAL_GLOBAL,
     Stepper,
 )
-from plumbob.verify.sentence import sentence
 from plumbob.verify.verify import MAX_HANGS, verify
 
 EVERYTHING = System(external_forces=True, tension_only=True)

@@ -7,6 +7,7 @@ shows only here.
 import numpy as np
 import pytest
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.greeting import Step
@@ -22,7 +23,6 @@ from plumbob.verify.mass_spring.laws import (
 )
 from plumbob.verify.mass_spring.model import Integrator, StepModel, predicted
 from plumbob.verify.mass_spring.problem import problem_of
-from plumbob.verify.sentence import sentence
 
 EPSILON = 2.0**-52
 LINEARISED = StepModel(Integrator("newton", "x_n", 1), damper="explicit")

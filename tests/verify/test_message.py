@@ -12,6 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, FailureKind
 from plumbob.verify.functions import understand
@@ -26,7 +27,6 @@ from plumbob.verify.message import (
     encode_greeting,
     shown,
 )
-from plumbob.verify.sentence import sentence
 from plumbob.verify.task import TASKS
 
 DOUBLES = st.floats(allow_nan=True, allow_infinity=False, allow_subnormal=True)

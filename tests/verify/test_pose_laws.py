@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from plumbob.reference import Skeleton, forward_kinematics, rotation
+from plumbob.text.sentence import sentence
 from plumbob.verify import laws
 from plumbob.verify.case import Case
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import inverse_kinematics, pose_laws
-from plumbob.verify.sentence import sentence
 
 EPSILON = {"double": 2.0**-52, "single": 2.0**-23}
 RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from kinematics_solvers import textbook
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer
 from plumbob.verify.functions import FunctionContestant
@@ -30,7 +31,6 @@ from plumbob.verify.output import json_file, junit, page, terminal
 from plumbob.verify.output.words import Presentation, speaker
 from plumbob.verify.precision import has_double
 from plumbob.verify.self_test import DECLARED, Stepper
-from plumbob.verify.sentence import sentence
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
 
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.explain import Match, Variant, _telling, explain
@@ -34,7 +35,6 @@ from plumbob.verify.laws import HOLDS, equal_answers
 from plumbob.verify.mass_spring import energy, forces
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.verify.precision import AS_SINGLE, is_off_by_single, judging_greeting
-from plumbob.verify.sentence import sentence
 
 EPSILON = 2.0**-52
 RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG

@@ -2,9 +2,9 @@
 
 import pytest
 
+from plumbob.text.sentence import sentence
 from plumbob.verify import timing
 from plumbob.verify.contestant import Answer, Failure, FailureKind
-from plumbob.verify.sentence import sentence
 
 UNTIMED = sentence("Not timed.")
 

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plumbob.reference import Skeleton, forward_kinematics, local_from_global, rotation
+from plumbob.text.sentence import Sentence, codes_in, with_code
 
 from ..case import Case
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
-from ..sentence import Sentence, codes_in, with_code
 from .faults import TABLE
 from .pose_laws import AnsweredPose
 from .predictions import path_to, solve

@@ -7,11 +7,11 @@ import numpy as np
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import Sentence
 
 from ..case import Case
 from ..judgement import Finding
 from ..laws import LAWS, finding
-from ..sentence import Sentence
 from .predictions import forward
 
 # Shorter than this share of the reach counts as zero.

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..explain import ending_test
 from ..greeting import Greeting
 from ..judgement import Explanation
-from ..sentence import Sentence, sentence, with_code
 from .faults import TABLE, by_key, sentences_of
 from .predictions import solve
 from .sweeps import PoseTrial

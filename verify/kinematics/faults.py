@@ -7,9 +7,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from plumbob.text.sentence import Sentence, codes_in, sentence, with_code
+
 from ..explain import either
 from ..judgement import LEAST_SHARE, TaskReport
-from ..sentence import Sentence, codes_in, sentence, with_code
 from .algebra import (
     FIRST_COMPONENT,
     FIRST_CROSS_TERM,

@@ -10,6 +10,7 @@ import numpy as np
 from plumbob.reference import rotation
 from plumbob.reference.inverse_kinematics import solve_ik
 from plumbob.reference.skeleton import Skeleton
+from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -17,7 +18,6 @@ from ..contestant import Answer, Exchange, Failure, FailureKind
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case
-from ..sentence import sentence
 from . import (
     claims,
     degenerate,

@@ -15,12 +15,12 @@ from scipy.spatial.transform import Rotation
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray
+from plumbob.text.sentence import Sentence, with_code
 
 from ..explain import either
 from ..formulas import value_of
 from ..greeting import Greeting
 from ..judgement import Explanation, Verdict
-from ..sentence import Sentence, with_code
 from .faults import TABLE, SwitchFault, describe, switches
 from .predictions import RIGHT, forward
 from .sweeps import PoseTrial

@@ -12,10 +12,10 @@ import numpy as np
 
 from plumbob.reference import curves, rotation
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..greeting import Greeting
-from ..sentence import sentence
 from . import skeletons
 from .predictions import forward, path_to, solve
 from .skeletons import CaseFamily, PosedSkeleton

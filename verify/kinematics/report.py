@@ -6,6 +6,8 @@ from functools import partial
 
 import numpy as np
 
+from plumbob.text.sentence import Sentence
+
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..explain import TRIAL, explain, first_broken
@@ -19,7 +21,6 @@ from ..judgement import (
     smallest_failures,
 )
 from ..laws import finding, hints_of, laws_that_hold, proportion_of
-from ..sentence import Sentence
 from .faults import SwitchFault, describe
 from .predictions import variants
 

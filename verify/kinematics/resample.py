@@ -8,6 +8,7 @@ import numpy as np
 
 from plumbob.reference import curves
 from plumbob.reference.arguments import FloatArray, distinct_texts
+from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -16,7 +17,6 @@ from ..explain import Variant, explain
 from ..greeting import Greeting
 from ..judgement import Diagnosis, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case
-from ..sentence import Sentence, sentence
 from . import rounding
 from .faults import AS_THE_TEXTBOOK, sentences_of
 from .polylines import Polyline

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.skeleton import Pose
+from plumbob.text.sentence import Sentence, with_code
 
-from ..sentence import Sentence, with_code
 from .faults import TABLE
 from .formulas import evaluate
 from .robot_models import IDENTITY

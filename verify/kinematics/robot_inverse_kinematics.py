@@ -11,6 +11,7 @@ from plumbob.reference import Outcome, solve_ik
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.formats import urdf
 from plumbob.reference.judging import PoseJudgement
+from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -18,7 +19,6 @@ from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from ..sentence import sentence
 from . import motion_faults, robot_targets, rounding
 from .motion_faults import is_falling_at
 from .report import report

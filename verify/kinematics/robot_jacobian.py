@@ -9,6 +9,7 @@ import numpy as np
 from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.reference.jacobians import jacobian
+from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -16,7 +17,6 @@ from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import LEAST_SHARE, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import digits, judge_case, not_finite, of_joints
-from ..sentence import Sentence, sentence
 from . import robot_models, rounding
 from .formulas import evaluate
 from .report import report

@@ -21,9 +21,9 @@ from plumbob.reference import (
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.judging import PoseJudgement
 from plumbob.reference.skeleton import Pose
+from plumbob.text.sentence import Sentence, sentence
 
 from ..judgement import CaseJudgement, Verdict
-from ..sentence import Sentence, sentence
 from .robot_textbook import Inputs, ancestors, roll_pitch_yaw
 
 ITERATIONS = 200

@@ -13,10 +13,10 @@ from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.reference.jacobians import jacobian
 from plumbob.reference.skeleton import Pose
 from plumbob.reference.tracking import track
+from plumbob.text.sentence import Sentence
 
 from ..case import Case
 from ..greeting import Greeting
-from ..sentence import Sentence
 from .robot_models import BENT, PRECISION, TOLERANCES, mechanism, robots, tool_pose, urdf
 from .robot_targets import (
     HALF_TURNS,

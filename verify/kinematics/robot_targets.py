@@ -11,10 +11,10 @@ from plumbob.reference import rotation, solve_ik
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import jacobian
 from plumbob.reference.skeleton import Pose
+from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..greeting import Greeting
-from ..sentence import sentence
 from .robot_models import (
     BENT,
     IDENTITY,

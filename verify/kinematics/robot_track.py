@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -15,7 +16,6 @@ from ..contestant import Exchange
 from ..greeting import Greeting
 from ..judgement import Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from ..sentence import sentence
 from . import motion_faults, robot_motions, rounding
 from .report import report
 from .robot_models import FARTHEST

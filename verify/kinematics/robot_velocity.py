@@ -11,6 +11,7 @@ import numpy as np
 from plumbob.reference import Articulation
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import jacobian
+from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -19,7 +20,6 @@ from ..explain import Variant, either, explain
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from ..sentence import Sentence, sentence, with_code
 from . import robot_jacobian, robot_models, rounding
 from .faults import TABLE, sentences_of
 from .formulas import evaluate

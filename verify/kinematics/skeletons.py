@@ -13,10 +13,10 @@ import numpy as np
 
 from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes
 from plumbob.reference.arguments import FloatArray, IndexArray
+from plumbob.text.sentence import Sentence
 
 from ..case import Requirement
 from ..greeting import Greeting
-from ..sentence import Sentence
 
 FILE = Path(__file__).with_name("cases.toml")
 # Projects onto the plane z = 0.

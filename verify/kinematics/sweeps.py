@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from plumbob.reference import rotation
+from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..contestant import Answer, Exchange
@@ -19,7 +20,6 @@ from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
 from ..laws import LAWS, finding
-from ..sentence import Sentence, sentence
 from . import pose_laws, rounding
 from .algebra import DEGREE
 from .faults import FAULTS, SwitchFault, by_key, describe, switches

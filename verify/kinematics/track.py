@@ -12,6 +12,7 @@ from plumbob.reference import curves, rotation
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.skeleton import Skeleton
 from plumbob.reference.tracking import track
+from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -20,7 +21,6 @@ from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import HOLDS, finding, judge_case
-from ..sentence import Sentence, sentence, with_code
 from . import claims, pose_laws, problems, rounding, skeletons, sweeps
 from .faults import TABLE, SwitchFault
 from .inverse_kinematics import METHODS

@@ -12,10 +12,10 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.scenes.grids import grid_cloth
+from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..greeting import Greeting, System
-from ..sentence import Sentence, sentence
 from ..task import TASKS
 from .faults import read_table
 

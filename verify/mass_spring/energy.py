@@ -14,6 +14,7 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import kinetic_energy, potential_energy
+from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -22,7 +23,6 @@ from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import digits, finding, hints_of, judge_case
-from ..sentence import sentence
 from .cases import task_cases
 from .faults import ENERGY_FAULTS, Option, apply, pairs
 from .formulas import evaluate

@@ -7,7 +7,8 @@ from itertools import combinations, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..sentence import Sentence, sentence, with_code
+from plumbob.text.sentence import Sentence, sentence, with_code
+
 from .formulas import evaluate
 from .model import RIGHT_MATRIX, Integrator, StepModel, SystemMatrix
 from .problem import SpringProblem

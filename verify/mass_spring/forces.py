@@ -9,6 +9,7 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import forces as reference_forces
+from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -17,7 +18,6 @@ from ..explain import TRIAL, Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, hints_of, judge_case
-from ..sentence import Sentence, sentence
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option, apply, pairs
 from .formulas import evaluate

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from plumbob.text.sentence import sentence
+
 from ..greeting import Step
-from ..sentence import sentence
 from .faults import ASPECTS, STEP_FAULTS, Option, options_of, read_table
 from .model import EXPLICIT, RIGHT_MATRIX, Integrator
 

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..explain import either, ending_test
 from ..judgement import LEAST_SHARE, Explanation
-from ..sentence import Sentence, sentence, with_code
 from .faults import (
     EARLY_END,
     FOLLOWED_FAULTS,

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plumbob.reference.judging import StepJudgement, judge_step
+from plumbob.text.sentence import Sentence
 
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..greeting import Step
 from ..judgement import Finding, Verdict
 from ..laws import finding
-from ..sentence import Sentence
 from .honest import ITERATIVE
 from .model import EXPLICIT, StepModel
 from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of

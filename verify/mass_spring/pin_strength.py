@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import Sentence
 
-from ..sentence import Sentence
 from .faults import Option
 from .problem import SpringProblem
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import Sentence, sentence
 
-from ..sentence import Sentence, sentence
 from .faults import Option, read_table, relation_fault
 
 # The maximum of terms of a combination, and how many numbers have to support each of them.

@@ -14,6 +14,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.mass_spring import State
+from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..cause_search import CauseSearch
@@ -22,7 +23,6 @@ from ..explain import either, first_broken, share_of
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import digits, hints_of, judge_case, laws_that_hold, proportion_of
-from ..sentence import Sentence, sentence
 from . import iterations, laws
 from .cases import task_cases, trace_of
 from .faults import ASPECTS, Option, apply

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from plumbob.text.sentence import Sentence, sentence, with_code
+
 from ..case import Case
 from ..contestant import Answer, Exchange, Failure
 from ..explain import MORE, Variant, difference, explain
@@ -25,7 +27,6 @@ from ..kinematics.limits import READINGS
 from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..laws import LAWS, finding
 from ..precision import judging_greeting
-from ..sentence import Sentence, sentence, with_code
 from ..task import BUILDS_ON, TASKS
 from .mutants import Mutant, Program
 

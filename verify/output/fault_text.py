@@ -7,9 +7,10 @@ from itertools import groupby
 
 import numpy as np
 
+from plumbob.text.sentence import Sentence, sentence
+
 from ..fault_programs import FAMILIES, CodedFault, coded_faults, contestant_of
 from ..judgement import CaseJudgement, Verdict
-from ..sentence import Sentence, sentence
 from ..verify import DISCIPLINES, judge_cases, trials
 from .saved import SavedCase, cases_of
 from .terminal import numbers, wrapped

@@ -7,8 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from plumbob.text.printable import visible
+from plumbob.text.sentence import Sentence, sentence
+
 from ..judgement import Report
-from ..sentence import Sentence, sentence, visible
 from . import json_file, junit, page, saved, terminal
 from .question import Question
 from .words import GOOD, Presentation, verdict_line

@@ -4,10 +4,11 @@ from typing import Any, Literal
 
 import msgspec
 
+from plumbob.text.printable import all_visible
+
 from ..contestant import Answer, Failure
 from ..judgement import CaseJudgement, Finding, Report, TaskReport
 from ..message import plain
-from ..sentence import all_visible
 from .words import GOOD, Say, advice, remarks
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..sentence import Sentence, sentence
+from plumbob.text.sentence import Sentence, sentence
+
 from ..solvers.export import export_cases
 from ..task import TASKS, Field, Task
 from .terminal import paragraphs, wrapped

@@ -8,10 +8,12 @@ from jinja2 import Template
 from markupsafe import Markup
 from rich.cells import cell_len
 
+from plumbob.text import html
+from plumbob.text.sentence import Sentence, sentence
+
 from ..judgement import Report, TaskReport
-from ..sentence import Sentence, sentence
 from ..task import TASKS
-from . import comparison, drawing, html, words
+from . import comparison, drawing, words
 from .words import Presentation
 
 _FOLDER = Path(__file__).parent

@@ -5,9 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from plumbob.text.sentence import sentence
+
 from ..contestant import Contestant
 from ..judgement import Report
-from ..sentence import sentence
 from ..solvers import LIMITS, ProcessLimits, open_contestant
 from ..solvers.files import FileContestant
 from ..verify import DISCIPLINES, Notify, judge_cases, verify

@@ -10,12 +10,12 @@ from typing import Any
 import msgspec
 
 from plumbob.reference.formats.source import read_bytes
+from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..contestant import Answer
 from ..judgement import TaskReport
 from ..message import plain
-from ..sentence import Sentence, sentence
 
 FORMAT, VERSION = "plumbob failing case", 1
 # A case with the longest answer that is read, with indentation, has fewer bytes.

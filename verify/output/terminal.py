@@ -11,8 +11,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from plumbob.text.printable import harmless, visible
+from plumbob.text.sentence import Sentence, sentence, without_repetition
+
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict, smallest_failures
-from ..sentence import Sentence, harmless, sentence, visible, without_repetition
 from . import comparison
 from .words import (
     GOOD,

@@ -4,10 +4,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from plumbob.text.language import translator
+from plumbob.text.printable import visible
+from plumbob.text.sentence import Sentence, codes_in, sentence
+
 from ..contestant import Failure
 from ..judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
-from ..language import translator
-from ..sentence import Sentence, codes_in, sentence, visible
 from . import saved
 
 Say = Callable[[Sentence], str]

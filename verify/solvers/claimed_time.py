@@ -11,9 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from plumbob.crosscheck.process_tree import family, main_thread_seconds
-
-from ..sentence import Sentence, sentence
+from plumbob.process.tree import family, main_thread_seconds
+from plumbob.text.sentence import Sentence, sentence
 
 # So many requests are compared, then again after as many more; the last ones are kept.
 COMPARED, WINDOW = 10, 40

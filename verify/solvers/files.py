@@ -8,11 +8,12 @@ from typing import Any
 
 import msgspec
 
+from plumbob.text.sentence import Sentence, did_you_mean, sentence
+
 from .. import message
 from ..case import Case
 from ..contestant import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
-from ..sentence import Sentence, did_you_mean, sentence
 from ..task import TASKS, Task
 from .losses import LIMITS
 from .tables import read_table

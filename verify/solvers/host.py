@@ -19,13 +19,13 @@ from typing import Any, BinaryIO
 
 import msgspec
 
-from plumbob.crosscheck.child_process import take_streams
+from plumbob.process.child import take_streams
+from plumbob.text.sentence import did_you_mean
 
 from ..contestant import Answer, Failure, FailureKind
 from ..functions import call, describe_exception, takes
 from ..greeting import PROTOCOL
 from ..message import GREETING, Request, decode_greeting, decode_request, encode_answer, excerpt
-from ..sentence import did_you_mean
 from ..task import TASKS
 
 # Functions by these names are methods of inverse kinematics where nothing declares methods.

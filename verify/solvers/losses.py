@@ -6,11 +6,11 @@ import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
-from plumbob.crosscheck.child_process import ChildProcess, Loss
+from plumbob.process.child import ChildProcess, Loss
+from plumbob.text.sentence import Sentence, sentence
 
 from ..contestant import Failure, FailureKind
 from ..message import shown
-from ..sentence import Sentence, sentence
 
 # How many lines of standard error are shown.
 STDERR_SHOWN = 3

@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from plumbob.crosscheck.child_process import ChildProcess, LostError
+from plumbob.process.child import ChildProcess, LostError
+from plumbob.text.sentence import Sentence, sentence
 
 from .. import message
 from ..case import Case
 from ..contestant import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
-from ..sentence import Sentence, sentence
 from ..task import TASKS
 from .claimed_time import ClaimedTimes
 from .losses import (

@@ -15,10 +15,10 @@ from plumbob.crosscheck.robots.files import (
     FileReading,
     FileSelection,
 )
+from plumbob.text.printable import visible
 
 from ...tables.columns import text
 from ...tables.table import Column, Summary, Table, cells, words
-from ...text import visible
 
 # Outcomes by which files are counted; the first two are shown even where there are none.
 READ = (AGREES, DIFFERS, files.DEVIATES)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.crosscheck.child_process import ChildProcess, LostError
+from plumbob.process.child import ChildProcess, LostError
 
 from ...problems.evaluate import evaluator_of
 from ...problems.robot_tasks import (

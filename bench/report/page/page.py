@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from plumbob.verify.output import html
+from plumbob.text import html
 
 from ...experiments.robots.figures import RobotMap
 from ...figures import svg

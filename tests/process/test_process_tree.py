@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from hostile_programs import case, program, running
 
-from plumbob.crosscheck import process_tree
-from plumbob.crosscheck.child_process import ChildProcess, Loss, LostError, python_process
-from plumbob.crosscheck.process_tree import carry, end_group, family
+from plumbob.process import tree as process_tree
+from plumbob.process.child import ChildProcess, Loss, LostError, python_process
+from plumbob.process.tree import carry, end_group, family
 
 ROOT = str(Path(__file__).parents[2])
 MARKER = (1 << 61) - 1234567

@@ -25,7 +25,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .process_tree import Process, carry, end_group, family, guard, new_marker
+from .tree import Process, carry, end_group, family, guard, new_marker
 
 CallResult = TypeVar("CallResult")
 

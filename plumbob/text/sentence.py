@@ -1,14 +1,11 @@
 """Sentences to print in English or translated: a literal template and its fields."""
 
 import difflib
-import re
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 # Of a longer name only the beginning is compared [characters].
 _LONGEST_NAME = 100
-# What GitHub and Azure obey on a line of a log: the first at its beginning, the second anywhere.
-_COMMAND = re.compile(r"^ ?( *)(?=::)|(?<=#)(?=#\w*\[)")
 
 
 class Sentence(NamedTuple):
@@ -69,30 +66,3 @@ def did_you_mean(value: object, options: Iterable[str]) -> str:
     word = str(value)[:_LONGEST_NAME].replace("_", "").replace("-", "").lower()
     near = difflib.get_close_matches(word, simple, n=1, cutoff=0.6)
     return f"; did you mean {simple[near[0]]}?" if near else ""
-
-
-def visible(text: str) -> str:
-    """Return one line in which whatever does not print is written as an escape, as in Python."""
-    spaced = " ".join(text.split())
-    if spaced.isprintable():
-        return spaced
-    return "".join(
-        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
-        for letter in spaced
-    )
-
-
-def harmless(line: str) -> str:
-    """Return a line of a screen in which no CI service finds a command, such as `::error`."""
-    return _COMMAND.sub(r"\1\\", line)
-
-
-def all_visible(value: Any) -> Any:
-    """Return a value with every text in it, keys of mappings included, made visible."""
-    if isinstance(value, str):
-        return visible(value)
-    if isinstance(value, Mapping):
-        return {all_visible(key): all_visible(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [all_visible(inner) for inner in value]
-    return value

@@ -1,0 +1,1 @@
+"""The ground floor of texts: sentences, translations, pages, and what is safe to print."""

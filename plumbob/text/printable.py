@@ -1,0 +1,49 @@
+"""Names from elsewhere as text that no terminal, browser or parser reads as an instruction."""
+
+import functools
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+# What GitHub and Azure obey on a line of a log: the first at its beginning, the second anywhere.
+_COMMAND = re.compile(r"^ ?( *)(?=::)|(?<=#)(?=#\w*\[)")
+# Where a word may be broken: after a dash or the like between letters, never in a number.
+_BREAK = re.compile(r"(?<=[^\W\d_][/_.-])(?=[^\W\d_])")
+
+
+def shortened(text: str, length: int) -> str:
+    """Return a text of at most so many letters, its end cut off if necessary."""
+    return text if len(text) <= length else f"{text[: length - 1]}…"
+
+
+@functools.lru_cache(maxsize=10_000)
+def chunks(text: str) -> Sequence[str]:
+    """Return the parts of a text between which a line may end: after spaces, dashes, slashes."""
+    return [part for token in text.split() for part in _BREAK.split(token)]
+
+
+def visible(text: str) -> str:
+    """Return one line in which whatever does not print is written as an escape, as in Python."""
+    spaced = " ".join(text.split())
+    if spaced.isprintable():
+        return spaced
+    return "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in spaced
+    )
+
+
+def harmless(line: str) -> str:
+    """Return a line of a screen in which no CI service finds a command, such as `::error`."""
+    return _COMMAND.sub(r"\1\\", line)
+
+
+def all_visible(value: Any) -> Any:
+    """Return a value with every text in it, keys of mappings included, made visible."""
+    if isinstance(value, str):
+        return visible(value)
+    if isinstance(value, Mapping):
+        return {all_visible(key): all_visible(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [all_visible(inner) for inner in value]
+    return value
