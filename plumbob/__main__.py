@@ -1,6 +1,6 @@
 """Run the command line."""
 
-from .entry_point import main
+from .cli.entry_point import main
 
 if __name__ == "__main__":
     main()

@@ -12,13 +12,13 @@ import command_names
 import numpy as np
 import pytest
 
-from plumbob import cli, terminal
 from plumbob.bench.figures import sketch
 from plumbob.bench.harness.record import Record, RecordFile
-from plumbob.commands import bench
+from plumbob.cli import bench, terminal
+from plumbob.cli import main as cli
+from plumbob.cli.help_text import epilog
 from plumbob.crosscheck.claims import CLAIMS
 from plumbob.crosscheck.verdict import ClaimVerdict
-from plumbob.help_text import epilog
 
 
 @pytest.fixture(autouse=True)
@@ -246,7 +246,7 @@ def test_a_reader_that_leaves_ends_it_without_a_word(arguments, buffered):
     """Nor is it taken for a claim that is missed, which is 1."""
     read, write = os.pipe()
     os.close(read)
-    script = f"from plumbob.cli import main; main({arguments})"
+    script = f"from plumbob.cli.main import main; main({arguments})"
     both = arguments == READERS["complaint"]
     done = subprocess.run(
         [sys.executable, "-c", script], stdout=write, stderr=write if both else subprocess.PIPE,
@@ -275,7 +275,7 @@ def test_ctrl_c_exits_130_and_a_bench_says_what_is_kept(capsys, monkeypatch, arg
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    for name in ("plumbob.commands.bench.run_suites", "plumbob.crosscheck.claims.run_claims"):
+    for name in ("plumbob.cli.bench.run_suites", "plumbob.crosscheck.claims.run_claims"):
         monkeypatch.setattr(name, interrupted)
     code, _, err = plumbob(capsys, *arguments)
     kept = "" if "check" in arguments else "; finished measurements are kept"
@@ -387,7 +387,7 @@ def test_help_has_examples_in_columns_and_does_nothing(capsys, main_job, empty_f
 
 def test_help_imports_no_engine_no_reference_and_no_matplotlib():
     script = (
-        "import sys, plumbob.cli; plumbob.cli.run_command(['--help']);"
+        "import sys, plumbob.cli.main as cli; cli.run_command(['--help']);"
         "print(sorted({name.partition('.')[0] for name in sys.modules}))"
     )
     done = subprocess.run(

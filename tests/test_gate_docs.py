@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from plumbob import cli
+from plumbob.cli import main as cli
 
 DOCS = Path(__file__).parents[1] / "docs"
 SOURCES = [DOCS / "cluster.md", DOCS / "compare.md", DOCS / "gate" / "action.yml"]

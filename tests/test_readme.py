@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import translate as catalogue
 
-from plumbob import cli
+from plumbob.cli import main as cli
 from plumbob.text.language import translator
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case

@@ -21,7 +21,7 @@ SOLVER = "def energy(masses): return {'total': 1.0}\n"
 # Runs command lines one after the other; the last one begun is known where one ends the process.
 PROGRAM = """
 import contextlib, io, json, sys
-from plumbob.cli import run_command
+from plumbob.cli.main import run_command
 done = {}
 for line in json.loads(sys.argv[1]):
     print(line, file=sys.stderr, flush=True)

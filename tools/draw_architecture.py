@@ -20,25 +20,34 @@ COLOURS = {
     "verify": "#a8761b",
     "crosscheck": "#0b7a5b",
     "reference": "#0b62a8",
+    "process": "#57606a",
+    "text": "#57606a",
 }
-ROOMS = [room for room in COLOURS if len(list((ROOT / room).rglob("*.py"))) > 1]  # from the top
+ROOMS = list(COLOURS)  # from the top
+GROUND = ("process", "text")  # the ground floors, folders of `plumbob/`
 WIDTH, BOX, ROW, GAP, MARGIN, HEAD = 1180, 22, 58, 10, 16, 44
 LETTER = 6.6  # the width of one [px]
 TEXT = {"font_family": "DejaVu Sans, sans-serif", "font_size": 11, "fill": "#22272e"}
 TITLE = TEXT | {"font_size": 14, "font_weight": "bold"}
 ARROW = {"fill": "none", "stroke": "#8b949e", "stroke_width": 0.8, "marker_end": "url(#head)"}
 
-# The four folders are installed as packages of `plumbob`; here they are panels beside it.
-FOLDERS = r"^plumbob\.(?=(bench|verify|crosscheck|reference)\b)"
+# These rooms are packages of `plumbob`; here they are panels beside it.
+FOLDERS = r"^plumbob\.(?=(bench|verify|crosscheck|reference|process|text)\b)"
 
 Graph = dict[str, set[str]]
 
 
+def folder(room: str) -> Path:
+    """Return the folder of a room."""
+    return ROOT / "plumbob" / room if room in GROUND else ROOT / room
+
+
 def modules(room: str) -> Iterator[tuple[Path, str]]:
     """Yield each file of a room with its dotted name."""
-    for path in sorted((ROOT / room).rglob("*.py")):
-        parts = path.relative_to(ROOT).with_suffix("").parts
-        yield path, ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+    for path in sorted(folder(room).rglob("*.py")):
+        parts = (room, *path.relative_to(folder(room)).with_suffix("").parts)
+        if room != "plumbob" or parts[1] not in GROUND:
+            yield path, ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 @functools.cache
@@ -61,8 +70,8 @@ def box(name: str) -> str | None:
     room, *rest = name.split(".")
     if room not in ROOMS or not rest:
         return None
-    folder = ROOT / room / rest[0]
-    exists = folder.is_dir() or folder.with_suffix(".py").exists()
+    place = folder(room) / rest[0]
+    exists = place.is_dir() or place.with_suffix(".py").exists()
     return f"{room}/{rest[0]}" if exists else None
 
 

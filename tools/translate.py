@@ -16,7 +16,7 @@ from plumbob.text.language import DOMAIN, LANGUAGES, LOCALES
 
 ROOT = Path(__file__).resolve().parents[1]
 # The folders and files that call `sentence`.
-SOURCES = ("verify", "plumbob/text", "plumbob/commands/verify.py")
+SOURCES = ("verify", "plumbob/text", "plumbob/cli/verify.py")
 _UNIT = re.compile(r"\[[^\]]*\]")
 
 

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import pytest
 
-from plumbob import cli
 from plumbob.bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
 from plumbob.bench.harness import run, values
 from plumbob.bench.harness.block import Choice
@@ -32,6 +31,7 @@ from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.writers import markdown
+from plumbob.cli import main as cli
 
 TINY = Scale(targets=3, seconds=0.001)
 ROOT = Path(__file__).parents[2]

@@ -21,7 +21,7 @@ from plumbob.bench.problems.evaluate import Evaluator
 from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results, printable
-from plumbob.cli import run_command
+from plumbob.cli.main import run_command
 from plumbob.reference import forward_kinematics
 from plumbob.reference.formats import mjcf, urdf
 from plumbob.verify.solvers import open_contestant

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plumbob import cli
 from plumbob.bench.comparison.history import BLOCKS, courses, read_runs, sparkline
 from plumbob.bench.harness.record import RecordFile
+from plumbob.cli import main as cli
 
 
 @pytest.fixture

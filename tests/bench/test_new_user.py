@@ -19,8 +19,8 @@ from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.entered import remarks_of_entrants
 from plumbob.bench.tables.results import Results, printable
 from plumbob.bench.tables.table import words
-from plumbob.cli import run_command
-from plumbob.commands import selection
+from plumbob.cli import selection
+from plumbob.cli.main import run_command
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK = re.search(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)[1]

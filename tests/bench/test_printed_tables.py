@@ -8,12 +8,13 @@ import numpy as np
 import printed_table
 import pytest
 
-from plumbob import cli, terminal
 from plumbob.bench.comparison.history import sparkline
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.report import sections
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import is_blank, without_empty, words
+from plumbob.cli import main as cli
+from plumbob.cli import terminal
 from plumbob.crosscheck.claims import CLAIMS
 from plumbob.crosscheck.verdict import ClaimVerdict
 from plumbob.verify.judgement import Verdict as TaskVerdict

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from plumbob import cli
 from plumbob.bench.harness.folder_lock import locked
 from plumbob.bench.harness.record import RecordFile, encode
+from plumbob.cli import main as cli
 
 
 @pytest.fixture

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plumbob import cli
 from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
 from plumbob.bench.comparison.rows import ChangeVerdict
 from plumbob.bench.harness import machine
+from plumbob.cli import main as cli
 
 LOOPS = 20_000
 # A bench of two rows, as far as a rerun asks for one and in lines that start at once: work of a

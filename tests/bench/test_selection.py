@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from html_page import Page
 
-from plumbob import cli
 from plumbob.bench.harness.metrics import Share, share
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.report import sections
@@ -18,6 +17,7 @@ from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.selection import column_numbers, selected
 from plumbob.bench.tables.table import NO_SUMMARY, Column, Summary, Table, best_cells, words
 from plumbob.bench.tables.writers import comma_separated, html_fragment, markdown
+from plumbob.cli import main as cli
 
 COLUMNS = (
     Column("robot", words=True),
@@ -232,7 +232,7 @@ def chosen(capsys, table, form, **options):
 def test_every_table_can_be_exported_with_every_option(capsys, folder, records, monkeypatch, form):
     """Those with rows of absent engines, too, about which nothing was measured."""
     every = sections.tables(Results(records))
-    monkeypatch.setattr("plumbob.commands.report._tables", lambda folder: every)
+    monkeypatch.setattr("plumbob.cli.report._tables", lambda folder: every)
     assert any(not source.suite for table in every for source in table.sources)
     for table in every:
         count = len(table.columns)

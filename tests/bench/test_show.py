@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from plumbob import cli
 from plumbob.bench.motion import motion
 from plumbob.bench.show import film, gallery
 from plumbob.bench.show import scenes as shows
 from plumbob.bench.show.your_solver import YourSolver
+from plumbob.cli import main as cli
 from plumbob.reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
 
 IK = """

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plumbob import terminal
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening
 from plumbob.bench.report import outcome, report
 from plumbob.bench.report.sections import tables
 from plumbob.bench.report.standings import MAX_CLOTHS, standings
 from plumbob.bench.tables.results import Results
-from plumbob.cli import run_command
+from plumbob.cli import terminal
+from plumbob.cli.main import run_command
 
 OURS = "Plumbob LM, first phase"
 WRITTEN = "Plumbob LM (first phase, ours)"
@@ -283,7 +283,7 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
 
 def test_what_fails_alike_is_said_once_and_counted(tmp_path, monkeypatch, capsys):
     from plumbob.bench.harness import run
-    from plumbob.commands.bench import run_suites
+    from plumbob.cli.bench import run_suites
 
     why = {"chain/near": "It raised", "chain/far": "It raised", "robots/all": "It crashed"}
     events = [run.Event(run.FAILED, "ik", f"{at}, Mine", message) for at, message in why.items()]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from plumbob import cli
 from plumbob.bench.harness.record import RecordFile
+from plumbob.cli import main as cli
 
 PAGE = Path(__file__).parents[2] / "docs" / "tables.md"
 BLOCKS = re.findall(r"```sh\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)

@@ -10,13 +10,14 @@ import pytest
 from rich.cells import cell_len
 from rich.console import Console
 
-from plumbob import cli, terminal
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.report import outcome, report, sections
 from plumbob.bench.report.headlines import ClaimCount, Headline, Overview
 from plumbob.bench.tables import aligned
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Table, naming, without_empty, words
+from plumbob.cli import main as cli
+from plumbob.cli import terminal
 
 WIDTHS = (*range(40, 110, 5), 133, 160, 200)
 FEW = (40, 57, 80, 133, 200)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from small_discipline import SMALL
 
-from plumbob import cli
+from plumbob.cli import main as cli
 from plumbob.text.sentence import sentence
 from plumbob.verify import verify
 from plumbob.verify.case import Case
@@ -332,7 +332,7 @@ test_wrong = laws(forward_kinematics=wrong.forward_kinematics, seed=1)
 
 
 ROOT = str(Path(cli.__file__).parents[1])
-CODE = "from plumbob.cli import main; main()"
+CODE = "from plumbob.cli.main import main; main()"
 
 
 def run_python(*arguments, **options):

@@ -6,7 +6,7 @@ import pytest
 from plumbob.bench.peers import opening, registry
 from plumbob.bench.report.which import solvers_on_robot
 from plumbob.bench.tables.results import Results
-from plumbob.cli import run_command
+from plumbob.cli.main import run_command
 
 OURS = "Plumbob LM, first phase"
 

@@ -90,7 +90,7 @@ def test_a_killed_search_leaves_the_verdict_in_all_files(tmp_path):
         "import importlib, os\n"
         "module = importlib.import_module('plumbob.verify.verify')\n"
         "module.with_kept_state = lambda *_: os._exit(9)\n"
-        "from plumbob.cli import main\n"
+        "from plumbob.cli.main import main\n"
         "main(['verify', 'mine.py', '-o', 'out'])",
         tmp_path,
     )
@@ -135,7 +135,7 @@ def test_a_screen_that_cannot_be_drawn_leaves_the_verdict(monkeypatch, tmp_path,
 def test_a_pipe_gets_a_line_while_nothing_else_is_printed(tmp_path):
     done = run(
         "import time\n"
-        "from plumbob.commands import verify\n"
+        "from plumbob.cli import verify\n"
         "from plumbob.verify import cause_search\n"
         "from plumbob.verify.mass_spring import forces\n"
         "verify.LINE_PAUSE = 0.4\n"
@@ -145,7 +145,7 @@ def test_a_pipe_gets_a_line_while_nothing_else_is_printed(tmp_path):
         "    time.sleep(1.2)\n"
         "    return judge(*arguments, **options)\n"
         "forces.judge = slow\n"
-        "from plumbob.cli import main\n"
+        "from plumbob.cli.main import main\n"
         "main(['verify', 'mine.py'])",
         tmp_path,
     )

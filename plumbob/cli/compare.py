@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from plumbob.text.printable import visible
 
-from ..terminal import print_aligned, width
 from .options import (
     FAILED,
     REPORT,
@@ -24,6 +23,7 @@ from .options import (
     writable,
     write_text,
 )
+from .terminal import print_aligned, width
 
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import RunComparison

@@ -4,8 +4,8 @@ import sys
 from collections.abc import Sequence
 from typing import Annotated
 
-from ..terminal import print_aligned, print_verdicts, progress
 from .options import FAILED, SUCCESS, Texts, argument, flag, valid_name
+from .terminal import print_aligned, print_verdicts, progress
 
 
 def check(

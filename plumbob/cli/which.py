@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ..terminal import print_filled, print_lines
 from .bench import run_with_progress
 from .options import SUCCESS, Entrants, Text, argument, option, valid_name
 from .report import FORMATS, formatted
+from .terminal import print_filled, print_lines
 
 if TYPE_CHECKING:
     from plumbob.bench.harness.block import Choice

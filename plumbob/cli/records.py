@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..help_text import Command, FittingGroup, epilog
+from .help_text import Command, FittingGroup, epilog
 from .options import REPORT, SUCCESS, Texts, argument, flag, option
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def list_records(
     from plumbob.bench.harness.record import FINISHED
     from plumbob.bench.tables.results import printable
 
-    from ..terminal import print_aligned
+    from .terminal import print_aligned
 
     matches = _filter(suites, solvers, problems, failed, superseded)
     measured = (record for record in _read(folder) if record.suite != FINISHED)

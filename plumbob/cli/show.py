@@ -7,8 +7,8 @@ import typer
 
 from plumbob.text.printable import visible
 
-from ..terminal import progress
 from .options import REPORT, SUCCESS, File, Text, argument, flag, option, valid_name, writable
+from .terminal import progress
 from .verify import program_of
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from plumbob.bench.harness.compile_ahead import compiling_ahead
 from plumbob.bench.harness.progress import TROUBLE, Progress, listening
 from plumbob.text.printable import visible
 
-from .. import terminal
-from ..help_text import fitted
+from . import terminal
+from .help_text import fitted
 from .options import (
     FAILED,
     REPORT,

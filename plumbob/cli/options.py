@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..entry_point import INTERRUPTED as INTERRUPTED
+from .entry_point import INTERRUPTED as INTERRUPTED
 
 REPORT = Path("report")
 SUCCESS, FAILED, MISUSED, UNREAD = 0, 1, 2, 141

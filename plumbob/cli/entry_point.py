@@ -14,7 +14,7 @@ def main() -> None:
     """Import the command line, run it and leave with its exit code."""
     leave_at_interrupt()
     open_closed_streams()
-    from .cli import main as run
+    from .main import main as run
 
     run()
 

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from plumbob.text.printable import visible
 
-from ..terminal import print_lines, print_outcome
 from .options import REPORT, SUCCESS, File, Texts, argument, flag, option, valid_name
+from .terminal import print_lines, print_outcome
 
 if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table

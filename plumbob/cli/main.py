@@ -13,13 +13,13 @@ import typer
 
 from plumbob.text.printable import visible
 
-from . import compile_notice, entry_point
-from .commands import bench, check, records, report, show, which
-from .commands import compare as comparison
-from .commands import explain as explain
-from .commands import verify as verify
-from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh, flag, option
+from .. import compile_notice
+from . import bench, check, entry_point, records, report, show, which
+from . import compare as comparison
+from . import explain as explain
+from . import verify as verify
 from .help_text import Command, FittingGroup, epilog
+from .options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh, flag, option
 
 _UsageError: Any = typer.BadParameter.__base__
 

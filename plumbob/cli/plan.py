@@ -19,7 +19,7 @@ from plumbob.bench.harness.record import Key, Record, RecordFile
 from plumbob.bench.peers import registry
 from plumbob.bench.tables.results import counted, grouped
 
-from ..terminal import width
+from .terminal import width
 
 NOT_INSTALLED = "not installed"
 # Names of problems or solvers in the list of all suites, and lines for them.

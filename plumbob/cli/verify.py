@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..help_text import Command
+from .help_text import Command
 from .options import FAILED, SUCCESS, File, Text, Texts, argument, flag, option
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     from plumbob.process.child import one_thread
 
     os.environ |= {**one_thread(), **os.environ}
-    from ..terminal import lines_in_a_pipe, progress
+    from .terminal import lines_in_a_pipe, progress
 
     with ExitStack() as work:  # imports take seconds, on a busy machine many
         bar = work.enter_context(progress())

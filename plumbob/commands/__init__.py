@@ -1,1 +1,0 @@
-"""The commands: their options and output; the work is done elsewhere."""
