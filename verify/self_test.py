@@ -11,8 +11,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.engines import SKELETON_ENGINES, forward_kinematics_by
-from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
 from plumbob.reference import Skeleton, forward_kinematics, solve_ik
 from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
@@ -293,8 +291,6 @@ def _right_kinematics() -> Iterator[Subject]:
     for precision, kind in PRECISIONS.items():
         function = {f"reference, {precision}": partial(_placed, kind)}
         yield from _subjects(HONEST, FK, function, precision=precision)
-    engines = {engine: partial(_placed_by, engine) for engine in SKELETON_ENGINES}
-    yield from _subjects(HONEST, FK, engines)
     for solver in ("ccd", "fabrik", "levenberg_marquardt"):
         function = {f"reference, {solver}": partial(_solved, solver)}
         yield from _subjects(HONEST, IK, function, methods=(solver,))
@@ -308,11 +304,6 @@ def _placed(kind: type, /, parents: Any, offsets: Any, local_rotations: Any) -> 
     return pose.positions.astype(kind), pose.rotations.astype(kind)
 
 
-def _placed_by(engine: str, /, parents: Any, offsets: Any, local_rotations: Any) -> Any:
-    skeleton = SKELETON_ENGINES[engine](Skeleton(parents, offsets))
-    return tuple(forward_kinematics_by(skeleton, local_rotations))
-
-
 def _solved(solver: str, /, parents: Any, offsets: Any, method: str, **inputs: Any) -> Any:
     if "cones" in inputs:
         return {
@@ -324,8 +315,8 @@ def _solved(solver: str, /, parents: Any, offsets: Any, method: str, **inputs: A
     return {"local_rotations": solution.local_rotations, "positions": solution.positions}
 
 
-# Steps of the reference and of MuJoCo, and their declarations. The reference's damper and MuJoCo's
-# discrete step are part of the energy; see docs/verify.md.
+# Steps of the reference, and their declarations. Its damper is part of the energy; see
+# docs/verify.md.
 _REFERENCE: dict[str, tuple[Callable[..., Any], Step]] = {
     "implicit Euler by Newton": (
         lambda s, state, h: ImplicitEuler(s, h=h, solver="newton", tolerance=0.0).step(state).state,
@@ -336,12 +327,6 @@ _REFERENCE: dict[str, tuple[Callable[..., Any], Step]] = {
         Step("local_global", "y", 10, damper="length_rate")),
     "symplectic Euler": (
         symplectic_euler, Step("symplectic", damper="explicit", velocity="separate")),
-    "MuJoCo Euler": (
-        lambda s, state, h: MujocoMassSpring(s, h=h, integrator="Euler").step(state),
-        Step("symplectic")),
-    "MuJoCo discrete": (
-        lambda s, state, h: MujocoMassSpring(s, h=h, integrator="discrete").step(state),
-        Step("linearised")),
 }  # fmt: skip
 
 
@@ -355,10 +340,11 @@ def _right_steps() -> Iterator[Subject]:
         stepper = {f"linearised, pins {pins}": Stepper(LINEARISED._replace(pins=pins))}
         yield from _subjects(HONEST, STEP, stepper, step=Step(pins=declared))
     for name, (function, step) in _REFERENCE.items():
-        yield from _subjects(HONEST, STEP, {name: partial(_stepped, function)}, step=step)
+        yield from _subjects(HONEST, STEP, {name: partial(stepped, function)}, step=step)
 
 
-def _stepped(function: Callable[..., Any], /, **inputs: Any) -> dict[str, Any]:
+def stepped(function: Callable[..., Any], /, **inputs: Any) -> dict[str, Any]:
+    """Answer a request by a function of system, state and h."""
     p = problem_of(inputs)
     state = function(system_of(p), state_of(p), p.h)
     return {"positions": state.positions, "velocities": state.velocities}

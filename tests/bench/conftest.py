@@ -121,13 +121,6 @@ def swung(solver, cloth="undamped", left=(1.0, 0.5)):
     return sample("swung", problem=f"swing/{cloth}", solver=solver, arrays=arrays, facts=facts)
 
 
-def judged(family, fault, laws=("positions",)):
-    """The verdict on a solver with a fault, or on an honest one."""
-    facts = {"title": fault or "reference", "family": family, "faulty": bool(fault)}
-    facts |= {"verdict": "WRONG" if fault else "RIGHT", "laws": list(laws)}
-    return sample("judged", problem=f"{family}/{fault}", arrays={"caught": bool(laws)}, facts=facts)
-
-
 def certified(solver="newton", settings=(), arrays=(), notes=None):
     """One step of a cloth in mid-swing, its answer covered unless Newton colours them itself."""
     changes = {"settings": dict(settings or ()), "arrays": dict(arrays or ())}
@@ -309,8 +302,6 @@ def records():
     arm = [drawn(s, warm, angles[s][warm]) for s in angles for warm in (False, True)]
     return [
         claim(),
-        judged("CCD", "root to tip"),
-        judged("honest solvers", "", ()),
         *arm,
         *followed("ccd", cold=1.0, warm=0.5, coherent=0.25),
         *drifted("ccd"),

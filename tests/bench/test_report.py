@@ -90,7 +90,7 @@ def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
         r"Questions without records: \d+; (plumbob bench [a-z_ ]+) measures", text
     )
     assert len(commands) == 5
-    assert commands[-1] == "plumbob bench self_test robot_models ik_proofs"
+    assert commands[-1] == "plumbob bench robot_models ik_proofs"
     assert "Which solvers of yours" not in text
     assert "Forward kinematics. Jacobians. Inverse kinematics. A step of the cloth. What" in text
     assert "plumbob bench timing cloth_scale measures them at full length." in text

@@ -1,12 +1,38 @@
 """Every fault of the self-test is caught and named; steps and forces mostly in the slow sweep."""
 
+from functools import partial
+
 import pytest
 
+from plumbob.crosscheck.engines import SKELETON_ENGINES, forward_kinematics_by
+from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
+from plumbob.reference import Skeleton
+from plumbob.verify.greeting import PROTOCOL, Greeting, Step
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.output.listings import self_test as lines
-from plumbob.verify.self_test import HONEST, Trial, attempt, subjects
+from plumbob.verify.self_test import FK, HONEST, STEP, Subject, Trial, attempt, stepped, subjects
 
-SUBJECTS = list(subjects())
+
+def placed_by(engine, parents, offsets, local_rotations):
+    skeleton = SKELETON_ENGINES[engine](Skeleton(parents, offsets))
+    return tuple(forward_kinematics_by(skeleton, local_rotations))
+
+
+def mujoco(integrator):
+    """A step by MuJoCo, whose discrete one has dampers in the energy, see docs/verify.md."""
+    return partial(stepped, lambda s, state, h: MujocoMassSpring(s, h, integrator).step(state))
+
+
+def engines():
+    for engine in SKELETON_ENGINES:
+        greeting = Greeting(PROTOCOL, (FK,))
+        yield Subject(engine, HONEST, FK, partial(placed_by, engine), greeting)
+    for integrator, method in (("Euler", "symplectic"), ("discrete", "linearised")):
+        greeting = Greeting(PROTOCOL, (STEP,), step=Step(method))
+        yield Subject(f"MuJoCo {integrator}", HONEST, STEP, mujoco(integrator), greeting)
+
+
+SUBJECTS = [*subjects(), *engines()]
 FAULTY = [subject for subject in SUBJECTS if subject.fault]
 RIGHT = [subject for subject in SUBJECTS if not subject.fault]
 QUICK = ("forward kinematics", "CCD", "FABRIK")

@@ -113,7 +113,7 @@ def self_test(trials: Iterable["Trial"], say: Say) -> Iterator[str]:
 
 
 def _sum(family: str, members: list["Trial"]) -> Sentence:
-    from ..self_test import HONEST  # which loads all engines
+    from ..self_test import HONEST
 
     n, accused = len(members), sum(not trial.passed for trial in members)
     if family == HONEST:

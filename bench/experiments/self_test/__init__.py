@@ -1,1 +1,0 @@
-"""The judge of `plumbob verify` itself: known faults and honest solvers."""
