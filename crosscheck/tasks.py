@@ -12,7 +12,7 @@ import numpy as np
 from plumbob.reference import rotation, tasks
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.formats import mjcf
-from plumbob.reference.formats.robot import Robot
+from plumbob.reference.model import Robot
 
 from . import samples
 from .engines import ROBOT_ENGINES

@@ -1,12 +1,28 @@
 """The models that public functions take: a Skeleton, an Articulation, or a Robot."""
 
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+from .arguments import FloatArray
 from .articulation import Articulation
 from .skeleton import Skeleton
 
 if TYPE_CHECKING:
-    from .formats.robot import Robot
+    from .inverse_kinematics.tasks import IKTask
+
+
+class Robot(NamedTuple):
+    """A robot or a character read from a file."""
+
+    # one joint for each link or body of the file, with its name and pose
+    articulation: Articulation
+    # index of the articulation's joint by the name of the file's joint; its coordinates in q are
+    # `articulation.coordinates_of(joints[name])`
+    joints: dict[str, int]
+    home: FloatArray  # the coordinates of the configuration in the file, (coordinate,)
+    masses: FloatArray  # of the links [kg], NaN where the file leaves them to meshes, (joint,)
+    centres: FloatArray  # the links' centres of mass in the joints' frames [m], (joint, 3)
+    equalities: "tuple[IKTask, ...]" = ()  # loop closures and couplings, as tasks
+
 
 Model: TypeAlias = "Skeleton | Articulation | Robot"
 
@@ -15,8 +31,6 @@ def checked_model(model: Any, argument: str = "skeleton") -> Skeleton | Articula
     """Return the model, of a Robot its articulation; else raise a ValueError about the argument."""
     if isinstance(model, Skeleton) or isinstance(model, Articulation):  # noqa: SIM101, a union is slow
         return model
-    from .formats.robot import Robot  # the readers are loaded by whoever has read a robot
-
     if isinstance(model, Robot):
         return model.articulation
     raise ValueError(

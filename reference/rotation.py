@@ -5,6 +5,8 @@ Functions raise a ValueError that names an argument of another shape, with numbe
 finite, or with lengths that fit into no memory.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -115,6 +117,18 @@ def to_matrix(q: ArrayLike) -> FloatArray:
     """Return the rotation matrices, (..., 3, 3), of unit quaternions (..., 4)."""
     q = arguments.array("q", q, "...", 4)
     return np.swapaxes(rotate(q[..., None, :], np.eye(3)), -1, -2)
+
+
+def roll_pitch_yaw(R: FloatArray) -> tuple[float, float, float]:
+    """Return the angles about the fixed axes x, y and z whose rotations in turn make R [rad].
+
+    Roll is read off after yaw is undone, so that it is exact also where pitch is a right angle.
+    """
+    yaw = math.atan2(R[1, 0], R[0, 0])
+    sine, cosine = math.sin(yaw), math.cos(yaw)
+    pitch = math.atan2(-R[2, 0], cosine * R[0, 0] + sine * R[1, 0])
+    roll = math.atan2(sine * R[0, 2] - cosine * R[1, 2], cosine * R[1, 1] - sine * R[0, 1])
+    return roll, pitch, yaw
 
 
 def from_matrix(matrix: ArrayLike) -> FloatArray:

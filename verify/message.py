@@ -19,6 +19,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 import msgspec
 import numpy as np
 
+from plumbob.text.printable import shown
 from plumbob.text.sentence import Sentence, did_you_mean, sentence
 
 from .case import Case
@@ -119,14 +120,6 @@ def _json_word(match: re.Match[str]) -> str:
     if word is None:
         return match[0]
     return "NaN" if word[0] in "nN" else f"{'-' if sign == '-' else ''}Infinity"
-
-
-def shown(text: str | bytes, length: int = 200) -> str:
-    """Return a text of a solver on one line, without control characters, shortened."""
-    words = text.decode(errors="replace") if isinstance(text, bytes) else text
-    clean = "".join(letter if letter.isprintable() else " " for letter in words[: 4 * length])
-    clean = " ".join(clean.split())
-    return clean if len(clean) <= length else f"{clean[: length - 3]}..."
 
 
 def decode_request(line: bytes) -> Request:

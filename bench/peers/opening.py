@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from plumbob.text.printable import shown
 from plumbob.verify.contestant import NoGreetingError
 from plumbob.verify.greeting import Greeting
-from plumbob.verify.message import shown
 from plumbob.verify.solvers import LIMITS, open_contestant
 
 from ..problems.own import clean

@@ -9,7 +9,7 @@ import numpy as np
 from plumbob import reference
 from plumbob.reference.arguments import FloatArray, IndexArray, name_list
 from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
-from plumbob.verify.kinematics.robot_textbook import roll_pitch_yaw
+from plumbob.reference.rotation import roll_pitch_yaw
 
 from .chains import TargetsForSkeleton
 from .robots import TWO_REVOLUTIONS, BenchRobot, chain_of

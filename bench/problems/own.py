@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from plumbob.reference import MassSpring, State
-from plumbob.text.printable import visible
-from plumbob.verify.message import shown
+from plumbob.text.printable import shown, visible
 
 from .chains import TargetsForSkeleton
 from .robots import BenchRobot

@@ -7,10 +7,10 @@ import numpy as np
 
 from plumbob.reference import MassSpring, Skeleton, State, forward_kinematics
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.printable import shown
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Contestant, Failure, NoGreetingError
-from plumbob.verify.message import shown
 from plumbob.verify.solvers import open_contestant
 
 TRACK, REACH = "track", "inverse_kinematics"

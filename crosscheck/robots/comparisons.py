@@ -11,8 +11,8 @@ import numpy as np
 from plumbob.reference import jacobians as jacobians_of
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
-from plumbob.reference.formats.robot import Robot
 from plumbob.reference.kinematics import forward_kinematics
+from plumbob.reference.model import Robot
 
 from .. import samples
 from ..engines import ROBOT_ENGINES

@@ -12,7 +12,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.articulation import Articulation
 from plumbob.reference.formats import mjcf, urdf
-from plumbob.reference.formats.robot import Robot
+from plumbob.reference.model import Robot
 
 from ..engines.file_kind import URDF, file_kind
 from . import deviations

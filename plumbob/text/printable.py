@@ -47,3 +47,11 @@ def all_visible(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [all_visible(inner) for inner in value]
     return value
+
+
+def shown(text: str | bytes, length: int = 200) -> str:
+    """Return a text of a solver on one line, without control characters, shortened."""
+    words = text.decode(errors="replace") if isinstance(text, bytes) else text
+    clean = "".join(letter if letter.isprintable() else " " for letter in words[: 4 * length])
+    clean = " ".join(clean.split())
+    return clean if len(clean) <= length else f"{clean[: length - 3]}..."

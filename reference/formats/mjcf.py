@@ -29,6 +29,7 @@ from .. import rotation
 from ..arguments import distinct_texts, frozen
 from ..backend.compiled import set_backend
 from ..inverse_kinematics.tasks import Coupling, FrameTask, IKTask
+from ..model import Robot
 from ..quaternion import (
     IDENTITY,
     add,
@@ -48,7 +49,6 @@ from .robot import (
     INFINITY,
     ORIGIN,
     Quaternion,
-    Robot,
     RobotLink,
     Vector,
     assemble,

@@ -1,4 +1,4 @@
-"""The robot that a reader returns: an articulation, its joints by name and its home position."""
+"""The links that a reader has read, and the robot that they make."""
 
 import contextlib
 from collections.abc import Mapping
@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import FloatArray, frozen
+from ..arguments import frozen
 from ..articulation import Articulation, Mimic
-from ..inverse_kinematics.tasks import IKTask
+from ..model import Robot
 from ..quaternion import IDENTITY, between, magnitude, normalised
 from ..skeleton import Skeleton
 from .xml import Element
@@ -19,20 +19,6 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 ORIGIN = (0.0, 0.0, 0.0)
 INFINITY = float("inf")
-
-
-class Robot(NamedTuple):
-    """A robot or a character read from a file."""
-
-    # one joint for each link or body of the file, with its name and pose
-    articulation: Articulation
-    # index of the articulation's joint by the name of the file's joint; its coordinates in q are
-    # `articulation.coordinates_of(joints[name])`
-    joints: dict[str, int]
-    home: FloatArray  # the coordinates of the configuration in the file, (coordinate,)
-    masses: FloatArray  # of the links [kg], NaN where the file leaves them to meshes, (joint,)
-    centres: FloatArray  # the links' centres of mass in the joints' frames [m], (joint, 3)
-    equalities: tuple[IKTask, ...] = ()  # loop closures and couplings, as tasks
 
 
 class RobotLink(NamedTuple):

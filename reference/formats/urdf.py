@@ -18,13 +18,13 @@ from typing import NamedTuple
 from .. import arguments
 from ..arguments import LARGEST_COORDINATE, distinct_texts
 from ..articulation import Articulation, Mimic
+from ..model import Robot
 from ..quaternion import IDENTITY, exponential, multiply, rotate
 from . import xml
 from .robot import (
     INFINITY,
     ORIGIN,
     Quaternion,
-    Robot,
     RobotLink,
     assemble,
     centre_of,

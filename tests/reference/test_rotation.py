@@ -188,3 +188,14 @@ def test_leading_axes_broadcast(a, v):
     many = rotation.rotate(a[:, None], v[None, :7])
     assert many.shape == (50, 7, 3)
     assert_close(many[3, 5], rotation.rotate(a[3], v[5]))
+
+
+@pytest.mark.parametrize("pitch", [0.3, -1.2, 0.5 * np.pi, -0.5 * np.pi, 0.5 * np.pi - 1e-9])
+def test_roll_pitch_and_yaw_turn_about_the_fixed_axes_also_where_pitch_is_a_right_angle(pitch):
+    x, y, z = (
+        rotation.exponential(a * e) for a, e in zip((0.7, pitch, -2.1), np.eye(3), strict=True)
+    )
+    R = rotation.to_matrix(rotation.multiply(z, rotation.multiply(y, x)))
+    x, y, z = map(rotation.exponential, np.diag(rotation.roll_pitch_yaw(R)))
+    back = rotation.to_matrix(rotation.multiply(z, rotation.multiply(y, x)))
+    assert np.abs(back - R).max() <= 1e-15 * 8  # a few roundings of entries of at most 1

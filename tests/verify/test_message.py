@@ -12,6 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from plumbob.text.printable import shown
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, FailureKind
@@ -25,7 +26,6 @@ from plumbob.verify.message import (
     encode_answer,
     encode_case,
     encode_greeting,
-    shown,
 )
 from plumbob.verify.task import TASKS
 

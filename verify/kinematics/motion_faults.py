@@ -10,6 +10,7 @@ import numpy as np
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray
+from plumbob.reference.rotation import roll_pitch_yaw
 from plumbob.reference.skeleton import Pose
 
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, Verdict
@@ -20,7 +21,7 @@ from .robot_faults import FAULTS as POSE_FAULTS
 from .robot_faults import JACOBIAN_FAULTS, POSITION_ONLY, RIGHT, RobotFault
 from .robot_models import feature_of, tool_pose
 from .robot_targets import HALF_TURNS, LIMIT_STEP, STEP, TOLERANCE
-from .robot_textbook import ancestors, roll_pitch_yaw, rotation_error, sine_error
+from .robot_textbook import ancestors, rotation_error, sine_error
 from .trajectories import AT_LIMIT, LENIENT, Trajectory, twists_between
 
 # Steps agree if they differ by less than this share, with one of these squared dampings [m^2];

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
+from plumbob.reference.rotation import roll_pitch_yaw
 from plumbob.reference.skeleton import Pose
 from plumbob.text.sentence import Sentence, with_code
 
@@ -16,16 +17,7 @@ from .faults import TABLE
 from .formulas import evaluate
 from .robot_models import IDENTITY
 from .robot_textbook import RIGHT as RIGHT_RULES
-from .robot_textbook import (
-    Inputs,
-    RobotFrames,
-    Rules,
-    ancestors,
-    frames_at,
-    jacobians_at,
-    matrices,
-    roll_pitch_yaw,
-)
+from .robot_textbook import Inputs, RobotFrames, Rules, ancestors, frames_at, jacobians_at, matrices
 
 POSITION_ONLY = "position only"
 # Kinematics that differ by less than this are the same [m, rad].

@@ -20,11 +20,12 @@ from plumbob.reference import (
 )
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.judging import PoseJudgement
+from plumbob.reference.rotation import roll_pitch_yaw
 from plumbob.reference.skeleton import Pose
 from plumbob.text.sentence import Sentence, sentence
 
 from ..judgement import CaseJudgement, Verdict
-from .robot_textbook import Inputs, ancestors, roll_pitch_yaw
+from .robot_textbook import Inputs, ancestors
 
 ITERATIONS = 200
 PRECISION = ("tolerance", "tolerance_rotation", "max_iterations")

@@ -4,7 +4,6 @@ Coordinates q have the shape (..., joint); leading axes are configurations. Each
 which the rules of a fault replace.
 """
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -36,18 +35,6 @@ RIGHT: Rules = {
 }  # fmt: skip
 # Rules whose faults make matrices that are no rotations.
 UNROTATED = {"cosine", "sine", "outer", "cross", "skew", "matrix"}
-
-
-def roll_pitch_yaw(R: FloatArray) -> tuple[float, float, float]:
-    """Return the angles about the fixed axes x, y and z whose rotations in turn make R [rad].
-
-    Roll is read off after yaw is undone, so that it is exact also where pitch is a right angle.
-    """
-    yaw = math.atan2(R[1, 0], R[0, 0])
-    sine, cosine = math.sin(yaw), math.cos(yaw)
-    pitch = math.atan2(-R[2, 0], cosine * R[0, 0] + sine * R[1, 0])
-    roll = math.atan2(sine * R[0, 2] - cosine * R[1, 2], cosine * R[1, 1] - sine * R[0, 1])
-    return roll, pitch, yaw
 
 
 class RobotFrames(NamedTuple):
@@ -112,7 +99,7 @@ def _composed(R: FloatArray, rules: Rules) -> FloatArray:
     """Return the product of rotations by roll, pitch and yaw that hinges with faults make."""
     x, y, z = (
         hinge_matrix(axis, np.array(angle), rules)
-        for axis, angle in zip(np.eye(3), roll_pitch_yaw(R), strict=True)
+        for axis, angle in zip(np.eye(3), rotation.roll_pitch_yaw(R), strict=True)
     )
     return np.asarray(z @ y @ x)
 

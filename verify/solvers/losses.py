@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from plumbob.process.child import ChildProcess, Loss
+from plumbob.text.printable import shown
 from plumbob.text.sentence import Sentence, sentence
 
 from ..contestant import Failure, FailureKind
-from ..message import shown
 
 # How many lines of standard error are shown.
 STDERR_SHOWN = 3

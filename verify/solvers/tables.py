@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from plumbob.text.printable import shown
+
 from ..functions import checked
-from ..message import plain, shown
+from ..message import plain
 from ..task import Field
 
 _BOMS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}

@@ -19,8 +19,8 @@ from plumbob.reference import (
     tasks,
 )
 from plumbob.reference.formats import mjcf, urdf
-from plumbob.reference.formats.robot import Robot
 from plumbob.reference.inverse_kinematics.solve_tasks import TaskSolution
+from plumbob.reference.model import Robot
 
 from ...problems.evaluate import evaluator_of
 from ...problems.robot_tasks import (
