@@ -123,8 +123,8 @@ def table(runs: Sequence[RecordedRun], rows: Sequence[Course], quantity: str) ->
 
 def draw(runs: Sequence[RecordedRun], rows: Sequence[Course], quantity: str) -> str:
     """Return the courses as SVG: the largest changes in colour, the others grey."""
+    from ..figures.canvas import canvas, styled, svg_of
     from ..figures.chart import LOOKS
-    from ..figures.drawing import canvas, styled, svg_of
     from ..figures.style import COLOURS, plain_label
 
     with styled():

@@ -1,7 +1,7 @@
 """A chart as data: panels of curves or of marks in rows, the labelled solvers, and their looks."""
 
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..peers import registry
 from ..peers.registry import Style
-from .sketch import Sketch, chart_sketch
 
 Floats = NDArray[np.float64]
 
@@ -197,17 +196,3 @@ def _preferred(name: str) -> tuple[Style, ...]:
     own = registry.find(name).style.colour
     first = colours.index(own) if own in colours else zlib.crc32(name.encode()) % len(LOOKS)
     return LOOKS[first:] + LOOKS[:first]
-
-
-def declared_chart(
-    declared: Mapping[str, Any], panels: Iterable[Panel], entrants: frozenset[str], **fields: Any
-) -> Sketch | None:
-    """Return the sketch of a chart that a `tables.toml` declares; None without panels.
-
-    `fields` are those of `Chart` that are not declared, or differ.
-    """
-    chart = {"panels": tuple(panels), "entrants": entrants, **declared, **fields}
-    for name in ("x", "y"):
-        axis = {"limits": (), **chart.get(name, {})}
-        chart[name] = Axis(**{**axis, "limits": (*axis["limits"], None, None)[:2]})
-    return chart_sketch(Chart(**chart)) if chart["panels"] else None

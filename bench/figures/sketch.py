@@ -19,7 +19,6 @@ from plumbob.process.paths import check_regular
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .chart import Chart
 
 # Drawings kept in memory.
 _CACHE_SIZE = 64
@@ -91,7 +90,7 @@ def _read(name: str, folder: Path | None, digest: str) -> tuple[str, bytes] | No
 
 def _draw(sketch: Sketch, digest: str) -> tuple[str, bytes]:
     """Return SVG and PDF of a sketch."""
-    from .drawing import pdf_of, styled, svg_of
+    from .canvas import pdf_of, styled, svg_of
 
     mark = f"{_MARK} {digest}"
     with styled():
@@ -113,16 +112,3 @@ def _update(digest: Any, value: Any) -> None:
         _update(digest, [getattr(value, field.name) for field in fields(value)])
     else:
         digest.update(f"{type(value).__name__}:{value!r};".encode())
-
-
-def chart_sketch(chart: "Chart") -> Sketch | None:
-    """Return the sketch of a chart, None if the chart has no curves."""
-    if not any(panel.series for panel in chart.panels):
-        return None
-    return Sketch(chart.name, chart.title, chart.caption, chart, _draw_chart)
-
-
-def _draw_chart(chart: "Chart") -> "Figure":
-    from .drawing import draw_chart
-
-    return draw_chart(chart)

@@ -3,14 +3,18 @@
 A folder of `bench/experiments` holds a measurement, its tables and its figures.
 """
 
+import functools
 import importlib
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from .block import Block, Scale
+
+if TYPE_CHECKING:
+    from .values import Kind
 
 
 class Experiment(NamedTuple):
@@ -50,3 +54,20 @@ def blocks(suite: str, scale: Scale) -> Iterator[Block]:
     for experiment in EXPERIMENTS:
         if experiment.suite == suite:
             yield from experiment.blocks(scale)
+
+
+@functools.cache
+def kind_of(suite: str, task: str) -> "Kind | None":
+    """Return the types of the records of a task ("" if they name none); None of other suites.
+
+    No engine is imported.
+
+    Raises:
+        ValueError: if the suite has no task of this name.
+    """
+    modules = [f"{e.package}.values" for e in EXPERIMENTS if e.suite == suite]
+    kinds = {name: kind for module in modules
+             for name, kind in importlib.import_module(module).KINDS.items()}  # fmt: skip
+    if kinds and task not in kinds:
+        raise ValueError(f"task: expected one of {', '.join(map(repr, kinds))}, got {task[:40]!r}")
+    return kinds.get(task)

@@ -21,6 +21,7 @@ import numpy as np
 from plumbob.process.paths import check_folder, check_regular
 
 from . import values
+from .experiment import kind_of
 
 FORMAT = 3
 FILE_NAME = "records.jsonl"
@@ -102,7 +103,7 @@ class Record:
 
     @property
     def _kind(self) -> values.Kind | None:
-        return values.kind_of(self.suite, str(self.facts.get("task", "")))
+        return kind_of(self.suite, str(self.facts.get("task", "")))
 
     @functools.cached_property
     def values(self) -> Any:

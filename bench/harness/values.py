@@ -4,8 +4,6 @@ An experiment declares its types in `values.py`, in `KINDS`. Records are read in
 record that lacks a field, or has a field of another type, is refused.
 """
 
-import functools
-import importlib
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar, get_args
 
@@ -42,25 +40,6 @@ class Kind(NamedTuple):
 
     values: type[Values]
     details: type[Details] = Details
-
-
-@functools.cache
-def kind_of(suite: str, task: str) -> Kind | None:
-    """Return the types of the records of a task ("" if they name none); None of other suites.
-
-    No engine is imported.
-
-    Raises:
-        ValueError: if the suite has no task of this name.
-    """
-    from .experiment import EXPERIMENTS
-
-    modules = [f"{e.package}.values" for e in EXPERIMENTS if e.suite == suite]
-    kinds = {name: kind for module in modules
-             for name, kind in importlib.import_module(module).KINDS.items()}  # fmt: skip
-    if kinds and task not in kinds:
-        raise ValueError(f"task: expected one of {', '.join(map(repr, kinds))}, got {task[:40]!r}")
-    return kinds.get(task)
 
 
 Typed = TypeVar("Typed", bound=msgspec.Struct)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import SUITES
-from plumbob.bench.figures import drawing
+from plumbob.bench.figures import canvas
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import FINISHED, Record
 from plumbob.bench.problems.robots import group_of
@@ -284,7 +284,7 @@ def in_this_process():
 def short_pdf():
     """Leave figures out of PDF files, which take longer than all else of a report."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drawing, "pdf_of", lambda figure, title, mark="": b"%PDF" + mark.encode())
+        patch.setattr(canvas, "pdf_of", lambda figure, title, mark="": b"%PDF" + mark.encode())
         yield
 
 

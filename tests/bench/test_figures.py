@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plumbob.bench.figures import drawing
+from plumbob.bench.figures import canvas, drawing
 from plumbob.bench.figures import sketch as figures
+from plumbob.bench.figures.canvas import pdf_of  # before its stand-in is in place
 from plumbob.bench.figures.chart import LOOKS, MAX_LABELLED, Axis, Chart, Panel, looks, series
-from plumbob.bench.figures.drawing import pdf_of  # before its stand-in is in place
-from plumbob.bench.figures.sketch import chart_sketch, drawn
+from plumbob.bench.figures.chart_sketch import chart_sketch
+from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.report import report
 from plumbob.bench.report.page import page
 from plumbob.bench.tables.results import Results
@@ -104,7 +105,7 @@ def test_labelled_curves_differ_in_colour_line_and_marker(count):
 
 
 def laid_out(chart):
-    with drawing.styled():
+    with canvas.styled():
         return drawing.draw_chart(chart)
 
 
@@ -149,7 +150,7 @@ def test_a_pdf_has_its_fonts_and_its_text(records):
     hostile = flat([r"$\frac{$", "\x1b[2J", "\ufffe手腕", "right\u202eleft"])
     sketches = [figure(Results(records)) for figure in report.all_figures()[::5]]
     for sketch in [*sketches, chart_sketch(hostile)]:
-        with drawing.styled():
+        with canvas.styled():
             pdf = pdf_of(sketch.draw(sketch.data), sketch.title)
         assert pdf.startswith(b"%PDF")
         assert b"/FontFile2" in pdf
@@ -167,7 +168,7 @@ def test_no_legend_covers_the_data(records, count):
     """That no two texts meet is seen in the browser: `test_labels`."""
     for chart in charts(with_solvers(records, count)):
         figure = laid_out(chart)
-        with drawing.styled():
+        with canvas.styled():
             figure.draw_without_rendering()
         for ax, legend in itertools.product(figure.axes, figure.legends):
             inside, box = ax.get_window_extent(), legend.get_window_extent()

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...figures.chart import Panel, Series, declared_chart, series
+from ...figures.chart import Panel, Series, series
+from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record

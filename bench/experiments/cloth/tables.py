@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...figures.chart import Panel, declared_chart, series
+from ...figures.chart import Panel, series
+from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record

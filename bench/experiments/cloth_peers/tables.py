@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...figures.chart import Panel, Series, declared_chart, series
+from ...figures.chart import Panel, Series, series
+from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from ...figures.chart import Panel, declared_chart, series
+from ...figures.chart import Panel, series
+from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...tables.captions import Captions
 from ...tables.columns import words_in

@@ -61,7 +61,8 @@ def falling_cloth(results: Results) -> Sketch | None:
 
 
 def _draw_arms(drawings: Any) -> "Figure":
-    from ...figures.drawing import canvas, power
+    from ...figures.canvas import canvas
+    from ...figures.drawing import power
     from ...figures.scene_drawing import draw_arm
 
     figure, axes = canvas(5.2, len(drawings), sharex=True, sharey=True)
@@ -81,7 +82,7 @@ def _draw_arms(drawings: Any) -> "Figure":
 
 
 def _draw_cloths(frames: Any) -> "Figure":
-    from ...figures.drawing import canvas
+    from ...figures.canvas import canvas
     from ...figures.scene_drawing import draw_cloth
 
     moments, times, pinned = frames

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...figures.chart import Panel, Series, declared_chart, series
+from ...figures.chart import Panel, Series, series
+from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...figures.style import COLOURS, plain_label
 from ...harness import metrics
@@ -202,7 +203,7 @@ def heat_map(start: str, results: Results) -> Sketch | None:
 
 def draw_maps(maps: Sequence[RobotMap]) -> "Canvas":
     """Return maps of the same solvers as a figure of matplotlib's, in the order of the first."""
-    from ...figures.drawing import canvas
+    from ...figures.canvas import canvas
 
     solvers, robots = [row.solver for row in maps[0].rows], maps[0].robots
     rows = 1 if len(robots) <= MAXIMUM_BESIDE else len(maps)

@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from ...figures.chart import MARKS, Panel, Series, declared_chart, series
+from ...figures.chart import MARKS, Panel, Series, series
+from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
