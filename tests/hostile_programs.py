@@ -8,8 +8,8 @@ import numpy as np
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.solvers import ProcessLimits
-from plumbob.verify.solvers.program import ProgramContestant
+from plumbob.verify.door import ProcessLimits
+from plumbob.verify.door.program import ProgramContestant
 
 # The first request may wait for a busy machine; the others come when the program is warm.
 LIMITS = ProcessLimits(

@@ -24,7 +24,7 @@ from plumbob.verify.judgement import (
     Verdict,
 )
 from plumbob.verify.message import decode_greeting
-from plumbob.verify.output import json_file
+from plumbob.verify.screen import json_file
 
 README = Path(__file__).parents[1] / "README.md"
 CHINESE = README.with_name("README.zh-CN.md")

@@ -9,7 +9,7 @@ from plumbob.bench.experiments.check import files
 from plumbob.bench.experiments.robots.readings import OUTCOMES
 from plumbob.reference.outcome import Outcome
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.output.words import VERDICTS
+from plumbob.verify.screen.words import VERDICTS
 
 PAGE = Path(__file__).parents[1] / "docs" / "verdicts.md"
 WORDS = {

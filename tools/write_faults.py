@@ -10,7 +10,7 @@ from itertools import groupby
 from pathlib import Path
 
 from plumbob.verify.fault_programs import FAMILIES, coded_faults
-from plumbob.verify.output.fault_text import cause_and_remedy, changed_lines
+from plumbob.verify.screen.fault_text import cause_and_remedy, changed_lines
 
 FOLDER = Path(__file__).parents[1] / "docs" / "faults"
 

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 from plumbob.text.sentence import Sentence
 
+from .door.host import PythonSolver
 from .functions import FunctionContestant
 from .message import decode_greeting
-from .solvers.host import PythonSolver
 
 FOLDER = Path(__file__).parent
 # The files with faults, those of kinematics first.

@@ -8,10 +8,10 @@ import pytest
 
 from plumbob.text.printable import harmless, visible
 
+from .door.host import PythonSolver
 from .functions import FunctionContestant
 from .judgement import LEAST_SHARE, TaskReport, Verdict
 from .message import decode_greeting
-from .solvers.host import PythonSolver
 from .verify import DISCIPLINES, judge_cases, trials
 
 

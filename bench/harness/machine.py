@@ -26,7 +26,7 @@ _PACKAGES = ("reference", "crosscheck", "verify", "bench", "plumbob/process")
 # Folders that only show numbers; all others may change one. Nothing that measures imports them.
 PRESENTATION = (
     *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),
-    *("bench/tables", "verify/output"),
+    *("bench/tables", "verify/screen"),
 )
 # Likewise in every experiment.
 PRESENTATION_FILES = (

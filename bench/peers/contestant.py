@@ -7,9 +7,9 @@ from typing import Any
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Failure
+from plumbob.verify.door import ProcessLimits, open_contestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.message import NO_SECONDS
-from plumbob.verify.solvers import ProcessLimits, open_contestant
 
 from .entrant import Spec
 from .protocol import NoAnswerError, OwnTime

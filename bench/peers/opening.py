@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from plumbob.text.printable import shown
 from plumbob.verify.contestant import NoGreetingError
+from plumbob.verify.door import LIMITS, open_contestant
 from plumbob.verify.greeting import Greeting
-from plumbob.verify.solvers import LIMITS, open_contestant
 
 from ..problems.own import clean
 from . import registry

@@ -11,7 +11,7 @@ from plumbob.text.printable import shown
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Contestant, Failure, NoGreetingError
-from plumbob.verify.solvers import open_contestant
+from plumbob.verify.door import open_contestant
 
 TRACK, REACH = "track", "inverse_kinematics"
 STEP, MOTION = "mass_spring_step", "mass_spring_motion"

@@ -16,8 +16,8 @@ def explain(
     With words: list the faults that have all of them. Without: list the families of faults.
     """
     from plumbob.text.language import language_of
-    from plumbob.verify.output.fault_text import fault_help
-    from plumbob.verify.output.words import speaker
+    from plumbob.verify.screen.fault_text import fault_help
+    from plumbob.verify.screen.words import speaker
 
     for line in fault_help(words or (), speaker(language_of(lang))):
         print(line, flush=True)

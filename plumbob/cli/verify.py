@@ -14,12 +14,12 @@ from .help_text import Command
 from .options import FAILED, SUCCESS, File, Text, Texts, argument, flag, option
 
 if TYPE_CHECKING:
-    from plumbob.text.sentence import Sentence
+    from plumbob.text.sentence import Say, Sentence
+    from plumbob.verify.door import ProcessLimits
+    from plumbob.verify.door.question import Question
     from plumbob.verify.judgement import Report
-    from plumbob.verify.output.files import Files
-    from plumbob.verify.output.question import Question
-    from plumbob.verify.output.words import Presentation, Say
-    from plumbob.verify.solvers import ProcessLimits
+    from plumbob.verify.screen.files import Files
+    from plumbob.verify.screen.words import Presentation
     from plumbob.verify.verify import Notify
 
 PROGRAM = "plumbob.program"
@@ -96,9 +96,9 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         work.enter_context(lines_in_a_pipe(bar, (LINE_PAUSE, LINE_PAUSE)))
         bar.add_task("starting", total=None)
         from plumbob.text.language import language_of
-        from plumbob.verify.output.files import Files
-        from plumbob.verify.output.question import ANSWERS, Question, limits
-        from plumbob.verify.output.words import Presentation, speaker
+        from plumbob.verify.door.question import ANSWERS, Question, limits
+        from plumbob.verify.screen.files import Files
+        from plumbob.verify.screen.words import Presentation, speaker
 
         language = language_of(lang)
         question = Question(tuple(task or ()), rerun, thorough, seed)
@@ -120,7 +120,7 @@ def _listed(
     question: "Question", names: bool, template: str | None, export: Path | None, say: "Say"
 ) -> Iterable[str]:
     """Return lines on the tasks, or on the starter or cases that it writes."""
-    from plumbob.verify.output import listings
+    from plumbob.verify.screen import listings
 
     if template and not names:
         return listings.starter(template, Path(), say)
@@ -140,8 +140,8 @@ def _judge(
     from plumbob.process.paths import check_regular
     from plumbob.text.sentence import sentence
     from plumbob.verify.contestant import NoGreetingError
-    from plumbob.verify.output.files import UNJUDGED
-    from plumbob.verify.output.question import ask, opened, suited
+    from plumbob.verify.door.question import ask, opened, suited
+    from plumbob.verify.screen.files import UNJUDGED
     from plumbob.verify.verify import failed
 
     from .options import writable
@@ -187,7 +187,7 @@ def _publisher(
     bar: Any, files: "Files", question: "Question", context: "Presentation"
 ) -> Callable[["Report"], None]:
     """Return what prints the newest verdict and writes the files, before any cause is sought."""
-    from plumbob.verify.output.words import verdict_line
+    from plumbob.verify.screen.words import verdict_line
 
     def publish(report: "Report") -> None:
         if report.tasks:
@@ -210,7 +210,7 @@ def _self_test(words: list[str], say: "Say") -> int:
     from rich.console import Console
     from rich.progress import track
 
-    from plumbob.verify.output.listings import self_test
+    from plumbob.verify.screen.listings import self_test
     from plumbob.verify.self_test import attempt, subjects
 
     console = Console(stderr=True)

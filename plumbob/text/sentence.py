@@ -26,6 +26,9 @@ class Sentence(NamedTuple):
         return self.text()
 
 
+Say = Callable[[Sentence], str]  # translates a sentence
+
+
 def sentence(template: str, /, **values: object) -> Sentence:
     """Return a sentence: `sentence("{joint} is {distance:.2g} m off", joint=..., distance=...)`."""
     return Sentence(template, values)

@@ -15,7 +15,7 @@ from plumbob.verify.case import Case
 from plumbob.verify.kinematics import pose_laws, resample
 from plumbob.verify.kinematics.polylines import Polyline
 from plumbob.verify.laws import HOLDS
-from plumbob.verify.output import comparison
+from plumbob.verify.screen import comparison
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 CLOSE = 1.0 + 1e-9

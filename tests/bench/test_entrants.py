@@ -24,7 +24,7 @@ from plumbob.bench.tables.results import Results, printable
 from plumbob.cli.main import run_command
 from plumbob.reference import forward_kinematics
 from plumbob.reference.formats import mjcf, urdf
-from plumbob.verify.solvers import open_contestant
+from plumbob.verify.door import open_contestant
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK, CLOTH, ROBOT, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)

@@ -29,9 +29,9 @@ from plumbob.reference import Skeleton
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer
+from plumbob.verify.door import export, open_contestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.message import NO_SECONDS
-from plumbob.verify.solvers import export, open_contestant
 
 NOT_TIMED = sentence('Not timed: the answers hold no valid "seconds".')
 TASK = "inverse_kinematics"

@@ -18,7 +18,7 @@ from plumbob.cli import terminal
 from plumbob.crosscheck.claims import CLAIMS
 from plumbob.crosscheck.verdict import ClaimVerdict
 from plumbob.verify.judgement import Verdict as TaskVerdict
-from plumbob.verify.output import terminal as verify_terminal
+from plumbob.verify.screen import terminal as verify_terminal
 
 # Of a terminal; None is a pipe.
 WIDTHS = (80, 120, 200, None)

@@ -18,6 +18,7 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 from plumbob.verify import verify
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, FailureKind
+from plumbob.verify.door import saved
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import (
@@ -29,16 +30,8 @@ from plumbob.verify.judgement import (
     TaskReport,
     Verdict,
 )
-from plumbob.verify.output import (
-    comparison,
-    drawing,
-    json_file,
-    junit,
-    page,
-    saved,
-    terminal,
-)
-from plumbob.verify.output.words import GOOD, Presentation, digits, explanations, speaker
+from plumbob.verify.screen import comparison, drawing, json_file, junit, page, terminal
+from plumbob.verify.screen.words import GOOD, Presentation, digits, explanations, speaker
 
 HOSTILE = '<script>alert(1)</script>\x1b[31m\u202e & "quotes" \' ]]>'
 TASKS = tuple(SMALL)

@@ -7,18 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from plumbob.verify.door import saved
+from plumbob.verify.door.question import Question
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.output import files, json_file, junit, page, saved, terminal
-from plumbob.verify.output.files import Files
-from plumbob.verify.output.question import Question
-from plumbob.verify.output.words import (
-    VERDICTS,
-    Presentation,
-    passed,
-    speaker,
-    title,
-)
+from plumbob.verify.screen import files, json_file, junit, page, terminal
+from plumbob.verify.screen.files import Files
+from plumbob.verify.screen.words import VERDICTS, Presentation, passed, speaker, title
 from plumbob.verify.self_test import subjects
 from plumbob.verify.verify import verify
 

@@ -136,7 +136,7 @@ def test_a_judge_that_is_killed_takes_the_program_with_it(tmp_path, end):
     judge = (
         "import os, sys; sys.path[:0] = sys.argv[1:3]\n"
         "from hostile_programs import LIMITS, case, program\n"
-        "from plumbob.verify.solvers.program import ProgramContestant\n"
+        "from plumbob.verify.door.program import ProgramContestant\n"
         "contestant = ProgramContestant([sys.executable, '-I', '-S', sys.argv[3]], limits=LIMITS)\n"
         "contestant.answer(case(2))\n"
         'contestant._ready().send(b\'{"id": 2, "parents": [1, 2, 3]}\\n\')\n'

@@ -10,8 +10,8 @@ from plumbob.process.tree import main_thread_seconds
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer
-from plumbob.verify.solvers import ProcessLimits, open_contestant
-from plumbob.verify.solvers.claimed_time import contradicts
+from plumbob.verify.door import ProcessLimits, open_contestant
+from plumbob.verify.door.claimed_time import contradicts
 
 LIMITS = ProcessLimits(first=60.0, request=60.0)
 # Seconds of 40 requests: what is computed for the messages, and what solves take; some are long.

@@ -12,7 +12,7 @@ from hostile_programs import case, program, running
 
 from plumbob.process import tree as process_tree
 from plumbob.verify.contestant import Answer
-from plumbob.verify.solvers import open_contestant
+from plumbob.verify.door import open_contestant
 
 ROOT = Path(__file__).parents[2]
 LINUX_ONLY = pytest.mark.skipif(process_tree.LIMIT is None, reason="Linux has this limit only")

@@ -13,7 +13,7 @@ from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.laws import LAWS
-from plumbob.verify.output.words import passed
+from plumbob.verify.screen.words import passed
 from plumbob.verify.verify import DISCIPLINES, judge_cases
 
 RIGHT_EXCEPT, BROKEN = Verdict.RIGHT_EXCEPT, Verdict.BROKEN

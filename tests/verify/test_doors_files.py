@@ -14,11 +14,11 @@ from hypothesis.extra import numpy as arrays
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, FailureKind, NoGreetingError
+from plumbob.verify.door import export, open_contestant
+from plumbob.verify.door.export import export_cases, write_cases
+from plumbob.verify.door.files import FileContestant, place_of
+from plumbob.verify.door.tables import read_table, write_table
 from plumbob.verify.greeting import Greeting
-from plumbob.verify.solvers import export, open_contestant
-from plumbob.verify.solvers.export import export_cases, write_cases
-from plumbob.verify.solvers.files import FileContestant, place_of
-from plumbob.verify.solvers.tables import read_table, write_table
 from plumbob.verify.task import TASKS, Field
 
 TABLE = Field("positions", ("frame", "particle", 3))

@@ -13,6 +13,9 @@ from hostile_programs import LIMITS, case, running
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, NoGreetingError
+from plumbob.verify.door import ProcessLimits, host, open_contestant
+from plumbob.verify.door.files import FileContestant
+from plumbob.verify.door.program import ProgramContestant
 from plumbob.verify.functions import call
 from plumbob.verify.message import (
     Request,
@@ -24,9 +27,6 @@ from plumbob.verify.message import (
     encode_answer,
     encode_case,
 )
-from plumbob.verify.solvers import ProcessLimits, host, open_contestant
-from plumbob.verify.solvers.files import FileContestant
-from plumbob.verify.solvers.program import ProgramContestant
 from plumbob.verify.task import TASKS
 
 TABLE = tomllib.loads(Path(__file__).with_name("python_files.toml").read_text("utf-8"))

@@ -26,14 +26,9 @@ from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics.predictions import forward
 from plumbob.verify.kinematics.switches import Switches
 from plumbob.verify.one_line import search
-from plumbob.verify.output import comparison, json_file, junit, page, terminal
-from plumbob.verify.output.fault_text import (
-    cause_and_remedy,
-    explained,
-    failure_of,
-    fault_help,
-)
-from plumbob.verify.output.words import Presentation, advice, reservations, speaker
+from plumbob.verify.screen import comparison, json_file, junit, page, terminal
+from plumbob.verify.screen.fault_text import cause_and_remedy, explained, failure_of, fault_help
+from plumbob.verify.screen.words import Presentation, advice, reservations, speaker
 from plumbob.verify.verify import verify
 
 REMEDY = sentence("Remedy")

@@ -15,8 +15,8 @@ from hostile_programs import LIMITS, LOOP, case, program, running
 from plumbob.process import child as child_process
 from plumbob.process.child import ChildProcess
 from plumbob.verify.contestant import Answer, Failure, FailureKind, NoGreetingError
+from plumbob.verify.door.program import ProgramContestant
 from plumbob.verify.judgement import Diagnosis, TaskReport
-from plumbob.verify.solvers.program import ProgramContestant
 from plumbob.verify.verify import DISCIPLINES, verify
 
 TABLE = tomllib.loads((Path(__file__).parents[1] / "hostile_programs.toml").read_text("utf-8"))

@@ -10,15 +10,15 @@ import pytest
 
 from plumbob.reference import Skeleton, solve_ik
 from plumbob.reference.rotation import exponential, multiply, rotate
+from plumbob.verify.door import open_contestant
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting, Step, System
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics.predictions import forward, path_to, solve
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
-from plumbob.verify.output.terminal import lines
-from plumbob.verify.output.words import Presentation, speaker
+from plumbob.verify.screen.terminal import lines
+from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.self_test import DECLARED, Stepper
-from plumbob.verify.solvers import open_contestant
 from plumbob.verify.templates import template
 from plumbob.verify.verify import verify
 

@@ -34,8 +34,8 @@ from plumbob.verify.mass_spring.problem import (
     state_of,
     system_of,
 )
-from plumbob.verify.output import terminal
-from plumbob.verify.output.words import Presentation, speaker
+from plumbob.verify.screen import terminal
+from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.self_test import (
     CONVERGED,
     DECLARED,

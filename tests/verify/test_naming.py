@@ -8,8 +8,8 @@ import planted_programs
 import pytest
 from planted_programs import FAULTS, IN
 
+from plumbob.verify.door import open_contestant
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.solvers import open_contestant
 from plumbob.verify.verify import verify
 
 QUICK = [

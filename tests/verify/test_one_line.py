@@ -21,8 +21,8 @@ from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics.limits import solve_within
 from plumbob.verify.one_line import search
 from plumbob.verify.one_line.mutants import Program
-from plumbob.verify.output import terminal
-from plumbob.verify.output.words import Presentation, speaker
+from plumbob.verify.screen import terminal
+from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.verify import DISCIPLINES, judge_cases, trials, verify
 
 # Of these kinds the programs are judged in half a second; the others are slow tests.

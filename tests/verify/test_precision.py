@@ -27,9 +27,9 @@ from plumbob.verify.mass_spring import search
 from plumbob.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, apply
 from plumbob.verify.mass_spring.model import StepModel
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
-from plumbob.verify.output import json_file, junit, page, terminal
-from plumbob.verify.output.words import Presentation, speaker
 from plumbob.verify.precision import has_double
+from plumbob.verify.screen import json_file, junit, page, terminal
+from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.self_test import DECLARED, Stepper
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
 

@@ -16,10 +16,10 @@ from plumbob.text.sentence import sentence
 from plumbob.verify import schema
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, FailureKind
+from plumbob.verify.door import LIMITS, open_contestant
 from plumbob.verify.functions import MOST_POINTS
 from plumbob.verify.greeting import MOST_ITERATIONS, PROTOCOL, Greeting
 from plumbob.verify.message import encode_case, encode_greeting
-from plumbob.verify.solvers import LIMITS, open_contestant
 from plumbob.verify.task import TASKS
 from plumbob.verify.verify import DISCIPLINES
 

@@ -9,7 +9,7 @@ from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
 from plumbob.reference import Skeleton
 from plumbob.verify.greeting import PROTOCOL, Greeting, Step
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.output.listings import self_test as lines
+from plumbob.verify.screen.listings import self_test as lines
 from plumbob.verify.self_test import FK, HONEST, STEP, Subject, Trial, attempt, stepped, subjects
 
 

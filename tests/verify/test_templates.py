@@ -13,10 +13,10 @@ import msgspec
 import planted_programs
 import pytest
 
+from plumbob.verify.door import open_contestant
 from plumbob.verify.greeting import PROTOCOL, Fixed, Greeting, Step, System
 from plumbob.verify.kinematics import robot_jacobian, robot_targets
 from plumbob.verify.message import encode_case
-from plumbob.verify.solvers import open_contestant
 from plumbob.verify.task import TASKS
 from plumbob.verify.templates import GREETING_FIELDS, LANGUAGES, template
 

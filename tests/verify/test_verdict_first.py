@@ -11,11 +11,11 @@ import pytest
 
 from plumbob.verify import cause_search
 from plumbob.verify.cause_search import CauseSearch, NoSearch, SearchLimit
+from plumbob.verify.door.question import Question
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting
-from plumbob.verify.output.files import WRONG, Files
-from plumbob.verify.output.question import Question
-from plumbob.verify.output.words import Presentation, speaker
+from plumbob.verify.screen.files import WRONG, Files
+from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.verify import verify
 
 FILES = ("verdict.json", "verdict.xml", "index.html", "card.svg")
@@ -123,7 +123,7 @@ def test_a_judge_that_fails_at_a_task_keeps_the_other_verdicts(monkeypatch, tmp_
 def test_a_screen_that_cannot_be_drawn_leaves_the_verdict(monkeypatch, tmp_path, capsys):
     functions = {"mass_spring_forces": wrong_forces}
     report = verify(FunctionContestant(functions, Greeting(1, tuple(functions))))
-    module = importlib.import_module("plumbob.verify.output.terminal")
+    module = importlib.import_module("plumbob.verify.screen.terminal")
     monkeypatch.setattr(module, "show", fails)
     context = Presentation(speaker("en"), "en", ("mine.py",))
     assert Files(None, None, None, None, tmp_path).write(report, Question(), context) == WRONG

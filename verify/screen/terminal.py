@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from plumbob.text.printable import harmless, visible
-from plumbob.text.sentence import Sentence, sentence, without_repetition
+from plumbob.text.sentence import Say, Sentence, sentence, without_repetition
 
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict, smallest_failures
 from . import comparison
@@ -20,7 +20,6 @@ from .words import (
     GOOD,
     VERDICTS,
     Presentation,
-    Say,
     advice,
     digits,
     explanations,

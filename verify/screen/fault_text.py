@@ -7,14 +7,13 @@ from itertools import groupby
 
 import numpy as np
 
-from plumbob.text.sentence import Sentence, sentence
+from plumbob.text.sentence import Say, Sentence, sentence
 
+from ..door.saved import SavedCase, cases_of
 from ..fault_programs import FAMILIES, CodedFault, coded_faults, contestant_of
 from ..judgement import CaseJudgement, Verdict
 from ..verify import DISCIPLINES, judge_cases, trials
-from .saved import SavedCase, cases_of
 from .terminal import numbers, wrapped
-from .words import Say
 
 # The lines around a change, and of the numbers of a failing case.
 CONTEXT, ROWS = 2, 4

@@ -1,18 +1,17 @@
 """What the terminal, the files and the page of `verify` share: verdicts in words."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from plumbob.text.language import translator
 from plumbob.text.printable import visible
-from plumbob.text.sentence import Sentence, codes_in, sentence
+from plumbob.text.sentence import Say, Sentence, codes_in, sentence
 
 from ..contestant import Failure
+from ..door import saved
 from ..judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
-from . import saved
 
-Say = Callable[[Sentence], str]
 GOOD = (Verdict.RIGHT, Verdict.RIGHT_EXCEPT)
 # In the answers of starters that nobody has filled in.
 UNWRITTEN = "is not written yet"

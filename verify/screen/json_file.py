@@ -5,11 +5,12 @@ from typing import Any, Literal
 import msgspec
 
 from plumbob.text.printable import all_visible
+from plumbob.text.sentence import Say
 
 from ..contestant import Answer, Failure
 from ..judgement import CaseJudgement, Finding, Report, TaskReport
 from ..message import plain
-from .words import GOOD, Say, advice, remarks
+from .words import GOOD, advice, remarks
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"
 VERSION: Literal[2] = 2

@@ -16,15 +16,7 @@ from ..contestant import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
 from ..task import TASKS
 from .claimed_time import ClaimedTimes
-from .losses import (
-    LIMITS,
-    FailureError,
-    ProcessLimits,
-    departure,
-    failure_of,
-    garbage,
-    not_started,
-)
+from .losses import LIMITS, FailureError, ProcessLimits, departure, failure_of, garbage, not_started
 
 
 class ProgramContestant:

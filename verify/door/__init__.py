@@ -22,7 +22,7 @@ home, spec, folder, patience = sys.argv[1:]
 is_known = home in sys.path
 if not is_known:
     sys.path.insert(0, home)
-from plumbob.verify.solvers.host import serve
+from plumbob.verify.door.host import serve
 if not is_known:
     sys.path.append(sys.path.pop(0))
 serve(spec, folder, float(patience))

@@ -5,15 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from plumbob.text.sentence import sentence
+from plumbob.text.sentence import Say, sentence
 
 from ..contestant import Contestant
 from ..judgement import Report
-from ..solvers import LIMITS, ProcessLimits, open_contestant
-from ..solvers.files import FileContestant
 from ..verify import DISCIPLINES, Notify, judge_cases, verify
-from . import saved
-from .words import Say
+from . import LIMITS, ProcessLimits, open_contestant, saved
+from .files import FileContestant
 
 # The words before a program, and before a folder of answers.
 PROGRAM, ANSWERS = "--", "--answers"

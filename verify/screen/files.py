@@ -10,9 +10,10 @@ from typing import NamedTuple
 from plumbob.text.printable import visible
 from plumbob.text.sentence import Sentence, sentence
 
+from ..door import saved
+from ..door.question import Question
 from ..judgement import Report
-from . import json_file, junit, page, saved, terminal
-from .question import Question
+from . import json_file, junit, page, terminal
 from .words import GOOD, Presentation, verdict_line
 
 FAILURES = Path("plumbob_failures")

@@ -3,9 +3,11 @@
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 
+from plumbob.text.sentence import Say
+
 from ..contestant import Answer
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict
-from .words import Say, explanations, title
+from .words import explanations, title
 
 # JUnit's element for a verdict that is not good.
 _ELEMENTS = {Verdict.UNDECIDED: "skipped", Verdict.WRONG: "failure", Verdict.BROKEN: "error"}

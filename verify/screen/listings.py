@@ -5,12 +5,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from plumbob.text.sentence import Sentence, sentence
+from plumbob.text.sentence import Say, Sentence, sentence
 
-from ..solvers.export import export_cases
+from ..door.export import export_cases
 from ..task import TASKS, Field, Task
 from .terminal import paragraphs, wrapped
-from .words import Say
 
 if TYPE_CHECKING:
     from ..self_test import Trial
