@@ -132,7 +132,7 @@ LONG = (
     "test_front_door.py::test_a_module_of_the_same_name_where_one_works_is_left_alone",
     "test_cloth_peers.py::test_the_truth_is_that_of_another_engines_runge_kutta",
     "test_files.py::test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not",
-    "test_dask.py::test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none[arm-30",
+    "test_dask.py::test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none",
     "test_readme.py::test_the_solver_of_the_readme_is_right_and_is_said_to_be",
     "[robots, damping too large]",
     "[CCD, world rotation on the left]",

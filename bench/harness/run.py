@@ -41,8 +41,8 @@ def run(
     """Measure suites, yielding events; valid records are kept.
 
     A block is measured again where its record is from other sources, versions or another machine,
-    is smaller than requested, or failed. Records of other blocks are kept. In this process suites
-    are measured in order. The scale is a name, or a choice of blocks.
+    is smaller than requested, or failed. Records of other blocks are kept. Suites are measured in
+    order. The scale is a name, or a choice of blocks.
 
     Raises:
         ValueError: if the result file cannot be read, or another run writes to it; or if the
@@ -51,19 +51,16 @@ def run(
     file, choice = RecordFile(folder), choice_at(scale)
     with locked(folder):
         present = {record.key: record for record in file.read().records}
-        for group in [suites] if executor.takes_suites_together else [[suite] for suite in suites]:
+        for suite in suites:
             begin = time.perf_counter()
-            every = [block for suite in group for block in blocks(suite, choice.scale)]
-            executor.note_records(present.get(block_key(block)) for block in every if block.times)
-            selected = [block for block in every if choice.takes(block)]
+            selected = [block for block in blocks(suite, choice.scale) if choice.takes(block)]
             yield from _run_blocks(selected, choice, file, present, executor)
+            suite_keys = {block_key(block) for block in selected}
             file.arrange(map(block_key, selected))
             seconds = time.perf_counter() - begin
-            for suite in group:
-                suite_keys = {block_key(block) for block in selected if block.suite == suite}
-                if not choice.is_partial:
-                    _record_finish(suite, suite_keys, choice.name, seconds, executor, file)
-                yield from _extra_records(suite, suite_keys, file, choice.is_partial)
+            if not choice.is_partial:
+                _record_finish(suite, suite_keys, choice.name, seconds, executor, file)
+            yield from _extra_records(suite, suite_keys, file, choice.is_partial)
 
 
 def _run_blocks(

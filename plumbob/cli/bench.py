@@ -63,9 +63,6 @@ Listing = Annotated[bool, flag("List problems and solvers, and stop.", "--list")
 DryRun = Annotated[bool, flag("List what would be measured, and stop.", "--dry-run")]
 Verbose = Annotated[bool, flag("Print every table as well.", "--verbose")]
 Address = Annotated[str, option("local|dask://HOST:PORT", "Where to measure; see docs/cluster.md.")]
-MixMachines = Annotated[
-    bool, flag("With Dask: mix times of several machines in a table.", "--mix-machines")
-]
 
 
 def bench(  # noqa: PLR0913 -- one parameter an option
@@ -88,7 +85,6 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     dry: DryRun = False,
     verbose: Verbose = False,
     executor: Address = "local",
-    mix_machines: MixMachines = False,
 ) -> int:
     """Measure problems with solvers. Records are kept, so that a run can be continued.
 
@@ -105,7 +101,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:
         return _print_plan(names, choice, None if listing else output)
-    return _measure(names, choice, output, fresh, (executor, mix_machines), verbose)
+    return _measure(names, choice, output, fresh, executor, verbose)
 
 
 def _print_plan(names: list[str], choice: "Choice", output: Path | None) -> int:
@@ -124,14 +120,14 @@ def _measure(
     choice: "Choice",
     output: Path,
     fresh: bool,
-    address: tuple[str, bool],
+    address: str,
     verbose: bool,
 ) -> int:
     """Measure suites and print the answer, after every table if that is wished."""
     from plumbob.bench.harness.executors import executor_at
 
     writable(output)
-    with closing(executor_at(*address)) as place:
+    with closing(executor_at(address)) as place:
         code = run_suites(names, choice, output, fresh, place)
     if verbose:
         terminal.print_tables(names, output)

@@ -1,6 +1,6 @@
 """Where blocks are measured, by its address: in this process, or by the workers of a cluster."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -23,16 +23,7 @@ Step = Block | Record | NotMeasured
 
 
 class Executor:
-    """Measure blocks in this process, in order; subclasses measure elsewhere.
-
-    Attributes:
-        takes_suites_together: whether the blocks of all suites are best given at once.
-    """
-
-    takes_suites_together = False
-
-    def note_records(self, records: Iterable[Record | None]) -> None:
-        """Take note of the records of all blocks with times, selected or not."""
+    """Measure blocks in this process, in order; subclasses measure elsewhere."""
 
     def difference(self, block: Block, record: Record) -> str:
         """Return how a record differs from a measurement made now, "" if it does not."""
@@ -61,7 +52,7 @@ class Executor:
 THIS_PROCESS = Executor()
 
 
-def executor_at(address: str, mix_machines: bool = False) -> Executor:
+def executor_at(address: str) -> Executor:
     """Return the executor of an address.
 
     Raises:
@@ -76,4 +67,4 @@ def executor_at(address: str, mix_machines: bool = False) -> Executor:
         raise ValueError(f"--executor: expected local or dask://HOST:PORT, got {address!r}")
     from .dask import DaskExecutor
 
-    return DaskExecutor(scheduler, mix_machines)
+    return DaskExecutor(scheduler)
