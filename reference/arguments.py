@@ -31,6 +31,8 @@ SMALLEST_POSITIVE = 1e-75
 LARGEST_COUNT = 10**8
 # Bounds of an array whose shape is an argument: its numbers, and the lengths of its shape.
 LARGEST_ARRAY, LARGEST_RANK = 4 * LARGEST_COUNT, 32
+# Error messages show no arrays of more numbers.
+LARGEST_SHOWN = 1000
 # Kinds of arrays that hold no numbers.
 KINDS = {"b": "booleans", "c": "complex numbers", "O": "objects", "U": "text", "M": "dates"}
 # Of the integers by which arrays are indexed.
@@ -310,7 +312,14 @@ def shape(lengths: Sequence[int | str]) -> str:
 
 
 def shown(value: Any) -> str:
-    """Write a value for an error message, in short; its type if that fails."""
+    """Write a value for an error message, in short; its type if that fails.
+
+    Large arrays are not written: NumPy takes half a minute to shorten an array of 20 axes.
+    """
+    parts = value if isinstance(value, list | tuple) else (value,)
+    if any(isinstance(part, np.ndarray) and part.size > LARGEST_SHOWN for part in parts):
+        kind = type(value).__name__
+        return f"an array of shape {shape(value.shape)}" if kind == "ndarray" else f"a {kind}"
     try:
         return f"{value!r:.80}"
     except Exception:

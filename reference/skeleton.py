@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments
-from .arguments import FloatArray, IndexArray, KeepsReadOnly, frozen
+from .arguments import FloatArray, IndexArray, KeepsReadOnly, frozen, shown
 
 
 class SkeletonArrays(NamedTuple):
@@ -154,7 +154,7 @@ def _checked_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     names = arguments.sequence("names", names, count, "a joint")
     for name in names:
         if not arguments.text("names", name):
-            raise ValueError(f"names: expected {count} non-empty strings, got {names!r:.80}")
+            raise ValueError(f"names: expected {count} non-empty strings, got {shown(names)}")
     if len(set(names)) != count:
         repeated = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"names: expected distinct names, got {repeated!r} more than once")

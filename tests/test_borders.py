@@ -14,7 +14,16 @@ import numpy as np
 import public_calls
 import pytest
 
-from plumbob.reference import arguments, curves, scenes, solve_ik
+from plumbob.reference import (
+    Skeleton,
+    Target,
+    all_solutions,
+    arguments,
+    curves,
+    scenes,
+    solve_ik,
+    solve_tasks,
+)
 from plumbob.reference.arguments import array, integer, shown
 
 PROGRAM = Path(border_walk.__file__)
@@ -178,6 +187,26 @@ def test_what_cannot_be_shown_is_named_by_its_type():
 
 
 ARM, REST = scenes.lab_arm()
+AXES_20 = np.zeros((2,) * 20)  # NumPy takes up to half a minute to write this array
+LARGE_ARRAYS = {
+    "tolerance": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], tolerance=AXES_20),
+    "restarts": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], restarts=AXES_20),
+    "effector": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], effector=AXES_20),
+    "solver": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], AXES_20),
+    "target": lambda: all_solutions(public_calls.robot(), Target(AXES_20)),
+    "targets": lambda: solve_ik(ARM, REST, [Target([0.3, 0.0, 0.4]), AXES_20]),
+    "names": lambda: Skeleton([-1, 0], np.ones((2, 3)), ["", AXES_20]),
+    "tasks": lambda: solve_tasks(public_calls.robot(), public_calls.robot().neutral(), AXES_20),
+}
+
+
+@pytest.mark.parametrize("name", LARGE_ARRAYS)
+def test_large_arrays_are_refused_without_their_numbers(name):
+    with pytest.raises(ValueError, match=rf"^{name.removesuffix('s')}.*: expected") as refusal:
+        LARGE_ARRAYS[name]()
+    assert "array([" not in str(refusal.value)
+
+
 TOO_MANY = {
     "size": lambda: scenes.lab_cloth(size=10**5),
     "rows, columns": lambda: scenes.grid_cloth(10**5, 10**5),

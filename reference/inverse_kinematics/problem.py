@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
-from ..arguments import FloatArray, IndexArray
+from ..arguments import FloatArray, IndexArray, shown
 from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import effector_of
@@ -142,11 +142,11 @@ def _checked(
     model: Skeleton | Articulation, target: Any, effector: int | str | None
 ) -> CheckedTarget:
     if not isinstance(target, Target):
-        raise ValueError(f"target: expected only Targets beside others, got {target!r:.80}")
+        raise ValueError(f"target: expected only Targets beside others, got {shown(target)}")
     joint = effector_of(model, effector if target.effector is None else target.effector)
     if effector is not None and joint != model.index(effector, "effector"):
         raise ValueError(
-            f"effector: expected that of the target, {target.effector!r}, got {effector!r}"
+            f"effector: expected that of the target, {target.effector!r}, got {shown(effector)}"
         )
     position = arguments.floats("target", target.position, "...", 3)
     quaternion = target.rotation

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments
-from ..arguments import FloatArray, frozen
+from ..arguments import FloatArray, frozen, shown
 from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import Model, checked_model, effector_of
@@ -134,7 +134,7 @@ class TaskProblem:
         self, model: Articulation, q: FloatArray, tasks: Sequence[IKTask | Target]
     ) -> None:
         if isinstance(tasks, Target) or not isinstance(tasks, Sequence) or not tasks:
-            raise ValueError(f"tasks: expected a list of at least one task, got {tasks!r:.80}")
+            raise ValueError(f"tasks: expected a list of at least one task, got {shown(tasks)}")
         self.model, self.tasks = model, [_as_task(model, task) for task in tasks]
         n, freedoms = model.joint_count, model.freedom_count
         self.mechanism = Mechanism(
@@ -255,7 +255,7 @@ def _as_task(model: Articulation, task: IKTask | Target) -> IKTask:
         frame = effector_of(model, task.effector)
         return FrameTask(frame, task.position, task.rotation, weight=task.weight)
     if isinstance(task, type) or not callable(getattr(task, "evaluate", None)):
-        raise ValueError(f"tasks: expected tasks and Targets, got {task!r:.80}")
+        raise ValueError(f"tasks: expected tasks and Targets, got {shown(task)}")
     arguments.number("weight", getattr(task, "weight", None), above=0.0)
     arguments.boolean("exact", getattr(task, "exact", None))
     return task
@@ -267,7 +267,7 @@ def _evaluated(
     """Return the residual of a task, of a size, and its derivative; both are checked."""
     parts = task.evaluate(current)
     if not isinstance(parts, tuple) or len(parts) != 2:
-        raise ValueError(f"evaluate: expected a residual and its derivative, got {parts!r:.80}")
+        raise ValueError(f"evaluate: expected a residual and its derivative, got {shown(parts)}")
     r = arguments.array("residual", parts[0], size)
     return r, arguments.array("derivative", parts[1], len(r), current.model.freedom_count)
 
