@@ -216,11 +216,16 @@ def _lists(position, rotation):
     def listed_by_form(position, rotation):
         return reference.all_solutions(wrist, Target(position, rotation))
 
+    def turned(position, rotation):
+        return list(listed_by_form(position, rotation).with_turns())
+
+    turns = inverse_kinematics.IKSolutions.with_turns
     pose, all_solutions = {"position": position, "rotation": rotation}, reference.all_solutions
     options = {"effector": 6, "grid": np.array([0.2, 0.4]), "restarts": 8, "seed": 3}
     laws = {"free": "position rotation grid", "names": "target"}
     yield entry(listed, pose | options, of=all_solutions, single="grid", **laws)
     yield entry(listed_by_form, pose, "closed form", all_solutions, **laws)
+    yield entry(turned, pose, of=turns, **laws)
 
 
 def _rotations():

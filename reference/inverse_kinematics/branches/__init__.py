@@ -4,16 +4,19 @@
 angles of `subproblems.py`, and `settle.py` checks what comes out by forward kinematics.
 """
 
-from collections.abc import Mapping
+import itertools
+import math
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import arguments
-from ...arguments import FloatArray, is_plain
-from ...articulation import Articulation
+from ...arguments import FloatArray, is_plain, shown
+from ...articulation import LIMIT_TOLERANCE, Articulation
 from ...model import Model, checked_model, effector_of
+from ..box_step import FULL_CIRCLE
 from ..problem import (
     CheckedTarget,
     Target,
@@ -24,7 +27,7 @@ from ..problem import (
 from ..solve import solve_checked, target_rows
 from .arms import SEARCH, Arm, Arms, arms_of
 from .closed_forms import CANDIDATES, HINGES, LARGEST_COUNT
-from .settle import FIGURES, closed_form_kernel, settle_kernel
+from .settle import FIGURES, TOLERANCE, closed_form_kernel, settle_kernel
 from .subproblems import CERTAIN, EVERY_ANGLE
 
 # Random starts of a search.
@@ -34,22 +37,25 @@ SEARCH_TOLERANCE = 1e-6
 
 
 class IKSolutions(NamedTuple):
-    """All solutions of a pose that a method finds; the arrays are read-only.
+    """All solutions of a pose that a method finds, up to whole revolutions; arrays are read-only.
 
     Attributes:
         coordinates: (solution, coordinate). Each angle is the one within the limits that is nearest
-            to their middle, or to zero without limits; whole revolutions more are not listed.
-            Joints that do not move the effector are at neutral.
+            to their middle, or to zero without limits; `with_turns` adds whole revolutions, which
+            are not listed. Joints that do not move the effector are at neutral.
         residual: distances from effector to target [m], by forward kinematics, (solution,).
         residual_rotation: angles between them [rad], (solution,).
         method: the name of the closed form, or "restarts".
-        complete: whether the method proves that there are no other solutions within the limits;
-            with a grid, at its values. Never near a singular pose, where their number is in doubt.
+        complete: whether the method proves that there are no other solutions within the limits, up
+            to whole revolutions; with a grid, at its values. Never near a singular pose, where the
+            number of solutions is in doubt: an empty list then proves nothing.
         continuum: whether the target is singular, within 1e-7 of the reach and in angle: solutions
             form a continuum, of which the list has single members, or none.
         unseen: the probability that a further restart would find a solution that is not listed,
             estimated as the share of those found once (Good 1953); 0 of closed forms.
         grid: the values at which joints were locked, by their names.
+        turn_limits: lower and upper limits [rad] of angles that `with_turns` moves, else infinite,
+            (2, coordinate).
     """
 
     coordinates: FloatArray
@@ -60,12 +66,28 @@ class IKSolutions(NamedTuple):
     continuum: bool
     unseen: float
     grid: dict[str, FloatArray]
+    turn_limits: FloatArray
+
+    def with_turns(self) -> Iterator[FloatArray]:
+        """Yield each solution, (coordinate,), at all whole revolutions within the limits.
+
+        Six hinges with limits of ±2 pi have 64 such rows for a solution. Angles without two limits,
+        locked joints and joints with followers do not turn.
+        """
+        is_limited = np.isfinite(self.turn_limits).all(axis=0)
+        limits = self.turn_limits + LIMIT_TOLERANCE * np.array([[-1.0], [1.0]])
+        for q in self.coordinates:
+            ends = np.where(is_limited, limits - q, 0.0) / FULL_CIRCLE
+            turns = [range(math.ceil(first), math.floor(last) + 1) for first, last in ends.T]
+            for counts in itertools.product(*turns):
+                yield np.clip(q + FULL_CIRCLE * np.array(counts), *self.turn_limits)
 
 
 class _ArmSolutions(NamedTuple):
     """The solutions of an arm: see IKSolutions."""
 
     rows: FloatArray  # the arm's coordinates, then FIGURES
+    method: str
     complete: bool
     continuum: bool
     starts: int = 0  # of a search, those that come to a solution
@@ -87,6 +109,9 @@ def all_solutions(
     second to fourth, or third to fifth, are parallel and the two at the end meet (Elias & Wen 2022,
     by subproblems of Paden 1986 and Kahan 1983). They prove their lists complete where the axes do
     so to rounding. Every other arm is searched by Levenberg-Marquardt from random starts.
+
+    The list is up to whole revolutions, which `IKSolutions.with_turns` adds. An arm whose closed
+    form comes to no solution near a singular pose is searched as well.
 
     All solutions are polished by Newton's method, reach the target within 1e-9, of the reach and in
     radians, and differ by more than 1e-6. A robot of seven joints has a continuum of solutions: a
@@ -110,16 +135,11 @@ def all_solutions(
         raise ValueError("robot: expected hinges and slides, got a Skeleton")
     pose = _checked_pose(model, target, effector)
     arms = arms_of(model, pose.joint, grid)
-    if len(arms.members) == 1 and arms.members[0].is_plain:
-        return _plain(arms.members[0], pose)
     count = arguments.count("restarts", restarts, minimum=1)
     seed = arguments.integer("seed", seed, minimum=0)
-    solved = [
-        _by_search(arm, pose, count, seed)
-        if arm.method == SEARCH
-        else _ArmSolutions(*_closed_form(arm, pose))
-        for arm in arms.members
-    ]
+    solved = [_solutions_of(arm, pose, count, seed) for arm in arms.members]
+    if len(solved) == 1 and arms.members[0].is_plain and solved[0].method != SEARCH:
+        return _plain(arms, solved[0])
     return _merged(arms, solved)
 
 
@@ -131,38 +151,50 @@ def _checked_pose(model: Articulation, target: Any, effector: int | str | None) 
             joint = effector_of(model, target.effector if effector is None else effector)
             return CheckedTarget(joint, x, R, 1.0)  # type: ignore[arg-type]
     if not isinstance(target, Target) or target.rotation is None:
-        raise ValueError(f"target: expected a Target with a rotation, got {target!r:.80}")
+        raise ValueError(f"target: expected a Target with a rotation, got {shown(target)}")
     (checked,) = checked_targets(model, target, effector)
     arguments.check_shape("target", checked.position, 3)
     arguments.check_shape("rotation", checked.rotation, 4)  # type: ignore[arg-type]
     return checked
 
 
-def _plain(arm: Arm, pose: CheckedTarget) -> IKSolutions:
+def _plain(arms: Arms, solved: _ArmSolutions) -> IKSolutions:
     """Return the solutions of an arm with a closed form, whose joints are all the robot has."""
-    rows, complete, continuum = _closed_form(arm, pose)
+    rows = solved.rows
     return IKSolutions(
-        rows[:, :HINGES], rows[:, HINGES], rows[:, HINGES + 1], arm.method, complete, continuum,
-        0.0, {},
+        rows[:, :HINGES], rows[:, HINGES], rows[:, HINGES + 1], solved.method, solved.complete,
+        solved.continuum, 0.0, {}, arms.turn_limits,
     )  # fmt: skip
 
 
-def _closed_form(arm: Arm, pose: CheckedTarget) -> tuple[FloatArray, bool, bool]:
-    """Return rows of solutions, whether they are complete, and whether some are in a continuum."""
+def _solutions_of(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:
+    """Return the solutions of an arm, by its closed form if it has one.
+
+    Near singular poses Newton's method may fail from all candidates: the arm is then searched, down
+    to TOLERANCE, as Newton's method fails from SEARCH_TOLERANCE, too.
+    """
+    if arm.method == SEARCH:
+        return _by_search(arm, pose, restarts, seed, SEARCH_TOLERANCE)
     rows = np.empty((CANDIDATES, HINGES + FIGURES))
     count, status, doubts = closed_form_kernel(*arm.flat, pose.position, pose.rotation, rows)
     rows.flags.writeable = False
     if count < 0:
         check_numbers([pose])
         raise ValueError("rotation: expected a quaternion within 1e-6 of unit length")
-    complete = arm.is_exact and status == CERTAIN and not doubts
-    return rows[:count], complete, status == EVERY_ANGLE
+    is_certain, continuum = status == CERTAIN and not doubts, status == EVERY_ANGLE
+    if count or is_certain:
+        return _ArmSolutions(rows[:count], arm.method, arm.is_exact and is_certain, continuum)
+    searched = _by_search(arm, pose, restarts, seed, TOLERANCE)
+    return searched._replace(continuum=searched.continuum or continuum)
 
 
-def _by_search(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:
+def _by_search(
+    arm: Arm, pose: CheckedTarget, restarts: int, seed: int, tolerance: float
+) -> _ArmSolutions:
+    """Return the solutions from random starts that reach a pose within a tolerance."""
     (pose,) = check_numbers([pose])
     starts = arm.articulation.random(np.random.default_rng(seed), restarts)
-    tolerances = SEARCH_TOLERANCE * arm.mechanism.reach, SEARCH_TOLERANCE
+    tolerances = tolerance * arm.mechanism.reach, tolerance
     settings = checked_settings("levenberg_marquardt", *tolerances, None, 0, 0, False)
     ends = solve_checked(arm.articulation, starts, [pose], settings)
     is_near = (ends.residual <= tolerances[0]) & (ends.residual_rotation <= tolerances[1])
@@ -172,7 +204,7 @@ def _by_search(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmS
     rows = rows[:count]
     hits = rows[:, -1]
     single = int((hits == 1.0).sum())
-    return _ArmSolutions(rows, False, count > LARGEST_COUNT, int(hits.sum()), single)
+    return _ArmSolutions(rows, SEARCH, False, count > LARGEST_COUNT, int(hits.sum()), single)
 
 
 def _merged(arms: Arms, solved: list[_ArmSolutions]) -> IKSolutions:
@@ -185,11 +217,12 @@ def _merged(arms: Arms, solved: list[_ArmSolutions]) -> IKSolutions:
     distance, angle, _ = rows[:, -FIGURES:].T.copy()
     for values in (coordinates, distance, angle):
         values.flags.writeable = False
-    methods = dict.fromkeys(arm.method for arm in arms.members)
+    methods = dict.fromkeys(s.method for s in solved)
     starts, unseen = sum(s.starts for s in solved), float(SEARCH in methods)
     if starts:
         unseen = sum(s.single for s in solved) / starts
     return IKSolutions(
         coordinates, distance, angle, ", ".join(methods), all(s.complete for s in solved),
         any(s.continuum for s in solved), unseen, arms.grid,
+        arms.turn_limits,
     )  # fmt: skip

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import arguments
-from ...arguments import FloatArray, IndexArray
-from ...articulation import Articulation, joint_transform
+from ...arguments import FloatArray, IndexArray, frozen
+from ...articulation import HINGE, Articulation, joint_transform
 from ...jacobians import jacobian
 from ...skeleton import Skeleton
 from ..box_step import FULL_CIRCLE
@@ -45,6 +45,7 @@ class Arms(NamedTuple):
 
     members: tuple[Arm, ...]
     grid: dict[str, FloatArray]
+    turn_limits: FloatArray  # see IKSolutions
 
 
 def arms_of(model: Articulation, effector: int, grid: Mapping[Any, ArrayLike] | None) -> Arms:
@@ -72,7 +73,8 @@ def arms_of(model: Articulation, effector: int, grid: Mapping[Any, ArrayLike] | 
         )
     points = itertools.product(*values.values())
     members = [arm_of(model, effector, dict(zip(values, point, strict=True))) for point in points]
-    arms = Arms(tuple(members), {model.names[j]: grid for j, grid in values.items()})
+    grid_by_name = {model.names[j]: points for j, points in values.items()}
+    arms = Arms(tuple(members), grid_by_name, _turn_limits(members[0]))
     if grid is None:
         model.mechanisms[key] = arms
     return arms
@@ -146,6 +148,16 @@ def arm_of(model: Articulation, effector: int, values: Mapping[int, float]) -> A
     method, is_exact = FORMS[form.form], form.deviation <= EXACT
     flat = tuple(mechanism), tuple(form)
     return Arm(articulation, mechanism, method, is_exact, flat, columns, rest, is_plain)
+
+
+def _turn_limits(arm: Arm) -> FloatArray:
+    """Return the limits of an arm's hinges without followers, else infinity, (2, coordinate)."""
+    limits = np.repeat([[-np.inf], [np.inf]], len(arm.rest), axis=1)
+    joints = arm.mechanism.joints
+    is_single = (joints["leader"] == np.arange(len(joints))) & ~joints["followed"]
+    hinges = joints[is_single & (joints["kind"] == HINGE)]
+    limits[:, arm.columns[hinges["coordinate"]]] = hinges["lower"], hinges["upper"]
+    return frozen(limits)
 
 
 def _is_singular(model: Articulation, mechanism: Mechanism, effector: int) -> bool:

@@ -125,6 +125,8 @@ def move(mechanism, data, step, share):
 def bring_within_limits(joints, q, reach):
     """Bring angles within limits, as near to the middle as whole revolutions do.
 
+    A joint with followers keeps its angle, as a revolution would not bring the followers around.
+
     Returns how far beyond a limit some coordinate is, lengths over the reach.
     """
     gap = 0.0
@@ -133,7 +135,8 @@ def bring_within_limits(joints, q, reach):
             lower, upper, at = joints["lower"][j], joints["upper"][j], joints["coordinate"][j]
             unit = reach
             if joints["kind"][j] == HINGE:
-                q[at] -= FULL_CIRCLE * round((q[at] - middle(lower, upper)) / FULL_CIRCLE)
+                if not joints["followed"][j]:
+                    q[at] -= FULL_CIRCLE * round((q[at] - middle(lower, upper)) / FULL_CIRCLE)
                 unit = 1.0
             excess = max(lower - q[at], q[at] - upper) / unit
             gap = max(gap, excess)
@@ -156,7 +159,8 @@ def is_same(joints, a, b, reach):
             at = joints["coordinate"][j]
             difference, unit = abs(a[at] - b[at]), reach
             if joints["kind"][j] == HINGE:
-                difference = min(difference, abs(FULL_CIRCLE - difference))
+                if not joints["followed"][j]:
+                    difference = min(difference, abs(FULL_CIRCLE - difference))
                 unit = 1.0
             if difference > DUPLICATE * unit:
                 return False

@@ -170,6 +170,79 @@ def test_angles_are_the_nearest_to_the_middle_of_the_limits(rng):
     assert np.abs(solutions.coordinates[:, :5] - 5.0).max() <= np.pi
 
 
+TURN = 2.0 * np.pi
+# Limits, and the number of revolutions of each hinge within them.
+WIDE = {
+    "plus and minus a revolution": (-TURN, TURN, 2),
+    "a revolution away": (np.pi, 3.0 * np.pi, 1),
+    "three revolutions below zero": (-3.0 * TURN, 0.0, 3),
+    "no limits": (-np.inf, np.inf, 1),
+    "a lower limit": (10.0, np.inf, 1),
+}
+
+
+@pytest.mark.parametrize("limits", WIDE)
+def test_whole_turns_within_the_limits_are_added(limits, named, rng):
+    lower, upper, turns = WIDE[limits]
+    # two joints keep half a revolution each, so that all rows are few
+    arm = arm_of(*ARMS[named][:2], [lower] * 4 + [-np.pi] * 3, [upper] * 4 + [np.pi] * 3)
+    q = arm.random(rng)
+    target = target_of(arm, q)
+    solutions = all_solutions(arm, target)
+    assert_lists(solutions, arm, target, q)
+    assert solutions.complete
+    rows = np.array(list(solutions.with_turns()))
+    assert len(rows) == turns**4 * len(solutions.coordinates)
+    assert arm.within_limits(rows).all()
+    pose = forward_kinematics(arm, rows)
+    assert np.linalg.norm(pose.positions[:, -1] - target.position, axis=-1).max() <= 2.0 * REACHED
+    assert rotation.angle(pose.rotations[:, -1], target.rotation).max() <= REACHED
+    apart = np.abs(rows[:, None] - rows).max(axis=-1)
+    assert (apart + 9.0 * np.eye(len(rows))).min() > SAME
+    if np.isfinite(upper):
+        assert np.abs(rows - q).max(axis=1).min() < SAME
+
+
+def test_limits_that_are_whole_turns_apart_keep_both_ends():
+    arm = arm_of(*ARMS["UR5"][:2], lower=-TURN, upper=TURN)
+    q = np.array([0.0, -1.0, 0.8, 0.5, 0.7, 0.4])
+    solutions = all_solutions(arm, target_of(arm, q))
+    near = differences(solutions.coordinates, q[None])[:, 0] < SAME
+    rows = np.array(list(solutions._replace(coordinates=solutions.coordinates[near]).with_turns()))
+    assert len(rows) == 3 * 2**5
+    np.testing.assert_allclose(np.unique(np.round(rows[:, 0], 6)), [-TURN, 0.0, TURN], atol=1e-5)
+
+
+def test_joints_that_do_not_turn_keep_their_angles(rng):
+    arm = arm_of(*SEVEN, lower=-7.0, upper=7.0)
+    target = target_of(arm, arm.random(rng))
+    solutions = all_solutions(arm, target, grid={"joint0": [0.4, 6.0]})
+    locked = {row[0] for row in solutions.with_turns()}
+    assert locked <= {0.4, 6.0}
+    assert np.isinf(solutions.turn_limits[:, 0]).all()
+    np.testing.assert_array_equal(solutions.turn_limits[:, 1:], [[-7.0] * 6, [7.0] * 6])
+
+
+def test_a_leader_s_revolution_is_another_pose(rng):
+    listed = 0
+    for _ in range(4):
+        skeleton = Skeleton(range(-1, 7), 0.3 * rng.standard_normal((8, 3)))
+        arm = Articulation(skeleton, "hinge", rng.standard_normal((8, 3)), lower=-6.0, upper=6.0,
+                           mimics={3: Mimic(1, 0.5, 0.2), 6: Mimic(5, 0.3)})  # fmt: skip
+        q = arm.random(rng)
+        target = target_of(arm, q)
+        solutions = all_solutions(arm, target, restarts=512)
+        assert_lists(solutions, arm, target)
+        leaders = [arm.coordinates_of(j).start for j in (1, 5)]
+        near = differences(solutions.coordinates, q[None])[:, 0] < SAME
+        listed += (np.abs(solutions.coordinates - q)[near][:, leaders] < SAME).all(axis=1).any()
+        rows = np.array(list(solutions.with_turns()))
+        assert np.isin(rows[:, leaders], solutions.coordinates[:, leaders]).all()
+        x = forward_kinematics(arm, rows).positions[:, -1]
+        assert np.linalg.norm(x - target.position, axis=-1).max() < 1e-7
+    assert listed == 4
+
+
 def test_both_backends_agree(named, rng):
     arm = arm_of(*ARMS[named][:2])
     target = target_of(arm, arm.random(rng))
@@ -201,6 +274,36 @@ def test_singular_poses_are_said(name, q, continuum):
     assert not solutions.complete
 
 
+# Poses in which no candidate of the closed form comes to a solution: the angle that nothing
+# determines has none at zero, or an angle is lost to rounding.
+EMPTY = {
+    "wrist of UR5, q6 = 0 out of reach": ("UR5", False, [
+        -2.361114425521, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 2.484619573405]),
+    "straight elbow and wrist of UR5": ("UR5", False, [
+        3.1415917679149334, 3.1415876647446646, -4.726591870665517e-06, -2.992853530862557e-06,
+        3.6877230759095294e-06, 1.9140633060996957]),
+    "elbow and wrist of UR5 backwards": ("UR5", True, [
+        0.46515968481693765, -4.906478816469396e-07, -4.2517286054978123e-07,
+        -6.498928088443545e-07, 3.141592457438786, -1.5707958461262996]),
+    "shoulder and wrist of Jaco": ("Jaco-like wrist", False, [
+        -2.8741050312721925, -1.5707963267948966, 1.5707963427618716, -2.540797097963117,
+        3.141592653589793, -1.5707963267948966]),
+    "wrist of Jaco backwards": ("Jaco-like wrist", True, [
+        -1.3718434164512934, 3.1415925225720795, -0.7741198554247194, 1.5707962775830657,
+        -0.1384021101329897, -5.6215879536618086e-08]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "backwards", "q"), EMPTY.values(), ids=EMPTY)
+def test_near_singular_poses_without_a_candidate_are_searched(name, backwards, q):
+    arm = arm_of(*ARMS[name][:2], backwards=backwards)
+    target = target_of(arm, np.array(q))
+    solutions = all_solutions(arm, target)
+    assert_lists(solutions, arm, target)
+    assert len(solutions.coordinates) > 0
+    assert (solutions.method, solutions.complete) == ("restarts", False)
+
+
 @pytest.mark.parametrize("count", [60, pytest.param(6000, marks=pytest.mark.slow)])
 def test_a_list_that_is_complete_has_the_pose_however_singular(named, count, rng):
     arm, is_complete = arm_of(*ARMS[named][:2]), []
@@ -212,6 +315,7 @@ def test_a_list_that_is_complete_has_the_pose_however_singular(named, count, rng
         target = target_of(arm, q)
         solutions = all_solutions(arm, target)
         assert_lists(solutions, arm, target)
+        assert len(solutions.coordinates) > 0
         near = differences(solutions.coordinates, q[None]).min(initial=9.0) < 10.0 * SAME
         assert near or not solutions.complete
         is_complete.append(solutions.complete)
@@ -337,6 +441,11 @@ def test_misuse_is_named(changes, message):
     arguments = {"robot": arm_of(*SEVEN), "target": POSE} | changes
     with pytest.raises(ValueError, match=f"^{message}"):
         all_solutions(**arguments)
+
+
+def test_misuse_of_a_search_is_named_where_a_closed_form_needs_none():
+    with pytest.raises(ValueError, match=r"^restarts: expected"):
+        all_solutions(arm_of(*ARMS["UR5"][:2]), POSE, restarts=0)
 
 
 def conic(p, angle):
