@@ -137,10 +137,11 @@ def all_solutions(
     arms = arms_of(model, pose.joint, grid)
     count = arguments.count("restarts", restarts, minimum=1)
     seed = arguments.integer("seed", seed, minimum=0)
-    solved = [_solutions_of(arm, pose, count, seed) for arm in arms.members]
-    if len(solved) == 1 and arms.members[0].is_plain and solved[0].method != SEARCH:
-        return _plain(arms, solved[0])
-    return _merged(arms, solved)
+    if len(arms.members) == 1 and arms.members[0].is_plain:
+        solutions = _plain(arms, pose)
+        if len(solutions.coordinates) or solutions.complete:
+            return solutions
+    return _merged(arms, [_solutions_of(arm, pose, count, seed) for arm in arms.members])
 
 
 def _checked_pose(model: Articulation, target: Any, effector: int | str | None) -> CheckedTarget:
@@ -158,32 +159,35 @@ def _checked_pose(model: Articulation, target: Any, effector: int | str | None) 
     return checked
 
 
-def _plain(arms: Arms, solved: _ArmSolutions) -> IKSolutions:
+def _plain(arms: Arms, pose: CheckedTarget) -> IKSolutions:
     """Return the solutions of an arm with a closed form, whose joints are all the robot has."""
-    rows = solved.rows
+    (arm,) = arms.members
+    rows, is_certain, continuum = _closed_form(arm, pose)
     return IKSolutions(
-        rows[:, :HINGES], rows[:, HINGES], rows[:, HINGES + 1], solved.method, solved.complete,
-        solved.continuum, 0.0, {}, arms.turn_limits,
+        rows[:, :HINGES], rows[:, HINGES], rows[:, HINGES + 1], arm.method,
+        arm.is_exact and is_certain, continuum, 0.0, {}, arms.turn_limits,
     )  # fmt: skip
 
 
-def _solutions_of(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:
-    """Return the solutions of an arm, by its closed form if it has one.
-
-    Near singular poses Newton's method may fail from all candidates: the arm is then searched, down
-    to TOLERANCE, as Newton's method fails from SEARCH_TOLERANCE, too.
-    """
-    if arm.method == SEARCH:
-        return _by_search(arm, pose, restarts, seed, SEARCH_TOLERANCE)
+def _closed_form(arm: Arm, pose: CheckedTarget) -> tuple[FloatArray, bool, bool]:
+    """Return rows of solutions, whether their number is certain, and whether some are continua."""
     rows = np.empty((CANDIDATES, HINGES + FIGURES))
     count, status, doubts = closed_form_kernel(*arm.flat, pose.position, pose.rotation, rows)
     rows.flags.writeable = False
     if count < 0:
         check_numbers([pose])
         raise ValueError("rotation: expected a quaternion within 1e-6 of unit length")
-    is_certain, continuum = status == CERTAIN and not doubts, status == EVERY_ANGLE
-    if count or is_certain:
-        return _ArmSolutions(rows[:count], arm.method, arm.is_exact and is_certain, continuum)
+    return rows[:count], status == CERTAIN and not doubts, status == EVERY_ANGLE
+
+
+def _solutions_of(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:
+    """Return the solutions of an arm, by its closed form if it has one."""
+    if arm.method == SEARCH:
+        return _by_search(arm, pose, restarts, seed, SEARCH_TOLERANCE)
+    rows, is_certain, continuum = _closed_form(arm, pose)
+    if len(rows) or is_certain:
+        return _ArmSolutions(rows, arm.method, arm.is_exact and is_certain, continuum)
+    # Newton's method fails near this singular pose: the search has to come down to TOLERANCE
     searched = _by_search(arm, pose, restarts, seed, TOLERANCE)
     return searched._replace(continuum=searched.continuum or continuum)
 
