@@ -72,11 +72,13 @@ def line_roots(k, a, b, deviation, roots):
     r = math.sqrt(a * a + b * b)
     if r <= ZERO:
         return every_angle(roots) if abs(k) <= ZERO else (0, CERTAIN)
+    is_singular = r <= SINGULAR and abs(k) <= SINGULAR  # rounding alone determines the angles
     x, a, b, largest = -k / r, a / r, b / r, 1.0 - min(1.0, deviation / r)
     excess = abs(x) - 1.0
     if excess > CLAMPED + deviation / r:
-        return 0, CERTAIN
+        return 0, EVERY_ANGLE if is_singular else CERTAIN
     status = DOUBTFUL if excess >= -NEARLY_DOUBLE else CERTAIN
+    status = EVERY_ANGLE if is_singular else status
     x = min(max(x, -largest), largest)
     y = math.sqrt(1.0 - x * x)
     if y <= SAME_ROOT:

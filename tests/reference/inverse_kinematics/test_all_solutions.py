@@ -322,6 +322,20 @@ def test_a_list_that_is_complete_has_the_pose_however_singular(named, count, rng
     assert 0.3 < np.mean(is_complete) < 1.0 or named == "skew"
 
 
+def test_axes_that_nearly_coincide_in_a_pose_leave_the_list_in_doubt(rng):
+    # the Panda's first six joints [m]: with the elbow at zero, axes 3 and 5 are one
+    points = [*[[0, 0, 0.333]] * 3, [0.0825, 0, 0.649], *[[0, 0, 1.033]] * 2]
+    arm = arm_of([Z, Y, Z, -Y, Z, -Y], points, lower=-1.2, upper=2.0)
+    for _ in range(300):
+        q = arm.random(rng)
+        q[3] = rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-11.0, -6.0)
+        target = target_of(arm, q)
+        solutions = all_solutions(arm, target)
+        assert_lists(solutions, arm, target)
+        near = differences(solutions.coordinates, q[None]).min(initial=9.0) < 10.0 * SAME
+        assert near or not solutions.complete
+
+
 def test_out_of_reach_there_is_no_solution(named):
     arm = arm_of(*ARMS[named][:2])
     solutions = all_solutions(arm, Target([3.0, 2.0, 1.0], rotation.identity()))
@@ -488,3 +502,4 @@ def test_roots_of_a_line_on_the_circle(rng):
     assert subproblems.line_roots(1.0, 0.6, 0.8, 0.0, roots) == (1, subproblems.DOUBTFUL)
     assert subproblems.line_roots(0.0, 0.0, 0.0, 0.0, roots) == (1, subproblems.EVERY_ANGLE)
     assert subproblems.line_roots(0.1, 0.0, 0.0, 0.0, roots) == (0, subproblems.CERTAIN)
+    assert subproblems.line_roots(1e-10, 3e-9, 0.0, 0.0, roots) == (2, subproblems.EVERY_ANGLE)
