@@ -34,6 +34,10 @@ FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
 # two updates of the multipliers by less than the second: with it costs are half a per cent higher
 # at most, after half as many iterations.
 SETTLED, SETTLED_BETWEEN = 1e-8, 1e-3
+# At a minimum a step at the first damping promises to lower the cost by no more than the first
+# share, or than the second where a descent along with exact tasks has settled: ten times what nine
+# of ten descents leave. In that step errors of exact tasks count HELD times as much.
+MINIMUM, MINIMUM_BETWEEN, HELD = 1e-6, 1e-2, 1e4
 # A step counts if the cost falls by this share of what was promised.
 ACCEPTED = 1e-3
 # After an update of the multipliers that leaves more than PROGRESS of the error exact tasks count
@@ -52,7 +56,9 @@ class TaskSolution(NamedTuple):
         errors: the largest entry of each task's residual [m or rad], (task,).
         cost: the sum of weight |residual|² of the tasks that are not exact.
         iterations: of all attempts.
-        outcome: CONVERGED if every exact task is met, else STALLED or ITERATION_LIMIT.
+        outcome: CONVERGED if every exact task is met, and the others are at a local minimum or met
+            too; else STALLED, or ITERATION_LIMIT if more iterations may do better. `errors` show
+            which tasks are met.
     """
 
     coordinates: FloatArray
@@ -112,8 +118,7 @@ def solve_tasks(
         total += solution.iterations
         if best is None or problem.misses(solution) < problem.misses(best):
             best = solution
-        if solution.outcome == Outcome.CONVERGED:
-            best = solution
+        if problem.misses(best) <= tolerance:
             break
     assert best is not None, "the start is the first attempt"
     return best._replace(iterations=total)
@@ -179,6 +184,19 @@ class TaskProblem:
         """Return the weighted sum of squares of the tasks that are not exact."""
         return float(np.sum(state.r[~self.exact] ** 2))
 
+    def is_minimum(self, state: _Evaluation, tolerance: float, share: float) -> bool:
+        """Return whether a motion that keeps limits and exact tasks lowers the cost by no more.
+
+        The bound is a share of the cost. Tasks that are met have nothing left to lower.
+        """
+        if (state.errors[~self.is_exact] <= tolerance).all():
+            return True
+        unit, unit_exact = (_unit(state.J[rows]) for rows in (~self.exact, self.exact))
+        scale = np.where(self.exact, HELD * (unit / unit_exact) ** 0.5, 1.0)
+        e = np.where(self.exact, 0.0, -state.r)
+        _, promised = self.step(state, e, scale, FIRST_DAMPING * unit)
+        return promised <= share * self.cost(state)
+
     def misses(self, solution: TaskSolution) -> float:
         """Return the largest error of an exact task."""
         return float(solution.errors[self.is_exact].max(initial=0.0))
@@ -202,8 +220,9 @@ def _attempt(problem: TaskProblem, q: FloatArray, tolerance: float, limit: int) 
         if problem.is_met(end, tolerance) and problem.cost(end) < problem.cost(state):
             state = end
             break
+    share = MINIMUM_BETWEEN if stalled and problem.exact.any() else MINIMUM
     outcome = Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT
-    if problem.is_met(state, tolerance):
+    if problem.is_met(state, tolerance) and problem.is_minimum(state, tolerance, share):
         outcome = Outcome.CONVERGED
     q, errors = frozen(state.q), frozen(state.errors)
     return TaskSolution(q, errors, problem.cost(state), count, outcome)
@@ -221,7 +240,7 @@ def _descend(
     exact, missed, penalties = problem.exact, np.inf, 0
     is_single = not scale[~exact].any()
     settled = SETTLED if is_single or not exact.any() else SETTLED_BETWEEN
-    unit = float(np.sum(state.J**2, axis=1).max(initial=0.0)) or 1.0  # if nothing moves them
+    unit = _unit(state.J)
     damping, growth = FIRST_DAMPING * unit, 2.0
     for count in range(limit):
         if is_single and problem.is_met(state, tolerance):
@@ -247,6 +266,11 @@ def _descend(
             shift /= PENALTY
             penalties += 1
     return state, limit, False
+
+
+def _unit(J: FloatArray) -> float:
+    """Return the largest diagonal entry of J J', 1 if nothing moves the residuals."""
+    return float(np.sum(J**2, axis=1).max(initial=0.0)) or 1.0
 
 
 def _as_task(model: Articulation, task: IKTask | Target) -> IKTask:
