@@ -383,12 +383,11 @@ def clamp_joint(joints, j, q):
 
 
 def joint_excess(joints, j, q):
-    """Return the excess [rad or m] of a joint's coordinates over its limits."""
-    kind, at = joints["kind"][j], joints["coordinate"][j]
-    if joints["leader"][j] != j:
-        return 0.0
+    """Return the excess [rad or m] of a joint over its limits, of a follower over its leader's."""
+    kind, at, leader = joints["kind"][j], joints["coordinate"][j], joints["leader"][j]
     if kind in (HINGE, SLIDE):
-        return max(joints["lower"][j] - q[at], q[at] - joints["upper"][j], 0.0)
+        excess = max(joints["lower"][leader] - q[at], q[at] - joints["upper"][leader], 0.0)
+        return abs(joints["multiplier"][j]) * excess
     if kind == BALL:
         swing, twist = swing_twist(load_quaternion_from(q, at), load_vector(joints["axis"], j))
         tilt = logarithm(swing)

@@ -17,7 +17,7 @@ from .mechanism import TARGET
 from .problem import Settings, Target, checked_settings, checked_targets, default_solver
 from .reduce import prepare
 from .restarts import FIGURES, OUTCOME
-from .solve import OUTCOMES, UNRECORDED, solve_checked
+from .solve import OUTCOMES, PROVEN, UNRECORDED, prove_unreachable, solve_checked
 
 
 class PreparedIK(threading.local):
@@ -41,6 +41,7 @@ class PreparedIK(threading.local):
         positions, figures = np.full((1, n, 3), np.nan), np.full((1, len(FIGURES)), np.nan)
         arrays: tuple[Any, ...]
         shape: tuple[int, ...]
+        prove: Any = None
         if isinstance(model, Skeleton):
             shape, q, kernel = (n, 4), local, settings.solver.chain
             arrays = (*model.arrays, model.path_array(joint))
@@ -55,13 +56,15 @@ class PreparedIK(threading.local):
             targets["rotation"], targets["weight"] = IDENTITY, 1.0
             row = targets.view(FLOAT64)[0, : 7 if oriented else 3]
             results = local, positions, figures, UNRECORDED, q
+            request = model, (joint,), (oriented,), targets, figures, settings.limits
+            prove = partial(prove_unreachable, *request)
         starts, self._arrays = np.empty((1, *shape)), (q, positions, figures)
         self._problem = model, joint, oriented, settings
         call = partial(kernel.in_force, *arrays, settings.numbers, starts, targets, *results)
         self.coordinates, self.positions = frozen(q[0]), frozen(positions[0])
         self.figures = frozen(figures[0])
         # one attribute, as a thread's attribute takes 0.05 µs
-        self._work = call, shape, starts[0], row.shape, row, self.figures
+        self._work = call, shape, starts[0], row.shape, row, self.figures, prove
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what makes a copy, which has arrays of its own."""
@@ -78,11 +81,15 @@ class PreparedIK(threading.local):
         Raises:
             ValueError: as `solve_ik` does. The solution is then not defined.
         """
-        call, shape, start_row, target_shape, target_row, figures = self._work
+        call, shape, start_row, target_shape, target_row, figures, prove = self._work
         if is_plain(start, shape) and is_plain(target, target_shape):
             start_row[...], target_row[...] = start, target
             if call():
-                return OUTCOMES[figures.item(OUTCOME)]
+                outcome = figures.item(OUTCOME)
+                if outcome in PROVEN and prove is not None:
+                    prove()
+                    outcome = figures.item(OUTCOME)
+                return OUTCOMES[outcome]
         self._solve_checked(start, target)
         return OUTCOMES[figures[OUTCOME]]
 

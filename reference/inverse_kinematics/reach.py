@@ -30,6 +30,7 @@ from .. import rotation
 from ..arguments import FloatArray
 from ..articulation import HINGE, SLIDE, Articulation
 from ..jacobians import jacobians
+from ..quaternion import add, rotate
 from ..skeleton import Skeleton
 
 UNIT = 2.0**-53
@@ -50,6 +51,8 @@ class ReachShell(NamedTuple):
     point: FloatArray  # in the frame of that joint [m], (3,)
     smallest: float  # distance from the base [m]
     largest: float
+    # from the effector to the point, in the effector's frame [m]; None if joints between them move
+    arm: tuple[float, ...] | None
 
 
 class Reach(NamedTuple):
@@ -87,9 +90,11 @@ class Axes(NamedTuple):
 
 
 def least_distance(
-    model: Articulation, joint: int, position: FloatArray, Q: FloatArray | None
+    model: Articulation, joint: int, position: Any, Q: Any | None, whole: bool = True
 ) -> tuple[float, float]:
     """Return a bound [m] and a lever [m]: distance + lever angle >= bound for every pose.
+
+    Unless the whole reach is asked for, only the first shell is, in microseconds.
 
     These are the distance [m] and the angle [rad] of the effector from its target in any pose
     within the limits; the bound is 0 if none is proven, and the lever 0 without a target rotation.
@@ -98,32 +103,35 @@ def least_distance(
     distance and, as the centre is `lever` from the target, up to the lever times the angle. The
     joints above a point on an axis keep it within the shell; for the effector to be at its target
     the joints below would have to bring it there, and `separation` bounds by how much they fail.
+    Where none of these moves, the effector's pose fixes the point, and the lever is its arm.
     """
-    reach = reach_of(model, joint, Q is not None)
+    reach = reach_of(model, joint, Q is not None, whole)
     for shell in reach.shells:
-        offset = shell.base - position
-        r = float(np.linalg.norm(offset))
-        if Q is None:
+        if shell.arm is not None:
+            centre = position if Q is None else add(position, rotate(Q, shell.arm))
+            r, lever = math.dist(shell.base, centre), math.hypot(*shell.arm)
             gap = max(r - shell.largest, shell.smallest - r)
         else:
+            offset = shell.base - position
+            lever = float(np.linalg.norm(offset))
             below, interval = reach.path[shell.joint + 1 :], (shell.smallest, shell.largest)
             point = rotation.rotate(rotation.conjugate(Q), offset)
             gap = separation(model, below, shell.point, point, interval)
         vectors = shell.base, shell.point, position
-        scale = reach.length + sum(float(np.linalg.norm(vector)) for vector in vectors)
-        gap -= ROUNDINGS * UNIT * scale
+        gap -= ROUNDINGS * UNIT * (reach.length + sum(math.hypot(*vector) for vector in vectors))
         if gap > 0.0:
-            return gap, 0.0 if Q is None else r * WIDER
+            return gap, lever * WIDER
     return 0.0, 0.0
 
 
-def reach_of(model: Articulation, joint: int, oriented: bool) -> Reach:
+def reach_of(model: Articulation, joint: int, oriented: bool, whole: bool = True) -> Reach:
     """Return the shells of the points on the path to a joint, kept by the model.
 
     With a rotation to reach there are shells of every hinge and ball, the last first, of the
-    point on its axis nearest to the next; else only that of the effector's origin.
+    point on its axis nearest to the next; else only that of the effector's origin. Unless the
+    whole reach is asked for there is only the first of all, if its point is fixed to the effector.
     """
-    key = "reach", joint, oriented
+    key = "reach", joint, oriented, whole
     if key not in model.mechanisms:
         path, offsets = model.skeleton.path_array(joint).tolist(), model.skeleton.offsets
         x, R = (part[path] for part in model.forward(model.zero()))
@@ -132,20 +140,26 @@ def reach_of(model: Articulation, joint: int, oriented: bool) -> Reach:
         base = x[0]
         if moving:
             base = x[moving[0]] + axes.nearest(moving[0], moving[min(1, len(moving) - 1)])
-        points = [] if oriented else [(len(path), np.zeros(3), np.zeros(3))]
+        points: list[Any] = [] if oriented else [(len(path), np.zeros(3), np.zeros(3), (0.0,) * 3)]
         for i in reversed(range(len(moving) if oriented else 0)):
             k = moving[i]
             if axes.kinds[k] in ("hinge", "ball"):
                 other = moving[i + 1] if i + 1 < len(moving) else moving[max(i - 1, 0)]
                 point = rotation.rotate(rotation.conjugate(R[k]), axes.nearest(k, other))
                 end = offsets[path[k]] + rotation.rotate(model.frames[path[k]], point)
-                points.append((k, point, end))
+                arm = None
+                if moving[-1] == k:
+                    place = x[k] + rotation.rotate(R[k], point) - x[-1]
+                    arm = tuple(rotation.rotate(rotation.conjugate(R[-1]), place).tolist())
+                points.append((k, point, end, arm))
         length = float(np.linalg.norm(offsets[path], axis=1).sum())
         around = length * np.vstack([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+        if not whole:
+            around, points = around[:1], [first for first in points[:1] if first[3] is not None]
         shells = [
-            ReachShell(centre, k, point, *span(model, path[:k], centre, end))
+            ReachShell(centre, k, point, *span(model, path[:k], centre, end), arm)
             for centre in base + around
-            for k, point, end in points
+            for k, point, end, arm in points
         ]
         model.mechanisms[key] = Reach(path, length, shells)
     reach: Reach = model.mechanisms[key]
@@ -160,15 +174,27 @@ def span(
     At a ball the chain is cut, and the parts may point in any direction: limits of balls do not
     count. A free joint, or a slide without limits, reaches everything.
     """
-    balls = [k for k, j in enumerate(joints) if model.kinds[j] in ("ball", "free")]
-    if balls:
-        k = balls[-1]
-        if model.kinds[joints[k]] == "free":
+    parts, first, smallest, largest = [], 0, 0.0, 0.0
+    for k, j in enumerate(joints):
+        if model.kinds[j] == "free":
             return 0.0, math.inf
-        before = span(model, joints[:k], base, model.skeleton.offsets[joints[k]])
-        after = span(model, joints[k + 1 :], np.zeros(3), point)
-        smallest = max(0.0, before[0] - after[1], after[0] - before[1])
-        return smallest, before[1] + after[1]
+        if model.kinds[j] == "ball":
+            parts.append((joints[first:k], base, model.skeleton.offsets[j]))
+            first, base = k + 1, np.zeros(3)
+    for part in (*parts, (joints[first:], base, point)):
+        least, greatest = _span(model, *part)
+        smallest = max(0.0, smallest - greatest, least - largest)
+        largest += greatest
+    return smallest, largest
+
+
+def _span(
+    model: Articulation, joints: list[int], base: FloatArray, point: FloatArray
+) -> tuple[float, float]:
+    """Return the same of a chain without balls."""
+    if not joints:
+        length = float(np.linalg.norm(point - base))
+        return length / WIDER, length * WIDER
     chain = _chain(model, joints, point)
     longest = _Bounds(chain, base).longest
     if not math.isfinite(longest):

@@ -29,14 +29,20 @@ from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
 from .mechanism import TARGET
 from .problem import CheckedTarget, IKSolution, Settings, Target, check_numbers
+from .reach import least_distance
 from .reduce import prepare, store_prepared
-from .restarts import FIGURES, ITERATIONS, MERIT, OUTCOME, Result
+from .restarts import FIGURES, ITERATIONS, MERIT, OUTCOME, Limits, Result
 
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
 SLICE_ON_CHAINS, SLICE_ON_MECHANISMS = 128, 16
 OUTCOMES = {outcome.value: outcome for outcome in Outcome}
 # Outcomes after which a chain is not restarted.
 FINAL_OUTCOMES = [outcome for outcome in Outcome if outcome.unreachable or outcome.solved]
+# Outcomes of failed solves, and those where a shell of reach proves that no pose is near enough.
+PROVEN = {
+    Outcome.STALLED.value: Outcome.UNREACHABLE.value,
+    Outcome.ITERATION_LIMIT.value: Outcome.UNREACHABLE_UNSETTLED.value,
+}
 LARGEST_HISTORY = 10**9  # residuals; more fit no memory
 NO_HISTORY = frozen(np.empty(0))
 UNRECORDED = np.empty((1, 1))  # where kernels may write a history that is not read
@@ -70,9 +76,8 @@ def solve_plain(
             settings.solver.chain, arrays, start[None], position[None], count, None, settings
         )
         return _single_solution(NO_HISTORY, *filled) if filled else None
-    if type(model) is not Articulation or not is_plain(start, (model.coordinate_count,)):
-        return None
-    if rotation is not None and not is_plain(rotation, (4,)):
+    is_valid = type(model) is Articulation and (rotation is None or is_plain(rotation, (4,)))
+    if not is_valid or not is_plain(start, (model.coordinate_count,)):
         return None
     key = effector, rotation is not None, settings.limits.restarts, settings.seed
     prepared = model.mechanisms.get(key)
@@ -86,7 +91,27 @@ def solve_plain(
         settings.solver.mechanism, (prepared.model,), start[None], targets, model.joint_count,
         model.coordinate_count, settings,
     )  # fmt: skip
+    if filled and filled[2].item(OUTCOME) in PROVEN:
+        joints = (effector_of(model, effector),)
+        prove_unreachable(model, joints, (key[1],), targets, filled[2], settings.limits)
     return _single_solution(NO_HISTORY, *filled) if filled else None
+
+
+def prove_unreachable(
+    model: Articulation, joints: tuple[int, ...], oriented: tuple[bool, ...],
+    targets: RecordArray, figures: FloatArray, limits: Limits,
+) -> None:  # fmt: skip
+    """Change the outcomes of failed solves, where the first shell of an effector proves it.
+
+    Targets are records TARGET, (target, effector); `figures` is that of Result.
+    """
+    for i, outcome in enumerate(figures[:, OUTCOME].tolist()):
+        if outcome in PROVEN:
+            pairs = zip(joints, oriented, targets[i].tolist(), strict=True)
+            for joint, is_oriented, (x, Q, _) in pairs:
+                gap, lever = least_distance(model, joint, x, Q if is_oriented else None, False)
+                if gap > limits.tolerance + lever * limits.tolerance_rotation:
+                    figures[i, OUTCOME] = PROVEN[outcome]
 
 
 def solve_checked(
@@ -157,6 +182,7 @@ def _run_checked(
     if not filled:
         return None
     result = Result(*filled)
+    prove_unreachable(articulation, effectors, oriented, rows, result.figures, settings.limits)
     if articulation is model:
         return result
     local = result.coordinates.reshape(result.local.shape)

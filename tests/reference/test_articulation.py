@@ -139,6 +139,20 @@ def test_limits_of_leaders_are_those_in_effect(lower, upper, mimics, expected):
     assert model.within_limits(model.random(np.random.default_rng(1), 5)).all()
 
 
+@pytest.mark.parametrize("multiplier", [-1e6, 1e3, 0.5, 0.0])
+def test_a_follower_is_within_its_limits_to_the_same_tolerance(multiplier, backend):
+    """It could be beyond by the multiplier times that of its leader."""
+    limit = 0.3 * abs(multiplier)
+    model = followed((-1.0, -limit, -1.0), (1.0, limit, 1.0), b=Mimic("a", multiplier))
+    edge = 1.0 if multiplier == 0.0 else 0.3
+    factor = max(1.0, abs(multiplier))
+    q, first = np.array([edge, 0.0]), np.array([1.0, 0.0])
+    assert model.within_limits(model.clamp(q + first))
+    assert model.within_limits(q + 0.9e-9 / factor * first)
+    assert not model.within_limits(q + 1.1e-9 / factor * first)
+    assert model.within_limits(-q - 0.9e-7 / factor * first, tolerance=1e-7)
+
+
 @pytest.mark.parametrize(
     ("lower", "mimic"),
     [(1.0, ("a",)), (0.1, ("a", 0.0)), (0.1, ("a", -1.0)), (1.0, ("a", 1e-80)), (0.0, ("a", 1, 5))],

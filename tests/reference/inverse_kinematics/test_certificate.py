@@ -292,6 +292,14 @@ class TestImpossible:
         assert result.least_distance == pytest.approx(exact, abs=1e-11)
         assert result.least_distance <= exact
 
+    def test_a_chain_of_any_length_has_the_exact_distance(self):
+        """It ended in a RecursionError."""
+        offsets = np.vstack([np.zeros((1, 3)), np.full((1500, 3), [0.001, 0.0, 0.0])])
+        offsets[700, 0] = 10.0
+        tentacle = Articulation(Skeleton(range(-1, 1500), offsets), "ball")
+        bound, _ = reach.least_distance(tentacle, 1500, np.array([0.0, 1.0, 0.0]), None)
+        assert bound == pytest.approx(10.0 - 1.499 - 1.0, abs=1e-8)
+
     def test_a_target_any_distance_away_is_impossible(self, rng):
         """Newton's step was beyond all numbers, and an error named it."""
         chain = Skeleton([-1, 0, 1], 1e-30 * rng.standard_normal((3, 3)))
@@ -305,7 +313,7 @@ class TestImpossible:
         target = Target([0.6, 0.0, 0.2], rotation.exponential([0.0, -np.pi / 2, 0.0]))
         result = certify_ik(model, model.neutral(), target)
         assert result.impossible
-        assert result.lever == pytest.approx(0.6)
+        assert result.lever == pytest.approx(0.1)
         assert 0.09 < result.least_distance <= 0.1
         assert certify_ik(model, model.neutral(), [0.6, 0.0, 0.2]).least_distance == 0.0
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from plumbob import prepare_ik
 from plumbob.reference import (
     Articulation,
     Outcome,
@@ -15,6 +16,7 @@ from plumbob.reference import (
     solve_ik,
     track,
 )
+from plumbob.reference.inverse_kinematics.reach import reach_of
 
 CLAW = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.5, 0, 0], [0, 3.0, 0], [0, 0, 0.5]])
 
@@ -210,3 +212,114 @@ def test_one_hand_out_of_reach_and_the_other_at_its_target_end_all_attempts(solv
     distances = [np.linalg.norm(again.positions[t.effector] - t.position) for t in targets]
     assert distances[0] <= 1e-4
     assert distances[1] <= np.linalg.norm([-0.7, 3.0, 0.0]) - 0.7 + 1e-4
+
+
+def elbow(low, high):
+    """Return a shoulder without limits and an elbow with limits, links of 0.5 and 0.3 m."""
+    links = Skeleton([-1, 0, 1, 2], [[0, 0, 0.2], [0, 0, 0], [0.5, 0, 0], [0.3, 0, 0]])
+    kinds, axes = ["hinge", "hinge", "hinge", "fixed"], [[0, 0, 1], *[[0, 1, 0]] * 3]
+    limits = {"lower": [-np.inf, -np.inf, low, 0], "upper": [np.inf, np.inf, high, 0]}
+    return Articulation(links, kinds, axes, **limits)
+
+
+def outcomes_of_all_routes(model, target, **options):
+    """Return the outcomes of a single solve, of a batch, of one prepared, and of two effectors."""
+    q, places = model.neutral(), np.tile(target, (2, 1))
+    both = [Target(target, effector=3), Target(model.skeleton.offsets[0], effector=0)]
+    prepared = prepare_ik(model, "levenberg_marquardt", **options)
+    solver = "levenberg_marquardt"
+    return [
+        solve_ik(model, q, target, solver, **options).outcome,
+        solve_ik(model, q.tolist(), target, solver, **options).outcome,
+        *solve_ik(model, q, places, solver, **options).outcome,
+        *track(model, places, solver, start=q, **options).outcome,
+        prepared(q, target),
+        solve_ik(model, q, both, solver, **options).outcome,
+    ]
+
+
+@pytest.mark.parametrize("bend", [0.4, 2.0])
+def test_limits_that_forbid_a_distance_prove_it_unreachable(bend, backend):
+    """By the law of cosines; every route said STALLED."""
+    model, direction = elbow(0.4, 2.0), np.array([0.6, 0.48, 0.64])
+    edge, side = np.sqrt(0.34 + 0.3 * np.cos(bend)), 1.0 if bend == 0.4 else -1.0
+    for beyond in (-2e-3, 2e-3):  # shells are within 1e-3 of the links' length
+        target = model.skeleton.offsets[0] + (edge + side * beyond) * direction
+        outcomes = outcomes_of_all_routes(model, target)
+        expected = {Outcome.UNREACHABLE} if beyond > 0.0 else {Outcome.CONVERGED}
+        assert set(outcomes) == expected
+        if beyond > 0.0:
+            for limit in (0, 1):
+                assert {
+                    Outcome(outcome).unreachable
+                    for outcome in outcomes_of_all_routes(model, target, max_iterations=limit)
+                } == {True}
+            near = solve_ik(model, model.neutral(), target, tolerance=3e-3)
+            assert near.outcome is Outcome.CONVERGED
+
+
+SEVERAL = ["hinge", "slide", "hinge", "ball", "hinge", "fixed", "hinge"]
+KINDS = [["hinge"] * 6, SEVERAL, ["slide", "hinge", "hinge", "fixed"], ["ball", "hinge", "ball"]]
+
+
+def first_shell_gap(model, target):
+    """Return how far a target's point of the first shell is outside of it, and its lever [m].
+
+    The point is fixed to the effector, unless a joint between them moves: then there is none.
+    """
+    tip, is_oriented = model.joint_count - 1, target.rotation is not None
+    reach = reach_of(model, tip, is_oriented)
+    if not reach.shells:
+        return 0.0, 0.0
+    shell = reach.shells[0]
+    k = [*reach.path, tip][shell.joint]
+    x, R = model.forward(model.random(np.random.default_rng(0), 2))
+    places = x[:, k] + rotation.rotate(R[:, k], shell.point) - x[:, tip]
+    arms = rotation.rotate(rotation.conjugate(R[:, tip]), places)
+    if is_oriented and np.abs(arms[1] - arms[0]).max() > 1e-9:
+        return 0.0, 0.0
+    arm = arms[0] if is_oriented else np.zeros(3)
+    Q = target.rotation if is_oriented else rotation.identity()
+    r = np.linalg.norm(target.position + rotation.rotate(Q, arm) - shell.base)
+    return max(r - shell.largest, shell.smallest - r), np.linalg.norm(arm)
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_what_the_first_shell_proves_is_unreachable(articulated, kinds):
+    """And what a pose reaches is not, though the solve fails."""
+    proven, failed = 0, 0
+    for seed in range(12):
+        model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+        tip = model.joint_count - 1
+        for attempt in range(8):
+            x, R = (part[tip] for part in model.forward(model.random(rng)))
+            v = 0.5 * (attempt % 4) * np.linalg.norm(x) * rng.standard_normal(3) / 1.7
+            target = Target(x + v, R if attempt < 4 else None, tip)
+            options = {"restarts": 0, "max_iterations": 3 + 20 * (attempt % 2)}
+            solution = solve_ik(model, model.random(rng), target, "levenberg_marquardt", **options)
+            failed += not solution.outcome.solved
+            gap, lever = first_shell_gap(model, target)
+            if gap > 1e-4 * (1.0 + lever) + 1e-9:
+                assert solution.outcome.unreachable
+                proven += 1
+            assert not (solution.outcome.unreachable and attempt % 4 == 0)
+    assert failed - proven > 5
+    assert proven > 5
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_what_a_pose_nearly_reaches_is_not_unreachable(articulated, kinds):
+    """Within both tolerances, which are large."""
+    for seed in range(12):
+        model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+        tip = model.joint_count - 1
+        for _ in range(4):
+            x, R = (part[tip] for part in model.forward(model.random(rng)))
+            directions = rng.standard_normal((2, 3))
+            v, turn = 0.1 * directions / np.linalg.norm(directions, axis=1)[:, None]
+            Q = rotation.multiply(rotation.exponential(3.0 * turn), R)
+            options = {"tolerance": 0.1 + 1e-9, "tolerance_rotation": 0.3 + 1e-9}
+            options |= {"restarts": 0, "max_iterations": 0}
+            target = Target(x + v, Q, tip)
+            solution = solve_ik(model, model.random(rng), target, "ccd", **options)
+            assert not solution.outcome.unreachable
