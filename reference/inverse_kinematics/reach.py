@@ -90,7 +90,7 @@ class Axes(NamedTuple):
 
 
 def least_distance(
-    model: Articulation, joint: int, position: Any, Q: Any | None, whole: bool = True
+    model: Articulation, joint: int, position: Any, Q: Any, whole: bool = True
 ) -> tuple[float, float]:
     """Return a bound [m] and a lever [m]: distance + lever angle >= bound for every pose.
 
