@@ -94,7 +94,7 @@ def least_distance(
 ) -> tuple[float, float]:
     """Return a bound [m] and a lever [m]: distance + lever angle >= bound for every pose.
 
-    Unless the whole reach is asked for, only the first shell is, in microseconds.
+    Without the whole reach only the first shell is tried, in microseconds.
 
     These are the distance [m] and the angle [rad] of the effector from its target in any pose
     within the limits; the bound is 0 if none is proven, and the lever 0 without a target rotation.
