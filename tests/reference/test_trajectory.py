@@ -195,9 +195,9 @@ def test_a_frame_that_limits_keep_from_its_point_says_what_its_solver_said():
     curve = line([1.0, 0.5, 0.0], [2.6, 0.5, 0.0])
     warm = track(arm, curve, LM, [0.0, 0.8, 0.8])
     motion = track(arm, curve, LM, [0.0, 0.8, 0.8], coherent=True)
-    assert set(warm.outcome) == {Outcome.CONVERGED, Outcome.STALLED}
+    assert set(warm.outcome) == {Outcome.CONVERGED, Outcome.UNREACHABLE}
     np.testing.assert_array_equal(motion.outcome, warm.outcome)
-    off = warm.outcome == Outcome.STALLED
+    off = warm.outcome == Outcome.UNREACHABLE
     assert motion.residual[off].mean() < 1.1 * warm.residual[off].mean()
     assert largest(arm, motion.coordinates) < 0.2
 
