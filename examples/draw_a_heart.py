@@ -1,4 +1,4 @@
-"""Draw a heart with an arm: frame after frame, then as the smoothest motion; write it as BVH."""
+"""Draw a heart with an arm: every frame from rest, then from the last frame; write it as BVH."""
 
 import numpy as np
 
@@ -6,11 +6,9 @@ from plumbob import curves, formats, forward_kinematics, scenes, track
 
 arm, _ = scenes.lab_arm()
 heart = curves["heart"]()
-frame_by_frame = track(arm, heart)
-coherent = track(arm, heart, coherent=True, closed=True)
-for name, motion in {"frame by frame": frame_by_frame, "coherent": coherent}.items():
+from_rest, from_last = (track(arm, heart, warm=warm) for warm in (False, True))
+for name, motion in {"from rest": from_rest, "from the last frame": from_last}.items():
     joints = forward_kinematics(arm, motion.local_rotations).positions
-    moves = joints - np.roll(joints, 1, axis=0)  # from the last frame to the first as well
-    jumps = np.linalg.norm(moves, axis=-1)
+    jumps = np.linalg.norm(np.diff(joints, axis=0), axis=-1)
     print(f"{name}: {len(joints)} frames, a joint jumps {1e3 * jumps.max():.1f} mm at most")
-formats.bvh.write("heart.bvh", arm, coherent.local_rotations)  # opens in an animation program
+formats.bvh.write("heart.bvh", arm, from_last.local_rotations)  # opens in an animation program

@@ -381,7 +381,7 @@ def _solves():
     yield entry(posed, target, "poses", solve, free="position rotation", names="target")
     yield entry(one_pose, target, "pose", solve, free="position rotation", names="target")
     yield from _lists(points[0], rotations[0])
-    motion = {"warm": True, "coherent": True, "closed": True, "record": True}
+    motion = {"warm": True, "record": True}
     yield entry(
         reference.track, {"skeleton": balls, "curve": points, "start": local, **settings, **motion},
         free="curve", names="q effector", raises=(FloatingPointError,),
@@ -524,9 +524,7 @@ def _trees_of_numbers():
     points, turns = RNG().uniform(-0.5, 0.5, (4, 3)), rotation.random(RNG(), 4)
     v = RNG().uniform(-1.0, 1.0, (3, model.freedom_count))
     tolerances = {"tolerance": 1e-4, "tolerance_rotation": 1e-4}
-    smooth = functools.partial(
-        reference.track, effector="f", coherent=True, closed=True, max_iterations=8
-    )
+    track = functools.partial(reference.track, effector="f", max_iterations=8)
     judged = functools.partial(reference.judge_pose, effector="f")
     posed = {"position": points[0], "rotation": turns[0], "weight": 2.0}
     place = reference.forward_kinematics(tree(), local).positions
@@ -538,7 +536,7 @@ def _trees_of_numbers():
         (differential.jacobians, "", None, {"q": local}, {"q": q}),
         (differential.integrate, "", None, None, {"q": q, "v": v}),
         (differential.difference, "", None, None, {"q1": q, "q0": q0}),
-        (smooth, "", reference.track, {"curve": points, **tolerances}, {"curve": points}),
+        (track, "", reference.track, {"curve": points, **tolerances}, {"curve": points}),
         (judged, "", reference.judge_pose, {"pose": local, **target}, {"pose": q[0], **target}),
         (bvh.format, "", None, {"local_rotations": local[None]}, None),
         (drawn, "", Articulation.random, None, {}),
@@ -555,7 +553,7 @@ def _trees_of_numbers():
     }
     limited = {"single": "axes lower upper cones", "infinite": "lower upper cones"}
     for function, variant, public, of_tree, of_model in table:
-        public, raises = public or function, (FloatingPointError,) * (function is smooth)
+        public, raises = public or function, (FloatingPointError,) * (function is track)
         if of_tree is not None:
             given, call = balls | of_tree, of_balls(function)
             yield entry(call, given, variant + "numbers", public, raises=raises, **laws)

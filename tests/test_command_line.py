@@ -54,7 +54,6 @@ MISUSE = {
     "solver": (["show", "heart", "--solver", "jacobi"], "expected one of ccd, fabrik"),
     "suffix": (["show", "heart", "-o", "heart.png"], "expected one of .gif, .svg"),
     "suffix of a cloth": (["show", "cloth", "-o", "cloth.bvh"], "expected one of .gif, .svg"),
-    "coherent cloth": (["show", "cloth", "--coherent"], "coherent: expected an arm"),
     "no scene": (["show"], "SCENE"),
     "no records": (["report"], "no records in report"),
     "options before the command": (["--output", "x", "report"], "behind the command: report"),
@@ -419,19 +418,17 @@ def test_from_measuring_to_the_page(capsys, empty_folder, monkeypatch):
     assert [path.name for path in empty_folder.iterdir()] == ["out"]
 
 
-@pytest.mark.parametrize("coherent", [False, True])
-def test_a_motion_is_written_for_animation_programs(capsys, empty_folder, coherent):
+def test_a_motion_is_written_for_animation_programs(capsys, empty_folder):
     """Six decimals leave joint n of the arm off by (n + 1) 9e-7 + n 2.6 m 2.7e-8 at the most."""
     from plumbob.bench.problems.curves import MAX_SPACING, MIN_SPACING
     from plumbob.reference import curves, resample, scenes, track
     from plumbob.reference.formats import bvh
 
-    options = ["--coherent"] if coherent else []
-    code, out, err = plumbob(capsys, "show", "heart", "-o", "heart.bvh", *options)
+    code, out, err = plumbob(capsys, "show", "heart", "-o", "heart.bvh")
     assert (code, out, err) == (0, "heart.bvh\n", "")
     spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
-    points = resample(curves["heart"](), closed=coherent, **spacing)
-    tracked = track(scenes.lab_arm()[0], points, "fabrik", coherent=coherent, closed=coherent)
+    points = resample(curves["heart"](), **spacing)
+    tracked = track(scenes.lab_arm()[0], points, "fabrik")
     motion = bvh.read(empty_folder / "heart.bvh")
     assert motion.frame_time * len(points) == pytest.approx(5.0)
     off = np.linalg.norm(motion.pose().positions - tracked.positions, axis=-1).max(axis=0)

@@ -20,7 +20,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 SAYS = {
     "arm_to_target": ["CONVERGED    tip [", "UNREACHABLE"],
     "compare_step_solvers": ["local_global   CONVERGED", "gauss_newton"],
-    "draw_a_heart": ["frame by frame: 150 frames", "coherent: 150 frames"],
+    "draw_a_heart": ["from rest: 150 frames", "from the last frame: 150 frames"],
     "falling_cloth": ["frame 9: CONVERGED", "lowest 1.4954 m"],
     "robot_with_limits": ["CONVERGED after", "coordinates ["],
 }

@@ -53,7 +53,7 @@ def compile_kernels() -> None:
     for name in IK_SOLVERS:
         solve_ik(robot, robot.neutral(), Target(target), solver=name, max_iterations=2)
         solve_ik(arm, rest, target, solver=name, max_iterations=2)
-    track(arm, curves["heart"](), coherent=True, closed=True)
+    track(arm, curves["heart"]())
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ def write_gallery(folder: Path, progress: Progress) -> list[Path]:
 
 def _scenes() -> Iterator[tuple[str, Scene]]:
     """Yield the file of each picture with its scene."""
-    arm, cloth = arm_motion("heart", "fabrik", coherent=False), cloth_motion(EXACT)
+    arm, cloth = arm_motion("heart", "fabrik"), cloth_motion(EXACT)
     drawn = [(fault.title, draw_like(arm, _solver(fault), _silent)) for fault in BESIDE_CURVES]
     yield "curves.svg", arm_scene("heart", arm, "Plumbob FABRIK", drawn)
     stepped = [(fault.title, step_like(cloth, _solver(fault), _silent)) for fault in BESIDE_CLOTHS]
@@ -100,7 +100,7 @@ def _beside_truth(fault: FamousFault) -> Scene:
         return cloth_scene(cloth, fault.solver, moves)
     if fault.scene == REACH:
         return _reach(fault)
-    arm = arm_motion(fault.scene, fault.solver, coherent=False)
+    arm = arm_motion(fault.scene, fault.solver)
     moves = [(fault.title, draw_like(arm, _solver(fault), _silent))]
     return arm_scene(fault.scene, arm, f"Plumbob {fault.solver.upper()}", moves)
 

@@ -54,7 +54,6 @@ def write(
     path: Path,
     solver: str | None,
     progress: Progress,
-    coherent: bool = False,
     competitor: YourSolver | None = None,
 ) -> None:
     """Write a scene as an animated GIF or, by the file's suffix, an SVG, a page or a BVH motion.
@@ -64,18 +63,15 @@ def write(
         path: of the file.
         solver: of Plumbob; FABRIK or Newton's if None.
         progress: called with the frames done and their number.
-        coherent: whether Plumbob's arm moves as smoothly as it can.
         competitor: a solver beside Plumbob's.
 
     Raises:
-        ValueError: if scene or solver are unknown, the suffix does not fit them, a cloth is to be
-            coherent, or the user's solver does not answer.
+        ValueError: if scene or solver are unknown, the suffix does not fit them, or the
+            user's solver does not answer.
     """
     is_cloth = choice("scene", name, SCENES) == CLOTH
     bones = () if is_cloth or competitor else (BVH,)
     choice("suffix of the file", path.suffix, (GIF, SVG, HTML, *bones))
-    if is_cloth and coherent:
-        raise ValueError("coherent: expected an arm that follows a curve, got a cloth")
     if competitor:
         competitor.offered(*(("a cloth", CLOTH_TASKS) if is_cloth else ("an arm", ARM_TASKS)))
     solver = choice(
@@ -87,13 +83,12 @@ def write(
         cloth = cloth_motion(solver)
         moves = [(c.name, step_like(cloth, c, progress)) for c in [competitor] if c]
         return _write_scene(cloth_scene(cloth, solver, moves), path, progress)
-    arm = arm_motion(name, solver, coherent)
+    arm = arm_motion(name, solver)
     if path.suffix == BVH:
         seconds = SECONDS / len(arm.curve)
         return bvh.write(path, arm.skeleton, arm.motion.local_rotations, seconds)
     moves = [(c.name, draw_like(arm, c, progress)) for c in [competitor] if c]
-    title = f"Plumbob {label(solver)}" + ", coherent" * coherent
-    return _write_scene(arm_scene(name, arm, title, moves), path, progress)
+    return _write_scene(arm_scene(name, arm, f"Plumbob {label(solver)}", moves), path, progress)
 
 
 def _write_scene(scene: Scene, path: Path, progress: Progress) -> None:
@@ -105,15 +100,12 @@ def _write_scene(scene: Scene, path: Path, progress: Progress) -> None:
     (film.animate if path.suffix == GIF else film.picture)(scene, path, progress)
 
 
-def arm_motion(name: str, solver: str, coherent: bool) -> ArmMotion:
-    """Return the arm drawing a curve; a coherent motion is closed, and can be repeated."""
+def arm_motion(name: str, solver: str) -> ArmMotion:
+    """Return the arm drawing a curve."""
     skeleton, rest = reference.scenes.lab_arm()
     points = reference.curves[CUSTOM if name == ARM else name]()
-    even = reference.resample(
-        points, min_spacing=MIN_SPACING, max_spacing=MAX_SPACING, closed=coherent
-    )
-    solution = reference.track(skeleton, even, solver, rest, coherent=coherent, closed=coherent)
-    return ArmMotion(skeleton, rest, even, solution)
+    even = reference.resample(points, min_spacing=MIN_SPACING, max_spacing=MAX_SPACING)
+    return ArmMotion(skeleton, rest, even, reference.track(skeleton, even, solver, rest))
 
 
 def draw_like(arm: ArmMotion, solver: YourSolver, progress: Progress) -> FloatArray:

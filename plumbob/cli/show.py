@@ -7,8 +7,13 @@ import typer
 
 from plumbob.text.printable import visible
 
-from .options import REPORT, SUCCESS, File, Text, argument, flag, option, valid_name, writable
+<<<<<<< HEAD:plumbob/cli/show.py
+from .options import REPORT, SUCCESS, File, Text, argument, option, valid_name, writable
 from .terminal import progress
+=======
+from ..terminal import progress
+from .options import REPORT, SUCCESS, File, Text, argument, option, valid_name, writable
+>>>>>>> 3d2731e1 (Remove coherent motions; compare the nearest of several solutions):plumbob/commands/show.py
 from .verify import program_of
 
 if TYPE_CHECKING:
@@ -25,7 +30,6 @@ OwnSolver = Annotated[
 Solver = Annotated[
     Text, option("NAME", "Plumbob's solver: fabrik, ccd ...; for the cloth: newton ...")
 ]
-Coherent = Annotated[bool, flag("Move the arm as smoothly as possible, in a loop.", "--coherent")]
 
 
 def show(
@@ -34,7 +38,6 @@ def show(
     *,
     file: Picture = None,
     solver: Solver = None,
-    coherent: Coherent = False,
     own_solver: OwnSolver = None,
 ) -> int:
     """Write an animation, a picture or a page of the arm or the cloth.
@@ -50,7 +53,7 @@ def show(
     if own_solver is not None and program:
         raise ValueError("with: expected one solver, got --with and a program behind --")
     words = program if own_solver is None else [own_solver]
-    if scene == GALLERY and not (words or solver or coherent):
+    if scene == GALLERY and not (words or solver):
         return _show_gallery(file or REPORT / GALLERY)
     if scene is None and not words:
         raise ValueError(f"SCENE: expected one of {', '.join(SCENES)}, got none")
@@ -60,7 +63,7 @@ def show(
     try:
         name = scene or (entrant.scene if entrant else "")
         path = file or REPORT / f"{name}.gif"
-        _draw(name, path, solver, coherent, entrant)
+        _draw(name, path, solver, entrant)
     finally:
         if entrant:
             entrant.close()
@@ -68,9 +71,7 @@ def show(
     return SUCCESS
 
 
-def _draw(
-    name: str, path: Path, solver: str | None, coherent: bool, entrant: "YourSolver | None"
-) -> None:
+def _draw(name: str, path: Path, solver: str | None, entrant: "YourSolver | None") -> None:
     """Write a scene to a file with a progress bar."""
     from plumbob.bench.show.scenes import write
     from plumbob.process.paths import check_regular
@@ -83,7 +84,7 @@ def _draw(
         def update(frame: int, total: int) -> None:
             bar.update(task, completed=frame, total=total)
 
-        write(name, path, solver, update, coherent, entrant)
+        write(name, path, solver, update, entrant)
 
 
 def _show_gallery(folder: Path) -> int:

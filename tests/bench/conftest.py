@@ -49,14 +49,14 @@ def drawn(solver, warm, angle):
 
 def followed(solver, **angles):
     """A closed curve of three points followed in three modes, its angles halving."""
-    smooth = {"residual": [1e-5, 2e-5, 3e-5], "iterations": [12, 11, 10]}
+    nearest = {"residual": [1e-5, 2e-5, 3e-5], "iterations": [12, 11, 10]}
     return [
         sample(
             *("followed",),
             solver=solver,
             settings={"mode": mode},
             arrays={
-                **(smooth if mode == "coherent" else {}),
+                **(nearest if mode == "nearest" else {}),
                 "largest_angle": [angle, angle / 2, angle / 2],
                 "mean_angle": [angle / 4, angle / 4, angle / 8],
             },
@@ -66,8 +66,8 @@ def followed(solver, **angles):
 
 
 def drifted(solver, curve="circle"):
-    """Three repetitions, warm and coherent."""
-    modes = {"warm": [0.1, 0.2, 0.3], "coherent": [0.0, 1e-9, 0.0]}
+    """Three repetitions, warm and nearest."""
+    modes = {"warm": [0.1, 0.2, 0.3], "nearest": [0.0, 1e-9, 0.0]}
     which = {"problem": f"drift/{curve}", "solver": solver}
     return [
         sample("drifted", **which, settings={"mode": mode}, arrays={"drift": drift})
@@ -209,7 +209,7 @@ def moved():
     rows, columns = np.divmod(np.arange(9), 3)
     cloth = np.array([[columns, -0.2 * k * rows, rows] for k in range(4)]).swapaxes(1, 2)
     return [
-        *(record("pictures", "motion/arm/x", s, {"coherent": s == "fabrik", "every": 1},
+        *(record("pictures", "motion/arm/x", s, {"every": 1},
                  {"positions": arm + 0.05 * i, "curve": curve, "error": [10.0 ** (-3 - i)] * 5},
                  facts={"task": "motion of the arm", "order": i})
           for i, s in enumerate(("ccd", "fabrik"))),
@@ -303,7 +303,7 @@ def records():
     return [
         claim(),
         *arm,
-        *followed("ccd", cold=1.0, warm=0.5, coherent=0.25),
+        *followed("ccd", cold=1.0, warm=0.5, nearest=0.25),
         *drifted("ccd"),
         beyond("ccd", 0.5),
         beyond("fabrik", 0.0),

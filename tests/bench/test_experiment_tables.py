@@ -161,27 +161,29 @@ def test_the_most_targets_met_are_ranked_by_chance(make, ccd, fabrik, first):
 
 
 def test_jitter_is_the_largest_angle_in_degrees_beside_price_and_drift(make):
-    records = make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)
+    records = make.followed("ccd", cold=1.0, warm=0.5, nearest=0.25)
     table = jitter(Results(records + make.drifted("ccd")))
     (row,) = rows(table)
     for mode, degrees in (("cold", 180 / math.pi), ("warm", 90 / math.pi)):
         assert row[f"largest rotation, {mode} [°]"] == pytest.approx(degrees)
         assert row[f"mean rotation, {mode} [°]"] == pytest.approx(degrees / 4)
-    assert row["closing rotation, coherent [°]"] == pytest.approx(math.degrees(0.125))
-    assert row["iterations over all frames at once"] == 7
-    assert row["within tolerance, coherent"].hits == 3
-    drifts = [row[f"drift, {mode}, after {i} [°]"] for mode in ("warm", "coherent")
+    assert row["closing rotation, nearest [°]"] == pytest.approx(math.degrees(0.125))
+    assert row["mean iterations, nearest"] == 11
+    assert row["within tolerance, nearest"].hits == 3
+    drifts = [row[f"drift, {mode}, after {i} [°]"] for mode in ("warm", "nearest")
               for i in (1, 2, 3)]  # fmt: skip
     assert [round(drift) for drift in drifts] == [6, 11, 17, 0, 0, 0]
-    assert "in 1 of 1 cases, and in 1 the step" in table.summary.sentence
+    assert "smaller in 1 of 1 cases; the nearest" in table.summary.sentence
+    assert table.summary.sentence.endswith("smaller still in 1.")
     cold, *_ = table.summary.points
     assert cold == "cold: 57.3° (arm, circle, CCD); 2 of 3 frames"
     assert jitter(Results(records[:2])).rows == ()  # not followed in all modes
 
 
 def test_jitter_that_grows_is_not_counted_as_smoother(make):
-    table = jitter(Results(make.followed("ccd", cold=0.1, warm=0.1, coherent=1.0)))
-    assert "in 0 of 1 cases" in table.summary.sentence
+    table = jitter(Results(make.followed("ccd", cold=0.1, warm=0.1, nearest=1.0)))
+    assert "smaller in 0 of 1 cases" in table.summary.sentence
+    assert table.summary.sentence.endswith("smaller still in 0.")
 
 
 def test_success_is_counted_by_the_residual_not_by_the_solver(records):

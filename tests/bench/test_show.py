@@ -87,7 +87,7 @@ def test_your_arm_stands_beside_ours_with_its_error(capsys, tmp_path):
 
 def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tmp_path):
     mine = YourSolver.open([file(tmp_path, "my_ik.py", IK.format(""))])
-    found = shows.arm_motion("circle", "ccd", coherent=False)
+    found = shows.arm_motion("circle", "ccd")
     told = []
     positions = mine.follow_curve(*found[:3], lambda done, total: told.append((done, total)))
     mine.close()
@@ -99,7 +99,7 @@ def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tm
 
 def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
     yours = YourSolver.open([file(tmp_path, "tracks.py", DOT)])
-    found = shows.arm_motion("heart", "fabrik", coherent=False)
+    found = shows.arm_motion("heart", "fabrik")
     positions = yours.follow_curve(*found[:3], lambda *_: None)
     yours.close()
     scene = shows.arm_scene("heart", found, "ours", [("yours", positions)])
@@ -224,9 +224,8 @@ def test_a_program_behind_two_dashes_is_shown_with_the_scene_it_can_do(capsys, t
     )
 
 
-@pytest.mark.parametrize("options", [["--coherent"], ["--solver", "ccd"]])
-def test_ours_alone_makes_a_page_of_one_arm(capsys, tmp_path, options):
-    assert show(capsys, "star", "-o", "star.html", *options)[0] == 0
+def test_ours_alone_makes_a_page_of_one_arm(capsys, tmp_path):
+    assert show(capsys, "star", "-o", "star.html", "--solver", "ccd")[0] == 0
     assert (tmp_path / "star.html").read_text().count("<canvas") == 1
     assert max(errors(tmp_path / "star.html")[0]) <= 1e-4
 

@@ -58,19 +58,19 @@ def test_the_arm_draws_within_tolerance_cold_and_warm(solver):
         assert (arrays["mean_angle"] <= arrays["largest_angle"]).all()
 
 
-def test_a_coherent_motion_is_the_smoothest_and_ends_where_it_began():
-    cold, warm, coherent = (
+def test_warm_and_nearest_frames_rotate_less_than_cold_ones_and_drift():
+    cold, warm, nearest = (
         found("tracking", "arm/heart", "ccd", mode=mode).measure().arrays
-        for mode in ("cold", "warm", "coherent")
+        for mode in ("cold", "warm", "nearest")
     )
-    assert coherent["residual"].max() <= 1e-4
-    assert coherent["largest_angle"].max() < warm["largest_angle"][:-1].max()
-    assert warm["largest_angle"][:-1].max() < cold["largest_angle"][:-1].max()
-    assert warm["largest_angle"][-1] > 10 * coherent["largest_angle"][-1]
-    for mode, least, most in (("warm", 0.1, 2.0), ("coherent", 0.0, 1e-9)):
-        left = found("tracking", "drift/heart", "ccd", mode=mode).measure().arrays["drift"]
-        assert (left >= least).all()
-        assert (left <= most).all()
+    for motion in (warm, nearest):
+        assert motion["residual"].max() <= 1e-4
+        assert motion["largest_angle"][:-1].max() < cold["largest_angle"][:-1].max()
+    assert (nearest["iterations"] > warm["iterations"]).all()  # of all starts
+    for mode in ("warm", "nearest"):
+        drift = found("tracking", "drift/heart", "ccd", mode=mode).measure().arrays["drift"]
+        assert (drift >= 0.1).all()
+        assert (drift <= 2.0).all()
 
 
 @pytest.mark.parametrize("solver", ["ccd", "fabrik", "lm/Pinocchio"])

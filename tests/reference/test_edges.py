@@ -7,12 +7,7 @@ from plumbob.reference import (
     Articulation,
     Mimic,
     Skeleton,
-    Target,
-    curves,
     forward_kinematics,
-    rotation,
-    scenes,
-    tracking,
 )
 from plumbob.reference.implicit_euler.certificate import Certificate, Coverage
 from plumbob.reference.inverse_kinematics.box_step import activate_limits, take_step
@@ -75,61 +70,6 @@ def test_a_target_further_out_than_the_tolerance_has_iterations_of_its_own(least
     criteria = mechanism_criteria(mechanism, least, Limits(1e-3, 1e-3, 7, 3, 0, False, 8))
     assert criteria.max_iterations == iterations
     assert least < criteria.distance <= least + 1e-3
-
-
-# ---- motions
-
-
-def recorded(monkeypatch, module, name):
-    """Return the list that what every later call of a function returns is added to."""
-    results, function = [], getattr(module, name)
-
-    def call(*arguments):
-        results.append(function(*arguments))
-        return results[-1]
-
-    monkeypatch.setattr(module, name, call)
-    return results
-
-
-def test_the_iterations_of_a_coherent_motion_are_those_of_both_solves_and_of_all_frames(
-    monkeypatch,
-):
-    """Without a tolerance every frame is solved once more from the smooth trajectory."""
-    solves = recorded(monkeypatch, tracking, "solve_checked")
-    trajectories = recorded(monkeypatch, tracking.trajectory, "smooth")
-    motion = tracking.track(
-        scenes.lab_arm()[0],
-        curves["circle"](6),
-        "levenberg_marquardt",
-        coherent=True,
-        tolerance=0.0,
-        max_iterations=40,
-    )
-    first, _, again, _ = (np.asarray(solve.iterations) for solve in solves)
-    ((_, steps),) = trajectories
-    assert again.sum() > 0
-    assert steps > 0
-    np.testing.assert_array_equal(motion.iterations, first + steps + again)
-
-
-@pytest.mark.parametrize(("tilt", "met"), [(0.0, True), (0.5, False)])
-def test_a_frame_has_met_its_target_if_its_rotation_has_too(monkeypatch, tilt, met):
-    """The effector is on its target whatever the hinge does; its tilt is out of reach."""
-    arm = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0, 0, 1.0]]), ["hinge", "fixed"])
-    reached = []
-
-    def smooth(mechanism, rows, q, constrained, closed):
-        reached.extend(constrained)
-        return q, 0
-
-    monkeypatch.setattr(tracking.trajectory, "smooth", smooth)
-    turns = rotation.exponential(np.outer(np.arange(3), [0.0, 0.0, 0.1]))
-    wanted = rotation.multiply(turns, rotation.exponential([tilt, 0.0, 0.0]))
-    curve = Target(np.tile([0.0, 0.0, 1.0], (3, 1)), wanted, 1)
-    motion = tracking.track(arm, curve, coherent=True)
-    assert motion.residual.max() <= 1e-12
-    assert reached == [met] * 3
 
 
 # ---- certificates and judgements

@@ -62,29 +62,23 @@ def test_a_cold_motion_is_a_batch_solved_with_the_same_options(arm, options, rng
         np.testing.assert_array_equal(tracked, solved)
 
 
-def test_only_a_coherent_motion_is_closed(arm):
-    with pytest.raises(ValueError, match="closed: expected False where coherent is False"):
-        track(arm, curves["circle"](3), closed=True)
-
-
-@pytest.mark.parametrize("coherent", [False, True])
-def test_a_motion_that_leaves_the_range_of_numbers_is_an_error_of_its_own(coherent):
+def test_a_motion_that_leaves_the_range_of_numbers_is_an_error_of_its_own():
     """A free joint has to go beyond 1e75 to bring the effector back to the origin."""
     tree = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [1e75, 0, 0], [0, 1e75, 0], [1e75, 0, 0]])
     robot = Articulation(tree, ["hinge", "slide", "ball", "free"])
     curve = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 3))
     with pytest.raises(FloatingPointError, match=r"track: .* left the numbers up to 1e"):
-        track(robot, curve, coherent=coherent, max_iterations=20)
+        track(robot, curve, max_iterations=20)
 
 
 @pytest.mark.parametrize("size", [1e-70, 1e-37, 1e37, 1e74])
-def test_a_smooth_motion_is_the_same_in_any_unit(size):
+def test_a_motion_is_the_same_in_any_unit(size):
     """Powers of two scale all numbers exactly but for the tolerances, which are absolute."""
     tree, unit = scenes.ball_chain(links=3)[0], 2.0 ** round(np.log2(size))
     curve = 0.2 * curves["circle"](12)[:, [0, 2, 1]] + 0.1
     solved = []
     for scale in (1.0, unit):
         model = Skeleton(tree.parents, scale * tree.offsets)
-        given = {"coherent": True, "closed": True, "tolerance": 1e-4 * scale}
-        solved.append(track(model, scale * curve, **given).positions / scale)
+        motion = track(model, scale * curve, tolerance=1e-4 * scale)
+        solved.append(motion.positions / scale)
     assert np.abs(solved[0] - solved[1]).max() < 1e-9

@@ -35,14 +35,16 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield Block("arm", beyond.name, solver, measure, limits, scale.targets, facts)
 
 
-def follow(
-    problem: FollowedCurve, solver: str, options: dict[str, Any], closed: bool = False
-) -> Measured:
-    """Follow a curve once; recompute residuals by forward kinematics of the solutions.
+def follow(problem: FollowedCurve, solver: str, options: dict[str, Any]) -> Measured:
+    """Follow a curve once."""
+    return followed(problem, solve_frames(problem, solver, options), closed=False)
+
+
+def followed(problem: FollowedCurve, motion: IKSolution, closed: bool) -> Measured:
+    """Return a motion along a curve; residuals are recomputed by forward kinematics.
 
     The last angle of a closed curve is from the last frame back to the first.
     """
-    motion = solve_frames(problem, solver, options)
     pose = forward_kinematics(problem.model, motion.coordinates)
     angles = _joint_angles(problem, motion)[: None if closed else -1]
     return Measured(

@@ -3,4 +3,4 @@
 # The tasks of records: a curve followed once, or three times.
 CURVE, DRIFT = "curve", "drift"
 # The modes in which the frames of a curve are solved.
-COLD, WARM, COHERENT = "cold", "warm", "coherent"
+COLD, WARM, NEAREST = "cold", "warm", "nearest"

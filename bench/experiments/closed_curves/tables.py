@@ -17,10 +17,10 @@ from ...tables.table import Summary, in_unit, words
 from .. import arm
 from ..arm.values import FollowedMotion
 from ..chain.tables import within_tolerance
-from . import COHERENT, COLD, CURVE, DRIFT, WARM
+from . import COLD, CURVE, DRIFT, NEAREST, WARM
 
-MODES = (COLD, WARM, COHERENT)
-# The step that closes a curve is as large as the others if it exceeds them by at most this share.
+MODES = (COLD, WARM, NEAREST)
+# Rotations that differ by at most this share are as large as each other.
 ALIKE = 0.01
 _CAPTIONS = Captions(__file__)
 
@@ -41,14 +41,12 @@ def _by_mode(results: Results, task: str) -> dict[tuple[str, str], dict[str, Rec
 
 
 def _row(by_mode: Mapping[str, Record], drifts: Mapping[str, Record]) -> Row:
-    """Return the cells of a curve; an iteration over all frames counts as one of each frame."""
-    iterations = {mode: record.values.iterations for mode, record in by_mode.items()}
+    """Return the cells of a curve."""
     row: Row = {
         "by_mode": by_mode,
         "drifts": drifts,
         "curve": by_mode[WARM].title,
         "solver": label(by_mode[WARM].solver),
-        "iterations over all frames at once": int((iterations[COHERENT] - iterations[WARM]).min()),
         "frames": by_mode[WARM].values.residual.size,
     }
     for mode, record in by_mode.items():
@@ -68,15 +66,19 @@ def _row(by_mode: Mapping[str, Record], drifts: Mapping[str, Record]) -> Row:
 
 
 def _summary(rows: Sequence[Row]) -> Summary:
-    largest, closing = (f"{quantity} rotation, {COHERENT}" for quantity in ("largest", "closing"))
-    smoother = sum(row[largest] < row[f"largest rotation, {WARM}"] for row in rows)
-    closed = sum(row[closing] <= (1.0 + ALIKE) * row[largest] for row in rows)
+    warm, nearest = (_count_smaller(rows, *modes) for modes in ((WARM, COLD), (NEAREST, WARM)))
     return Summary(
-        "Solving all frames together makes the largest rotation of a joint smaller than warm "
-        f"starts do in {smoother} of {len(rows)} cases, and in {closed} the step from the last "
-        "frame back to the first is no larger than others.",
+        "Starting each frame from the previous solution makes the largest rotation of a joint "
+        f"smaller in {warm} of {len(rows)} cases; the nearest of several solutions makes the "
+        f"rotation smaller still in {nearest}.",
         tuple(_points(rows)),
     )
+
+
+def _count_smaller(rows: Sequence[Row], mode: str, other_mode: str) -> int:
+    """Return the number of rows whose largest rotation is smaller in a mode than in another."""
+    largest, other = (f"largest rotation, {name}" for name in (mode, other_mode))
+    return sum((1.0 + ALIKE) * row[largest] < row[other] for row in rows)
 
 
 def _points(rows: Sequence[Row]) -> Iterator[str]:

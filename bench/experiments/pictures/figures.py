@@ -118,7 +118,7 @@ def arm_motion(results: Results) -> Scene | None:
         return None
     return Scene(
         **CAPTIONS.figure("arm"),
-        motions=[Moving(_arm_label(r), r.values.positions, r.values.error) for r in records],
+        motions=[Moving(label(r.solver), r.values.positions, r.values.error) for r in records],
         seconds=DRAWING / len(records[0].values.positions),
         view=ARM_VIEW,
         panes=2,
@@ -155,7 +155,3 @@ def _first(results: Results, task: str, maximum: int) -> Sequence[Record]:
     records = results.all("pictures", task=task)
     order = sorted(records, key=lambda r: (r.solver not in results.entrants, r.details.order))
     return order[:maximum]
-
-
-def _arm_label(record: Record) -> str:
-    return label(record.solver) + (", coherent" if record.details.coherent else "")

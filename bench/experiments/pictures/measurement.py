@@ -15,14 +15,8 @@ from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
 from .values import ArmDrawing, ClothDrawing, MovingArm, MovingCloth
 
 GHOSTS, FRAMES = 9, 6
-# Motions that are played: solvers of inverse kinematics, coherent or frame by frame; step solvers
-# with their iteration limits.
-FOLLOWING = (
-    ("ccd", False),
-    ("fabrik", True),
-    ("fabrik", False),
-    ("levenberg_marquardt", False),
-)
+# Motions that are played: solvers of inverse kinematics; step solvers with their iteration limits.
+FOLLOWING = ("ccd", "fabrik", "levenberg_marquardt")
 SWINGING = (("local_global", 1), ("newton", 100), ("local_global", 10), ("gauss_newton", 1))
 # A step solver that may make more iterations than this works to the tolerance.
 SOLVED = 50
@@ -38,9 +32,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
         measure = partial(drawing, first, evened)
         yield _block(ARM, f"arm/{CUSTOM}", first, measure, {"evened": evened, **spacing})
     yield _block(CLOTH, "cloth/x1", "newton", falling_cloth, {"h": H, "frames": FRAMES})
-    for i, (solver, coherent) in enumerate(FOLLOWING):
-        measure = partial(arm_motion, solver, coherent)
-        settings = {"coherent": coherent, "every": THINNED}
+    for i, solver in enumerate(FOLLOWING):
+        measure, settings = partial(arm_motion, solver), {"every": THINNED}
         yield _block(ARM_MOTION, f"motion/arm/{CUSTOM}", solver, measure, settings, order=i)
     for i, (solver, iterations) in enumerate(SWINGING):
         measure = partial(cloth_motion, solver, iterations)
@@ -52,11 +45,11 @@ def _block(task: str, name: str, solver: str, measure: Any, settings: Any, **fac
     return Block("pictures", name, solver, measure, settings, facts={"task": task, **facts})
 
 
-def arm_motion(solver: str, coherent: bool) -> Measured:
+def arm_motion(solver: str) -> Measured:
     """Follow the evened custom curve; keep each `THINNED`-th frame, to a micrometre."""
     skeleton, rest = scenes.lab_arm()
     curve = evened_custom_curve()
-    frames = track(skeleton, curve, solver, rest, coherent=coherent)
+    frames = track(skeleton, curve, solver, rest)
     positions, errors = frames.positions[::THINNED], np.atleast_1d(frames.residual)[::THINNED]
     return Measured(MovingArm(positions.round(PLACES), curve.round(PLACES), errors))
 

@@ -39,9 +39,8 @@ class MovingArm(Values, frozen=True):
 
 
 class MovingArmDetails(Details, frozen=True):
-    """Whether the motion is coherent, and its position in the order."""
+    """The position of the motion in the order."""
 
-    coherent: bool
     order: int
 
 
