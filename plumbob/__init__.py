@@ -65,7 +65,6 @@ __all__ = [
     "symplectic_euler",
     "tasks",
     "track",
-    "wind_forces",
 ]
 
 

@@ -26,7 +26,6 @@ from .mass_spring import MassSpring, State
 from .outcome import Outcome
 from .skeleton import Pose, Skeleton
 from .tracking import track
-from .wind import wind_forces
 
 __all__ = [
     "IK_SOLVERS",
@@ -72,5 +71,4 @@ __all__ = [
     "symplectic_euler",
     "tasks",
     "track",
-    "wind_forces",
 ]

@@ -35,7 +35,6 @@ from plumbob.reference import (
     scenes,
     skeleton,
     tracking,
-    wind,
 )
 from plumbob.reference import jacobians as differential
 from plumbob.reference import sparse as cholesky
@@ -48,7 +47,7 @@ from plumbob.reference.sparse import linear_solver
 # The modules that a user meets, the package itself first.
 MODULES = [
     reference, rotation, curve, skeleton, articulation, kinematics, differential,
-    inverse_kinematics, tracking, mass_spring, explicit, wind, implicit_euler, objective,
+    inverse_kinematics, tracking, mass_spring, explicit, implicit_euler, objective,
     certificate, scenes, formats, bvh, mjcf, obj, urdf, linear_solver, cholesky, compiled, parallel,
     samples, verdict,
 ]  # fmt: skip
@@ -420,10 +419,6 @@ def _systems():
     for function in (m.rest_vectors, m.lengths, m.stretches, m.potential_energy, m.spring_energy,
                      m.spring_forces, m.stiffness_matrix, m.damping_matrix):  # fmt: skip
         yield entry(function, at)
-    blown = {"state": state, "triangles": np.array([[0, 1, 2], [2, 3, 4]]), "wind": outer,
-             "density": 1.2, "drag": 1.0, "lift": 0.5}  # fmt: skip
-    raises = (FloatingPointError,)
-    yield entry(reference.wind_forces, blown, single="wind", free="triangles", raises=raises)
 
 
 def _steps():
