@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def solve_nearest(problem: FollowedCurve, solver: str) -> IKSolution:
     for target in problem.curve:
         starts = np.stack([q, problem.start, *random_poses])
         limits = LIMITS._asdict()
-        solutions = solve_ik(model, starts, target, solver, restarts=0, phases=1, **limits)
+        solutions: Any = solve_ik(model, starts, target, solver, restarts=0, phases=1, **limits)
         distances = np.linalg.norm(difference(model, solutions.coordinates, q), axis=-1)
         nearest = np.where(solutions.outcome == Outcome.CONVERGED, distances, np.inf).argmin()
         frame = IKSolution(*(values[nearest : nearest + 1] for values in solutions))
