@@ -62,6 +62,7 @@ docs: .venv/docs-installed
 drawing: .venv/installed
 	$(BIN)/python tools/draw_architecture.py
 	$(BIN)/python tools/draw_lab.py
+	$(BIN)/python tools/draw_gallery.py
 
 messages: .venv/installed
 	$(BIN)/python tools/translate.py

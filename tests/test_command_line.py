@@ -52,8 +52,8 @@ MISUSE = {
     "scene": (["show", "hart"], "did you mean 'heart'?"),
     "scene unlike any": (["show", "qqq"], "expected one of arm, cloth, circle"),
     "solver": (["show", "heart", "--solver", "jacobi"], "expected one of ccd, fabrik"),
-    "suffix": (["show", "heart", "-o", "heart.png"], "expected one of .gif, .svg"),
-    "suffix of a cloth": (["show", "cloth", "-o", "cloth.bvh"], "expected one of .gif, .svg"),
+    "suffix": (["show", "heart", "-o", "heart.png"], "expected one of .html, .svg"),
+    "suffix of a cloth": (["show", "cloth", "-o", "cloth.bvh"], "expected one of .html, .svg"),
     "no scene": (["show"], "SCENE"),
     "no records": (["report"], "no records in report"),
     "options before the command": (["--output", "x", "report"], "behind the command: report"),
@@ -82,7 +82,7 @@ def test_misuse_exits_2_with_one_sentence(capsys, main_job, empty_folder, argume
 def test_a_folder_that_cannot_be_written_to_exits_2_and_is_named(capsys, empty_folder, arguments):
     (empty_folder / "file").write_text("in the way")
     folder = empty_folder / "file" / "report"
-    target = ["-o", str(folder / "a.gif") if "show" in arguments else str(folder)]
+    target = ["-o", str(folder / "a.html") if "show" in arguments else str(folder)]
     code, _, err = plumbob(capsys, *arguments, *target)
     assert code == 2
     assert str(empty_folder / "file") in err
@@ -129,7 +129,7 @@ OBSTRUCTED += [
         *((command, "out/records.jsonl") for command in COMMANDS),
         *((["report"], f"out/{path}") for path in
           ("index.html", "tables/check.md", "figures/timing_kinematics.svg")),
-        *((["show", "heart"], path) for path in ("heart.svg", "heart.bvh", "heart.gif")),
+        *((["show", "heart"], path) for path in ("heart.svg", "heart.bvh", "heart.html")),
     ]
 ]  # fmt: skip
 

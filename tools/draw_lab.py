@@ -109,7 +109,6 @@ if __name__ == "__main__":
     draw_convergence("lab_convergence.svg")
     draw_heart_beside("show_with.svg")
     draw_plumb_bob("plumb_bob.svg")
-    draw_scene("gallery", "gallery")
     draw_card("gallery/card.svg")
-    for path in (*DOCS.glob("*_*.svg"), *DOCS.glob("gallery/c*s.svg")):
+    for path in DOCS.glob("*_*.svg"):
         shorten(path)

@@ -1,4 +1,4 @@
-"""Solve the named scenes, and write them as animations, pictures, pages or BVH motions."""
+"""Solve the named scenes, and write them as pages, pictures or BVH motions."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,11 +17,11 @@ from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING
 from ..tables.results import label
 from .your_solver import ARM_TASKS, CLOTH_TASKS, H, YourSolver
 
-ARM, CLOTH, GALLERY = "arm", "cloth", "gallery"
+ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *reference.curves)
-GIF, SVG, HTML, BVH = ".gif", ".svg", ".html", ".bvh"
+HTML, SVG, BVH = ".html", ".svg", ".bvh"
 SECONDS = 5
-# An animation shows every third step of a cloth; the frames of an arm are thinned to as many.
+# A page shows every third step of a cloth; the frames of an arm are thinned to as many.
 EVERY = 3
 RATE = 20
 FRAMES = SECONDS * RATE
@@ -56,7 +56,7 @@ def write(
     progress: Progress,
     competitor: YourSolver | None = None,
 ) -> None:
-    """Write a scene as an animated GIF or, by the file's suffix, an SVG, a page or a BVH motion.
+    """Write a scene as a page, a picture or a BVH motion, by the suffix of the file.
 
     Args:
         name: of the scene.
@@ -71,7 +71,7 @@ def write(
     """
     is_cloth = choice("scene", name, SCENES) == CLOTH
     bones = () if is_cloth or competitor else (BVH,)
-    choice("suffix of the file", path.suffix, (GIF, SVG, HTML, *bones))
+    choice("suffix of the file", path.suffix, (HTML, SVG, *bones))
     if competitor:
         competitor.offered(*(("a cloth", CLOTH_TASKS) if is_cloth else ("an arm", ARM_TASKS)))
     solver = choice(
@@ -95,9 +95,9 @@ def _write_scene(scene: Scene, path: Path, progress: Progress) -> None:
     if path.suffix == HTML:
         path.write_text(motion.page(scene), encoding="utf-8")
         return
-    from . import film
+    from .picture import draw_picture
 
-    (film.animate if path.suffix == GIF else film.picture)(scene, path, progress)
+    draw_picture(scene, path, progress)
 
 
 def arm_motion(name: str, solver: str) -> ArmMotion:

@@ -20,10 +20,8 @@ if TYPE_CHECKING:
     from plumbob.bench.show.your_solver import YourSolver
 
 
-Scene = Annotated[Text, argument("SCENE", "arm, cloth, a curve that the arm draws, or gallery.")]
-Picture = Annotated[
-    File, option("FILE", "File in .gif, .svg, .html or .bvh, or a folder.", "--output", "-o")
-]
+Scene = Annotated[Text, argument("SCENE", "arm, cloth, or a curve that the arm draws.")]
+Output = Annotated[File, option("FILE", "File in .html, .svg or .bvh.", "--output", "-o")]
 OwnSolver = Annotated[
     Text, option("SOLVER", "Your solver, my_ik.py; or -- and a program.", "--with")
 ]
@@ -36,25 +34,22 @@ def show(
     context: typer.Context,
     scene: Scene = None,
     *,
-    file: Picture = None,
+    file: Output = None,
     solver: Solver = None,
     own_solver: OwnSolver = None,
 ) -> int:
-    """Write an animation, a picture or a page of the arm or the cloth.
+    """Write a page that plays the arm or the cloth, or a picture.
 
     Your solver moves beside Plumbob's, with errors in colour. The motion of the arm can also be
-    written as BVH, which animation programs open. The gallery is a folder of pictures of good and
-    faulty solvers.
+    written as BVH, which animation programs open.
     """
-    from plumbob.bench.show.scenes import GALLERY, SCENES
+    from plumbob.bench.show.scenes import SCENES
     from plumbob.bench.show.your_solver import YourSolver
 
     program = program_of(context)
     if own_solver is not None and program:
         raise ValueError("with: expected one solver, got --with and a program behind --")
     words = program if own_solver is None else [own_solver]
-    if scene == GALLERY and not (words or solver):
-        return _show_gallery(file or REPORT / GALLERY)
     if scene is None and not words:
         raise ValueError(f"SCENE: expected one of {', '.join(SCENES)}, got none")
     if scene is not None:
@@ -62,7 +57,7 @@ def show(
     entrant = YourSolver.open(words) if words else None
     try:
         name = scene or (entrant.scene if entrant else "")
-        path = file or REPORT / f"{name}.gif"
+        path = file or REPORT / f"{name}.html"
         _draw(name, path, solver, entrant)
     finally:
         if entrant:
@@ -85,15 +80,3 @@ def _draw(name: str, path: Path, solver: str | None, entrant: "YourSolver | None
             bar.update(task, completed=frame, total=total)
 
         write(name, path, solver, update, entrant)
-
-
-def _show_gallery(folder: Path) -> int:
-    """Write the gallery, and print the paths of its pictures."""
-    from plumbob.bench.show.gallery import write_gallery
-
-    writable(folder)
-    with progress() as bar:
-        task = bar.add_task(folder.name, total=None)
-        paths = write_gallery(folder, lambda i, count: bar.update(task, completed=i, total=count))
-    print("\n".join(visible(str(path)) for path in paths))
-    return SUCCESS

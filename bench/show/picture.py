@@ -1,14 +1,11 @@
-"""A scene as an animated GIF, or as a strip of moments in SVG."""
+"""A scene as a picture that stands still, in SVG."""
 
-import tempfile
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
@@ -23,34 +20,13 @@ from ..motion.motion import Moving, Scene, decades, length
 # Moments of a picture.
 MOMENTS = 4
 MARGIN = 0.1
-_ON_WHITE = {**PARAMETERS, "savefig.facecolor": "white", "figure.facecolor": "white"}
+ON_WHITE = {**PARAMETERS, "savefig.facecolor": "white", "figure.facecolor": "white"}
 Progress = Callable[[int, int], None]
 
 
-def animate(scene: Scene, path: Path, progress: Progress, dpi: int = 96) -> None:
-    """Write a GIF: the solvers beside each other and, if there are several, a colour bar."""
-    with mpl.rc_context(_ON_WHITE):
-        count = len(scene.motions)
-        figure = Figure(figsize=(4.8 * count, 4.8 if count == 1 else 5.4), dpi=dpi)
-        base, top = (0.0, 1.0) if count == 1 else (0.18, 0.94)
-        lefts = [(i + 0.02) / count for i in range(count)]
-        axes = [figure.add_axes((left, base, 0.96 / count, top - base)) for left in lefts]
-        if count > 1:
-            _colour_bar(scene, figure, cax=figure.add_axes((0.3, 0.08, 0.4, 0.02)))
-        update = partial(_draw_frame, axes, scene)
-        frames = len(scene.motions[0].positions)
-        animation = FuncAnimation(figure, update, frames=frames, init_func=lambda: ())
-        with tempfile.TemporaryDirectory() as folder:  # interrupted, Pillow writes what it has
-            whole = Path(folder, "film.gif")
-            animation.save(
-                whole, writer=PillowWriter(fps=round(1 / scene.seconds)), progress_callback=progress
-            )
-            path.write_bytes(whole.read_bytes())
-
-
-def picture(scene: Scene, path: Path, progress: Progress) -> None:
+def draw_picture(scene: Scene, path: Path, progress: Progress) -> None:
     """Write an SVG: the curve that an arm has drawn, or moments of a cloth, for each solver."""
-    with mpl.rc_context(_ON_WHITE):
+    with mpl.rc_context(ON_WHITE):
         count, is_arm = len(scene.motions), scene.curve is not None
         rows, columns, size = (1, count, 4.8) if is_arm else (count, MOMENTS, 2.4)
         figure = Figure(figsize=(size * columns, size * rows + 0.6), layout="constrained")
@@ -58,14 +34,15 @@ def picture(scene: Scene, path: Path, progress: Progress) -> None:
         last = len(scene.motions[0].positions) - 1
         moments = np.linspace(0, last, MOMENTS).round().astype(int).tolist()
         for k, i in enumerate(moments[-panels.shape[1] :]):
-            _draw_frame(list(panels[:, k]), scene, i, k == 0, moments if is_arm else ())
+            draw_frame(list(panels[:, k]), scene, i, k == 0, moments if is_arm else ())
             progress(k + 1, panels.shape[1])
         if count > 1:
-            _colour_bar(scene, figure, ax=panels.ravel().tolist(), shrink=0.5, aspect=40)
+            draw_colour_bar(scene, figure, ax=panels.ravel().tolist(), shrink=0.5, aspect=40)
         figure.savefig(path, metadata={"Date": None}, bbox_inches="tight")
 
 
-def _colour_bar(scene: Scene, figure: Figure, **place: Any) -> None:
+def draw_colour_bar(scene: Scene, figure: Figure, **place: Any) -> None:
+    """Draw the scale of errors, placed as by `Figure.colorbar`."""
     low, high = decades(scene)
     colours = ScalarMappable(LogNorm(10.0**low, 10.0**high), COLOUR_MAP)
     bar = figure.colorbar(colours, orientation="horizontal", **place)
@@ -74,7 +51,7 @@ def _colour_bar(scene: Scene, figure: Figure, **place: Any) -> None:
     bar.set_label(scene.measure)
 
 
-def _draw_frame(
+def draw_frame(
     axes: Sequence[Axes], scene: Scene, i: int, title: bool = True, poses: Sequence[int] = ()
 ) -> tuple[()]:
     """Draw frame i of each motion, and faintly the poses of other frames."""
