@@ -54,18 +54,6 @@ def draw_plumb_bob(name: str) -> None:
     (DOCS / name).write_text(text, encoding="utf-8")
 
 
-def draw_card(name: str) -> None:
-    """Write the card of the solver of README.md by `plumbob verify`."""
-    page = (DOCS.parent / "README.md").read_text(encoding="utf-8")
-    source = re.search(r"```python\n(# my_ik.py\n.*?)```", page, re.DOTALL)
-    assert source
-    plumbob = Path(sys.executable).with_name("plumbob")
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "my_ik.py").write_text(source[1], encoding="utf-8")
-        command = [plumbob, "verify", "my_ik.py", "--card", DOCS / name]
-        subprocess.run(command, check=True, cwd=folder)
-
-
 def shorten(path: Path) -> None:
     """Write the numbers of a picture to a hundredth of a point."""
     text = path.read_text(encoding="utf-8")
@@ -109,6 +97,5 @@ if __name__ == "__main__":
     draw_convergence("lab_convergence.svg")
     draw_heart_beside("show_with.svg")
     draw_plumb_bob("plumb_bob.svg")
-    draw_card("gallery/card.svg")
     for path in DOCS.glob("*_*.svg"):
         shorten(path)

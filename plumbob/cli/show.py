@@ -7,13 +7,8 @@ import typer
 
 from plumbob.text.printable import visible
 
-<<<<<<< HEAD:plumbob/cli/show.py
 from .options import REPORT, SUCCESS, File, Text, argument, option, valid_name, writable
 from .terminal import progress
-=======
-from ..terminal import progress
-from .options import REPORT, SUCCESS, File, Text, argument, option, valid_name, writable
->>>>>>> 3d2731e1 (Remove coherent motions; compare the nearest of several solutions):plumbob/commands/show.py
 from .verify import program_of
 
 if TYPE_CHECKING:

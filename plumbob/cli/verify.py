@@ -75,7 +75,6 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     json: Annotated[File, option("FILE", "Write the verdict as JSON.")] = None,
     junit: Annotated[File, option("FILE", "Write the verdict as JUnit XML.")] = None,
     html: Annotated[File, option("FILE", "Write the verdict as a page.")] = None,
-    card: Annotated[File, option("FILE", "Write the verdict as an SVG for a README.")] = None,
     output: Folder = None,
     lang: Language = None,
     self_test: SelfTest = False,
@@ -110,7 +109,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         if self_test:
             work.close()
             return _self_test([*words, *question.tasks], speaker(language))
-        files = Files(json, junit, html, card, output)
+        files = Files(json, junit, html, output)
         presentation = Presentation(speaker(language), language, words)
         finish = _judge(presentation, limits(time_limit, memory_limit), question, files, bar)
     return finish()

@@ -228,7 +228,7 @@ def test_all_files_are_written(capsys, folder):
     assert code == 1
     assert "判定" in out
     assert {path.name for path in (folder / "out").iterdir()} == {
-        "index.html", "verdict.json", "verdict.xml", "card.svg", "failures",
+        "index.html", "verdict.json", "verdict.xml", "failures",
     }  # fmt: skip
     assert '<html lang="zh-CN">' in (folder / "out" / "index.html").read_text()
     assert ET.parse(folder / "out" / "verdict.xml").getroot().get("failures") == "4"

@@ -13,7 +13,7 @@ from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.screen import files, json_file, junit, page, terminal
 from plumbob.verify.screen.files import Files
-from plumbob.verify.screen.words import VERDICTS, Presentation, passed, speaker, title
+from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.self_test import subjects
 from plumbob.verify.verify import verify
 
@@ -88,7 +88,7 @@ def test_a_failing_writer_costs_no_verdict(writer, language, report, monkeypatch
     names = {"json_file": "text", "junit": "text", "page": "render", "saved": "save"}
     monkeypatch.setattr(getattr(files, writer), names[writer], raises)
     context = Presentation(speaker(language), language, ["my.py"])
-    code = Files(None, None, None, None, Path("out")).write(report, Question(), context)
+    code = Files(None, None, None, Path("out")).write(report, Question(), context)
     out, err = capsys.readouterr()
     assert code == 1  # a mistake of ours in a file leaves the exit code to the verdict
     assert "mass_spring_forces" in out
@@ -97,25 +97,13 @@ def test_a_failing_writer_costs_no_verdict(writer, language, report, monkeypatch
     assert "TypeError: Encoding objects of type sphinx" in err
     wanted = {"json_file": "verdict.json", "junit": "verdict.xml", "page": "index.html"}
     lost = {wanted.get(writer)}
-    names = {"card.svg", *wanted.values()}
+    names = set(wanted.values())
     assert {path.name for path in Path("out").glob("*.*")} == names - lost
-
-
-@pytest.mark.parametrize("language", ["en", "zh"])
-def test_the_card_shows_each_verdict(language, report):
-    say = speaker(language)
-    card = ET.fromstring(page.card(report, Presentation(say, language, ["my.py"])))
-    texts = [element.text for element in card.iter("{http://www.w3.org/2000/svg}text")]
-    (task,) = report.tasks
-    assert title(task) in texts
-    assert say(VERDICTS[task.verdict]) in texts
-    assert any(passed(task) in text for text in texts)
-    assert float(card.get("width")) > 7 * len(title(task))
 
 
 def test_a_case_that_cannot_be_saved_costs_no_verdict(report, capsys):
     Path("plumbob_failures").write_text("a file")
-    code = Files(None, None, None, None, None).write(
+    code = Files(None, None, None, None).write(
         report, Question(), Presentation(speaker("en"), "en", ["my.py"])
     )
     out, err = capsys.readouterr()
@@ -134,10 +122,10 @@ def test_files_are_written_though_nobody_reads_the_screen(report, monkeypatch):
 
     monkeypatch.setattr(terminal, "show", closed)
     monkeypatch.setattr(Path, "write_text", lambda path, *_, **__: order.append(path.name))
-    Files(None, None, None, None, Path("out")).write(
+    Files(None, None, None, Path("out")).write(
         report, Question(), Presentation(speaker("en"), "en", ["my.py"])
     )
-    assert order == ["verdict.json", "verdict.xml", "index.html", "card.svg", "screen"]
+    assert order == ["verdict.json", "verdict.xml", "index.html", "screen"]
 
 
 def test_numbers_of_numpy_are_written_like_any_other(report):

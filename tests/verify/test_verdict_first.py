@@ -18,7 +18,7 @@ from plumbob.verify.screen.files import WRONG, Files
 from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.verify import verify
 
-FILES = ("verdict.json", "verdict.xml", "index.html", "card.svg")
+FILES = ("verdict.json", "verdict.xml", "index.html")
 MISTAKEN = """
 def mass_spring_forces(masses, gravity, **_):
     return {"forces": 7.0 * masses[:, None] * gravity}
@@ -70,7 +70,7 @@ def test_a_search_that_ends_early_costs_the_name_alone(
     report = verify(contestant, publish=published.append)
     assert [part.verdict for part in published] == [report.verdict]
     context = Presentation(speaker("en"), "en", ("mine.py",))
-    assert Files(None, None, None, None, tmp_path).write(report, Question(), context) == WRONG
+    assert Files(None, None, None, tmp_path).write(report, Question(), context) == WRONG
     screen = " ".join(capsys.readouterr().out.split())
     assert "mass_spring_forces WRONG" in screen
     assert MISHAPS[mishap] in screen
@@ -110,7 +110,7 @@ def test_a_judge_that_fails_at_a_task_keeps_the_other_verdicts(monkeypatch, tmp_
 
     def code_of(*tasks):
         report = verify(FunctionContestant(functions, Greeting(1, tasks)))
-        return Files(None, None, None, None, tmp_path).write(report, Question(), context)
+        return Files(None, None, None, tmp_path).write(report, Question(), context)
 
     assert code_of("energy", "mass_spring_forces") == WRONG  # the verdict that stands
     screen = " ".join(capsys.readouterr().out.split())
@@ -126,7 +126,7 @@ def test_a_screen_that_cannot_be_drawn_leaves_the_verdict(monkeypatch, tmp_path,
     module = importlib.import_module("plumbob.verify.screen.terminal")
     monkeypatch.setattr(module, "show", fails)
     context = Presentation(speaker("en"), "en", ("mine.py",))
-    assert Files(None, None, None, None, tmp_path).write(report, Question(), context) == WRONG
+    assert Files(None, None, None, tmp_path).write(report, Question(), context) == WRONG
     printed = capsys.readouterr()
     assert "mass_spring_forces: WRONG, " in printed.out
     assert "could not be written: KeyError: 'a mistake of ours'" in printed.err

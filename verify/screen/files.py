@@ -34,15 +34,14 @@ class Files(NamedTuple):
     json: Path | None
     junit: Path | None
     html: Path | None
-    card: Path | None
     folder: Path | None
 
     def paths(self) -> tuple[Path | None, ...]:
-        """Return the paths of JSON, JUnit XML, the page and the card."""
-        paths = self.json, self.junit, self.html, self.card
+        """Return the paths of JSON, JUnit XML and the page."""
+        paths = self.json, self.junit, self.html
         if self.folder is None:
             return paths
-        names = "verdict.json", "verdict.xml", "index.html", "card.svg"
+        names = "verdict.json", "verdict.xml", "index.html"
         return tuple(path or self.folder / name for path, name in zip(paths, names, strict=True))
 
     def save(
@@ -62,7 +61,6 @@ class Files(NamedTuple):
             lambda: json_file.text(report, context.say),
             lambda: junit.text(report, context.say),
             lambda: page.render(report, context),
-            lambda: page.card(report, context),
         )
         finished = [
             _attempt(path, partial(_write, path, make), failures)

@@ -1,12 +1,10 @@
-"""The result of `verify` as a self-contained page, with the failing cases drawn, and as a card."""
+"""The result of `verify` as a self-contained page, with the failing cases drawn."""
 
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Template
 from markupsafe import Markup
-from rich.cells import cell_len
 
 from plumbob.text import html
 from plumbob.text.sentence import Sentence, sentence
@@ -36,31 +34,18 @@ WORDS = {
 }
 
 
-def _template(name: str, context: Presentation) -> Template:
-    """Return a template, which escapes all texts of the solver."""
+def _template(context: Presentation) -> Template:
+    """Return the template of the page, which escapes all texts of the solver."""
     templates = html.environment(_FOLDER)
     templates.globals |= {"words": WORDS, "verdicts": words.VERDICTS}
-    templates.filters |= {
-        "say": context.say, "numbers": comparison.texts, "digits": words.digits,
-        "title": words.title, "passed": words.passed,
-    }  # fmt: skip
-    return templates.get_template(name)
-
-
-def card(report: Report, context: Presentation) -> str:
-    """Return the verdicts as a small SVG, for the README of a solver."""
-    introduction = words.introduction(report)
-    source = sentence("Judged by Plumbob {version}", version=version("plumbob"))
-    names = [words.title(task) for task in report.tasks]
-    widest = max(map(cell_len, [*names, context.say(introduction)]))
-    return _template("card.svg", context).render(
-        report=report, introduction=introduction, source=source, width=max(20, widest)
-    )
+    filters = {"say": context.say, "numbers": comparison.texts, "digits": words.digits}
+    templates.filters |= filters
+    return templates.get_template("page.html")
 
 
 def render(report: Report, context: Presentation) -> str:
     """Return the page."""
-    return _template("page.html", context).render(
+    return _template(context).render(
         style=Markup(html.BASE_STYLE + (_FOLDER / "page.css").read_text(encoding="utf-8")),
         language={"zh": "zh-CN"}.get(context.language, context.language),
         introduction=words.introduction(report),
