@@ -38,14 +38,16 @@ from .rows import (
 )
 
 # What --fail takes, by the first word; and what a gate of the user's solvers takes by default.
+# Every gate has the limit "gone", unless ANY allows rows to vanish and to fail.
 LIMITS = {
     "accuracy": "accuracy or accuracy:SHARE",
     "time": "time:SHARE",
     "solved": "solved:POINTS",
     "error": "error:SHARE",
-    "gone": "gone",
+    "gone": "gone or gone:any",
 }
-OF_SOLVERS = "solved:1,error:100%,time:25%,gone"
+OF_SOLVERS = "solved:1,error:100%,time:25%"
+ANY = "any"
 # Lines of the summary on a terminal; rows of the table in a pull request.
 MAX_LINES, MAX_ROWS = 10, 50
 # Indentation of the second line of a row on a terminal, as wide as its verdict.
@@ -113,11 +115,14 @@ def gate_limits(request: str) -> dict[str, float]:
     Raises:
         ValueError: if a part of it is no limit.
     """
-    limits: dict[str, float] = {}
+    limits: dict[str, float] = {"gone": 0.0} if request.strip(" ,") else {}
     for part in filter(None, (part.strip() for part in request.split(","))):
         name, _, text = part.partition(":")
-        if name not in LIMITS or (name == "gone" and text):
+        if name not in LIMITS or (name == "gone" and text not in ("", ANY)):
             raise ValueError(f"--fail: expected {', '.join(LIMITS.values())}, got {part!r}")
+        if text == ANY and name == "gone":
+            limits.pop(name, None)
+            continue
         try:
             number = float(text.removesuffix("%") or 0)
         except ValueError:
@@ -139,8 +144,8 @@ def _exceeded_limit(row: RowChange, limits: Mapping[str, float]) -> str:
     names = {SHARE: "solved", ERROR: "error"}
     name = names.get(row.quantity, "accuracy")
     limit = limits.get(name, math.inf)
-    if row.verdict == ChangeVerdict.GONE and "gone" in limits:
-        return "no row may be gone"
+    if "gone" in limits and _is_lost(row):
+        return "no row may be gone or fail"
     if row.verdict == ChangeVerdict.SLOWER and row.ratio:
         limit = 1 + limits.get("time", math.inf)
         return f"limit {limit:.4g}" if row.ratio.ratio >= limit else ""
@@ -152,13 +157,21 @@ def _exceeded_limit(row: RowChange, limits: Mapping[str, float]) -> str:
     return f"limit {limit:g}" * (name == "accuracy" and is_changed and row.change >= limit)
 
 
+def _is_lost(row: RowChange) -> bool:
+    """Return whether a row that was measured is gone, or has failed."""
+    has_failed = row.verdict == ChangeVerdict.LESS_RIGHT and not row.quantity
+    return row.verdict == ChangeVerdict.GONE or has_failed
+
+
 def headline(comparison: RunComparison, failed: Sequence[RowChange]) -> str:
     """Return the result in a sentence."""
     if failed:
         return f"STOP: {counted(len(failed), 'row')} beyond the limits"
     bad = (ChangeVerdict.LESS_RIGHT, ChangeVerdict.SLOWER)
     worse = sum(row.verdict in bad for row in comparison.rows)
-    return f"{counted(worse, 'row')} worse" if worse else "No row is less accurate or slower"
+    gone = sum(row.verdict == ChangeVerdict.GONE for row in comparison.rows)
+    result = f"{counted(worse, 'row')} worse" if worse else "No row is less accurate or slower"
+    return f"{result}, but {gone:,} gone" if gone else result
 
 
 def verdict_counts(comparison: RunComparison) -> str:

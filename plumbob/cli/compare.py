@@ -37,7 +37,7 @@ BASELINES = Path("plumbob_baselines")
 Folders = Annotated[
     list[Path] | None, argument("[OLD NEW]", "Two folders of records, or baselines.")
 ]
-Limits = Annotated[str, option("LIMITS", "Exit 1 beyond limits, such as solved:1,time:10%,gone.")]
+Limits = Annotated[str, option("LIMITS", "Exit 1 beyond limits, such as solved:1,time:10%.")]
 Revision = Annotated[str, option("REV", "Measure a revision in git, and the working copy.")]
 Measured = Annotated[Texts, option("NAME", "With --rerun: measure this suite.", "--suite")]
 Only = Annotated[Texts, option("TEXT", "Problems or solvers with this text; repeatable.")]
@@ -63,8 +63,9 @@ def compare(  # noqa: PLR0913 -- one parameter an option
     """Compare two runs or revisions: faster, slower, more or less accurate.
 
     Answers are compared bit by bit, times by confidence intervals. Differences within the drift of
-    the machine are undecided; --rerun REV decides them. Exit code 1 if a row fails --fail. With
-    --with, the solver is yours, and so is the repository; limits are set unless --fail sets others.
+    the machine are undecided; --rerun REV decides them. Exit code 1 if a row fails --fail, as do
+    rows that are gone or have failed, unless it says gone:any. With --with, the solver is yours,
+    and so is the repository; limits are set unless --fail sets others.
     """
     from plumbob.bench.comparison import compare as comparison
     from plumbob.bench.tables.writers import markdown as as_markdown

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import resource
 from dataclasses import replace
 
@@ -87,8 +88,14 @@ def test_rows_come_go_and_fail(make):
     assert verdicts([a], [b]) == [(ChangeVerdict.GONE, ""), (ChangeVerdict.NEW, "")]
     assert verdicts([b], [failed])[0] == (ChangeVerdict.LESS_RIGHT, "")
     assert verdicts([failed], [b])[0] == (ChangeVerdict.NEW, "")
-    rows = compare([a], [b]).rows
-    assert [row.verdict for row in failing(rows, {"gone": 0.0})] == [ChangeVerdict.GONE]
+    made = compare([a], [b])
+    assert comparing.headline(made, []) == "No row is less accurate or slower, but 1 gone"
+    for new, lost in ((b, ChangeVerdict.GONE), (failed, ChangeVerdict.LESS_RIGHT)):
+        rows = compare([a if new is b else b], [new]).rows
+        for gate in ("gone", "solved:1,error:100%", "time:10%"):
+            assert [row.verdict for row in failing(rows, gate_limits(gate))] == [lost]
+        assert failing(rows, gate_limits("solved:1,time:10%,gone:any")) == []
+        assert failing(rows, gate_limits("")) == []
 
 
 def test_a_run_cut_sooner_is_compared_over_what_both_came_to(make):
@@ -232,13 +239,16 @@ def test_chances_over_all_rows_are_those_of_holm():
 
 
 LIMITS = {
-    "accuracy": {"accuracy": 0.0},
-    "accuracy,time:10%": {"accuracy": 0.0, "time": 0.1},
+    "accuracy": {"accuracy": 0.0, "gone": 0.0},
+    "accuracy,time:10%,gone:any": {"accuracy": 0.0, "time": 0.1},
     "time:0.25, gone": {"time": 0.25, "gone": 0.0},
-    "accuracy:1e-9": {"accuracy": 1e-9},
-    "time:": {"time": 0.0},
+    "accuracy:1e-9": {"accuracy": 1e-9, "gone": 0.0},
+    "solved:1,error:100%": {"solved": 0.01, "error": 1.0, "gone": 0.0},
+    "solved:0.5%,error:3": {"solved": 0.005, "error": 3.0, "gone": 0.0},
+    "time:": {"time": 0.0, "gone": 0.0},
+    "gone:any": {},
     "": {},
-    **dict.fromkeys(["speed", "time:fast", "time:-1", "gone:1", "time:nan"]),
+    **dict.fromkeys(["speed", "time:fast", "time:-1", "gone:1", "time:nan", "time:any"]),
 }
 
 
@@ -342,19 +352,23 @@ def plumbob(capsys, *arguments):
 
 
 def test_the_terminal_shows_ten_lines_the_worst_first_and_exits_1(capsys, folders):
-    code, out, err = plumbob(capsys, "compare", "old", "new", "--fail", "accuracy")
+    code, out, err = plumbob(capsys, "compare", "old", "new", "--fail", "accuracy,gone:any")
     assert (code, err) == (1, "")
     lines = out.splitlines()
     assert len(lines) <= 10
     assert lines[0] == "STOP: 1 row beyond the limits"
     assert "LESS RIGHT arm/circle, ccd, residual (warm false): 0.0003" in lines[2]
-    assert plumbob(capsys, "compare", "old", "new")[0] == 0
+    code, out, _ = plumbob(capsys, "compare", "old", "new")
+    assert code == 0
+    assert re.match(r"1 row worse, but \d+ gone\n", out)
+    assert plumbob(capsys, "compare", "old", "new", "--fail", "time:1000%")[0] == 1
     assert plumbob(capsys, "compare", "old", "old", "--fail", "accuracy,time:0%,gone")[0] == 0
 
 
 def test_markdown_and_json_hold_what_was_found(capsys, folders):
     files = ["--markdown", "out/comment.md", "--json", "out/rows.json"]
-    assert plumbob(capsys, "compare", "old", "new", *files, "--fail", "accuracy")[0] == 1
+    limits = ["--fail", "accuracy,gone:any"]
+    assert plumbob(capsys, "compare", "old", "new", *files, *limits)[0] == 1
     comment = (folders / "out" / "comment.md").read_text()
     assert comment.startswith("# plumbob compare: STOP: 1 row")
     assert "| LESS RIGHT | arm/circle | ccd | warm false | residual |" in comment
@@ -376,6 +390,10 @@ def test_a_gate_says_which_statistic_failed_and_by_how_much(make):
         "share solved fell from 98.3 % to 91.7 % (limit 1 point)",
     ]
     assert failing(rows, {"solved": 0.07, "error": 2.5}) == []
+    old = [make.solving("a", 100, count=100)]
+    for solved, count in ((99, 0), (98, 1)):
+        rows = compare(old, [make.solving("a", solved, count=100)], statistics=True).rows
+        assert len(failing(rows, gate_limits("solved:1"))) == count
     assert failing(compare(new, old, statistics=True).rows, {"solved": 0.0, "error": 0.0}) == []
     assert not {"share solved", "smallest error"} & {row.quantity for row in compare(old, new).rows}
 
@@ -395,9 +413,9 @@ def test_a_baseline_whose_name_is_none_costs_no_record(capsys, folders, name):
     for folder in (".", "old"):
         RecordFile(folder).append(RecordFile("new").read().records)
     files = {path: path.read_bytes() for path in folders.rglob("*.jsonl")}
-    code, out, err = plumbob(capsys, "compare", "--save", name, "new")
+    code, out, err = plumbob(capsys, "compare", f"--save={name}", "new")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "--save" in err
+    assert "--save: expected a name without folders or control characters" in err
     assert {path: path.read_bytes() for path in folders.rglob("*.jsonl")} == files
 
 
