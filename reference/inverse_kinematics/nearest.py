@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments
-from ..arguments import FloatArray
+from ..arguments import FloatArray, IndexArray
 from ..articulation import HINGE, Articulation
 from ..jacobians import difference
 from ..outcome import Outcome
@@ -45,12 +45,15 @@ def nearest_solution(
     limits = settings.limits._replace(restarts=0)
     single_start = replace(settings, limits=limits)
     rng = np.random.default_rng(settings.seed)
-    starts = np.vstack([q[None], model.random(rng, settings.limits.restarts)])
+    effectors, oriented = zip(*((t.joint, t.rotation is not None) for t in targets), strict=True)
+    columns = prepare(model, effectors, oriented).mechanism.columns  # other joints stay as in q
+    starts = np.tile(q, (1 + settings.limits.restarts, 1))
+    starts[1:, columns] = model.random(rng, settings.limits.restarts)[:, columns]
     ends = solve_checked(model, starts, targets, single_start)
     solved = ends.coordinates[ends.outcome == Outcome.CONVERGED]
     plain = solve_checked(model, q, targets, settings)
     rows = [
-        *_branches(model, targets, q),
+        *_branches(model, targets, q, columns),
         *[plain.coordinates] * (plain.outcome == Outcome.CONVERGED),
     ]
     candidates = _unwound(model, np.vstack([solved, *rows]), q)
@@ -64,7 +67,9 @@ def nearest_solution(
     return solution._replace(iterations=int(np.sum(ends.iterations)) + plain.iterations)
 
 
-def _branches(model: Articulation, targets: list[CheckedTarget], q: FloatArray) -> list[FloatArray]:
+def _branches(
+    model: Articulation, targets: list[CheckedTarget], q: FloatArray, columns: IndexArray
+) -> list[FloatArray]:
     """Return the rows of `all_solutions` of a single pose, other joints as in q; else nothing."""
     if len(targets) > 1 or targets[0].rotation is None:
         return []
@@ -72,7 +77,6 @@ def _branches(model: Articulation, targets: list[CheckedTarget], q: FloatArray) 
     rows = []
     with contextlib.suppress(ValueError):  # joints of other kinds, or too many
         solutions = all_solutions(model, Target(target.position, target.rotation, target.joint))
-        columns = prepare(model, (target.joint,), (True,)).mechanism.columns
         for coordinates in solutions.coordinates:
             rows.append(q.copy())
             rows[-1][columns] = coordinates[columns]

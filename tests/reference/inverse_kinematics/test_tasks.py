@@ -420,6 +420,23 @@ def test_a_preference_leads_no_further_than_none(prefer, order, seed):
     assert distances[0] <= distances[1]
 
 
+@pytest.mark.parametrize("prefer", ["nearest", "nearest_linf"])
+def test_joints_off_the_path_stay_whatever_is_preferred(prefer):
+    """One solution in five took them from the random start that led to it."""
+    arm, rng = six_hinges(), np.random.default_rng(0)
+    branch = np.vstack([arm.skeleton.offsets, [[0.2, 0.0, 0.0], [0.1, 0.0, 0.0]]])
+    kinds, axes = [*arm.kinds, "hinge", "slide"], np.vstack([arm.axes, np.eye(3)[:2]])
+    parents = [*arm.skeleton.parents, 1, 7]
+    model = Articulation(Skeleton(parents, branch), kinds, axes, lower=-3.0, upper=3.0)
+    for oriented in [False, True] * 5:
+        x, R = (part[6] for part in model.forward(model.random(rng)))
+        start, target = model.random(rng), Target(x, R if oriented else None, 6)
+        nearest = solve_ik(model, start, target, prefer=prefer)
+        assert nearest.outcome == Outcome.CONVERGED
+        np.testing.assert_array_equal(nearest.coordinates[6:], start[6:])
+        assert np.abs(nearest.coordinates - start).max() > 0.1
+
+
 def test_nothing_is_nearest_where_no_solution_is():
     model = six_hinges()
     far = solve_ik(model, model.neutral(), (9.0, 0.0, 0.0), prefer="nearest")
