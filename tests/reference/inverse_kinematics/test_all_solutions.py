@@ -5,8 +5,11 @@ import pytest
 
 from plumbob import Articulation, Mimic, Skeleton, Target, all_solutions, solve_ik
 from plumbob.reference import forward_kinematics, rotation, set_backend
-from plumbob.reference.inverse_kinematics.branches import subproblems
+from plumbob.reference.inverse_kinematics.branches import settle, subproblems
+from plumbob.reference.inverse_kinematics.branches.arms import arms_of
 from plumbob.reference.inverse_kinematics.branches.closed_forms import FORMS
+from plumbob.reference.inverse_kinematics.problem import check_numbers, checked_targets
+from plumbob.reference.inverse_kinematics.solve import target_rows
 
 WRIST, PARALLEL = FORMS
 X, Y, Z = np.eye(3)
@@ -160,6 +163,64 @@ def test_limits_keep_those_within_them(named, rng):
         assert differences(expected, within.coordinates).min(axis=1).max() < SAME
         kept += len(expected) < len(everything.coordinates)
     assert kept > 0
+
+
+@pytest.mark.parametrize(
+    ("beyond", "is_listed", "is_complete"),
+    [(-1e-5, True, True), (5e-10, True, True), (1e-7, False, False), (1e-5, False, True)],
+)
+def test_a_solution_just_beyond_a_limit_leaves_the_list_in_doubt(beyond, is_listed, is_complete):
+    """A limit counts as kept to 1e-9; within 1e-6 of it rounding may have moved the solution."""
+    arm = arm_of(*ARMS["UR5"][:2])
+    q = np.array([0.3, -1.0, 0.8, 0.5, 0.9, 0.4])
+    narrow = arm_of(*ARMS["UR5"][:2], upper=[LIMIT, LIMIT, q[2] - beyond, *[LIMIT] * 4])
+    solutions = all_solutions(narrow, target_of(arm, q))
+    distances = differences(solutions.coordinates, q[None])
+    assert (distances.min(initial=9.0) < SAME) == is_listed
+    assert solutions.complete == is_complete
+    assert len(solutions.coordinates) > 0
+
+
+def settled(arm, target, candidates):
+    """Return the rows that the candidates come to, and the number of doubtful ones."""
+    mechanism = arms_of(arm, arm.joint_count - 1, None).members[0].mechanism
+    rows = np.empty((len(candidates), len(mechanism.columns) + settle.FIGURES))
+    (pose,) = check_numbers(checked_targets(arm, target, None))
+    count, doubts = settle.settle_candidates(
+        tuple(mechanism), candidates, target_rows([pose], ()), rows
+    )
+    return rows[:count], doubts
+
+
+def test_candidates_return_from_beyond_their_limits_if_they_are_near():
+    """Newton's method brings all of them back to q, which is at the limit of its elbow."""
+    q = np.array([0.3, -1.0, 0.8, 0.5, 0.9, 0.4])
+    arm = arm_of(*ARMS["UR5"][:2], upper=[LIMIT, LIMIT, q[2], *[LIMIT] * 4])
+    for excess, count in ((0.0, 1), (1e-8, 1), (0.05, 1), (0.09, 1), (0.11, 0)):
+        rows, doubts = settled(arm, target_of(arm, q), q[None] + excess * np.eye(6)[2:3])
+        assert (len(rows), doubts) == (count, 0)
+        assert differences(rows[:, :6], q[None]).max(initial=0.0) < SAME
+
+
+@pytest.mark.parametrize("bend", [2e-6, 1e-4])
+def test_solutions_that_nearly_meet_are_two(bend):
+    """The elbow of a nearly straight arm bends either way, and candidates come to both."""
+    q = np.array([0.3, -1.0, bend, 0.5, 0.9, 0.4])
+    arm = arm_of(*ARMS["UR5"][:2])
+    listed = all_solutions(arm, target_of(arm, q)).coordinates
+    near = listed[differences(listed, q[None])[:, 0] < 10.0 * bend]
+    np.testing.assert_allclose(np.sort(near[:, 2]), [-bend, bend], rtol=1e-2)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_coordinates_are_one_solution_to_a_millionth(share):
+    """Of a radian, also across whole turns, and of the reach, here of 2 m."""
+    joints = Articulation(Skeleton([-1, 0], np.zeros((2, 3))), ["hinge", "slide"]).joints
+    for a in ([0.0, 0.0], [0.5, -0.3]):
+        for step in ([share * 1e-6, 0.0], [-share * 1e-6, 0.0], [2.0 * LIMIT - share * 1e-6, 0.0],
+                     [0.0, 2.0 * share * 1e-6]):  # fmt: skip
+            b = np.add(a, step)
+            assert settle.is_same(joints, np.array(a), b, 2.0) is (share < 1.0)
 
 
 def test_angles_are_the_nearest_to_the_middle_of_the_limits(rng):
@@ -397,6 +458,22 @@ def test_a_search_states_its_coverage(targets, dense, rng):
         assert 0.0 <= more.unseen < 0.02
         missing = differences(more.coordinates, solutions.coordinates).min(axis=1) > SAME
         assert missing.sum() <= 1 + (solutions.unseen > 0.01)
+
+
+@pytest.mark.parametrize("restarts", [1, 12, 40])
+@pytest.mark.parametrize("seed", [0, 3])
+def test_what_is_unseen_is_the_share_of_solutions_found_once(restarts, seed, rng):
+    """Good 1953: the starts are drawn and solved here as well, and counted by their ends."""
+    arm = arm_of(*GENERAL)
+    target = target_of(arm, arm.random(rng))
+    solutions = all_solutions(arm, target, restarts=restarts, seed=seed)
+    starts = arm.random(np.random.default_rng(seed), restarts)
+    ends = solve_ik(arm, starts, target, "levenberg_marquardt", tolerance=1e-6,
+                    tolerance_rotation=1e-6, restarts=0, max_iterations=1000)  # fmt: skip
+    solved = ends.coordinates[(ends.residual <= 1e-6) & (ends.residual_rotation <= 1e-6)]
+    hits = (differences(solved, solutions.coordinates) < 1e-3).sum(axis=0)
+    assert hits.sum() == len(solved)
+    assert solutions.unseen == ((hits == 1).sum() / hits.sum() if hits.sum() else 1.0)
 
 
 def test_slides_and_joints_that_follow_others_are_searched(rng):

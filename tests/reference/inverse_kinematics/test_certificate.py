@@ -64,6 +64,19 @@ def wrist():
     return Articulation(Skeleton([-1, 0, 1], np.zeros((3, 3))), "hinge", np.eye(3))
 
 
+def finger():
+    """A hinge that another follows three times as far, and a slide that follows by 50 m/rad."""
+    links = Skeleton([-1, 0, 1, 2], [[0, 0, 0.1], [1, 0, 0], [1, 0, 0], [0, 0, 0]])
+    axes = [[0, 0, 1], [0, 0, 1], [1, 0, 0], [0, 0, 1]]
+    kinds = ["hinge", "hinge", "slide", "fixed"]
+    return Articulation(links, kinds, axes, mimics={1: Mimic(0, 3.0), 2: Mimic(0, -50.0, 0.2)})
+
+
+def spinner():
+    """A hinge about its effector."""
+    return Articulation(Skeleton([-1], np.zeros((1, 3))), "hinge", [0.6, 0.0, 0.8])
+
+
 def target_at(model, q, effector=-1):
     """The pose of an effector as a target."""
     pose = forward_kinematics(model, q)
@@ -126,7 +139,9 @@ class Precise:
 
 
 class TestRounding:
-    @pytest.mark.parametrize("kinds", [HINGES, MIXED, crane], ids=["hinges", "mixed", "crane"])
+    @pytest.mark.parametrize(
+        "kinds", [HINGES, MIXED, crane, finger], ids=["hinges", "mixed", "crane", "finger"]
+    )
     def test_forward_kinematics_in_40_digits_is_within_the_bound(self, articulated, kinds):
         worst = 0.0
         for seed in range(3):
@@ -150,12 +165,14 @@ class TestRounding:
         result = certify_ik(model, q, target_at(model, q))
         assert 0 < result.rounding < 2e-13
         assert result.rounding <= result.residual < 2 * result.rounding
+        quaternion = 7 * 48 * 2.0**-53  # of seven joints
+        assert 2 * quaternion <= result.residual_rotation < 2.2 * quaternion
 
 
 class TestLipschitz:
     @pytest.mark.parametrize(
-        "kinds", [HINGES, MIXED, ["ball"] * 4, crane, wrist],
-        ids=["hinges", "mixed", "balls", "crane", "wrist"],
+        "kinds", [HINGES, MIXED, ["ball"] * 4, crane, wrist, finger],
+        ids=["hinges", "mixed", "balls", "crane", "wrist", "finger"],
     )  # fmt: skip
     @pytest.mark.parametrize("oriented", [False, True])
     def test_second_differences_are_below_it(self, articulated, kinds, oriented):
@@ -177,6 +194,23 @@ class TestLipschitz:
                 before, here, after = (system.evaluate(q)[0] for q in points)
                 ratios.append(np.linalg.norm(after - 2 * here + before) / t**2 / L)
         assert not ratios or 0.05 < max(ratios) <= 1.0
+
+    def test_a_slide_counts_with_all_lengths_that_it_has_within_the_extent(self):
+        """x = s (cos t, sin t): along t = v a, s = v b the second derivative is 2 a b, and s a²."""
+        links = Skeleton([-1, 0], np.zeros((2, 3)))
+        model = Articulation(links, ["hinge", "slide"], [[0, 0, 1], [1, 0, 0]])
+        t, v = 1e-3, np.sqrt([2 / 3, 1 / 3])
+        for s in (-1.0, 0.0, 1.0):
+            L = equations(model, np.zeros(2), oriented=False).lipschitz(np.ones(2, dtype=bool))
+            points = [model.forward(np.array([0.0, s]) + k * t * v)[0][1] for k in (-1, 0, 1)]
+            second = np.linalg.norm(points[0] - 2 * points[1] + points[2]) / t**2
+            assert second == pytest.approx(math.hypot(2 * math.sqrt(2) / 3, 2 / 3 * s), rel=1e-5)
+            assert second < L < 2.0
+
+    def test_a_rotation_by_half_a_turn_has_the_second_derivative_one_half(self):
+        """Twice the sine of half an angle: minus half of that sine."""
+        system = equations(spinner(), np.zeros(1), error=1.0)
+        assert system.lipschitz(np.ones(1, dtype=bool)) == pytest.approx(0.5)
 
     def test_the_jacobian_is_the_derivative(self, articulated):
         model, rng = articulated(MIXED, 3), np.random.default_rng(3)
@@ -202,6 +236,39 @@ class TestExactSolution:
         # The target itself is rounded: a joint moves by some 1e-15.
         assert error - 1e-14 <= result.distance <= error * (1 + 1e-6) + 1e-10
         assert result.reached == (error < 1e-4)
+
+    @pytest.mark.parametrize("bend", [2e-6, 2.5e-6, 3.2e-6, 4e-6, 5e-6, 8e-6])
+    def test_a_solution_is_proven_just_where_the_condition_of_kantorovich_holds(self, bend):
+        """2 L |B|² |F| < 1 for a nearly straight arm, of whose F only the rounding is left."""
+        model, q = elbow(), np.array([0.4, -0.7, bend])
+        target = forward_kinematics(model, q).positions[-1]
+        result = certify_ik(model, q, target)
+        system = Equations(model, checked_targets(model, target, None), q)
+        F, J = system.evaluate(q)
+        size, inverse = np.linalg.norm(F) + system.rounding()[0], np.linalg.norm(np.linalg.pinv(J))
+        L = system.lipschitz(np.array([True, True, True]))
+        share = 2.0 * L * inverse**2 * size
+        assert 0.1 < share < 5.0
+        assert result.covered == (share < 1.0)
+        if result.covered:
+            radius = 2.0 * size / (1.0 + math.sqrt(1.0 - share))
+            assert result.distance == pytest.approx(inverse * radius, rel=1e-2)
+        else:
+            assert result.coverage == IKCoverage.SINGULAR
+
+    @pytest.mark.parametrize(("way", "is_covered"), [(0.99, True), (1.01, False)])
+    def test_bounds_of_slides_hold_within_their_extent_and_prove_nothing_beyond(
+        self, way, is_covered
+    ):
+        """Hinges have no extent: lengths of their arms are the same wherever they are."""
+        gantry = Articulation(Skeleton([-1, 0, 1], np.zeros((3, 3))), "slide", np.eye(3))
+        result = certify_ik(gantry, [0.1, 0.2, 0.3], [0.1, 0.2, 0.3 + way])
+        assert result.covered is is_covered
+        assert is_covered or result.coverage == IKCoverage.TOO_FAR
+        target = forward_kinematics(elbow(), [0.4, -0.7, 1.2]).positions[-1]
+        turned = certify_ik(elbow(), [0.4 + way, -0.7, 1.2], target)
+        assert turned.covered
+        assert turned.distance == pytest.approx(way)
 
     def test_slides_have_the_distance_itself(self):
         gantry = Articulation(Skeleton([-1, 0, 1], np.zeros((3, 3))), "slide", np.eye(3),

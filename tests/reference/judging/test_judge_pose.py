@@ -57,11 +57,11 @@ def test_the_distance_and_angle_are_those_by_forward_kinematics(arm, rng):
 
 def test_broken_limits_are_told_by_how_much():
     links = Skeleton([-1, 0, 1, 2], np.eye(4, 3))
-    model = Articulation(links, ["hinge", "slide", "ball", "fixed"], lower=-0.5, upper=0.5)
-    q = np.concatenate([[0.7], [-1.5], rotation.exponential([0.0, 0.0, 0.75])])
+    model = Articulation(links, ["hinge", "slide", "ball", "hinge"], lower=-0.5, upper=0.5)
+    q = np.concatenate([[0.7], [-1.5], rotation.exponential([0.0, 0.0, 0.75]), [0.9]])
     judged = judge_pose(model, q, [0.0, 0.0, 0.0])
-    np.testing.assert_allclose(judged.limit_excess, [0.2, 1.0, 0.25, 0.0], atol=1e-15)
-    assert "3 joints are beyond their limits, joint1 by 1" in judged.summary
+    np.testing.assert_allclose(judged.limit_excess, [0.2, 1.0, 0.25, 0.4], atol=1e-15)
+    assert "4 joints are beyond their limits, joint1 by 1" in judged.summary
     assert (judge_pose(model, model.neutral(), [0, 0, 0]).limit_excess == 0.0).all()
 
 
@@ -82,6 +82,27 @@ def test_positions_that_are_not_the_pose_s_are_told(arm, rng):
     assert alone.reached
     assert (alone.position_error, alone.length_errors[4]) == (None, pytest.approx(0.25))
     assert (alone.positions == x).all()
+
+
+def test_a_link_that_slides_may_be_longer_and_no_other():
+    """Lengths are the fourth link's 1 m, and what the slide adds along its axis."""
+    links = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]])
+    model = Articulation(links, ["hinge", "slide", "hinge", "hinge"], [1, 0, 0])
+    x = forward_kinematics(model, [0.0, 0.7, 0.0, 0.0]).positions.copy()
+    x[3, 0] += 0.25
+    judged = judge_pose(model, [0.0, 0.7, 0.0, 0.0], x[3], positions=x)
+    np.testing.assert_allclose(judged.length_errors, [0.0, 0.0, 0.0, 0.25], atol=1e-15)
+
+
+def test_each_tolerance_is_for_its_own_error(arm, rng):
+    """A target 1e-3 m and 0.01 rad away is reached within 0.002 m and 0.02 rad."""
+    local = rotation.random(rng, 5)
+    pose = forward_kinematics(arm, local)
+    turn = rotation.multiply(rotation.exponential([0.01, 0.0, 0.0]), pose.rotations[4])
+    target = Target(pose.positions[4] + [0.0, 1e-3, 0.0], turn, 4)
+    for far, turned, reached in ((2.0, 2.0, True), (0.5, 2.0, False), (2.0, 0.5, False)):
+        tolerances = {"tolerance": 1e-3 * far, "tolerance_rotation": 0.01 * turned}
+        assert judge_pose(arm, local, target, **tolerances).reached is reached
 
 
 def test_our_own_answers_are_judged_as_they_say(arm, rng):

@@ -6,7 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from plumbob.reference import STEP_SOLVERS, ImplicitEuler, Outcome, State, judge_step, scenes
+from plumbob.reference import (
+    STEP_SOLVERS,
+    Coverage,
+    ImplicitEuler,
+    Outcome,
+    State,
+    judge_step,
+    scenes,
+)
 from plumbob.reference.mass_spring import MassSpring
 
 h = 1 / 30
@@ -59,6 +67,10 @@ def test_pins_half_a_metre_off_are_detected_where_the_residual_is_zero(soft, sti
         assert found.pin_displacement == pytest.approx(0.5, abs=1e-15)
         assert found.error > 1
         assert found.summary.startswith("A pin is 0.5 m from where the step takes it.")
+        in_place = np.where(system.free[:, None], astray.state.positions, state.positions)
+        expected = ImplicitEuler(system, h=h).certify(state, in_place)  # of the free particles
+        assert found.certificate == expected
+        assert expected.coverage != Coverage.PINS_ASTRAY
         taken = judge_step(system, state, h, astray.state.positions, pin_positions=targets)
         assert taken.pin_displacement == 0
         assert taken.error < 1e-9
