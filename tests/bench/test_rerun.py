@@ -1,5 +1,6 @@
 """Two revisions side by side: with itself one differs in nothing, planted faults are found."""
 
+import contextlib
 import os
 import re
 import signal
@@ -7,16 +8,22 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from plumbob.bench.comparison import rerun as rerunning
 from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
-from plumbob.bench.comparison.rows import ChangeVerdict
+from plumbob.bench.comparison.rows import ChangeVerdict, Pair, TimeRatio, row_key
+from plumbob.bench.comparison.times import time_change
 from plumbob.bench.harness import machine
 from plumbob.cli import main as cli
 
+KEY = ("timing", "p", "mine", "{}")
 LOOPS = 20_000
 # A bench of two rows, as far as a rerun asks for one and in lines that start at once: work of a
 # length, and an answer.
@@ -187,6 +194,68 @@ def test_a_planted_digit_is_first_of_all(repository):
     assert [row.verdict for row in made.rows[:2]] == [ChangeVerdict.LESS_RIGHT] * 2
     assert made.rows[0].quantity == "residual"
     assert "2 times each" in made.method
+
+
+class CountedBench:
+    """Two revisions of which the new one takes twice as long, and the orders of their calls."""
+
+    def __init__(self, records, **plan):
+        self.plan, self.records = Plan("before", ("timing",), **plan), records
+        self.starts, self.calls = [], []
+
+    def tell(self, message):
+        pass
+
+    @contextlib.contextmanager
+    def processes(self, order=(0, 1)):
+        self.starts.append(tuple(order))
+        self.calls.append([])
+        yield tuple(SimpleNamespace(blocks=list, measure=partial(self.measure, i)) for i in (0, 1))
+
+    def measure(self, revision, key):
+        self.calls[-1].append((revision, key))
+        (record,) = (r for r in self.records if r.key == key)
+        seconds = np.full(5, 1.0 + revision)
+        return replace(record, arrays={"seconds": seconds})
+
+
+def test_the_ratio_is_that_of_the_new_time_to_the_old_and_orders_are_drawn(make):
+    """Of 60 draws each order comes at least 15 times, but for one chance in 10,000."""
+    records = [make.timed(solver, 1.0) for solver in ("a", "b", "c")]
+    rows = {row_key(record): Pair(record, record) for record in records}
+    bench = CountedBench(records, pairs=60, seed=1)
+    times = rerunning._measure_times(bench, rows)
+    assert times == {(key, "seconds"): [(1.0, 2.0)] * 60 for key in rows}
+    for key, ratio in rerunning._ratios(times).items():
+        assert ratio.ratio == pytest.approx(2.0)
+        assert time_change(*key, ratio, ratio.chance).verdict is ChangeVerdict.SLOWER
+    firsts = [calls[k][0] for calls in bench.calls for k in (0, 2, 4)]
+    rows_first = [calls[0][1] for calls in bench.calls]
+    for order in (0, 1):
+        assert 15 <= [first for first, _ in bench.starts].count(order) <= 45
+        assert 45 <= firsts.count(order) <= 135
+    assert all(8 <= rows_first.count(record.key) <= 34 for record in records)
+    again, other = (CountedBench(records, pairs=60, seed=seed) for seed in (1, 2))
+    for repeated in (again, other):
+        rerunning._measure_times(repeated, rows)
+    assert again.calls == bench.calls
+    assert other.calls != bench.calls
+
+
+def test_a_time_is_decided_where_two_measurements_agree_on_its_direction():
+    slower, faster = (TimeRatio(r, 0.9 * r, 1.1 * r, 1e-9) for r in (1.5, 0.7))
+    unsure = slower._replace(chance=0.5)
+    first = {(KEY, name): slower for name in ("alike", "reversed", "unsure")}
+    second = dict(zip(first, (slower._replace(ratio=1.4), faster, unsure), strict=True))
+    confirmed = list(rerunning._confirmed(first, second).values())
+    assert [ratio.chance for ratio in confirmed] == [1e-9, 1.0, 1.0]
+    assert confirmed[0].ratio == 1.4
+
+
+def test_ratios_within_a_hundredth_count_as_chance():
+    pairs = {(KEY, str(r)): [(1.0, r)] * 30 for r in (0.985, 0.992, 1.0, 1.008, 1.015)}
+    chances = [ratio.chance < 1e-6 for ratio in rerunning._ratios(pairs).values()]
+    assert chances == [True, False, False, False, True]
 
 
 @pytest.mark.slow

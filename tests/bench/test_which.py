@@ -73,6 +73,19 @@ def test_the_advice_is_for_whoever_is_best(make):
     assert nobody == "No solver reaches a target: does --link name the link that you mean?"
 
 
+@pytest.mark.parametrize(
+    ("hits", "choice"), [(200, "mink"), (198, "mink"), (190, "pink"), (150, "pink")]
+)
+def test_of_solvers_that_tie_the_fastest_is_advised_and_no_other(make, hits, choice):
+    """Of 200 targets chance explains two fewer, by McNemar's test with p = 0.5, but not ten."""
+    records = [make.solving("pink", 200, seconds=2e-3), make.solving("mink", hits, seconds=1e-3)]
+    for entries in (records, records[::-1]):
+        summary = table_of(*entries).summary.sentence
+        assert summary.startswith(f"Choose {choice}: ")
+        assert ("more than any other" in summary) == (choice == "pink")
+        assert ("the fastest of 2 that" in summary) == (choice == "mink")
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch, in_this_process):
     """A folder with an arm and one whose last joint slides, where only Plumbob is installed."""
