@@ -1,6 +1,7 @@
 """Steps of Jacobian methods: honest ones are not accused, and mistakes show their numbers."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import pytest
 
@@ -83,6 +84,19 @@ def explanations(changes):
     answers = [(case, contestant.answer(case)) for case in sweeps(contestant.greeting)]
     trials = [PoseTrial(Exchange(case, answer, answer)) for case, answer in answers]
     return jacobian_steps.explanations(trials, contestant.greeting)
+
+
+@pytest.mark.parametrize(
+    ("hits", "count", "is_enough"),
+    [(6, 10, True), (5, 10, False), (3, 4, True), (2, 3, False)],
+)
+def test_a_model_has_to_explain_three_steps_and_three_fifths_of_all(hits, count, is_enough):
+    def evaluate(change, item):
+        return SimpleNamespace(gap=0.0 if item < hits else 1.0)
+
+    models = [("one mistake", {})]
+    best, results = jacobian_steps._best(evaluate, models, range(count), 1e-9)
+    assert (best, len(results)) == ((["one mistake"], hits) if is_enough else ([], 0))
 
 
 @pytest.mark.parametrize("name", sampled(HONEST))

@@ -51,16 +51,16 @@ def test_margins_are_negative_where_the_reference_is_beyond_limits():
     assert 0 < sum(inside) < len(inside)
 
 
-def hinge(angle, tilt=0.0):
+def hinge(angle, tilt=0.0, target=0.5, upper=0.5):
     """Return an exchange about an arm of one hinge about z, its answer rotated and tilted."""
     parents, offsets = np.array([-1, 0]), np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     identity = rotation.identity(2)
     inputs = {
         "parents": parents, "offsets": offsets, "local_rotations": identity,
-        "target": np.array([np.cos(0.5), np.sin(0.5), 0.0]), "effector": 1, "tolerance": 1e-4,
+        "target": np.array([np.cos(target), np.sin(target), 0.0]), "effector": 1, "tolerance": 1e-4,
         "max_iterations": 60, "method": "", "axes": np.array([Z, Z]),
         "cones": np.array([0.0, np.pi]), "lower": np.array([-0.2, -np.pi]),
-        "upper": np.array([0.5, np.pi]),
+        "upper": np.array([upper, np.pi]),
     }  # fmt: skip
     case = Case("hinge", TASK, inputs, "hinge", HOLDS, facts=problems.facts(inputs))
     local = np.array([rotation.exponential([tilt, 0.0, angle]), identity[1]])
@@ -84,6 +84,18 @@ def test_a_hinge_keeps_its_limits_and_reaches_its_target(angle, tilt, law, verdi
     broken = {found.law for found in judgement.findings if found.verdict}
     assert judgement.verdict is verdict
     assert law in broken if law else not broken
+
+
+@pytest.mark.parametrize(
+    ("angle", "target", "jumps"),
+    [(0.99, 0.09, False), (1.01, 0.09, True), (-1.01, -0.09, True), (1.01, 0.11, False)],
+)
+def test_to_a_target_within_a_tenth_of_a_metre_no_joint_rotates_by_a_radian(angle, target, jumps):
+    exchange = hinge(angle, target=target, upper=2.0)
+    ((judgement,), _) = limits.judge([exchange], GREETING, True)
+    verdicts = {found.law: found.verdict for found in judgement.findings}
+    expected = Verdict.RIGHT_EXCEPT if jumps else Verdict.RIGHT
+    assert verdicts.get("no jumps", Verdict.RIGHT) is expected
 
 
 def test_an_answer_without_rotations_is_broken():

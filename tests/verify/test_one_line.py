@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from kinematics_solvers import HONEST, judged, reference
 
+from plumbob.text.sentence import sentence
 from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.fault_programs import (
     FAMILIES,
@@ -17,7 +18,7 @@ from plumbob.verify.fault_programs import (
     source_of,
 )
 from plumbob.verify.greeting import PROTOCOL, Greeting
-from plumbob.verify.judgement import Verdict
+from plumbob.verify.judgement import Explanation, Verdict
 from plumbob.verify.kinematics.limits import solve_within
 from plumbob.verify.one_line import search
 from plumbob.verify.one_line.mutants import Program
@@ -196,6 +197,15 @@ def test_a_mistake_of_the_catalogue_is_named_rather_than_a_line():
     fault = coded_faults()["PB-ENERGY-003"]
     (report,) = verify(contestant_of(fault.wrong_program)).tasks
     assert report.diagnosis.explanations[0].codes == (fault.code,)
+
+
+@pytest.mark.parametrize(("share", "is_named"), [(0.75, True), (0.74, False)])
+def test_a_changed_line_has_to_give_three_quarters_of_the_answers(share, is_named, monkeypatch):
+    explanation = Explanation(("a line",), sentence("It is wrong."), share, 0.0)
+    monkeypatch.setattr(search, "_of_program", lambda *arguments: (explanation,))
+    source = source_of("energy in loops")
+    wrong = source.replace("length - rest_lengths[s]", "length - stiffnesses[s]")
+    assert changed_lines(wrong, "energy") == ((explanation,) if is_named else ())
 
 
 def test_answers_of_a_right_program_speak_for_no_change():

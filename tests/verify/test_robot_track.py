@@ -13,7 +13,7 @@ from plumbob.verify.fault_programs import coded_faults, contestant_of
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics import robot_motions
+from plumbob.verify.kinematics import motion_faults, robot_motions
 from plumbob.verify.kinematics.robot_faults import FAULTS as POSE_FAULTS
 from plumbob.verify.kinematics.robot_models import mechanism, tool_at
 from plumbob.verify.kinematics.robot_motions import TASK, followed
@@ -152,6 +152,59 @@ def test_a_joint_beyond_its_limit_is_seen_and_a_start_beyond_may_return():
     assert broken(case, slow)["limits kept"] is Verdict.RIGHT_EXCEPT
     slow[-1, 1] = case.inputs["lower"][1] - 0.01
     assert broken(case, slow)["limits kept"] is Verdict.WRONG
+
+
+@pytest.mark.parametrize(("steps", "verdict"), [(4.9, Verdict.RIGHT_EXCEPT), (5.1, Verdict.WRONG)])
+def test_a_tool_may_trail_its_target_by_five_of_the_steps_so_far(steps, verdict):
+    """A step is the largest displacement of the target in a frame up to then."""
+    case = CASES["curve"]
+    tool, tolerance = tool_of(case), case.inputs["tolerance"]
+    displacements = twists_between(
+        Pose(*(part[:-1] for part in tool)), Pose(*(p[1:] for p in tool))
+    )
+    lengths = np.linalg.norm(displacements.reshape(-1, 2, 3), axis=-1)
+    lengths /= [tolerance, case.inputs["tolerance_rotation"]]
+    largest = np.maximum.accumulate(np.concatenate([[0.0], lengths.max(axis=1)]))
+    behind = tool.positions - steps * tolerance * largest[:, None] * np.array([0.0, 0.6, 0.8])
+    precise = {**case.inputs, "tolerance": 1e-9, "tolerance_rotation": 1e-9}
+    q = followed(precise, case.inputs["start"], tool._replace(positions=behind))
+    assert broken(case, q)["target followed"] is verdict
+
+
+@pytest.mark.parametrize(("move", "is_jump"), [(0.99, False), (1.01, True)])
+def test_a_joint_that_moves_a_radian_while_its_target_rests_jumps(move, is_jump):
+    case = CASES["rest"]
+    q = right(case).copy()
+    frame = len(q) - case.facts["rest"] // 2
+    q[frame:] = q[frame]
+    moved = q.copy()
+    moved[frame:, 0] += move
+    assert "no jumps" not in broken(case, q)
+    assert ("no jumps" in broken(case, moved)) == is_jump
+
+
+@pytest.mark.parametrize(("explained", "is_named"), [(12, True), (11, False)])
+def test_a_fault_that_explains_half_of_the_frames_is_named(explained, is_named, monkeypatch):
+    """Of 24 frames, all of which it concerns."""
+    frames = np.arange(24)
+
+    def signature(motion, laws):
+        return motion_faults.Evidence(frames >= 0, frames < explained)
+
+    tier = motion_faults.Tier({"single step": signature})
+    monkeypatch.setattr(motion_faults, "TIERS", (tier,))
+    case = CASES["curve"]
+    answer = Answer({"q": right(case) + 0.5}, 0.0)
+    likely = judge([Exchange(case, answer, answer)], GREETING, "").diagnosis.explanations
+    assert [one.faults for one in likely] == [("single step",)] * is_named
+
+
+def test_a_start_beyond_a_limit_may_only_come_nearer():
+    """A joint that goes farther beyond on its way back does not return."""
+    case = CASES["start beyond a limit"]
+    q = right(case).copy()
+    q[:4, 1] = case.inputs["lower"][1] - [0.2, 0.25, 0.05, 0.02]
+    assert broken(case, q)["limits kept"] is Verdict.WRONG
 
 
 def test_an_arm_that_does_not_rest_with_its_target_is_seen():

@@ -71,6 +71,19 @@ def test_damping_is_told_and_no_fault(damping):
     np.testing.assert_allclose(values, damping, rtol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("loss", "verdict"),
+    [(0.24, Verdict.RIGHT_EXCEPT), (0.26, Verdict.WRONG), (-0.1, Verdict.WRONG)],
+)
+def test_damping_may_take_a_quarter_of_the_velocity_away_and_add_nothing(loss, verdict):
+    """Of one joint a factor s² / (s² + d²) is a damping d."""
+    case = next(case for case in CASES if len(case.inputs["q"]) == 1)
+    answer = Answer({"velocities": (1.0 - loss) * shortest(*equation(case.inputs))}, 0.0)
+    (judgement,) = judge([Exchange(case, answer, answer)], GREETING, "").judgements
+    verdicts = {found.law: found.verdict for found in judgement.findings}
+    assert verdicts["velocity of the tool"] is verdict
+
+
 def test_an_inverse_that_fails_in_singular_poses_alone_is_right_except():
     def solve(J, twist):
         if np.linalg.matrix_rank(J, 1e-6) < min(6, np.count_nonzero(J.any(axis=0))):

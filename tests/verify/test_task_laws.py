@@ -22,10 +22,12 @@ from plumbob.verify.judgement import (
     smallest_failure,
 )
 from plumbob.verify.kinematics import (
+    claims,
     resample,
     robot_inverse_kinematics,
     robot_models,
     robot_targets,
+    sweeps,
     track,
 )
 from plumbob.verify.kinematics.polylines import Polyline
@@ -202,6 +204,33 @@ def test_a_joint_that_moves_more_than_a_metre_in_a_frame_has_jumped(motion, dist
     assert found.error == pytest.approx(distance)
 
 
+@pytest.mark.parametrize(
+    ("hits", "share", "method"),
+    [(4, 0.0, "ccd"), (3, 0.5, "fabrik"), (3, 0.49, "")],
+)
+def test_the_method_is_that_of_half_of_the_sweeps_right_or_with_a_fault(
+    hits, share, method, monkeypatch
+):
+    """Of eight sweeps, so many CCD's; FABRIK with a fault gives a share of them."""
+    fits = {"ccd": (0.0, 0), "fabrik": (share, -1)}
+    errors = {"ccd": lambda i: (float(i >= hits), 0.5), "fabrik": lambda i: (1.0, 0.5)}
+    monkeypatch.setattr(sweeps, "_error", lambda trial, name, greeting: errors[name](trial))
+    monkeypatch.setattr(sweeps, "_is_other_solver", lambda *arguments: False)
+    monkeypatch.setattr(sweeps, "honest_variant", lambda *arguments: sentence("Another."))
+    monkeypatch.setattr(sweeps, "_best_fit", lambda trials, name, *others: fits[name])
+    assert sweeps.recognise_method(range(8), GREETING) == method
+
+
+@pytest.mark.parametrize(("hits", "is_named"), [(9, True), (8, False)])
+def test_a_formula_has_to_give_nine_of_ten_residuals(hits, is_named):
+    answers = [
+        {"distance": d, "residual": d**2 if i < hits else d + 0.3, "tolerance": 1e-4, "same": 1e-9}
+        for i, d in enumerate(np.linspace(0.1, 0.8, 10))
+    ]
+    named = [one.faults for one in claims.explanations(answers)]
+    assert named == [("residual squared",)] * is_named
+
+
 # ---- robots
 
 
@@ -282,6 +311,20 @@ def test_errors_of_five_to_nine_digits_are_those_of_single_precision(digits, is_
     report = TaskReport("", "", judgements, Diagnosis())
     assert is_off_by_single(report) is is_single
     assert report.digits == min(digits, default=None)
+
+
+@pytest.mark.parametrize(("whole", "is_single"), [(5, False), (6, True)])
+def test_a_request_tells_the_precision_if_a_quarter_of_its_numbers_are_whole_doubles(
+    whole, is_single, rng
+):
+    """Of 20 numbers; answers to requests of few digits may have few digits themselves."""
+    roots, tenths = np.sqrt([2.0, 3.0, 5.0, 6.0, 7.0, 8.0]), 0.13 + 0.1 * np.arange(20 - whole)
+    numbers = np.concatenate([roots[:whole], np.round(tenths, 2)])
+    case = Case("", "mass_spring_step", {"positions": numbers}, "", sentence(""))
+    output = rng.standard_normal(30).astype(np.float32).astype(float)
+    greeting = Greeting(1, ("mass_spring_step",))
+    exchange = Exchange(case, Answer({"positions": output}, 0.0), None)
+    assert (judging_greeting([exchange], greeting)[1] is AS_SINGLE) == is_single
 
 
 @pytest.mark.parametrize("single", ["positions", "velocities"])
