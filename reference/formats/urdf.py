@@ -146,12 +146,12 @@ def _warn_of_locked_leaders(origin: str, links: list[RobotLink], model: Articula
 
 
 def _with_mass(link: RobotLink, element: Element) -> RobotLink:
-    """Return the link with its mass and the centre of that."""
+    """Return the link with its mass and its centre; of several elements the first counts."""
     inertials = element.children_named("inertial")
     if not inertials:
         return link
-    tags = inertials[-1].children_named("mass"), inertials[-1].children_named("origin")
-    mass, origin = (tag[-1] if tag else None for tag in tags)
+    tags = inertials[0].children_named("mass"), inertials[0].children_named("origin")
+    mass, origin = (tag[0] if tag else None for tag in tags)
     return link._replace(mass=mass_of(mass, "value"), centre=centre_of(origin, "xyz"))
 
 

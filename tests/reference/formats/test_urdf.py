@@ -286,6 +286,34 @@ def test_the_quaternion_of_an_origin_is_read_as_pinocchio_reads_it(name, tmp_pat
     np.testing.assert_allclose(theirs, tip, atol=1e-15)
 
 
+def inertial(mass, centre, more=""):
+    moments = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    return f'<inertial><mass value="{mass}"/>{more}<origin xyz="{centre}"/>{moments}</inertial>'
+
+
+INERTIALS = {
+    "one": inertial(2.5, "0.1 0.2 0.3"),
+    "two": inertial(2.5, "0.1 0.2 0.3") + inertial(1.0, "1 1 1"),
+    "two masses": inertial(2.5, "0.1 0.2 0.3", '<mass value="7"/>'),
+}
+
+
+@pytest.mark.parametrize("name", INERTIALS)
+def test_masses_and_their_centres_are_pinocchios(name):
+    """Of repeated elements the first counts, as in urdfdom."""
+    pinocchio = pytest.importorskip("pinocchio")
+    body = f'<link name="b">{INERTIALS[name]}</link>'
+    text = f'<robot name="r">{link("a", "c")}{body}{{}}{{}}</robot>'.format(
+        joint("j", "a", "b", "continuous", OFFSET, ""), joint("k", "b", "c", "fixed", OFFSET, "")
+    )
+    robot, model = urdf.parse(text), pinocchio.buildModelFromXML(text)
+    names = robot.articulation.names
+    theirs = model.inertias[model.getJointId("j")]
+    assert (robot.masses[names.index("b")], robot.masses.sum()) == (theirs.mass, theirs.mass)
+    np.testing.assert_allclose(robot.centres[names.index("b")], theirs.lever, atol=1e-15)
+    assert theirs.mass == 2.5
+
+
 def test_a_quaternion_that_is_passed_over_gets_a_warning():
     text = (
         f"<robot>{link('a', 'b')}{joint('j', 'a', 'b', inside=f'<origin {QUATERNION}/>')}</robot>"
