@@ -1,6 +1,7 @@
 """Laws of the comparison of files: which files are found, their outcomes, and crashes."""
 
 import os
+import re
 import signal
 import time
 import tracemalloc
@@ -396,6 +397,28 @@ def test_a_changed_file_differs(name, tmp_path, monkeypatch):
         reading = compare(engine, file)
         assert reading.outcome == DIFFERS, reading
         assert reading.difference > 1e3 * POSITION.value
+
+
+@pytest.mark.parametrize("frame", [0, -1])
+@pytest.mark.parametrize("part", [1, 2], ids=["position", "rotation"])
+def test_every_frame_of_a_motion_is_compared(frame, part, tmp_path, monkeypatch):
+    """Also the rotations of a joint that carries no other."""
+    (tmp_path / "a.bvh").write_text(motion())
+    file = find([tmp_path]).files[0]
+    poses = list(files.global_poses(motion()))
+    assert len(poses[-1][1]) > 1
+    poses[-1][part][frame] += 1e-6
+    assert compare(files.SECOND_READER, file).outcome == AGREES
+    monkeypatch.setattr(files, "global_poses", lambda text: iter(poses))
+    assert compare(files.SECOND_READER, file).outcome == DIFFERS
+
+
+def test_channels_in_small_letters_are_the_same_channels(tmp_path):
+    text = re.sub("[XYZ](rot|pos)", lambda match: match[0].lower(), motion())
+    assert text != motion()
+    (tmp_path / "a.bvh").write_text(text)
+    reading = compare(files.SECOND_READER, find([tmp_path]).files[0])
+    assert (reading.outcome, reading.why) == (AGREES, "")
 
 
 def test_white_space_before_the_declaration_keeps_no_engine_from_reading(folder, here):

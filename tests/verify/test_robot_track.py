@@ -17,8 +17,8 @@ from plumbob.verify.kinematics import motion_faults, robot_motions
 from plumbob.verify.kinematics.robot_faults import FAULTS as POSE_FAULTS
 from plumbob.verify.kinematics.robot_models import mechanism, tool_at
 from plumbob.verify.kinematics.robot_motions import TASK, followed
-from plumbob.verify.kinematics.robot_track import judge
-from plumbob.verify.kinematics.trajectories import twists_between
+from plumbob.verify.kinematics.robot_track import _too_fast, judge
+from plumbob.verify.kinematics.trajectories import Trajectory, twists_between
 from plumbob.verify.verify import verify
 
 GREETING = Greeting(PROTOCOL, (TASK,), velocity_limits=True)
@@ -259,6 +259,21 @@ def test_an_arm_that_never_moves_skips_more_than_slow_frames():
         exchanges.append(Exchange(case, answer, answer))
     likely = judge(exchanges, GREETING, "").diagnosis.explanations
     assert all("slow frames skipped" not in explanation.faults for explanation in likely)
+
+
+@pytest.mark.parametrize(("factor", "fault"), [(1.0, ()), (0.5, ("speed limits of iterations",))])
+def test_speeds_of_which_two_are_the_largest_have_another_limit(factor, fault):
+    """A limit of whatever is left in an iteration is met in one frame only."""
+    limited, free = CASES["jump, limited speeds"], CASES["jump"]
+    free = replace(free, name=limited.name.replace(robot_motions.LIMITED_JUMP, robot_motions.JUMP))
+    steps = np.zeros((len(limited.inputs["target_positions"]), 7))
+    steps[:2, 0] = 2.0 * limited.inputs["h"] * limited.inputs["velocity_limits"][0]
+    steps[1] *= factor
+    moved = {
+        case.name: Trajectory(case, case.inputs["start"] + np.cumsum(rows, axis=0))
+        for case, rows in ((limited, steps), (free, 5.0 * steps))
+    }
+    assert _too_fast(moved) == fault
 
 
 def test_another_constant_limit_of_speeds_is_not_taken_for_one_of_iterations():

@@ -167,6 +167,32 @@ def test_a_posture_is_never_given_up(tolerance, weight):
     assert max(slopes) < 0.03
 
 
+def test_of_attempts_that_all_miss_the_one_that_misses_least_is_returned():
+    """Each is made here on its own as well, from the starts that the seed draws."""
+    model = arm(limit=0.4)
+    pose, rng, start = Target((1.0, 0.3, 1.9), Q, 7), np.random.default_rng(7), model.neutral()
+    first = solve_tasks(model, start, [pose], restarts=0).coordinates
+    parts = [pose, tasks.Posture(first)]  # whose cost is least at the end of the first attempt
+    starts = [start, *(model.random(rng) for _ in range(5))]
+    alone = [solve_tasks(model, q, parts, restarts=0) for q in starts]
+    misses = [solution.errors[0] for solution in alone]
+    costs = [solution.cost for solution in alone]
+    assert np.argmin(misses) not in (0, np.argmin(costs))
+    assert min(misses) > 1.0
+    together = solve_tasks(model, start, parts, restarts=5, seed=7)
+    assert together.errors[0] == min(misses)
+    np.testing.assert_array_equal(together.coordinates, alone[int(np.argmin(misses))].coordinates)
+    assert together.iterations == sum(solution.iterations for solution in alone)
+
+
+def test_a_joint_without_a_leader_is_held_at_its_zero_and_the_constant():
+    model = tree()
+    task = tasks.Coupling("b", coefficients=(0.4, 7.0), zero=0.1)
+    q = model.neutral()
+    q[model.coordinates_of("b")] = 0.5
+    np.testing.assert_allclose(at(model, q, task)[0], 0.0, atol=1e-15)
+
+
 def test_an_attempt_makes_no_more_iterations_than_it_may():
     model = arm()
     x, R = pose_of(model, 3)
