@@ -139,6 +139,11 @@ EDGES = {
         lambda p, share: {"positions": np.tile(
             [0, 0, share * (4.0 * bound(p) + SOLVED * displacement(p, LINEARISED))], (3, 1))},
         EDGE),
+    "masses weigh in the centre of mass, of which the lightest particle is a seventh": (
+        laws.momentum, triangle(), {},
+        lambda p, share: {"positions": one_moved(0, 0.01) - one_moved(1, 0.005) + one_moved(
+            2, 7.0 * share * (4.0 * bound(p) + SOLVED * 0.01))},
+        EDGE),
     "gravity takes the centre of mass by h² g or by less, never beyond or upwards": (
         laws.momentum, triangle(), {},
         lambda p, share: {"positions": np.tile(share * p.h**2 * p.gravity, (3, 1))},

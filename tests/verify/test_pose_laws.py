@@ -116,6 +116,19 @@ def test_law_is_kept_to_rounding(case, name, precision):
         assert {found[other].verdict for other in others} == {RIGHT}
 
 
+def test_every_pair_of_children_keeps_its_distance(rng):
+    """The last of three turns about the line from their parent to the first, past the second."""
+    offsets = rng.uniform(0.5, 1.0, (5, 3))
+    parents, directions = np.array([-1, 0, 1, 1, 1]), np.eye(3)
+    offsets[2:] = directions
+    x = forward_kinematics(Skeleton(parents, offsets), rotation.identity(5)).positions.copy()
+    assert pose_laws._branches(x, parents, offsets, 1e-12).verdict is RIGHT
+    x[4] = x[1] + rotation.rotate(rotation.exponential(0.1 * directions[0]), directions[2])
+    found = pose_laws._branches(x, parents, offsets, 1e-12)
+    assert (found.verdict, found.index) == (WRONG, 4)
+    assert found.error == pytest.approx(abs(np.linalg.norm(x[4] - x[3]) - np.sqrt(2.0)))
+
+
 @pytest.mark.parametrize("precision", EPSILON)
 @pytest.mark.parametrize(
     ("roundings", "dead_angles", "verdict"),

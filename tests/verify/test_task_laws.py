@@ -3,12 +3,14 @@
 The faults of the other files are gross, and most are in every frame and at every joint.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from plumbob.text.sentence import sentence
+from plumbob.verify import laws
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.explain import Match, Variant, _telling, explain
@@ -104,6 +106,19 @@ def test_parts_of_the_energy_add_up_to_rounding(spring, name, share, verdict):
     assert wrong == (set() if verdict is RIGHT else {name})
 
 
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+def test_a_sum_of_energies_is_judged_to_rounding(share, verdict):
+    greeting = Greeting(1, ("energy",))
+    case = energy.cases(greeting, "", 0, False)[0]
+    p = problem_of(case.inputs)
+    answered = energy.predict((), p)
+    answered["total"] += share * 4.0 * energy.tolerance(p, EPSILON)
+    answer = Answer(answered, 0.0)
+    (judgement,) = energy.judge([Exchange(case, answer, answer)], greeting, "").judgements
+    found = [one.verdict for one in judgement.findings if one.law == "sum of energies"]
+    assert sorted(found) == [RIGHT, verdict]
+
+
 # ---- resampled polylines
 
 
@@ -136,6 +151,14 @@ def test_points_and_ends_are_kept_to_rounding(segments, law, point, direction, s
     found = by_law(resample.point_laws(points, case, GREETING))
     assert found[law].verdict is verdict
     assert {found[other].verdict for other in {"ends", "on the line"} - {law}} == {RIGHT}
+
+
+@pytest.mark.parametrize(("count", "verdict"), [(11, RIGHT), (12, WRONG), (10, WRONG)])
+def test_an_open_line_has_as_many_points_as_asked(segments, count, verdict):
+    """A closed one may repeat its start."""
+    case, _ = segments
+    points = case.facts["line"].even_points(count, False)
+    assert by_law(resample.point_laws(points, case, GREETING))["count"].verdict is verdict
 
 
 @pytest.mark.parametrize(("share", "verdict"), [(0.015, RIGHT), (0.025, WRONG)])
@@ -190,6 +213,25 @@ def test_a_single_frame_that_breaks_a_law_breaks_it(motion, frame):
     assert findings[1]["link lengths"].verdict is WRONG
     number = range(len(positions))[frame]
     assert str(findings[1]["link lengths"].sentence).startswith(f"Frame {number}: ")
+
+
+def test_only_frames_that_start_anew_do_not_continue(motion):
+    """Those of another solver are neither the textbook's nor the textbook's from the start."""
+    case, _ = motion
+    outputs = {
+        start: predict_track("fabrik", Switches(frame_start=start), case) for start in (0, 1)
+    }
+    answers = {
+        "warm": outputs[0],
+        "anew": outputs[1],
+        "another": {name: value + 1e-3 for name, value in outputs[0].items()},
+    }
+    greeting, verdicts = Greeting(1, ("track",)), {}
+    for name, values in answers.items():
+        answer = Answer({"positions": values["path_positions"]}, 0.0)
+        verdicts[name] = track._continues(Exchange(case, answer, None), "fabrik", greeting).verdict
+    assert verdicts["warm"] is verdicts["another"] is RIGHT
+    assert verdicts["anew"] > RIGHT
 
 
 @pytest.mark.parametrize(("distance", "verdict"), [(0.99, RIGHT), (1.01, RIGHT_EXCEPT)])
@@ -299,6 +341,25 @@ def test_smallest_failure_has_the_worst_verdict_if_unexplained():
     assert smallest_failure(judgements, explained=False) is judgements[3]
     assert smallest_failure(judgements[:3], explained=False) is judgements[2]
     assert smallest_failure(judgements[:1], explained=False) is None
+
+
+@pytest.mark.parametrize(
+    ("worst", "assumed", "asked"),
+    [(RIGHT, RIGHT_EXCEPT, Verdict.UNDECIDED), (WRONG, WRONG, WRONG)],
+)
+def test_what_is_assumed_is_a_reservation_and_what_is_asked_is_undecided(worst, assumed, asked):
+    report = TaskReport("", "", [judgement(1, RIGHT), judgement(1, worst)], Diagnosis())
+    assumptions = (sentence("Something."),)
+    assert report.verdict is worst
+    assert replace(report, assumptions=assumptions).verdict is assumed
+    assert replace(report, assumptions=assumptions, is_asked=True).verdict is asked
+
+
+def test_decimals_are_those_of_the_right_numbers_rounded(rng):
+    right = rng.standard_normal((4, 3))
+    assert laws._decimals([(np.round(right, 2), right)]) == 2
+    assert laws._decimals([(np.round(right, 2) + 0.5, right)]) is None
+    assert laws._decimals([(right, right)]) is None
 
 
 @pytest.mark.parametrize(
