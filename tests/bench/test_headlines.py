@@ -379,6 +379,13 @@ def test_the_scale_gives_the_number_of_targets_if_there_are_records(make, run):
     assert scale == "Quick run: 100 targets of each kind"
 
 
+def test_the_faster_of_two_comes_first_with_the_ratio_and_its_interval_inverted():
+    ratio = metrics.Interval(0.5, 0.4, 0.8)
+    first, second, inverted = headlines._in_order("a", "b", ratio)
+    assert (first, second, inverted) == ("b", "a", (2.0, 1.25, 2.5))
+    assert headlines._in_order("b", "a", inverted) == ("b", "a", inverted)
+
+
 def test_a_paired_ratio_holds_the_factor_and_a_single_pair_leaves_it_open():
     found = metrics.paired_ratio(np.array([2.0, 8.0, np.nan]), np.array([1.0, 2.0, 1.0]))
     assert found.value == pytest.approx(np.sqrt(8.0))

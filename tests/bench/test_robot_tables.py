@@ -170,6 +170,14 @@ def test_records_of_other_targets_are_marked_and_not_ranked(run):
     assert [one.solver for one in FIGURES[8](results).data.panels[0].series] == ["a", "b"]
 
 
+@pytest.mark.parametrize("sizes", [(30, 100), (100, 30)])
+def test_of_two_sets_of_targets_the_larger_one_counts(run, sizes):
+    results = Results([run(str(n), 20, begun=n, size=n) for n in sizes])
+    marks = by_solver(robot_by_robot(results), "mark")
+    assert marks["30"] == "other targets, 30"
+    assert "most solved" in marks["100"]
+
+
 def test_outcomes_are_told_apart(run):
     arrays = {
         "position": [1e-9, 1e-9, 0.5, 0.5, np.nan, 1e-9],

@@ -454,6 +454,7 @@ def test_joints_off_the_path_stay_whatever_is_preferred(prefer):
     kinds, axes = [*arm.kinds, "hinge", "slide"], np.vstack([arm.axes, np.eye(3)[:2]])
     parents = [*arm.skeleton.parents, 1, 7]
     model = Articulation(Skeleton(parents, branch), kinds, axes, lower=-3.0, upper=3.0)
+    alone, is_nearer = Articulation(arm.skeleton, arm.kinds, arm.axes, lower=-3.0, upper=3.0), []
     for oriented in [False, True] * 5:
         x, R = (part[6] for part in model.forward(model.random(rng)))
         start, target = model.random(rng), Target(x, R if oriented else None, 6)
@@ -461,6 +462,15 @@ def test_joints_off_the_path_stay_whatever_is_preferred(prefer):
         assert nearest.outcome == Outcome.CONVERGED
         np.testing.assert_array_equal(nearest.coordinates[6:], start[6:])
         assert np.abs(nearest.coordinates - start).max() > 0.1
+        # nor does their displacement from neutral count, where no restart but a closed form helps
+        same, plain = (
+            solve_ik(robot, start[:size], target, prefer=choice, restarts=0).coordinates[:6]
+            for robot, size, choice in ((alone, 6, prefer), (model, 8, None))
+        )
+        single = solve_ik(model, start, target, prefer=prefer, restarts=0)
+        np.testing.assert_allclose(single.coordinates[:6], same, atol=1e-4)
+        is_nearer.append(np.abs(same - plain).max() > 0.1)
+    assert any(is_nearer)
 
 
 def test_nothing_is_nearest_where_no_solution_is():
