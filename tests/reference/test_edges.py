@@ -87,6 +87,16 @@ def test_one_result_s_minimiser_within_the_other_s_ball_is_the_same(swapped):
     assert one.shares_minimiser(good, 0.02) is (None if one is good else True)
 
 
+@pytest.mark.parametrize(("distance", "shared"), [(0.049, True), (0.075, None), (0.101, False)])
+def test_two_good_results_differ_only_if_their_balls_are_apart(distance, shared):
+    one, other = (
+        Certificate(0.0, Coverage.COVERED, distance=radius, unique_within=0.08)
+        for radius in (0.03, 0.07)
+    )
+    assert one.shares_minimiser(other, distance) is shared
+    assert other.shares_minimiser(one, distance) is shared
+
+
 def test_links_that_slide_or_move_freely_have_no_length():
     tree = Skeleton([-1, 0, 1, 2], np.eye(4, 3))
     model = Articulation(tree, ["hinge", "slide", "free", "hinge"])

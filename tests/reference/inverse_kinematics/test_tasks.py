@@ -346,8 +346,12 @@ def assert_residuals_of_mujoco(text):
             assert np.sin(angle / 2.0) == pytest.approx(np.linalg.norm(expected[3:]), abs=1e-12)
 
 
-def test_equalities_of_a_file_have_the_residuals_of_mujoco():
-    assert_residuals_of_mujoco(LOOP)
+@pytest.mark.parametrize("turn", ["", ' euler="10 20 30"'])
+def test_equalities_of_a_file_have_the_residuals_of_mujoco(turn):
+    """Also of a weld of bodies that are rotated from each other at home."""
+    twin = '<body name="twin" pos="0 3 0"{}>'
+    assert LOOP.count(twin.format("")) == 1
+    assert_residuals_of_mujoco(LOOP.replace(twin.format(""), twin.format(turn)))
 
 
 def test_equalities_between_sites_have_the_residuals_of_mujoco():
