@@ -1,4 +1,4 @@
 """The commands of the command line that have a help page."""
 
 COMMANDS = ("", "verify", "explain", "check", "bench", "which", "report", "show", "compare",
-            "history", "records", "records list", "records merge", "records drop")  # fmt: skip
+            "records", "records list", "records merge", "records drop")  # fmt: skip

@@ -5,7 +5,6 @@ import re
 import shlex
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import command_names
@@ -191,16 +190,6 @@ def test_a_figure_that_cannot_be_drawn_costs_itself_and_a_sentence(capsys, monke
     assert (code, err) == (0, "")
     assert "The figure timing_kinematics cannot be drawn (ValueError: arange: cannot" in out
     assert "ccd" in Path("out", "tables", "timing_kinematics.csv").read_text()
-
-
-def test_a_quantity_without_a_finite_number_is_not_called_unknown(capsys):
-    RecordFile("out").append(
-        [replace(a_record(), arrays={"seconds": np.full((1, 5), np.nan), "moved": np.array(0)})]
-    )
-    code, _, err = plumbob(capsys, "history", "out", "--quantity", "seconds")
-    assert (code, err) == (
-        2, "plumbob: quantity: expected finite numbers of 'seconds', got none\n"
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["a\x1b[2Jb", "a\udcffb", "a\nb"])

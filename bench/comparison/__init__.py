@@ -1,1 +1,1 @@
-"""Compare runs and revisions: faster, slower, more or less accurate; and follow many runs."""
+"""Compare runs and revisions: faster, slower, more or less accurate."""

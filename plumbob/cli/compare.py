@@ -1,4 +1,4 @@
-"""The commands `compare` and `history`."""
+"""The command `compare`."""
 
 import shlex
 import sys
@@ -23,7 +23,7 @@ from .options import (
     writable,
     write_text,
 )
-from .terminal import print_aligned, width
+from .terminal import width
 
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import RunComparison
@@ -133,25 +133,3 @@ def _side_by_side(
     tell = partial(print, "plumbob:", file=sys.stderr, flush=True)
     plan = Plan(revision, tuple(names), tuple(words), pairs, solvers=tuple(solvers))
     return rerun(plan, Path.cwd(), tell)
-
-
-def history(
-    folders: Annotated[list[Path], argument("FOLDER...", "Folders of records.")],
-    *,
-    quantity: Annotated[
-        str, option("NAME", "Quantity of the records, such as iterations.")
-    ] = "seconds",
-    only: Only = None,
-    output: Annotated[File, option("FILE", "Write a figure, an .svg.", "--output", "-o")] = None,
-) -> int:
-    """Show a quantity over many runs, the largest change first."""
-    from plumbob.bench.comparison import history as course
-
-    if output and output.suffix != ".svg":
-        raise ValueError(f"--output: expected a file that ends with .svg, got {output}")
-    runs = course.read_runs(folders)
-    rows = course.courses(runs, quantity, only or [])
-    print_aligned(course.table(runs, rows, quantity))
-    if output:
-        write_text(output, course.draw(runs, rows, quantity))
-    return SUCCESS

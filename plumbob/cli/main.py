@@ -125,7 +125,6 @@ for run, kind in (
     (report.report, Command),
     (show.show, verify.SolverCommand),
     (comparison.compare, Command),
-    (comparison.history, Command),
 ):
     app.command(cls=kind, epilog=epilog(run.__name__))(run)
 app.add_typer(records.app, name="records")

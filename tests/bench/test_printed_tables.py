@@ -8,7 +8,6 @@ import numpy as np
 import printed_table
 import pytest
 
-from plumbob.bench.comparison.history import sparkline
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.report import sections
 from plumbob.bench.tables.results import Results
@@ -184,31 +183,6 @@ def test_files_are_listed_with_what_each_engine_reads(capsys, tmp_path, monkeypa
     ]
     lines = printed_table.below(out, (about, "other kinds"))
     assert assert_printed(lines, headings, rows, width) == headings
-
-
-def test_history_prints_the_first_and_the_last_value_of_each_row(
-    capsys, tmp_path, monkeypatch, make, width
-):
-    monkeypatch.chdir(tmp_path)
-    for day, factor in (("1", 1.0), ("2", 1.5), ("3", 4.0)):
-        records = [make.drawn("my_ik, 20 restarts", warm, 1.0) for warm in (False, True)]
-        records = [
-            replace(r, when=f"2000-01-0{day}T00:00:00+00:00", stamp={},
-                    arrays={"seconds": np.array([1e-5 * (1 + 9 * r.settings["warm"]) * factor])})
-            for r in records[: 2 if day != "2" else 1]
-        ]  # fmt: skip
-        RecordFile(tmp_path / f"run{day}").append(records)
-    code, out = plumbob(capsys, "history", "run1", "run2", "run3")
-    headings = ["problem", "solver", "settings", "first", "last", "ratio", "trend"]
-    rows = [
-        ["arm/circle", "my_ik, 20 restarts", "warm false", "1.0e-5", "4.0e-5", "4.00"],
-        ["arm/circle", "my_ik, 20 restarts", "warm true", "1.0e-4", "4.0e-4", "4.00"],
-    ]
-    for row, values in zip(rows, ([1.0, 1.5, 4.0], [1.0, np.nan, 4.0]), strict=True):
-        row.append(sparkline(np.array(values)))
-    about = ("seconds, 3 runs: run1, run2, run3",)
-    assert assert_printed(printed_table.below(out, about), headings, rows, width) == headings
-    assert code == 0
 
 
 def test_compare_prints_whole_sentences_in_ten_lines(capsys, tmp_path, monkeypatch, make, width):
