@@ -96,7 +96,7 @@ PINS = --universal --python-version 3.11 --generate-hashes --only-binary :all: \
 COMPILE = $(UV) pip compile pyproject.toml $(PINS)
 
 locks: $(UV)
-	$(COMPILE) --extra robots --extra fast --extra test -o requirements.lock
+	$(COMPILE) --extra robots --extra test -o requirements.lock
 	$(COMPILE) --extra docs -c requirements.lock -o requirements-docs.lock
 	$(COMPILE) --all-extras -c requirements.lock -o requirements-peers.lock
 	$(UV) pip compile --group pyproject.toml:placo $(PINS) -o requirements-placo.lock

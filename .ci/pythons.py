@@ -29,7 +29,7 @@ LOCKS = {
     ROOT / "requirements-placo.lock": LATER,
 }
 MACOS = {PLATFORMS: "13.0", LATER: "15.0"}
-EXTRAS = ("robots", "fast", "test")
+EXTRAS = ("robots", "test")
 VENVS = ROOT / "build" / "pythons"
 
 

@@ -24,7 +24,7 @@ BENCH = [  # each may import those before it
     "problems", "peers", "harness", "tables", "figures", "motion", "experiments",
     "comparison", "report", "show",
 ]  # fmt: skip
-LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "cholespy"}  # llvmlite is numba's own
+LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # llvmlite is numba's own
 RUBBISH = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = {"pathlib", "os", "io", "shutil", "tempfile", "open", "fromfile", "tofile", "loadtxt"}
 CLOCKS = {"time", "datetime", "timeit", "perf_counter"}

@@ -45,10 +45,9 @@ def needed(text, python, machine):
     return {pin.name for pin in pins(text) if not pin.marker or pin.marker.evaluate(where)}
 
 
-def has_no_wheel(python, machine):
+def has_no_wheel(python):
     """What is known to have no wheel there; `make wheels` asks about everything."""
-    late = {"labmaze", "dm-control"} if python in ("3.13", "3.14") else set()
-    return late | ({"cholespy"} if machine == ARM else set())
+    return {"labmaze", "dm-control"} if python in ("3.13", "3.14") else set()
 
 
 @pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
@@ -65,10 +64,10 @@ def test_everything_is_pinned_with_hashes_and_no_host_is_named(lock):
 def test_what_has_no_wheel_is_left_out_by_its_marker(pythons, machine):
     text = LOCKS[0].read_text(encoding="utf-8")
     for python in pythons.PYTHONS:
-        assert not needed(text, python, machine) & has_no_wheel(python, machine)
+        assert not needed(text, python, machine) & has_no_wheel(python)
         assert {"numpy", "numba", "pin", "mujoco", "gymnasium"} <= needed(text, python, machine)
         unmarked = re.sub(r" ; .*? \\\n", " \\\n", text)
-        assert needed(unmarked, python, machine) >= has_no_wheel(python, machine)
+        assert needed(unmarked, python, machine) >= has_no_wheel(python)
 
 
 def peers_without_wheels(python, machine):

@@ -18,7 +18,7 @@ from ..peers.sources import git_commit
 from ..peers.stopwatch import time_call
 
 PACKAGES = (
-    *("plumbob", "numpy", "scipy", "numba", "cholespy", "pin", "mujoco", "example-robot-data"),
+    *("plumbob", "numpy", "scipy", "numba", "pin", "mujoco", "example-robot-data"),
     *("gymnasium", "dm_control", "matplotlib"),
 )
 ROOT = Path(__file__).resolve().parents[2]

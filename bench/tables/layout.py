@@ -27,7 +27,7 @@ _PACKAGES = {
     registry.PINOCCHIO: "pin",
     registry.MUJOCO: "mujoco",
     registry.NEWTON: "newton",
-    "CHOLMOD": "cholespy",
+    "SciPy": "scipy",
 }
 # The cells of a row by the titles of their columns, and the records or scores behind them.
 Row = dict[str, Any]

@@ -1,7 +1,6 @@
 """Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
 
-Three solvers have the same interface: our own `CholeskyFactor`, the default, CHOLMOD through
-cholespy where that is installed, and SciPy's SuperLU. cholespy warns of an indefinite matrix.
+Two solvers have the same interface: our own `CholeskyFactor`, the default, and SciPy's SuperLU.
 """
 
 from collections.abc import Callable
@@ -28,8 +27,8 @@ class Factor(Protocol):
 def factorize(matrix: Any, library: str = "supernodal") -> Factor:
     """Return the factor of a sparse symmetric positive definite matrix, both triangles given.
 
-    `library` is "supernodal", "cholespy" or "scipy". Raise a NotPositiveDefiniteError if the matrix
-    is not positive definite, another ValueError if it is not sparse, real and square.
+    `library` is "supernodal" or "scipy". Raise a NotPositiveDefiniteError if the matrix is not
+    positive definite, another ValueError if it is not sparse, real and square.
     """
     factor = LIBRARIES[choice("library", library, LIBRARIES)]
     if not np.isfinite(square(matrix).data).all():
@@ -68,37 +67,7 @@ class SuperLUFactor:
         return factorize(matrix, "scipy")
 
 
-class CholespyFactor:
-    """P A P' = L L' by CHOLMOD through cholespy."""
-
-    def __init__(self, matrix: Any):
-        import cholespy
-
-        entries = square(matrix).astype(np.float64).tocoo()
-        self._size = matrix.shape[0]
-        rows, columns = entries.row.astype(np.int32), entries.col.astype(np.int32)
-        layout = cholespy.MatrixType.COO
-        try:
-            self._solver = cholespy.CholeskySolverD(
-                matrix.shape[0], rows, columns, entries.data, layout
-            )
-        except ValueError:
-            raise NotPositiveDefiniteError("matrix: expected positive definite") from None
-
-    def solve(self, b: FloatArray) -> FloatArray:
-        """Return x of A x = b."""
-        b = right_sides(b, self._size)
-        x = np.empty_like(b, order="C")
-        self._solver.solve(b, x)
-        return x
-
-    def refactorize(self, matrix: Any) -> Factor:
-        """Return the factor of another matrix."""
-        return factorize(matrix, "cholespy")
-
-
 LIBRARIES: dict[str, Callable[[Any], Factor]] = {
     "supernodal": CholeskyFactor,
-    "cholespy": CholespyFactor,
     "scipy": SuperLUFactor,
 }

@@ -19,7 +19,7 @@ from plumbob.bench.problems.robots import group_of
 SAMPLES = tomllib.loads(Path(__file__).with_name("records.toml").read_text(encoding="utf-8"))
 STAMP = {
     "machine": {"processor": "a <b>slide</b> rule", "cores": 1, "memory_gib": 0.5, "system": "x"},
-    "versions": {"python": "3.11.0", "plumbob": "0.0", "numpy": "2", "cholespy": ""},
+    "versions": {"python": "3.11.0", "plumbob": "0.0", "numpy": "2", "matplotlib": ""},
     "source": "0123456789ab",
 }
 WHEN = "2000-01-02T03:04:05+00:00"
@@ -330,7 +330,7 @@ def records():
         entrant("ik"),
         entered(bounded("mine", 0.02)),
         *republished(),
-        *(sample("scaled", solver=solver) for solver in ("supernodal", "cholespy")),
+        *(sample("scaled", solver=solver) for solver in ("supernodal", "scipy")),
         compared("MuJoCo"),
         compared("Pinocchio", "it forgets the hand"),
         sample("read_by_a_peer", solver="PyBullet"),

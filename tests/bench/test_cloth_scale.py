@@ -9,6 +9,7 @@ import pytest
 
 from plumbob.bench.experiments.cloth_scale import measurement as suite
 from plumbob.bench.experiments.cloth_scale import tables
+from plumbob.bench.harness.block import Scale
 from plumbob.bench.harness.progress import listening
 from plumbob.bench.tables.results import Results
 from plumbob.reference.implicit_euler.objective import Objective
@@ -22,10 +23,8 @@ OURS = {
 THEIRS = {"before": 2**20, "factor": 4.0, "solve": [0.02, 0.02], "memory": 2**30}
 
 
-def measured(make, solver, arrays, **notes):
-    return make.record(
-        "cloth_scale", "cloth/100x100", solver, SETTINGS, arrays, size=0, notes=notes
-    )
+def measured(make, solver, arrays):
+    return make.record("cloth_scale", "cloth/100x100", solver, SETTINGS, arrays, size=0)
 
 
 @pytest.fixture
@@ -64,13 +63,24 @@ def test_progress_is_announced():
     assert sum("round" in message for message in messages) == 2 * (suite.ROUNDS[1] + 1)
 
 
-def test_a_failure_in_its_process_and_a_missing_library_are_reported(make):
+def test_a_failure_in_its_process_is_reported():
     with pytest.raises(RuntimeError, match="ValueError: library"):
         suite.in_its_own_process(SMALL, "json")
-    notes = suite.in_its_own_process(SMALL, "no_such_library").notes
-    assert notes == {"missing": "no_such_library is not installed"}
-    table = tables.scale(Results([measured(make, "cholespy", {}, missing="is away")]))
-    assert table.rows[0][:3] == (10_000, "CHOLMOD (cholespy): is away", None)
+
+
+def test_all_cloths_but_the_largest_are_measured_by_scipy_too():
+    solvers = {}
+    for block in suite.blocks(Scale(targets=1, seconds=1.0)):
+        solvers.setdefault(block.settings["particles"], []).append(block.solver)
+    *others, largest = solvers.values()
+    assert others == [["supernodal", "scipy"]] * 3
+    assert largest == ["supernodal"]
+
+
+def test_scipy_factors_the_same_matrix():
+    costs = suite.measure(SMALL, "scipy")
+    assert costs.keys() == {"factor", "solve", "memory", "before"}
+    assert len(costs["solve"]) == suite.ROUNDS[1]
 
 
 def test_the_limit_reads_what_it_says():
@@ -79,11 +89,11 @@ def test_the_limit_reads_what_it_says():
     assert suite.local_bytes(system) == 26 * (16 + 8 + 8 + 1) + 9 * 144
 
 
-def test_our_parts_stand_beside_cholmods(make):
-    records = [measured(make, "supernodal", OURS), measured(make, "cholespy", THEIRS)]
+def test_our_parts_stand_beside_scipys(make):
+    records = [measured(make, "supernodal", OURS), measured(make, "scipy", THEIRS)]
     table = tables.scale(Results(records))
     ours, theirs = table.rows
-    assert (ours[1], theirs[1]) == ("ours", "CHOLMOD (cholespy)")
+    assert (ours[1], theirs[1]) == ("ours", "SciPy's SuperLU")
     np.testing.assert_allclose(
         ours[2:], [2.0, 0.5, 10.0, 2.0, 3000, 2, 1e-3, 30, 2000, 1000, 20, 50], rtol=1e-12
     )

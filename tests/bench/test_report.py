@@ -104,7 +104,7 @@ def test_what_is_missing_is_said(tmp_path, records):
     for words in (
         "“cloth” is not complete",
         "gone, MuJoCo could not be measured: OSError: no engine",
-        "cholespy is not installed",
+        "matplotlib is not installed",
         "1 of ",
     ):
         assert any(words in sentence for sentence in result.missing)
@@ -114,7 +114,7 @@ def test_what_is_missing_is_said(tmp_path, records):
 def test_a_complete_report_misses_only_the_package_and_the_peers_that_are_not_there(whole):
     result, page = whole
     package, absent, others = result.missing
-    assert package == "cholespy is not installed."
+    assert package == "matplotlib is not installed."
     assert absent.startswith("Absent peers: pink and PyBullet (cloth). `make peers` ")
     assert others.startswith("Not selected: our closed loop on Pinocchio, mink, ")
     assert "Newton engine (cloth)" in others

@@ -24,11 +24,10 @@ def _row(record: Record) -> Row:
         present = name in medians and divisor in medians
         return metrics.ratio(medians[name], medians[divisor]) if present else None
 
-    missing = record.details.missing
     return {
         "record": record,
         "particles": record.details.particles,
-        "library": LABELS.get(record.solver, record.solver) + (f": {missing}" if missing else ""),
+        "library": LABELS.get(record.solver, record.solver),
         "first factor": medians.get("factor"),
         "second factor": medians.get("refactor"),
         "solve": medians.get("solve"),

@@ -4,7 +4,7 @@ from ...harness.values import Details, Floats1, Kind, Values
 
 
 class FactorCosts(Values, frozen=True, kw_only=True):
-    """A cloth factored by a library; CHOLMOD's has None where only ours is measured."""
+    """A cloth factored by a library; SciPy's has None where only ours is measured."""
 
     before: int  # the memory before the cloth
     assembly: float | None = None
@@ -22,11 +22,10 @@ class FactorCosts(Values, frozen=True, kw_only=True):
 
 
 class FactorDetails(Details, frozen=True):
-    """The number of particles, the iterations of a step, and why a library is missing."""
+    """The number of particles, and the iterations of a step."""
 
     particles: int
     iterations: int
-    missing: str = ""
 
 
 KINDS = {"": Kind(FactorCosts, FactorDetails)}

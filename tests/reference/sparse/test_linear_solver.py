@@ -11,8 +11,6 @@ from plumbob.reference.sparse.linear_solver import LIBRARIES, NotPositiveDefinit
 
 @pytest.fixture(params=LIBRARIES)
 def library(request):
-    if request.param == "cholespy":
-        pytest.importorskip("cholespy")
     return request.param
 
 
@@ -77,7 +75,7 @@ def test_another_matrix_is_refactorised_whatever_its_pattern(library, matrix, rn
 
 def test_an_unknown_library_is_named_with_the_known_ones(matrix):
     with pytest.raises(
-        ValueError, match=r"^library: expected one of supernodal, cholespy, scipy, got 'eigen'"
+        ValueError, match=r"^library: expected one of supernodal, scipy, got 'eigen'"
     ):
         factorize(matrix, "eigen")
 
