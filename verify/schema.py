@@ -1,8 +1,7 @@
-"""The JSON Schema of the protocol; `python -m plumbob.verify.schema` writes it."""
+"""The JSON Schema of the protocol, which `plumbob verify --schema` prints."""
 
 import json
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -10,7 +9,6 @@ import msgspec
 from .greeting import PROTOCOL, Greeting
 from .task import TASKS, Field
 
-FILE = Path(__file__).with_name("protocol.schema.json")
 GREETING_REQUEST, GREETING, ERROR = "greeting_request", "greeting", "error"
 _ID = {"type": "integer", "minimum": 0, "description": "an answer repeats its request's"}
 _SECONDS = {"type": "number", "minimum": 0, "description": "what the solver itself took [s]"}
@@ -92,9 +90,5 @@ def _fields(fields: Iterable[Field]) -> dict[str, Any]:
 
 
 def text() -> str:
-    """Return the schema as it stands in its file."""
-    return json.dumps(schema(), indent=1, ensure_ascii=False) + "\n"
-
-
-if __name__ == "__main__":
-    FILE.write_text(text(), encoding="utf-8")
+    """Return the schema as JSON."""
+    return json.dumps(schema(), indent=1, ensure_ascii=False)

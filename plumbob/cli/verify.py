@@ -55,6 +55,7 @@ Folder = Annotated[
     File, option("DIR", "Write all four formats and failing cases.", "--output", "-o")
 ]
 Language = Annotated[Text, option("LANG", "Language: en or zh (zh-CN); default: the locale.")]
+Schema = Annotated[bool, flag("Print the JSON Schema of the protocol.", "--schema")]
 SelfTest = Annotated[bool, flag("Test verify itself with all known faults.", "--self-test")]
 
 
@@ -77,6 +78,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     html: Annotated[File, option("FILE", "Write the verdict as a page.")] = None,
     output: Folder = None,
     lang: Language = None,
+    schema: Schema = False,
     self_test: SelfTest = False,
 ) -> int:
     """Judge your solver: is it right, how large are its errors, what is the mistake?
@@ -84,6 +86,10 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     Exit code 0 if every task is RIGHT or RIGHT EXCEPT, 1 if not, 2 if a command or file is wrong,
     3 if Plumbob itself failed at a task and the other tasks are right.
     """
+    if schema:
+        from plumbob.verify.schema import text
+
+        return _print([text()])
     # Solver and reference are timed on one thread each; NumPy is not imported yet.
     from plumbob.process.child import one_thread
 

@@ -12,6 +12,7 @@ import numpy as np
 import planted_programs
 import pytest
 
+from plumbob.cli import main as cli
 from plumbob.text.sentence import sentence
 from plumbob.verify import schema
 from plumbob.verify.case import Case
@@ -24,7 +25,7 @@ from plumbob.verify.task import TASKS
 from plumbob.verify.verify import DISCIPLINES
 
 PAGE = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
-SCHEMA = json.loads(schema.FILE.read_text(encoding="utf-8"))
+SCHEMA = json.loads(schema.text())
 TRANSCRIPT = [
     tuple(map(json.loads, block.splitlines()))
     for block in re.findall(r"```json\n(.*?)```", PAGE, re.DOTALL)
@@ -51,10 +52,15 @@ def kind_of_answer(request, answer):
     return schema.GREETING if task == "greeting" else schema.answer_name(task)
 
 
-def test_the_committed_schema_is_what_tasks_and_greeting_say():
-    hint = "run `python -m plumbob.verify.schema`"
-    assert schema.FILE.read_text(encoding="utf-8") == schema.text(), hint
+def test_the_command_prints_the_schema(capsys):
+    assert cli.run_command(["verify", "--schema"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out) == SCHEMA
+    assert err == ""
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
+
+
+def test_the_page_asks_for_every_task_in_order():
     tasks = [request["task"] for request, _ in TRANSCRIPT]
     assert tasks[: len(TASKS) + 1] == ["greeting", *TASKS]
     assert [request["id"] for request, _ in TRANSCRIPT] == list(range(len(TRANSCRIPT)))
