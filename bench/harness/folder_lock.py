@@ -1,10 +1,11 @@
 """Let a single process write the records of a folder."""
 
 import contextlib
-import fcntl
 import os
 from collections.abc import Iterator
 from pathlib import Path
+
+import filelock
 
 from plumbob.process.paths import check_regular
 
@@ -15,43 +16,43 @@ LOCK_NAME = "records.lock"
 def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
     """Hold the lock of a folder inside the block; the lock of a killed process is free.
 
-    A file system without locks allows everyone. The lock's file stays: without it two
-    processes could lock two files of the same name.
-
     Raises:
-        ValueError: naming folder and process, if another holds it.
+        ValueError: naming folder and process, if another process holds the lock, or if the file
+            of the lock is a link, which could lead to any file of the user's.
     """
     path = Path(folder, LOCK_NAME)
     path.parent.mkdir(parents=True, exist_ok=True)
-    descriptor = open_lock(path, 0o644)
+    check_lock_file(path)
+    lock = filelock.FileLock(path, timeout=0)
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            number = path.read_text(encoding="utf-8")
-            raise ValueError(
-                f"{folder}: expected a folder that nobody writes to, got that of "
-                f"{f'process {number}' if number.isdigit() else 'another process'}; wait for it "
-                "to end, or name another folder"
-            ) from None
-        except OSError:  # a file system without locks
-            pass
-        else:
-            with contextlib.suppress(OSError):  # the number is for the reader; the disk may be full
-                os.ftruncate(descriptor, 0)
-                os.write(descriptor, str(os.getpid()).encode())
+        lock.acquire()
+    except filelock.Timeout:
+        raise ValueError(
+            f"{folder}: expected a folder that nobody writes to, got that of {_holder(path)}; wait "
+            "for it to end, or name another folder"
+        ) from None
+    try:
+        with contextlib.suppress(OSError):  # the number is for the reader; the disk may be full
+            path.write_text(str(os.getpid()), encoding="utf-8")
         yield
     finally:
-        os.close(descriptor)
+        lock.release()
 
 
-def open_lock(path: Path, mode: int) -> int:
-    """Return the descriptor of a lock file, which is created with this mode if it is missing.
+def check_lock_file(path: Path) -> None:
+    """Refuse a link or anything but a file as the file of a lock.
 
     Raises:
-        ValueError: if it is a link, which could lead to any file of the user's, or no file.
+        ValueError: if the path is a link or no regular file; a missing file is accepted.
     """
     if path.is_symlink():
         raise ValueError(f"{path}: expected a file, got a link")
     check_regular(path)
-    return os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, mode)
+
+
+def _holder(path: Path) -> str:
+    """Return the process that holds a lock, as far as its file says so."""
+    number = ""
+    with contextlib.suppress(OSError):  # Windows lets nobody else read the file
+        number = path.read_text(encoding="utf-8")
+    return f"process {number}" if number.isdigit() else "another process"
