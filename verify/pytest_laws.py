@@ -4,8 +4,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import pytest
-
 from plumbob.text.printable import harmless, visible
 
 from .door.host import PythonSolver
@@ -36,8 +34,13 @@ def laws(
         functions: by the names of the tasks, or `ccd` and `fabrik`; a dict PLUMBOB declares.
 
     Raises:
+        ImportError: if pytest is not installed.
         ValueError: if there is no solver, or both a module and functions.
     """
+    try:
+        import pytest
+    except ImportError:
+        raise ImportError("laws: expected pytest to be installed; pip install pytest") from None
     if (solver is None) == (not functions):
         raise ValueError("laws: expected a module or functions by name, got both or neither")
     declared = functions.get("PLUMBOB") or getattr(solver, "PLUMBOB", None) or {}
@@ -66,6 +69,8 @@ def laws(
 
 def _check(report: TaskReport, name: str) -> None:
     """Fail if a case is not right; skip it if it is undecided."""
+    import pytest
+
     judgements = {judgement.case.name: judgement for judgement in report.judgements}
     judgement = judgements.get(name)
     if judgement is None:

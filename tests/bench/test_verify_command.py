@@ -357,6 +357,26 @@ def test_laws_run_under_plain_pytest(folder):
     assert "raceback" not in run.stdout
 
 
+WITHOUT_PYTEST = """
+import sys
+sys.modules["pytest"] = None  # as if it were not installed
+from plumbob import cli
+from plumbob.testing import laws
+assert cli.run_command(["verify", "--list"]) == 0
+try:
+    laws(forward_kinematics=print)
+except ImportError as error:
+    sys.exit(str(error))
+"""
+
+
+def test_only_laws_need_pytest():
+    run = run_python("-c", WITHOUT_PYTEST)
+    message = "laws: expected pytest to be installed; pip install pytest"
+    assert run.stderr.splitlines()[-1] == message
+    assert "forward_kinematics(" in run.stdout
+
+
 def test_letters_that_a_terminal_lacks_cost_no_output():
     ascii_terminal = {"PYTHONIOENCODING": "ascii"}
     run = run_python("-c", CODE, "verify", "--list", "--lang", "zh", environment=ascii_terminal)
