@@ -11,7 +11,7 @@ from plumbob.reference import arguments
 from plumbob.reference.inverse_kinematics import IK_SOLVERS
 
 from . import kinematics, tasks
-from .engines import ROBOT_ENGINES, SKELETON_ENGINES
+from .engines import ABSENT, ROBOT_ENGINES, SKELETON_ENGINES
 from .mass_spring import equilibria, forces, integrators, orders, steps
 from .robots import comparisons
 from .robots.models import CHARACTERS, PACKAGES, ROBOTS, comparable, models
@@ -49,6 +49,7 @@ def _claim(name: str, entry: dict[str, Any], engine: str = "") -> Claim:
         each_case(partial(getattr(MODULES[module], function), *settings)),
         TOLERANCES[entry["tolerance"]],
         entry["cases"],
+        ABSENT.get(engine, ""),
     )
 
 
@@ -62,6 +63,7 @@ def robot_claims(family: str, engine: str) -> list[Claim]:
             partial(comparisons.compare, quantity, family, engine),
             tolerance,
             cases=len(comparable(family, engine, moving=name == "positions")),
+            obstacle=ABSENT.get(engine, ""),
         )
         for name, (quantity, function, tolerance) in QUANTITIES.items()
     ]
@@ -69,7 +71,7 @@ def robot_claims(family: str, engine: str) -> list[Claim]:
 
 skeleton_claims = partial(claims_about, "skeletons")
 TASK_CLAIMS = [
-    *(claim for engine in ROBOT_ENGINES for claim in claims_about("tasks", engine)),
+    *(claim for engine in (*ABSENT, *ROBOT_ENGINES) for claim in claims_about("tasks", engine)),
     *claims_about("equalities"),
 ]
 MASS_SPRING_CLAIMS = claims_about("masses and springs")
@@ -77,13 +79,13 @@ ROBOT_CLAIMS = [
     claim
     for family in PACKAGES
     if models(family)
-    for engine in ROBOT_ENGINES
+    for engine in (*ABSENT, *ROBOT_ENGINES)
     for claim in robot_claims(family, engine)
 ]
 CLAIMS: dict[str, Claim] = {
     claim.name: claim
     for claim in [
-        *(claim for engine in SKELETON_ENGINES for claim in skeleton_claims(engine)),
+        *(claim for engine in (*ABSENT, *SKELETON_ENGINES) for claim in skeleton_claims(engine)),
         *TASK_CLAIMS,
         *MASS_SPRING_CLAIMS,
         *ROBOT_CLAIMS,

@@ -35,22 +35,30 @@ class Claim:
     compare: Callable[[int], Iterable[Comparison]]  # yields those of the first n cases
     tolerance: ClaimTolerance  # the largest difference allowed, with its reason
     cases: int  # number of cases in a full check
+    obstacle: str = ""  # why the claim cannot be checked here; empty if it can
 
 
 @dataclass(frozen=True)
 class ClaimVerdict:
-    """The result of checking a claim; numbers are NaN if a value is not finite."""
+    """The result of checking a claim; numbers are NaN if a value is not finite or not known."""
 
     claim: Claim
     cases: int  # how many were compared
     difference: float  # the largest relative one of a case
     displacement: float  # the least relative distance of a case from its baseline
-    failure: str  # why the claim does not hold; empty if it holds
+    failure: str  # why the claim does not hold; empty if it holds or was not checked
 
     @property
     def holds(self) -> bool:
-        """Whether the claim holds."""
-        return not self.failure
+        """Whether the claim was checked and holds."""
+        return not (self.failure or self.claim.obstacle)
+
+    @property
+    def words(self) -> str:
+        """The verdict as tables show it."""
+        if self.claim.obstacle:
+            return f"not checked: {self.claim.obstacle}"
+        return "MISSED" if self.failure else "held"
 
 
 def each_case(compare: Callable[[int], Comparison]) -> Callable[[int], Iterable[Comparison]]:
@@ -65,6 +73,8 @@ def check_claim(claim: Claim, cases: int | None = None) -> ClaimVerdict:
     """
     arguments.instance("claim", claim, Claim)
     count = claim.cases if cases is None else arguments.integer("cases", cases, minimum=0)
+    if claim.obstacle:
+        return ClaimVerdict(claim, 0, np.nan, np.nan, "")
     comparisons = list(claim.compare(count))
     differences = [_relative_difference(c.actual, c.expected, c.scale) for c in comparisons]
     displacements = [_relative_difference(c.actual, c.baseline, c.scale) for c in comparisons]

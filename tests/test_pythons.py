@@ -70,6 +70,15 @@ def test_what_has_no_wheel_is_left_out_by_its_marker(pythons, machine):
         assert needed(unmarked, python, machine) >= has_no_wheel(python)
 
 
+@pytest.mark.parametrize("lock", LOCKS[:2], ids=lambda path: path.name)
+def test_pinocchio_is_left_out_on_windows(pythons, lock):
+    text = lock.read_text(encoding="utf-8")
+    for python in pythons.PYTHONS:
+        names = needed(text, python, ("win32", "AMD64"))
+        assert not {"pin", "libpinocchio", "coal", "pin-pink"} & names
+        assert {"numba", "mujoco"} <= names
+
+
 def peers_without_wheels(python, machine):
     """The peers that are known to have no wheel there, or none that goes with the other locks."""
     has = {

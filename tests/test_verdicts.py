@@ -15,7 +15,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "verdicts.md"
 WORDS = {
     "`plumbob verify`": [str(VERDICTS[verdict]) for verdict in Verdict],
     "`plumbob verify --self-test`": ["caught", "named", "accused"],
-    "`plumbob check`": ["held", "MISSED"],
+    "`plumbob check`": ["held", "MISSED", "not checked"],
     "`plumbob check --files`": list(files.OUTCOMES),
     "`plumbob bench`": [*OUTCOMES, "disputed answers"],
     "`plumbob compare`": list(map(str, ChangeVerdict)),

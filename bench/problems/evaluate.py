@@ -1,9 +1,9 @@
 """Evaluate solutions of inverse kinematics by engines that share no code with the solver.
 
 MuJoCo is the arbiter of solvers that are built on Pinocchio, Pinocchio that of all others; both
-place every answer, so that answers on which they differ are known. The same is measured for every
-solver: the distance and the angle of each effector from its target, and by how much a joint is
-beyond its limits.
+place every answer, so that answers on which they differ are known. Where Pinocchio is absent,
+MuJoCo evaluates all answers. The same is measured for every solver: the distance and the angle of
+each effector from its target, and by how much a joint is beyond its limits.
 """
 
 import functools
@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-import pinocchio
 from scipy.spatial.transform import Rotation
 
+from plumbob.crosscheck.engines import ABSENT
 from plumbob.reference.arguments import FloatArray
 
 from .robots import LIMIT_TOLERANCE, BenchRobot, robot
@@ -89,6 +89,7 @@ class Evaluation(NamedTuple):
     beyond: FloatArray  # by how much the worst joint is beyond its limit [rad]
     solved: np.ndarray  # whether all three are within tolerance
     # by how much the two engines place an effector differently [m] or [rad]; zero without an answer
+    # or a second engine
     difference: FloatArray
 
 
@@ -103,7 +104,7 @@ def mujoco_model(robot: BenchRobot) -> Any:
 
 def arbiter_of(engine: str) -> str:
     """Return the engine that evaluates the answers of a solver built on an engine."""
-    return MUJOCO if engine == PINOCCHIO else PINOCCHIO
+    return MUJOCO if engine == PINOCCHIO or PINOCCHIO in ABSENT else PINOCCHIO
 
 
 def pinocchio_model(robot: BenchRobot) -> Any:
@@ -112,6 +113,8 @@ def pinocchio_model(robot: BenchRobot) -> Any:
     Raises:
         ValueError: if Pinocchio orders its joints otherwise.
     """
+    import pinocchio
+
     if robot.is_chain:
         model = pinocchio.buildModelFromXML(robot.text)
     else:
@@ -160,6 +163,8 @@ class Evaluator:
 
     def forward_by_pinocchio(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what `forward` returns, by Pinocchio, of coordinates (row, coordinate)."""
+        import pinocchio
+
         model, data, frames = self._pinocchio
         placements = []
         for row in q:
@@ -184,15 +189,21 @@ class Evaluator:
         return J
 
     def evaluate(
-        self, targets: Targets, q: FloatArray, tolerance: Tolerance, arbiter: str = PINOCCHIO
+        self, targets: Targets, q: FloatArray, tolerance: Tolerance, arbiter: str = ""
     ) -> Evaluation:
-        """Return the errors of answers (target, coordinate) to the first targets; NaN is none."""
+        """Return the errors of answers (target, coordinate) to the first targets; NaN is none.
+
+        The arbiter is an engine, by default that of our solvers.
+        """
         is_answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
         poses = np.where(is_answered[:, None], q, targets.starts[:count])
-        by_engine = {MUJOCO: self.forward(poses), PINOCCHIO: self.forward_by_pinocchio(poses)}
+        by_engine = {MUJOCO: self.forward(poses)}
+        if PINOCCHIO not in ABSENT:
+            by_engine[PINOCCHIO] = self.forward_by_pinocchio(poses)
         target_poses = targets.positions[:count], targets.rotations[:count]
-        distance, angle = _distances(by_engine[arbiter], target_poses)
-        difference = np.maximum(*_distances(by_engine[MUJOCO], by_engine[PINOCCHIO]))
+        distance, angle = _distances(by_engine[arbiter or arbiter_of("")], target_poses)
+        first, last = by_engine[MUJOCO], by_engine.get(PINOCCHIO, by_engine[MUJOCO])
+        difference = np.maximum(*_distances(first, last))
         excess = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
         errors = np.stack([distance, angle * self.robot.oriented, excess])
         errors[:, ~is_answered] = np.nan

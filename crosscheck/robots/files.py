@@ -194,7 +194,7 @@ def _with_causes(
     Where MuJoCo refuses the file, it reads a copy without settings, which kinematics does not need.
     """
     outcomes = {reading.engine: reading.outcome for reading in readings}
-    if file.kind == MJCF and (outcomes["Pinocchio"], outcomes["MuJoCo"]) == (DIFFERS, UNREAD):
+    if file.kind == MJCF and (outcomes.get("Pinocchio"), outcomes["MuJoCo"]) == (DIFFERS, UNREAD):
         with tempfile.TemporaryDirectory() as folder:
             copy = _without_settings(file, Path(folder))
             outcomes["MuJoCo"] = _read(child, "MuJoCo", copy).outcome

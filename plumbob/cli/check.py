@@ -34,7 +34,7 @@ def check(
     print_verdicts(verdicts)
     if missing := left_out():
         print(missing)
-    return SUCCESS if all(verdict.holds for verdict in verdicts) else FAILED
+    return FAILED if any(verdict.failure for verdict in verdicts) else SUCCESS
 
 
 def check_files(paths: Sequence[str]) -> int:
@@ -42,6 +42,7 @@ def check_files(paths: Sequence[str]) -> int:
     if not paths:
         raise ValueError("--files: expected folders or files, got none")
     from plumbob.bench.experiments.check.files import lines_on, summary
+    from plumbob.crosscheck.engines import ABSENT
     from plumbob.crosscheck.robots.files import check, find
 
     search = find(paths)
@@ -56,4 +57,6 @@ def check_files(paths: Sequence[str]) -> int:
                 print(line, file=stream, flush=True)
     table, disagreements = summary(search, readings)
     print_aligned(table)
+    for engine, obstacle in ABSENT.items():
+        print(f"{engine}: not checked: {obstacle}")
     return FAILED if disagreements else SUCCESS

@@ -35,7 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     stays ignored: a pipe to a worker that has ended would raise it too. Other signals that end the
     program become exceptions, so that commands clean up, unless they are ignored, as under nohup.
     """
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    # Windows has no SIGHUP.
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _leave)
     entry_point.open_closed_streams()

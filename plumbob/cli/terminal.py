@@ -97,19 +97,25 @@ def print_verdicts(verdicts: Sequence["ClaimVerdict"]) -> None:
     from plumbob.bench.harness.metrics import ratio
     from plumbob.bench.tables.table import Column, Table, cells
 
+    def used(v: "ClaimVerdict") -> float | None:
+        return None if v.claim.obstacle else ratio(v.difference, v.claim.tolerance.value)
+
     columns = (
         Column("claim", words=True, read=lambda v: v.claim.name),
-        Column("verdict", words=True, read=lambda v: "held" if v.holds else "MISSED"),
+        Column("verdict", words=True, read=lambda v: v.words),
         Column("cases", read=lambda v: v.cases),
-        Column("largest difference", read=lambda v: v.difference),
+        Column("largest difference", read=lambda v: None if v.claim.obstacle else v.difference),
         Column("tolerance", read=lambda v: v.claim.tolerance.value),
-        Column("tolerance used", "%", read=lambda v: ratio(v.difference, v.claim.tolerance.value)),
+        Column("tolerance used", "%", read=used),
     )
     print_lines(Table("verdicts", "", columns, cells(columns, verdicts)))
     for verdict in verdicts:
-        if not verdict.holds:
+        if verdict.failure:
             print(f"MISSED: {verdict.claim.name} ({verdict.failure})")
-    print(f"{sum(verdict.holds for verdict in verdicts)} of {len(verdicts)} claims held")
+    obstacles = [verdict.claim.obstacle for verdict in verdicts if verdict.claim.obstacle]
+    more = f"; {len(obstacles)} not checked: {obstacles[0]}" if obstacles else ""
+    count = len(verdicts) - len(obstacles)
+    print(f"{sum(verdict.holds for verdict in verdicts)} of {count} claims held{more}")
 
 
 def progress() -> Any:

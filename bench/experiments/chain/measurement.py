@@ -24,6 +24,7 @@ from ...peers.entrant import CHAIN_TASK
 from ...peers.ik import chain_loops
 from ...peers.protocol import NoAnswerError, describe
 from ...problems import chains
+from ...problems.evaluate import arbiter_of
 from . import CHAIN
 from .values import ChainSolves
 
@@ -119,7 +120,8 @@ def _blocks_on(
     """Yield targets for every solver of ours, for one loop on each engine, and for users'."""
     facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
     adapters: dict[str, dict[str, str]] = {solver: {"solver": solver} for solver in IK_SOLVERS}
-    adapters |= {loop.name: {"engine": loop.engine} for loop in registry.LOOPS}
+    loops = [loop for loop in registry.LOOPS if loop.engine in SKELETON_ENGINES]
+    adapters |= {loop.name: {"engine": loop.engine} for loop in loops}
     for name, settings in adapters.items():
         job = job_of(problem, limits, chain_loops.__name__, settings)
         answers = partial(solve_one_by_one, problem, job, limits)
@@ -158,13 +160,13 @@ def job_of(
 def solve_targets(
     problem: chains.TargetsForSkeleton, solver: str, limits: SolverLimits, record: bool = False
 ) -> Measured:
-    """Solve all targets with a solver of ours; Pinocchio recomputes residuals from the solutions.
+    """Solve all targets with a solver of ours; an engine recomputes residuals from the solutions.
 
     `record` keeps residuals by iteration.
     """
     options: dict[str, Any] = {**limits._asdict(), "record": record}
     solution = solve_ik(problem.skeleton, problem.starts, problem.targets, solver, **options)
-    engine = SKELETON_ENGINES[registry.PINOCCHIO](problem.skeleton)
+    engine = SKELETON_ENGINES[arbiter_of("")](problem.skeleton)
     positions = forward_kinematics_by(engine, solution.local_rotations).positions
     arrays = _evaluated(problem, limits, positions, solution.iterations)
     arrays["outcome"] = np.asarray(solution.outcome)

@@ -21,4 +21,6 @@ def evaluate(name: str) -> Measured:
     claim = verdict.claim
     numbers = (verdict.cases, verdict.difference, claim.tolerance.value, verdict.displacement)
     notes = {"ours": claim.quantity, "reason": claim.tolerance.reason, "missed": verdict.failure}
+    if claim.obstacle:
+        return Measured(None, {**notes, "obstacle": claim.obstacle})
     return Measured(ClaimValues(*numbers, verdict.holds), notes)

@@ -9,8 +9,8 @@ from ...harness.record import Record
 from ...peers.registry import MUJOCO, PINOCCHIO
 from ...tables.captions import Captions
 from ...tables.layout import Row
-from ...tables.results import listed
-from ...tables.table import Summary, in_unit, words
+from ...tables.results import counted, listed
+from ...tables.table import NO_SUMMARY, Summary, in_unit, words
 
 # A claim against an engine names it in the description of one of its sides.
 ENGINES = (PINOCCHIO, MUJOCO)
@@ -18,21 +18,32 @@ ENGINES = (PINOCCHIO, MUJOCO)
 
 def _row(record: Record) -> Row:
     claim, details = record.values, record.details
+    row = {
+        "record": record,
+        "claim": record.problem,
+        "our quantity": details.quantity,
+        "compared with": record.solver,
+    }
+    if details.obstacle:
+        numbers = dict.fromkeys(("cases", "largest difference", "tolerance"))
+        return {**row, "verdict": f"not checked: {details.obstacle}", **numbers}
     digits = distinct_texts(claim.difference, claim.tolerance, 2)
     excess = " by {}, more than {}".format(*digits) * (claim.difference > claim.tolerance)
     return {
-        "record": record,
-        "claim": record.problem,
+        **row,
         "verdict": "held" if claim.holds else f"MISSED: {details.failure}{excess}",
-        "our quantity": details.quantity,
-        "compared with": record.solver,
         "cases": claim.cases,
         "largest difference": claim.difference,
         "tolerance": claim.tolerance,
     }
 
 
-def _summary(rows: Sequence[Row]) -> Summary:
+def _summary(all_rows: Sequence[Row]) -> Summary:
+    rows = [row for row in all_rows if row["cases"] is not None]
+    if not rows:
+        return NO_SUMMARY
+    unchecked = len(all_rows) - len(rows)
+    more = f"; {counted(unchecked, 'claim')} could not be checked" if unchecked else ""
     failures = [row["claim"] for row in rows if row["verdict"] != "held"]
     used = max(metrics.ratio(row["largest difference"], row["tolerance"]) for row in rows)
     engines = sum(
@@ -42,7 +53,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
         f"{len(rows) - len(failures)} of {len(rows)} claims held ({engines} against "
         f"{listed(ENGINES, 'or')}, {len(rows) - engines} against closed forms and invariants), "
         f"over {words(sum(row['cases'] for row in rows))} cases; "
-        f"the largest difference is {words(in_unit(used, '%'))} % of its tolerance.",
+        f"the largest difference is {words(in_unit(used, '%'))} % of its tolerance{more}.",
         tuple(f"Missed: {name}" for name in failures),
     )
 

@@ -16,11 +16,15 @@ class ClaimValues(Values, frozen=True):
 
 
 class ClaimDetails(Details, frozen=True):
-    """The quantity that we compute, the reason for the tolerance, and why the claim failed."""
+    """The quantity that we compute, the reason for the tolerance, and why the claim failed.
+
+    An obstacle says why the claim could not be checked.
+    """
 
     quantity: str = msgspec.field(default="", name="ours")
     reason: str = ""
     failure: str = msgspec.field(default="", name="missed")
+    obstacle: str = ""
 
 
 KINDS = {"": Kind(ClaimValues, ClaimDetails)}

@@ -22,7 +22,11 @@ LIMITS: dict[str, Any] = {"tolerance": TOLERANCE, "max_iterations": MAX_ITERATIO
 LOOP = "levenberg_marquardt"
 KINEMATICS: dict[str, Callable[[Any], SkeletonEngine]] = {
     registry.OUR_KINEMATICS.name: ReferenceKinematics,
-    **{loop.name: SKELETON_ENGINES[loop.engine] for loop in registry.LOOPS},
+    **{
+        loop.name: SKELETON_ENGINES[loop.engine]
+        for loop in registry.LOOPS
+        if loop.engine in SKELETON_ENGINES
+    },
 }
 
 

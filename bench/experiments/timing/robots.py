@@ -7,8 +7,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import pinocchio
 
+from plumbob.crosscheck.engines import ABSENT
 from plumbob.reference import forward_kinematics, prepare
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.formats import mjcf, urdf
@@ -30,7 +30,8 @@ def cases() -> Iterator[TimedCase]:
         group = f"{robot(name).title}, {len(robot(name).joints)} joints"
         title = "one pose a call" if count == 1 else f"{count:,} poses a call"
         work = TimedWork(f"{subject}/{name}/{title}", subject, group, title)
-        for solver in CALLS if subject == "kinematics" else (COMPILED, PINOCCHIO, MUJOCO):
+        solvers = CALLS if subject == "kinematics" else (COMPILED, PINOCCHIO, MUJOCO)
+        for solver in (solver for solver in solvers if solver not in ABSENT):
             call = partial(timed_call, subject, solver, name, count)
             yield TimedCase(work, solver, call, count)
 
@@ -58,6 +59,8 @@ def our_calls(bench_robot: BenchRobot, is_prepared: bool = False) -> Calls:
 
 def pinocchio_calls(bench_robot: BenchRobot) -> Calls:
     """Return Pinocchio's forward kinematics of all frames, and its Jacobian."""
+    import pinocchio
+
     model, axes = pinocchio_model(bench_robot), pinocchio.LOCAL_WORLD_ALIGNED
     data, frame = model.createData(), model.getFrameId(bench_robot.effectors[0])
     return {

@@ -30,6 +30,7 @@ def claim_dots(check: PageTable) -> list[ClaimDot]:
     claims = [
         (number_of(row[difference]) / number_of(row[tolerance]), words(row[0]), page_row.address)
         for row, page_row in zip(check.table.rows, check.rows, strict=True)
+        if row[difference] is not None
     ]
     dots: list[ClaimDot] = []
     ends: list[float] = []  # of the last dot of each level
