@@ -5,7 +5,7 @@ import io
 import re
 import string
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from babel.messages import Catalog
@@ -89,20 +89,20 @@ def read(path: Path) -> Catalog:
         return read_po(file)
 
 
-def renewed(catalogue: Catalog, places: Mapping[str, str]) -> Catalog:
+def renewed(catalogue: Catalog, texts: Iterable[str]) -> Catalog:
     """Return a catalogue of templates in order, with the previous translations."""
     template = Catalog(creation_date=catalogue.creation_date)
-    for text, place in places.items():
-        template.add(text, locations=[(place, 0)])
+    for text in texts:
+        template.add(text)
     catalogue.update(template, no_fuzzy_matching=True)
     catalogue.obsolete.clear()
     return catalogue
 
 
 def to_po(catalogue: Catalog) -> bytes:
-    """Return the .po file of a catalogue."""
+    """Return the .po file of a catalogue, without the files that have a text: these move."""
     file = io.BytesIO()
-    write_po(file, catalogue, width=0, include_lineno=False)
+    write_po(file, catalogue, width=0)
     return file.getvalue()
 
 
