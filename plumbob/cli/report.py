@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 FORMATS = ("md", "tex", "csv", "html")
 
 
-def report(  # noqa: PLR0913 -- one parameter an option
+def report(
     folder: Annotated[
         File, argument("[FOLDER]", "Folder of the records.  [default: report]")
     ] = None,
@@ -31,9 +31,6 @@ def report(  # noqa: PLR0913 -- one parameter an option
         Texts, option("FILTER", "Rows: solver=Newton, robot~UR, 'median<10' ...")
     ] = None,
     order: Annotated[str, option("COLUMN", "Sort rows, best or smallest first.", "--sort")] = "",
-    width: Annotated[
-        str, option("LENGTH", "Width of LaTeX: column, page, or such as 120mm.")
-    ] = "page",
     names: Annotated[bool, flag("List the tables; with --table, its columns.", "--list")] = False,
 ) -> int:
     """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records.
@@ -57,7 +54,7 @@ def report(  # noqa: PLR0913 -- one parameter an option
     from plumbob.bench.tables import selection
 
     table = selection.selected(table, columns or [], rows or [], order)
-    return _write(formatted(table, form, width), output)
+    return _write(formatted(table, form), output)
 
 
 def write_report(output: Path) -> int:
@@ -98,15 +95,14 @@ def _list_columns(table: "Table") -> int:
     return SUCCESS
 
 
-def formatted(table: "Table", form: str, width: str = "page") -> str:
-    """Return a table in one of `FORMATS`; LaTeX for a width."""
+def formatted(table: "Table", form: str) -> str:
+    """Return a table in one of `FORMATS`."""
     from plumbob.bench.tables import writers
     from plumbob.bench.tables.latex import latex
 
-    if form == "tex":
-        return latex(table, width)
     formats = {
-        "md": writers.markdown, "csv": writers.comma_separated, "html": writers.html_fragment
+        "md": writers.markdown, "tex": latex, "csv": writers.comma_separated,
+        "html": writers.html_fragment,
     }  # fmt: skip
     return formats[form](table)
 

@@ -1,25 +1,16 @@
 """Names from elsewhere as text that no terminal, browser or parser reads as an instruction."""
 
-import functools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 # What GitHub and Azure obey on a line of a log: the first at its beginning, the second anywhere.
 _COMMAND = re.compile(r"^ ?( *)(?=::)|(?<=#)(?=#\w*\[)")
-# Where a word may be broken: after a dash or the like between letters, never in a number.
-_BREAK = re.compile(r"(?<=[^\W\d_][/_.-])(?=[^\W\d_])")
 
 
 def shortened(text: str, length: int) -> str:
     """Return a text of at most so many letters, its end cut off if necessary."""
     return text if len(text) <= length else f"{text[: length - 1]}…"
-
-
-@functools.lru_cache(maxsize=10_000)
-def chunks(text: str) -> Sequence[str]:
-    """Return the parts of a text between which a line may end: after spaces, dashes, slashes."""
-    return [part for token in text.split() for part in _BREAK.split(token)]
 
 
 def visible(text: str) -> str:

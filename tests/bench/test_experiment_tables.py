@@ -23,9 +23,9 @@ from plumbob.bench.experiments.cloth import tables as cloth
 from plumbob.bench.experiments.cloth_peers import SOLVED
 from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.report.sections import SECTIONS, tables
+from plumbob.bench.tables.latex import escaped
 from plumbob.bench.tables.results import Results, label
 from plumbob.bench.tables.table import best_cells, words
-from plumbob.bench.tables.tex_text import escaped
 from plumbob.bench.tables.writers import comma_separated, markdown
 
 
