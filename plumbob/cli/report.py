@@ -25,11 +25,9 @@ def report(
     name: Annotated[str, option("NAME", "Print one table; see --list.", "--table")] = "",
     form: Annotated[str, option("FORMAT", f"Format: {', '.join(FORMATS)}.", "--format")] = "md",
     columns: Annotated[
-        Texts, option("COLUMNS", "Headings or numbers, such as 'solver, 3-5'.")
+        Texts, option("COLUMNS", "Headings, such as 'solver, within tolerance'.")
     ] = None,
-    rows: Annotated[
-        Texts, option("FILTER", "Rows: solver=Newton, robot~UR, 'median<10' ...")
-    ] = None,
+    rows: Annotated[Texts, option("FILTER", "Rows: solver=Newton, or robot~UR for a part.")] = None,
     order: Annotated[str, option("COLUMN", "Sort rows, best or smallest first.", "--sort")] = "",
     names: Annotated[bool, flag("List the tables; with --table, its columns.", "--list")] = False,
 ) -> int:
@@ -88,10 +86,10 @@ def _list_tables(tables: list["Table"]) -> int:
 
 
 def _list_columns(table: "Table") -> int:
-    for number, column in enumerate(table.columns, 1):
+    for column in table.columns:
         marks = (f"{column.best} is best" * bool(column.best), "folded" * column.folded)
         about = ", ".join(filter(None, marks))
-        print(f"{number} {column.heading}" + (f" ({about})" if about else ""))
+        print(column.heading + (f" ({about})" if about else ""))
     return SUCCESS
 
 

@@ -39,8 +39,6 @@ TABLE = Table("robots", "Robots", COLUMNS, ROWS)
     ("text", "numbers"),
     [
         ("solver", [1]),
-        ("2", [1]),
-        ("1,3-5", [0, 2, 3, 4]),
         ("time, median", [2]),
         ("time, median [µs]", [2]),
         ("solver, time, median, SOLVED", [1, 2, 4]),
@@ -48,7 +46,7 @@ TABLE = Table("robots", "Robots", COLUMNS, ROWS)
         ("time, 95 %,robot", [3, 0]),
     ],
 )
-def test_columns_are_named_by_heading_title_or_number(text, numbers):
+def test_columns_are_named_by_heading_or_title(text, numbers):
     assert column_numbers(TABLE, text) == numbers
 
 
@@ -59,9 +57,7 @@ def test_columns_are_named_by_heading_title_or_number(text, numbers):
         ("time, medina", "did you mean 'time, median"),
         ("solvd", "did you mean 'solved (95 % interval)'?"),
         ("qqq", "expected one of 'robot', 'solver', 'time, median [µs]', "),
-        ("0", "numbers from 1 to 5, got 0"),
-        ("2-9", "numbers from 1 to 5, got 2-9"),
-        ("4-2", "numbers from 1 to 5, got 4-2"),
+        ("2", "no column '2'"),
         ("solver,", "no column ''"),
     ],
 )
@@ -75,16 +71,10 @@ def test_a_column_that_is_not_there_is_refused_with_the_nearest(text, sentence):
     [
         (["solver=newton"], [0, 2]),
         (["solver=local_global"], [1, 3]),
-        (["solver!=newton"], [1, 3]),
         (["robot~ur"], [0, 1]),
-        (["robot!~ur"], [2, 3]),
         (["robot~ur", "solver=Newton"], [0]),
         (["robot=ur5", "robot=IIWA", "solver=Newton"], [0, 2]),
-        (["time, median<3"], [1, 2]),
-        (["time, median <= 3"], [0, 1, 2]),
-        (["solved>=50"], [0, 2]),
-        (["3>2", "3<1.5"], [0, 1, 3]),
-        (["2=Newton"], [0, 2]),
+        (["time, median = 3.00"], [0]),
     ],
 )
 def test_rows_pass_one_filter_of_each_column(rows, left):
@@ -94,10 +84,10 @@ def test_rows_pass_one_filter_of_each_column(rows, left):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("solver", "expected COLUMN and one of"),
+        ("solver", "expected COLUMN=VALUE or COLUMN~PART, got 'solver'"),
+        ("solver<2", "expected COLUMN=VALUE"),
         ("solvr=x", "did you mean 'solver'?"),
-        ("solver=CCD", "no row of robots passes; solver is 'Newton' or 'local/global'"),
-        ("solved<many", "expected a number"),
+        ("solver=CCD", "no row of robots passes; solver is Newton, local/global"),
         ("robot,solver=x", "no column"),
     ],
 )
@@ -108,7 +98,12 @@ def test_a_filter_that_is_none_is_refused(text, sentence):
 
 @pytest.mark.parametrize(
     ("column", "order"),
-    [("3", [1, 2, 0, 3]), ("solved", [0, 2, 1, 3]), ("time, 95 %", [3, 0, 1, 2]), ("robot", None)],
+    [
+        ("time, median", [1, 2, 0, 3]),
+        ("solved", [0, 2, 1, 3]),
+        ("time, 95 %", [3, 0, 1, 2]),
+        ("robot", None),
+    ],
 )
 def test_rows_are_sorted_the_best_first_and_what_is_unknown_last(column, order):
     made = selected(TABLE, order=column)
@@ -117,7 +112,8 @@ def test_rows_are_sorted_the_best_first_and_what_is_unknown_last(column, order):
 
 def test_the_best_are_those_of_the_rows_left_by_the_columns_of_before():
     assert best_cells(selected(TABLE, ["time, median"])) == {(1, 0), (2, 0)}
-    swapped = selected(TABLE, ["3, 1"], ["solver=Newton", "solver=local/global"], "3")
+    rows, order = ["solver=Newton", "solver=local/global"], "time, median"
+    swapped = selected(TABLE, [f"{order}, robot"], rows, order)
     assert {swapped.rows[i][1] for i, j in best_cells(swapped)} == {"UR5", "iiwa"}
     assert best_cells(selected(TABLE, ["time, median"], ["solver=Newton"])) == set()
 
@@ -127,7 +123,6 @@ def test_a_summary_of_all_rows_is_not_said_of_some():
     assert selected(table, ["solver"]).summary == table.summary
     assert selected(table, rows=["solver~o"]).summary == table.summary
     assert selected(table, rows=["solver=Newton"]).summary == NO_SUMMARY
-    assert not any(column.folded for column in selected(TABLE, ["1-5"]).columns)
     assert selected(TABLE).columns == COLUMNS
 
 
@@ -161,7 +156,7 @@ def run(capsys, *arguments):
 def test_the_list_of_a_table_names_its_columns(capsys, folder):
     code, out, _ = run(capsys, "--table", "accuracy", "--list")
     assert code == 0
-    assert out.splitlines()[0] == "1 problem"
+    assert out.splitlines()[0] == "problem"
     assert "greatest is best" in out
     assert "folded" in out
 
@@ -234,14 +229,14 @@ def test_every_table_can_be_exported_with_every_option(capsys, folder, records, 
     monkeypatch.setattr("plumbob.cli.report._tables", lambda folder: every)
     assert any(not source.suite for table in every for source in table.sources)
     for table in every:
-        count = len(table.columns)
-        numbers = ",".join(str(j) for j in range(count, 0, -1))
-        whole = chosen(capsys, table, form, columns=numbers, sort="1")
+        headings = [column.heading for column in table.columns]
+        whole = chosen(capsys, table, form, columns=",".join(headings[::-1]), sort=headings[0])
         assert len(whole) == len(table.rows)
         if not table.rows:
             continue
         name = words(table.rows[-1][0])
-        left = chosen(capsys, table, form, rows=f"1={name}", columns="1", sort=str(count))
+        asked = {"rows": f"{headings[0]}={name}", "columns": headings[0], "sort": headings[-1]}
+        left = chosen(capsys, table, form, **asked)
         wanted = [row for row in table.rows if words(row[0]) == name]
         assert len(left) == len(wanted)
         if form in ("md", "html"):
