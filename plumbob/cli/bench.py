@@ -54,8 +54,10 @@ Quick = Annotated[bool, flag("Measure fewer targets and rounds.", "--quick")]
 Solvers = Annotated[Texts, option("NAME", "Measure only this solver; repeatable.")]
 Problems = Annotated[Texts, option("NAME", "Only this problem, or your .py, model or folder.")]
 Robots = Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")]
-Targets = Annotated[int | None, option("N", "Targets per problem; of robots 1/20 of each kind.")]
-Seed = Annotated[int | None, option("N", "Seed of other random targets in suite ik.")]
+Targets = Annotated[
+    int | None, option("N", "Targets per problem; of robots 1/20 of each kind.", min=1)
+]
+Seed = Annotated[int | None, option("N", "Seed of other random targets in suite ik.", min=0)]
 Seeds = Annotated[int, option("N", "Draw targets of robots from N seeds.", min=1)]
 Effector = Annotated[Text, option("NAME", "Link of your models that must reach the target.")]
 Pins = Annotated[Text, option("RULE", "Pinned vertices of your OBJ: far, top or 0,10.")]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
 from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
-from plumbob.bench.harness.block import SEED, Block, Choice, Scale
+from plumbob.bench.harness.block import Block, Choice, Scale
 from plumbob.bench.peers import opening, registry
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.problems import files
@@ -64,8 +64,7 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
         else:
             entrants.append(entrant)
     own, names = files.read(request.problems, suites, request.effector, request.pins)
-    size = scale_of(scale, request.targets, entrants, own)
-    size = replace(size, seed=seed_of(request.seed), seeds=request.seeds)
+    size = _scale(scale, request, entrants, own)
     if not any((request.solvers, names, request.robots)):
         return Choice(scale, size, is_partial=request.targets is not None)
     every = [block for suite in suites for block in blocks(suite, size)]
@@ -88,23 +87,14 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
     return choice
 
 
-def seed_of(number: int | None) -> int:
-    """Return the seed of random targets, by default the same for everybody."""
-    if number is not None and not 0 <= number < 2**32:
-        raise ValueError(f"seed: expected 0 to {2**32 - 1}, got {number}")
-    return SEED if number is None else number
-
-
-def scale_of(
-    name: str, targets: int | None, entrants: Sequence[Entrant], problems: Sequence[OwnProblem]
+def _scale(
+    name: str, request: MeasurementRequest, entrants: list[Entrant], problems: list[OwnProblem]
 ) -> Scale:
-    """Return a scale with the user's solvers, problems and number of targets."""
-    if targets is not None and targets < 1:
-        raise ValueError(f"targets: expected 1 or more, got {targets}")
-    scale = SCALES[name]
-    return replace(
-        scale, entrants=tuple(entrants), problems=tuple(problems), targets=targets or scale.targets
-    )
+    """Return a scale with the user's solvers, problems, targets and seeds."""
+    given = {"targets": request.targets, "seed": request.seed, "seeds": request.seeds}
+    numbers = {key: number for key, number in given.items() if number is not None}
+    scale = replace(SCALES[name], entrants=tuple(entrants), problems=tuple(problems))
+    return replace(scale, **numbers)
 
 
 def _solver_names(block: Block) -> tuple[str, list[str]]:

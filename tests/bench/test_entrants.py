@@ -359,7 +359,7 @@ def test_a_solver_is_closed_after_its_greeting(folder, monkeypatch):
         (["--solver", "qqq"], "expected one of 'Anderson CCD', 'DART', "),
         (["--problem", "qqq"], "'Fetch', 'Franka Panda', 'KUKA iiwa14'"),
         (["--robot", "qqq"], "expected one of baxter, character, fetch"),
-        (["--targets", "0"], "targets: expected 1 or more, got 0"),
+        (["--targets", "0"], "'--targets': Input should be greater than or equal to 1"),
         (
             ["--solver", "ccd", "--robot", "ur5"],
             "expected one that is asked ur5 in ik, got ccd; `plumb",

@@ -4,11 +4,12 @@ import contextlib
 import io
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from plumbob.bench.experiments import SUITES, blocks
+from plumbob.bench.experiments import SCALES, SUITES, blocks
 from plumbob.bench.experiments.arm.tables import accuracy, residuals_chart
 from plumbob.bench.experiments.chain.tables import beyond_reach, iterations_chart
 from plumbob.bench.figures.sketch import drawn
@@ -171,7 +172,7 @@ def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder, mo
 
 def test_entrants_may_make_as_many_iterations_as_ours(folder, records, made):
     entrants = opening.opened(opening.addresses(["my_ik.py"]), ["ik"])
-    scale = selection.scale_of("quick", 2, entrants, [])
+    scale = replace(SCALES["quick"], targets=2, entrants=tuple(entrants))
     asked: dict[str, dict[str, object]] = {}
     for block in blocks("ik", scale):
         if block.problem.startswith(("chain/", "published/fabrik")) and "max_iterations" in (
