@@ -1,5 +1,6 @@
-"""Problems from model files: a robot of URDF or MJCF, a skeleton of BVH, a cloth of OBJ."""
+"""Problems from model files: a robot of URDF or MJCF, a skeleton of BVH."""
 
+import itertools
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -7,21 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from plumbob import reference
-from plumbob.reference.arguments import FloatArray, IndexArray, name_list
-from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
+from plumbob.reference.formats import bvh, mjcf, urdf
 from plumbob.reference.rotation import roll_pitch_yaw
 
-from .chains import TargetsForSkeleton
+from . import own
 from .robots import TWO_REVOLUTIONS, BenchRobot, chain_of
 
-# Springs [N/m] and mass [kg] of cloths from meshes.
-STIFFNESS, MASS = 1000.0, 1.0
-# The share of a mesh's height that counts as its highest point.
-_TOP = 1e-3
-# Poses for each target of a skeleton, of which those that reach far or near are taken.
-_POOL, _EXTREME = 40, 0.05
 _SEED = 1986
-ANYWHERE, OUTER, INNER = "joint space", "outer shell", "near the root"
 
 
 def robot(path: Path, name: str, effector: str | None) -> BenchRobot:
@@ -33,110 +26,55 @@ def robot(path: Path, name: str, effector: str | None) -> BenchRobot:
     """
     read = urdf.read if path.suffix.lower() == ".urdf" else mjcf.read
     model = read(path).articulation
-    tip = _effector(model.skeleton, model.names, effector)
-    steps = [int(j) for j in model.skeleton.path(tip)]
+    steps = _path(model.skeleton, effector)
     kinds = ["mimic joint" if j in model.mimics else model.kinds[j] for j in steps]
     wrong = [f"a {kind}" for kind in kinds if kind not in ("hinge", "fixed")]
     if wrong or "hinge" not in kinds:
         got = [*wrong, "none"][0]
-        raise ValueError(f"{path}: expected hinges to {model.names[tip]!r}, got {got}")
+        raise ValueError(f"{path}: expected hinges to {model.names[steps[-1]]!r}, got {got}")
     return chain_of(name, name, "base", list(_joints(model, steps)))
 
 
-def _effector(skeleton: reference.Skeleton, names: tuple[str, ...], effector: str | None) -> int:
-    """Return a joint by name, else the leaf with the most joints before it."""
+def _path(skeleton: reference.Skeleton, effector: str | None) -> list[int]:
+    """Return the joints to one given by name, else to the leaf with the most joints before it."""
     if effector is not None:
-        if effector not in names:
-            raise ValueError(f"effector: expected one of {name_list(names[:20])}, got {effector!r}")
-        return names.index(effector)
-    leaves = set(range(len(names))) - set(skeleton.parents.tolist())
-    return max(sorted(leaves), key=lambda leaf: len(skeleton.path(leaf)))
+        return skeleton.path(effector).tolist()
+    leaves = sorted({*range(skeleton.joint_count)} - {*skeleton.parents.tolist()})
+    return max((skeleton.path(leaf).tolist() for leaf in leaves), key=len)
 
 
 def _joints(model: reference.Articulation, steps: list[int]) -> Iterator[ElementTree.Element]:
     """Yield the joints of a path as URDF, which begins at the link `base`."""
-    parent, half = "base", TWO_REVOLUTIONS / 2
-    for i, j in enumerate(steps):
-        child, kind = f"{i}_{model.names[j]}", "revolute" if model.kinds[j] == "hinge" else "fixed"
-        R = reference.rotation.to_matrix(model.frames[j])
+    links = ["base", *(f"{i}_{model.names[j]}" for i, j in enumerate(steps))]
+    for j, (parent, child) in zip(steps, itertools.pairwise(links), strict=True):
+        rpy = roll_pitch_yaw(reference.rotation.to_matrix(model.frames[j]))
+        parts = {"origin": {"xyz": _numbers(model.skeleton.offsets[j]), "rpy": _numbers(rpy)}}
+        parts |= {"parent": {"link": parent}, "child": {"link": child}}
+        if model.kinds[j] == "hinge":
+            limits = np.array([model.lower[j], model.upper[j]])
+            lower, upper = np.clip(limits, -TWO_REVOLUTIONS / 2, TWO_REVOLUTIONS / 2).tolist()
+            parts |= {"axis": {"xyz": _numbers(model.axes[j])}}
+            parts |= {"limit": {"lower": repr(lower), "upper": repr(upper)}}
+        kind = "revolute" if model.kinds[j] == "hinge" else "fixed"
         joint = ElementTree.Element("joint", name=f"joint_{child}", type=kind)
-        origin = {"xyz": _numbers(model.skeleton.offsets[j]), "rpy": _numbers(roll_pitch_yaw(R))}
-        ElementTree.SubElement(joint, "origin", origin)
-        ElementTree.SubElement(joint, "parent", link=parent)
-        ElementTree.SubElement(joint, "child", link=child)
-        if kind == "revolute":
-            ElementTree.SubElement(joint, "axis", xyz=_numbers(model.axes[j]))
-            lower, upper = (float(np.clip(x[j], -half, half)) for x in (model.lower, model.upper))
-            ElementTree.SubElement(joint, "limit", lower=repr(lower), upper=repr(upper))
+        for tag, attributes in parts.items():
+            ElementTree.SubElement(joint, tag, attributes)
         yield joint
-        parent = child
 
 
 def _numbers(vector: Iterable[float]) -> str:
     return " ".join(repr(float(x)) for x in vector)
 
 
-def skeletons(
-    path: Path, title: str, effector: str | None, count: int = 100
-) -> list[TargetsForSkeleton]:
-    """Return targets for the balls of a BVH file, from random poses: anywhere, far out, near.
+def skeleton(path: Path, name: str, effector: str | None, count: int = 100) -> own.OwnProblem:
+    """Return targets for the balls of a BVH file, from random poses.
 
     Raises:
         ValueError: if it cannot be read, or has no joint of this name.
     """
-    skeleton = bvh.read(path).skeleton
-    tip = _effector(skeleton, skeleton.names, effector)
-    chain = path_to(skeleton, tip)
-    rng = np.random.default_rng(_SEED)
-    pool = reference.rotation.random(rng, _POOL * count, chain.joint_count)
-    reached = reference.forward_kinematics(chain, pool).positions[:, -1]
-    order = np.argsort(np.linalg.norm(reached - chain.offsets[0], axis=-1))
-    few = max(count, round(_EXTREME * len(order)))
-    strata = {
-        ANYWHERE: np.arange(count),
-        OUTER: rng.choice(order[-few:], count, replace=False),
-        INNER: rng.choice(order[:few], count, replace=False),
-    }
-    starts = reference.rotation.random(rng, count, chain.joint_count)
-    return [
-        TargetsForSkeleton(
-            f"chain/{title}, {name}", f"{title}, {name}", chain, starts, reached[poses]
-        )
-        for name, poses in strata.items()
-    ]
-
-
-def path_to(skeleton: reference.Skeleton, effector: int) -> reference.Skeleton:
-    """Return the joints from the root to an effector: no other moves it."""
-    path = skeleton.path(effector)
-    return reference.Skeleton(np.arange(len(path)) - 1, skeleton.offsets[path])
-
-
-def cloth(path: Path, pins: str | None) -> tuple[reference.MassSpring, reference.State]:
-    """Return the cloth of an OBJ file: its edges are springs at rest, its masses are equal.
-
-    Raises:
-        ValueError: if it cannot be read, or the pins are no rule and no particles.
-    """
-    mesh = read_obj(path)
-    x, sides = mesh.vertices, mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    used, edges = np.unique(np.unique(np.sort(sides, axis=1), axis=0), return_inverse=True)
-    x, edges = x[used], edges.reshape(-1, 2)
-    rest = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1)
-    masses = np.full(len(x), MASS / len(x))
-    system = reference.MassSpring(masses, edges, rest, STIFFNESS, pinned=_pins(x, pins))
-    return system, reference.State(x, np.zeros_like(x))
-
-
-def _pins(x: FloatArray, rule: str | None) -> IndexArray:
-    if rule in (None, "far"):
-        first = int(np.argmax(np.linalg.norm(x - x.mean(axis=0), axis=1)))
-        second = int(np.argmax(np.linalg.norm(x - x[first], axis=1)))
-        return np.unique([first, second])
-    if rule == "top":
-        height = x[:, 1]
-        return np.flatnonzero(height >= height.max() - _TOP * max(np.ptp(height), 1e-12))
-    words = str(rule).split(",")
-    if not all(word.strip().isdecimal() and int(word) < len(x) for word in words):
-        raise ValueError(f"pins: expected far, top, or indices below {len(x)}, got {rule!r}")
-    return np.unique([int(word) for word in words])
+    tree, rng = bvh.read(path).skeleton, np.random.default_rng(_SEED)
+    tip = _path(tree, effector)[-1]
+    poses, starts = reference.rotation.random(rng, 2, count, tree.joint_count)
+    targets = reference.forward_kinematics(tree, poses).positions[:, tip]
+    fields = {"parents": tree.parents, "offsets": tree.offsets, "targets": targets}
+    return own.skeleton(name, **fields, starts=starts, effector=tip)

@@ -60,7 +60,6 @@ Targets = Annotated[
 Seed = Annotated[int | None, option("N", "Seed of other random targets in suite ik.", min=0)]
 Seeds = Annotated[int, option("N", "Draw targets of robots from N seeds.", min=1)]
 Effector = Annotated[Text, option("NAME", "Link of your models that must reach the target.")]
-Pins = Annotated[Text, option("RULE", "Pinned vertices of your OBJ: far, top or 0,10.")]
 Listing = Annotated[bool, flag("List problems and solvers, and stop.", "--list")]
 DryRun = Annotated[bool, flag("List what would be measured, and stop.", "--dry-run")]
 Verbose = Annotated[bool, flag("Print every table as well.", "--verbose")]
@@ -82,7 +81,6 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     seed: Seed = None,
     seeds: Seeds = 1,
     effector: Effector = None,
-    pins: Pins = None,
     listing: Listing = False,
     dry: DryRun = False,
     verbose: Verbose = False,
@@ -98,7 +96,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
     request = MeasurementRequest(
-        entrants or (), program_of(context), *parts, targets, seed, seeds, effector, pins
+        entrants or (), program_of(context), *parts, targets, seed, seeds, effector
     )
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:

@@ -34,7 +34,6 @@ class MeasurementRequest(NamedTuple):
         seed: of random targets, if not as in the scale.
         seeds: that targets of robots are drawn from.
         effector: link of the user's models that reaches the target.
-        pins: rule for the pins of the user's cloths.
     """
 
     entrants: Sequence[str] = ()
@@ -46,7 +45,6 @@ class MeasurementRequest(NamedTuple):
     seed: int | None = None
     seeds: int = 1
     effector: str | None = None
-    pins: str | None = None
 
 
 def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Choice:
@@ -63,7 +61,7 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
             print(f"plumbob: {visible(entrant)}", file=sys.stderr)
         else:
             entrants.append(entrant)
-    own, names = files.read(request.problems, suites, request.effector, request.pins)
+    own, names = files.read(request.problems, suites, request.effector)
     size = _scale(scale, request, entrants, own)
     if not any((request.solvers, names, request.robots)):
         return Choice(scale, size, is_partial=request.targets is not None)
@@ -91,10 +89,15 @@ def _scale(
     name: str, request: MeasurementRequest, entrants: list[Entrant], problems: list[OwnProblem]
 ) -> Scale:
     """Return a scale with the user's solvers, problems, targets and seeds."""
-    given = {"targets": request.targets, "seed": request.seed, "seeds": request.seeds}
-    numbers = {key: number for key, number in given.items() if number is not None}
-    scale = replace(SCALES[name], entrants=tuple(entrants), problems=tuple(problems))
-    return replace(scale, **numbers)
+    scale = SCALES[name]
+    return replace(
+        scale,
+        targets=request.targets or scale.targets,
+        seed=scale.seed if request.seed is None else request.seed,
+        seeds=request.seeds,
+        entrants=tuple(entrants),
+        problems=tuple(problems),
+    )
 
 
 def _solver_names(block: Block) -> tuple[str, list[str]]:

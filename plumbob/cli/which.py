@@ -68,7 +68,7 @@ def _choice(robot: Path, link: str | None, entrants: Sequence[str]) -> "Choice":
     if not robot.is_file() or robot.suffix.lower() not in SUFFIXES:
         raise ValueError(f"ROBOT: expected a file of type {' or '.join(SUFFIXES)}, got {robot}")
     try:
-        own, (poses, *_) = read([str(robot)], ["ik"], link, None)
+        own, (poses, *_) = read([str(robot)], ["ik"], link)
     except ValueError as error:
         hint = "" if link else "; --link names the link that must reach the targets"
         raise ValueError(str(error).replace("effector: ", "--link: ") + hint) from None
