@@ -504,12 +504,12 @@ def test_a_folder_of_models_is_measured_by_ours_and_by_entrants(folder):
     (folder / "models" / "readme.txt").write_text("nothing")
     (folder / "robot.py").write_text(ROBOT)
     bench("ik", "--quick", "--targets", "10", "--problem", "models", "--with", "robot.py",
-          "--solver", "Mine", "--solver", "Plumbob LM")  # fmt: skip
+          "--solver", "Mine", "--solver", "Plumbob LM, first phase")  # fmt: skip
     found = {(one.problem, one.solver): one for one in records()}
-    for solver in ("Mine", "Plumbob LM"):
+    for solver in ("Mine", "Plumbob LM, first phase"):
         assert found["robots/mine", solver].arrays["solved"].size == 6
         assert found["unreachable/mine", solver].arrays["solved"].sum() == 0
-    assert found["robots/mine", "Plumbob LM"].arrays["solved"].any()
+    assert found["robots/mine", "Plumbob LM, first phase"].arrays["solved"].any()
 
 
 @pytest.mark.parametrize(
