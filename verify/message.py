@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 import msgspec
 import numpy as np
 
-from plumbob.text.printable import shown
+from plumbob.text.printable import one_line
 from plumbob.text.sentence import Sentence, did_you_mean, sentence
 
 from .case import Case
@@ -107,7 +107,7 @@ def _decode_leniently(text: bytes) -> dict[str, Any]:
         raise ValueError(f"expected UTF-8, got byte {text[error.start]:#x}") from None
     except ValueError as error:
         place = getattr(error, "pos", 0)
-        context = shown(text.decode()[max(place - 30, 0) : place + 30])
+        context = one_line(text.decode()[max(place - 30, 0) : place + 30])
         reason = getattr(error, "msg", None) or str(error)
         raise ValueError(
             f"expected JSON, got {context!r} ({reason}, character {place + 1})"
@@ -126,7 +126,7 @@ def decode_request(line: bytes) -> Request:
     """Return a request with its inputs as arrays; raise ValueError if the line is no request."""
     fields = decode_object(line)
     if fields is None or not isinstance(fields.get("id"), int):
-        raise ValueError(f"request: expected an object with an id, got {shown(line)}")
+        raise ValueError(f"request: expected an object with an id, got {one_line(line)}")
     if fields.get("task") == GREETING:
         return Request(fields["id"], GREETING, {})
     task = TASKS[one_of("task", fields.get("task"), TASKS)]
@@ -147,7 +147,7 @@ def decode_answer(
     try:
         outputs = understand(task, inputs, fields)
     except ValueError as error:
-        return Failure(FailureKind.GARBAGE, sentence("{why}", why=shown(str(error), 400)))
+        return Failure(FailureKind.GARBAGE, sentence("{why}", why=one_line(str(error), 400)))
     untimed = _why_untimed(fields.get("seconds"), seconds)
     own = seconds if untimed else min(float(fields["seconds"]), seconds)
     return Answer(outputs, own, _decode_remarks(fields, inputs), untimed)
@@ -155,11 +155,11 @@ def decode_answer(
 
 def decode_error(fields: Mapping[str, Any]) -> Failure:
     """Return the failure of an answer with an "error"."""
-    reason = shown(str(fields["error"]), 400)
+    reason = one_line(str(fields["error"]), 400)
     if fields.get("kind") == FailureKind.GARBAGE:
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=reason))
     if fields.get("kind") == FailureKind.RAISED:
-        exception, file = (shown(str(fields.get(key, ""))) for key in ("exception", "file"))
+        exception, file = (one_line(str(fields.get(key, ""))) for key in ("exception", "file"))
         line = fields.get("line")
         return raised(exception, reason, file, line if isinstance(line, int) else 0)
     return Failure(FailureKind.REFUSED, sentence("The solver reports an error: {why}", why=reason))
@@ -178,7 +178,7 @@ def _why_untimed(own: object, seconds: float) -> Sentence | None:
     return sentence(
         'Not timed: expected "seconds" as 0, or a number from 1e-9 to the time that the answer '
         "took, got {own}.",
-        own=shown(repr(own), 40),
+        own=one_line(repr(own), 40),
     )
 
 
@@ -195,7 +195,9 @@ def _decode_remarks(fields: Mapping[str, Any], inputs: Mapping[str, Any]) -> tup
 
 def prints(line: str | bytes) -> Sentence:
     """Return the remark about prints on standard output."""
-    return sentence("It prints to its standard output, for example: {line}", line=shown(line, 80))
+    return sentence(
+        "It prints to its standard output, for example: {line}", line=one_line(line, 80)
+    )
 
 
 def decode_greeting(fields: Mapping[str, Any], source: str = "greeting") -> Greeting:
@@ -245,7 +247,7 @@ def _check_fields(fields: Mapping[str, Any], kind: type[msgspec.Struct], path: s
 
 def excerpt(value: object) -> str:
     """Return a value as Python writes it; of a long text or list the beginning and the length."""
-    text = shown(repr(value), 60)
+    text = one_line(repr(value), 60)
     if not text.endswith("...") or not isinstance(value, str | list | tuple):
         return text
     return f"{len(value)} {'characters' if isinstance(value, str) else 'entries'}: {text}"

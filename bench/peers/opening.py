@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from plumbob.text.printable import shown
+from plumbob.text.printable import one_line
 from plumbob.verify.contestant import NoGreetingError
 from plumbob.verify.door import LIMITS, open_contestant
 from plumbob.verify.greeting import Greeting
@@ -113,7 +113,7 @@ def _opened(address: SolverAddress) -> Entrant:
     try:
         greeting = contestant.greeting
     except NoGreetingError as error:
-        why = shown(str(error.failure.sentence), 300)
+        why = one_line(str(error.failure.sentence), 300)
         raise ValueError(
             f"with: expected a solver that says what it is, got {address.door}: {why}"
         ) from None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plumbob.reference import MassSpring, Skeleton, State, rotation
 from plumbob.reference.arguments import array, coordinates, number
-from plumbob.text.printable import shown, visible
+from plumbob.text.printable import one_line, visible
 
 from .chains import TargetsForSkeleton
 from .robots import BenchRobot
@@ -21,7 +21,7 @@ _LONGEST = 60
 
 def clean(name: str) -> str:
     """Return a name on a line with printable letters only."""
-    return shown(visible(name.encode(errors="replace").decode()), _LONGEST)
+    return one_line(visible(name.encode(errors="replace").decode()), _LONGEST)
 
 
 @dataclass(frozen=True, eq=False)

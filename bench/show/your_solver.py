@@ -7,7 +7,7 @@ import numpy as np
 
 from plumbob.reference import MassSpring, Skeleton, State, forward_kinematics
 from plumbob.reference.arguments import FloatArray
-from plumbob.text.printable import shown
+from plumbob.text.printable import one_line
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Contestant, Failure, NoGreetingError
@@ -44,7 +44,7 @@ class YourSolver:
             self._greeting = self._contestant.greeting
         except NoGreetingError as error:
             self.close()
-            reason = shown(str(error.failure.sentence), 500)
+            reason = one_line(str(error.failure.sentence), 500)
             raise ValueError(f"with: expected a solver, got {self.address}: {reason}") from None
         self.tasks = self._greeting.tasks
         self.name = self.address if self._greeting.name == "solver" else self._greeting.name
@@ -152,7 +152,7 @@ class YourSolver:
         """Return the answer to a request, which error messages name."""
         answer = self._contestant.answer(Case(request, task, inputs, "show", sentence("")))
         if isinstance(answer, Failure):
-            reason = shown(str(answer.sentence), 300)
+            reason = one_line(str(answer.sentence), 300)
             raise ValueError(
                 f"with: expected an answer to {request}, got none from {self.address}: {reason}"
             )

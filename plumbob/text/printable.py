@@ -40,7 +40,7 @@ def all_visible(value: Any) -> Any:
     return value
 
 
-def shown(text: str | bytes, length: int = 200) -> str:
+def one_line(text: str | bytes, length: int = 200) -> str:
     """Return a text of a solver on one line, without control characters, shortened."""
     words = text.decode(errors="replace") if isinstance(text, bytes) else text
     clean = "".join(letter if letter.isprintable() else " " for letter in words[: 4 * length])

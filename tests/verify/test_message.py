@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from plumbob.text.printable import shown
+from plumbob.text.printable import one_line
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Failure, FailureKind
@@ -319,5 +319,5 @@ def test_a_name_far_from_all_has_no_hint():
 
 
 def test_what_a_solver_says_is_shown_on_one_line_without_control_characters():
-    assert shown(b"a\x1b[2J\r\n\tb\x00\xff") == "a [2J b \ufffd"
-    assert len(shown("x" * 10**6, 50)) == 50
+    assert one_line(b"a\x1b[2J\r\n\tb\x00\xff") == "a [2J b \ufffd"
+    assert len(one_line("x" * 10**6, 50)) == 50

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from plumbob.text.printable import shown
+from plumbob.text.printable import one_line
 from plumbob.text.sentence import Sentence, did_you_mean, sentence
 
 from .. import message
@@ -54,7 +54,7 @@ def _object(path: Path) -> dict[str, Any]:
         content = content.decode("utf-16", errors="replace").encode()
     fields = message.decode_object(content)
     if fields is None:
-        text = shown(content, 60)
+        text = one_line(content, 60)
         raise ValueError(f"{path.name}: expected a JSON object, got {text!r}")
     return fields
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from plumbob.process.child import ChildProcess, Loss
-from plumbob.text.printable import shown
+from plumbob.text.printable import one_line
 from plumbob.text.sentence import Sentence, sentence
 
 from ..contestant import Failure, FailureKind
@@ -57,7 +57,7 @@ def failure_of(
     values = {
         "limit": limits.memory / 1e9,
         "most": limits.line,
-        "line": shown(bytes(part), 60),
+        "line": one_line(bytes(part), 60),
         "count": process.request_length if loss is Loss.UNREAD else len(process.partial),
         "seconds": patience,
         "how": ending(process.code) if loss in (Loss.ENDED, Loss.TRUNCATED) else "",
@@ -66,7 +66,7 @@ def failure_of(
     if entry.get("last_words", True):
         is_hung = entry["kind"] == FailureKind.HUNG  # what it wrote before is no reason of that
         words = process.recent_words if is_hung else bytes(process.last_words)
-        lines = list(dict.fromkeys(map(shown, words.splitlines())))
+        lines = list(dict.fromkeys(map(one_line, words.splitlines())))
         lines = [line for line in lines if not any(text in line for text in _HIDDEN)]
         lines = [line for line in lines if line.strip(_MARKS)]
         if lines:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from plumbob.process.child import ChildProcess, LostError
-from plumbob.text.printable import shown
+from plumbob.text.printable import one_line
 from plumbob.text.sentence import Sentence, sentence
 
 from .. import message
@@ -136,7 +136,7 @@ class ProgramContestant:
             fields = self._decode(received)
             if fields is not None:
                 return fields, seconds, size
-        example = shown(self._print or b"", 80)
+        example = one_line(self._print or b"", 80)
         raise garbage("prints", count=self._limits.prints, line=example)
 
     def _decode(self, line: bytes) -> Mapping[str, Any] | None:
@@ -151,7 +151,7 @@ class ProgramContestant:
         if number == self._number and not isinstance(number, bool):
             return fields
         key = "no id" if number is None else "another id"
-        raise garbage(key, number=self._number, id=shown(repr(number), 40))
+        raise garbage(key, number=self._number, id=one_line(repr(number), 40))
 
     def _with_prints(self, error: FailureError) -> FailureError:
         """Return a loss with an example of the program's earlier prints, if there are any."""
@@ -160,6 +160,6 @@ class ProgramContestant:
         words = sentence(
             "{what} Before it had printed lines that are no answers, for example: {line}",
             what=error.failure.sentence,
-            line=shown(self._print, 80),
+            line=one_line(self._print, 80),
         )
         return FailureError(error.failure.kind, words)

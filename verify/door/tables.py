@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.text.printable import shown
+from plumbob.text.printable import one_line
 
 from ..functions import checked
 from ..message import plain
@@ -90,7 +90,7 @@ def _rows(
         if None in numbers:
             wrong = row[numbers.index(None)]
             raise ValueError(
-                f"{field.name}: expected a number in line {line}, got {shown(repr(wrong), 40)}"
+                f"{field.name}: expected a number in line {line}, got {one_line(repr(wrong), 40)}"
             )
         yield [number for number in numbers if number is not None]
 

@@ -49,7 +49,7 @@ class DaskExecutor(Executor):
             self.close()
             raise self._error(f"expected a worker, got none within {workers:g} s") from None
         # Times come from the kind of machine of most workers, and from the first of these.
-        machines = {at: json.dumps(found) for at, found in self._client.run(_machine).items()}
+        machines = {at: json.dumps(machine) for at, machine in self._client.run(_machine).items()}
         counts = Counter(machines.values())
         self._timer = min(machines, key=lambda at: (-counts[machines[at]], machines[at], at))
         self._machine = json.loads(machines[self._timer])
@@ -78,12 +78,12 @@ class DaskExecutor(Executor):
             elif block.times:
                 yield NotMeasured(block, f"the worker that takes times, {self._timer}, is lost")
 
-    def _measure(self, blocks: Sequence[Block], scale: Scale, **where: Any) -> Iterator[Step]:
+    def _measure(self, blocks: Sequence[Block], scale: Scale, **options: Any) -> Iterator[Step]:
         yield from blocks
-        limits, ours = pickle.dumps(scale), _of_any_machine()
+        limits, client = pickle.dumps(scale), _of_any_machine()
         futures = {
             self._client.submit(
-                perform, block.suite, limits, block_key(block), ours, pure=False, **where
+                perform, block.suite, limits, block_key(block), client, pure=False, **options
             ): block
             for block in blocks
         }
@@ -98,15 +98,15 @@ class DaskExecutor(Executor):
         while left:
             try:
                 with self._client.as_current():
-                    done = wait(left, timeout=_LOOK, return_when="FIRST_COMPLETED").done
+                    completed = wait(left, timeout=_LOOK, return_when="FIRST_COMPLETED").done
             except TimeoutError:
-                done = set()
-            if done or self._client.nthreads():
+                completed = set()
+            if completed or self._client.nthreads():
                 patience = Patience(self._patience)
             elif patience.is_spent:
                 raise self._error(f"no worker is left for {self._patience:g} s")
-            yield from done
-            left -= done
+            yield from completed
+            left -= completed
 
     def _record(self, block: Block, future: Any) -> Record:
         from distributed import KilledWorker
