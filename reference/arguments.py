@@ -1,14 +1,12 @@
 """Checks of arguments: return the value, or raise a ValueError that names the argument.
 
 One rule bounds all magnitudes: no number is beyond 1e75, and a size, which is a number that may not
-be negative, is 0 or at least 1e-75. `array`, `sizes` and `number` keep it; only a caller that
-checks the numbers itself, a kernel say, may take them from `floats`. No copy that does not fit
-into memory is made; a boolean is no number and no integer.
+be negative, is 0 or at least 1e-75. The fourth powers of all numbers, and the quotients by those of
+sizes, are then finite. `array`, `sizes` and `number` keep the rule; only a caller that checks the
+numbers itself, a kernel say, may take them from `floats`. A boolean is no number and no integer.
 """
 
-import contextlib
 import copy
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -23,19 +21,13 @@ Kind = TypeVar("Kind")
 
 FLOAT64 = np.dtype(np.float64)
 
-# No number is beyond this, so that its fourth power is finite.
-LARGEST_COORDINATE = 1e75
-# No size but 0 is below this, so that one can divide by its fourth power.
-SMALLEST_POSITIVE = 1e-75
+# The largest number and the smallest size but 0.
+LARGEST_COORDINATE, SMALLEST_POSITIVE = 1e75, 1e-75
 # The largest number of particles, joints, points, poses or restarts: arrays of more fit no memory.
 LARGEST_COUNT = 10**8
-# Bounds of an array whose shape is an argument: its numbers, and the lengths of its shape.
-LARGEST_ARRAY, LARGEST_RANK = 4 * LARGEST_COUNT, 32
 # Error messages show no arrays of more numbers.
 LARGEST_SHOWN = 1000
-# Kinds of arrays that hold no numbers.
-KINDS = {"b": "booleans", "c": "complex numbers", "O": "objects", "U": "text", "M": "dates"}
-# Of the integers by which arrays are indexed.
+# The largest integer of the arrays of indices, and of the kernels.
 LARGEST_INTEGER = 2**63 - 1
 
 
@@ -80,10 +72,10 @@ def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
         return value
     numbers = _converted(name, value)
     if numbers.dtype.kind not in "fiu":
-        kind = KINDS.get(numbers.dtype.kind) if isinstance(value, np.ndarray) else None
-        raise ValueError(f"{name}: expected an array of numbers, got {kind or shown(value)}")
+        got = f"{value.dtype} values" if isinstance(value, np.ndarray) else shown(value)
+        raise ValueError(f"{name}: expected an array of numbers, got {got}")
     check_shape(name, numbers, *trailing)
-    return copied(name, numbers, np.float64)
+    return np.array(numbers, dtype=np.float64, order="C")
 
 
 def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
@@ -113,19 +105,16 @@ def number(
     result = floats(name, value, "...")
     if result.shape != ():
         raise ValueError(f"{name}: expected one number, got shape {shape(result.shape)}")
-    if not np.isfinite(result):
-        raise ValueError(f"{name}: expected a finite number, got {value}")
-    if result <= above:
-        raise ValueError(f"{name}: expected a number greater than {above:g}, got {value}")
-    if result < minimum:
-        raise ValueError(f"{name}: expected a number of at least {minimum:g}, got {value}")
-    if result < lowest and result != 0.0:
-        zero = "0 or " if minimum == 0.0 > above else ""
-        raise ValueError(f"{name}: expected {zero}a number of at least {lowest:g}, got {value}")
-    if result > LARGEST_COORDINATE:
-        raise ValueError(
-            f"{name}: expected a number of at most {LARGEST_COORDINATE:g}, got {value}"
-        )
+    zero = "0 or " if minimum == 0.0 > above else ""
+    for is_wrong, expected in (
+        (not np.isfinite(result), "a finite number"),
+        (result <= above, f"a number greater than {above:g}"),
+        (result < minimum, f"a number of at least {minimum:g}"),
+        (result < lowest and result != 0.0, f"{zero}a number of at least {lowest:g}"),
+        (result > LARGEST_COORDINATE, f"a number of at most {LARGEST_COORDINATE:g}"),
+    ):
+        if is_wrong:
+            raise ValueError(f"{name}: expected {expected}, got {value}")
     return float(result)
 
 
@@ -137,8 +126,7 @@ def integer(name: str, value: Any, *, minimum: int, below: int = LARGEST_INTEGER
         raise ValueError(f"{name}: expected an integer, got {shown(value)}")
     if not minimum <= value < below:
         upper = "" if below > LARGEST_INTEGER >= value else f" and at most {below - 1}"
-        got = shown(int(value))
-        raise ValueError(f"{name}: expected an integer of at least {minimum}{upper}, got {got}")
+        raise ValueError(f"{name}: expected an integer of at least {minimum}{upper}, got {value}")
     return int(value)
 
 
@@ -146,19 +134,13 @@ def count(name: str, value: Any, *, minimum: int) -> int:
     """Return an int, at least `minimum` and at most LARGEST_COUNT: a length of arrays."""
     result = integer(name, value, minimum=minimum)
     if result > LARGEST_COUNT:
-        raise ValueError(f"{name}: expected at most {LARGEST_COUNT:,}, got {shown(result)}")
+        raise ValueError(f"{name}: expected at most {LARGEST_COUNT:,}, got {result}")
     return result
 
 
-def lengths(name: str, value: Sequence[Any], width: int) -> tuple[int, ...]:
-    """Return the leading axes, of 0 or more, of an array that ends with an axis of a width."""
-    axes = tuple(integer(name, length, minimum=0) for length in value)
-    if len(axes) > LARGEST_RANK or math.prod(max(n, 1) for n in (*axes, width)) > LARGEST_ARRAY:
-        raise ValueError(
-            f"{name}: expected at most {LARGEST_RANK} lengths, of an array of at most "
-            f"{LARGEST_ARRAY:,} numbers, got {shape(axes):.80}"
-        )
-    return axes
+def lengths(name: str, value: Sequence[Any]) -> tuple[int, ...]:
+    """Return the leading axes of an array, 0 or more."""
+    return tuple(count(name, length, minimum=0) for length in value)
 
 
 def indices(
@@ -169,7 +151,7 @@ def indices(
     if integers.dtype.kind not in ("iu" if integers.size else "iuf"):  # an empty list is of floats
         raise ValueError(f"{name}: expected integer indices, got {integers.dtype} values")
     check_shape(name, integers, *trailing)
-    result = copied(name, integers, np.int64)
+    result = np.array(integers, dtype=np.int64, order="C")
     outside = integers[(result < minimum) | (result >= below)]
     if outside.size:
         raise ValueError(
@@ -259,16 +241,6 @@ def check_shape(name: str, values: np.ndarray, *trailing: int | str) -> None:
         raise ValueError(f"{name}: expected shape {shape(trailing)}, got {shape(values.shape)}")
 
 
-def copied(name: str, values: np.ndarray, dtype: Any) -> Any:
-    """Return a C-contiguous copy of another type; a number that overflows becomes infinite."""
-    try:
-        with np.errstate(over="ignore"):
-            return np.array(values, dtype=dtype, order="C")
-    except MemoryError:
-        got = shape(values.shape)
-        raise ValueError(f"{name}: expected an array that fits into memory, got {got}") from None
-
-
 def spread(values: FloatArray, lengths: Sequence[int]) -> FloatArray:
     """Return the values broadcast to a shape, contiguous and writable, copied only if need be."""
     if values.shape == tuple(lengths):
@@ -296,13 +268,9 @@ class KeepsReadOnly:
         self.__dict__.update(values, **{name: frozen(values[name]) for name in names})
 
 
-def snapshot(name: str, value: Any) -> Any:
+def snapshot(value: Any) -> Any:
     """Return a copy of an array or a list, safe from later changes; else the value."""
-    if isinstance(value, np.ndarray) and not np.ma.is_masked(value):
-        return copied(name, value, value.dtype)
-    with contextlib.suppress(Exception):  # a list that cannot be copied is refused at its use
-        return copy.deepcopy(value) if isinstance(value, list) else value
-    return value
+    return copy.deepcopy(value) if isinstance(value, np.ndarray | list) else value
 
 
 def shape(lengths: Sequence[int | str]) -> str:
@@ -312,7 +280,7 @@ def shape(lengths: Sequence[int | str]) -> str:
 
 
 def shown(value: Any) -> str:
-    """Write a value for an error message, in short; its type if that fails.
+    """Write a value for an error message, in short.
 
     Large arrays are not written: NumPy takes half a minute to shorten an array of 20 axes.
     """
@@ -320,10 +288,7 @@ def shown(value: Any) -> str:
     if any(isinstance(part, np.ndarray) and part.size > LARGEST_SHOWN for part in parts):
         kind = type(value).__name__
         return f"an array of shape {shape(value.shape)}" if kind == "ndarray" else f"a {kind}"
-    try:
-        return f"{value!r:.80}"
-    except Exception:
-        return type(value).__name__
+    return f"{value!r:.80}"
 
 
 def digits_apart(number: float, bound: float, minimum: int = 6) -> int:
@@ -346,7 +311,7 @@ def _converted(name: str, value: Any) -> np.ndarray:
         values = np.asarray(value)
     except Exception:  # an object's own conversion may raise any error
         raise ValueError(f"{name}: expected an array of numbers, got {shown(value)}") from None
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+    if np.ma.is_masked(value):
         raise ValueError(f"{name}: expected an array of numbers, got one with masked values")
     return values
 

@@ -244,7 +244,7 @@ class Articulation(KeepsReadOnly):
         metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
         """
         arguments.instance("rng", rng, np.random.Generator)
-        shape = arguments.lengths("shape", shape, self.coordinate_count)
+        shape = arguments.lengths("shape", shape)
         q = np.empty((math.prod(shape), self.coordinate_count))
         for joint in self._leading:
             q[:, self.coordinates_of(int(joint))] = _drawn(rng, self, int(joint), len(q))

@@ -21,7 +21,7 @@ from .quaternion import logarithm as logarithm_of
 
 def identity(*shape: int) -> FloatArray:
     """Return identity quaternions, (*shape, 4)."""
-    result = np.zeros((*arguments.lengths("shape", shape, 4), 4))
+    result = np.zeros((*arguments.lengths("shape", shape), 4))
     result[..., 0] = 1.0
     return result
 
@@ -29,7 +29,7 @@ def identity(*shape: int) -> FloatArray:
 def random(rng: np.random.Generator, *shape: int) -> FloatArray:
     """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors."""
     rng = arguments.instance("rng", rng, np.random.Generator)
-    q = rng.standard_normal((*arguments.lengths("shape", shape, 4), 4))
+    q = rng.standard_normal((*arguments.lengths("shape", shape), 4))
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 

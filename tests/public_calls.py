@@ -144,6 +144,8 @@ VARIANTS = {
     "solve_ik, numbers": posed, "ImplicitEuler.iterates": iterates,
     "all_solutions, closed form": lambda position, rotation=None:
         plumbob.all_solutions(arm(6), Target(position, rotation)),
+    "IKSolutions.with_turns": lambda position, rotation=None:
+        list(plumbob.all_solutions(arm(6), Target(position, rotation)).with_turns()),
     "prepare, called": lambda q: plumbob.prepare(robot())(q),
     "prepare_ik, called": lambda q, target: plumbob.prepare_ik(robot(), effector="f")(q, target),
     "formats.bvh.Motion.pose": lambda local_rotations, offsets:
@@ -211,13 +213,13 @@ def values():
             "record": True, "phases": 1, "prefer": None, "oriented": False, "target": point,
             "solver": "levenberg_marquardt", "position": point, "rotation": quaternions[0],
             "weight": 2.0, "tasks": [Target(point, effector=5)], "curve": forces, "start": local[0],
-            "warm": True, "coherent": False, "closed": False, "pose": local[0], "count": 12,
+            "warm": True, "pose": local[0], "count": 12,
             "min_spacing": 0.01, "max_spacing": 0.05, "masses": masses, "springs": SPRINGS,
             **per_spring, "pinned": np.array([0]), "gravity": gravity, "positions": positions,
             "velocities": velocities, "system": system, "state": state, "h": 0.01,
             "external_forces": forces, "pin_positions": positions[:1] + 0.1, "result": result,
             "other": proof, "distance": 0.1, "triangles": np.array([[0, 1, 2], [0, 2, 3]]),
-            "wind": forces, "density": 1.2, "drag": 1.0, "lift": 0.5, "text": triangle,
+            "text": triangle,
         },
         "instances": {"Articulation": model, "Skeleton": balls, "ImplicitEuler": euler,
                       "Certificate": proof},

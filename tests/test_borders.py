@@ -24,7 +24,7 @@ BATCHED = {
 ANY_LENGTH = {"pinned", "joints", "coefficients"}
 INFINITE = {"lower", "upper", "cones"}
 # Words for errors, what stands for a file, and a choice that is not checked.
-UNCHECKED = {"argument", "name", "path", "root", "coherent"}
+UNCHECKED = {"argument", "name", "path", "root"}
 # Other names by which an error may call an argument.
 ALIASES = {
     "local_rotations": "q", "pose": "q local_rotations", "position": "target residual",

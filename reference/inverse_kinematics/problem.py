@@ -56,8 +56,8 @@ class Target(_TargetFields):
         weight: float = 1.0,
     ) -> "Target":
         """Copy the arrays; they are checked where the target is used."""
-        x = arguments.snapshot("position", position)
-        Q = arguments.snapshot("rotation", rotation)
+        x = arguments.snapshot(position)
+        Q = arguments.snapshot(rotation)
         return super().__new__(cls, x, Q, effector, weight)
 
 

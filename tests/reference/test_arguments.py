@@ -4,9 +4,20 @@ import re
 from functools import partial
 
 import numpy as np
+import public_calls
 import pytest
 
-from plumbob.reference import arguments, rotation
+from plumbob.reference import (
+    Skeleton,
+    Target,
+    all_solutions,
+    arguments,
+    curves,
+    rotation,
+    scenes,
+    solve_ik,
+    solve_tasks,
+)
 
 POSITIVE = partial(arguments.number, above=0.0)
 SIZE = partial(arguments.number, minimum=0.0)
@@ -87,8 +98,8 @@ REFUSED = [
     (partial(arguments.choice, valid=["ccd", "fabrik"]), "cdc",
      "expected one of ccd, fabrik, got 'cdc'"),
     *((row, np.zeros((100, 3), dtype), f"expected an array of numbers, got {kind}")
-      for dtype, kind in (("complex128", "complex numbers"), ("object", "objects"),
-                          ("<U1", "text"), ("bool", "booleans"), ("datetime64[s]", "dates"))),
+      for dtype, kind in ((kind, f"{kind} values") for kind in
+                          ("complex128", "object", "<U1", "bool", "datetime64[s]"))),
 ]  # fmt: skip
 
 
@@ -141,8 +152,43 @@ def test_what_is_frozen_cannot_be_written_to_but_its_owner_can():
     assert view[0] == 1.0
 
 
-@pytest.mark.parametrize("axes", [(10**12,), (2**40, 2**40), (10**9, 0), (1,) * 70])
-def test_the_axes_of_arrays_that_fit_no_memory_are_refused(axes):
-    for make in (rotation.identity, partial(rotation.random, np.random.default_rng(0))):
-        with pytest.raises(ValueError, match=r"^shape: expected at most 32 lengths, of an array"):
-            make(*axes)
+ARM, REST = scenes.lab_arm()
+TOO_MANY = {
+    "shape": lambda: rotation.identity(10**12),
+    "size": lambda: scenes.lab_cloth(size=10**5),
+    "rows, columns": lambda: scenes.grid_cloth(10**5, 10**5),
+    "counts": lambda: scenes.lattice([10**4, 10**4, 10**4]),
+    "count": lambda: curves["circle"](10**15),
+    "links": lambda: scenes.ball_chain(links=10**12),
+    "restarts": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], restarts=10**12),
+    "max_iterations": lambda: solve_ik(
+        ARM, REST, [0.3, 0.0, 0.4], max_iterations=10**12, record=True
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TOO_MANY)
+def test_counts_beyond_any_memory_are_refused_before_arrays_are_made(name):
+    with pytest.raises(ValueError, match=rf"^{name}: expected .*at most 1"):
+        TOO_MANY[name]()
+
+
+ARM, REST = scenes.lab_arm()
+AXES_20 = np.zeros((2,) * 20)  # NumPy takes up to half a minute to write this array
+LARGE_ARRAYS = {
+    "tolerance": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], tolerance=AXES_20),
+    "restarts": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], restarts=AXES_20),
+    "effector": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], effector=AXES_20),
+    "solver": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], AXES_20),
+    "target": lambda: all_solutions(public_calls.robot(), Target(AXES_20)),
+    "targets": lambda: solve_ik(ARM, REST, [Target([0.3, 0.0, 0.4]), AXES_20]),
+    "names": lambda: Skeleton([-1, 0], np.ones((2, 3)), ["", AXES_20]),
+    "tasks": lambda: solve_tasks(public_calls.robot(), public_calls.robot().neutral(), AXES_20),
+}
+
+
+@pytest.mark.parametrize("name", LARGE_ARRAYS)
+def test_large_arrays_are_refused_without_their_numbers(name):
+    with pytest.raises(ValueError, match=rf"^{name.removesuffix('s')}.*: expected") as refusal:
+        LARGE_ARRAYS[name]()
+    assert "array([" not in str(refusal.value)
