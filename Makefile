@@ -1,5 +1,6 @@
 # make report   check, bench and write report/index.html
-# make test     the tests, a few minutes; `make test-all` adds the heavy sweeps
+# make test     the tests, a few minutes; `make test-all` adds the heavy sweeps, and the borders of
+#               public functions with kernels that check their indices
 # make peers    install the solvers of others as well, for `make bench`: all that this Python has
 #               wheels of; 4 GB on Linux x86-64
 # make lint     ruff and mypy
@@ -40,6 +41,8 @@ test: .venv/installed
 
 test-all: .venv/installed
 	$(BIN)/python -m pytest $(PARALLEL) -m "slow or not slow"
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/build/bounds \
+	    $(BIN)/python -m pytest $(PARALLEL) tests/test_borders.py
 
 peers: .venv/peers/installed
 

@@ -173,7 +173,6 @@ def test_counts_beyond_any_memory_are_refused_before_arrays_are_made(name):
         TOO_MANY[name]()
 
 
-ARM, REST = scenes.lab_arm()
 AXES_20 = np.zeros((2,) * 20)  # NumPy takes up to half a minute to write this array
 LARGE_ARRAYS = {
     "tolerance": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], tolerance=AXES_20),
