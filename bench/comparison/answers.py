@@ -20,18 +20,18 @@ _TIMES: Mapping[str, frozenset[str]] = {
 }
 # Bytes of memory, which depend on the state of the system.
 _MEMORY = frozenset({("cloth_scale", "before"), ("cloth_scale", "memory")})
-# Arrays that are better when smaller.
+# Arrays of which smaller values are better.
 _ERRORS = frozenset({
     "residual", "error", "position", "rotation", "beyond", "excess", "drift", "difference",
     "positions", "rotations", "jacobians", "above",
 })  # fmt: skip
 # In other suites the distance of a target, which is an input.
 _DISTANCES = frozenset({("cloth", "distance"), ("newton", "distance")})
-# Arrays that are better when larger.
+# Arrays of which larger values are better.
 _MERITS = frozenset({"solved", "held", "covered", "same"})
 # Which targets were solved; records with this array have times by target too.
 SOLVED = "solved"
-# Statistics of a row, and the arrays whose smallest entry is one.
+# Statistics of a row, and the arrays whose minimum is the smallest error.
 SHARE, ERROR = "share solved", "smallest error"
 _SMALLEST = {"error", "true"}
 # The setting of a time limit per solve, which makes answers differ from run to run.
@@ -54,7 +54,7 @@ def worse_sign(suite: str, name: str) -> int:
 def compare_answers(key: RowKey, pair: Pair) -> RowChange:
     """Return the change of a row's answers: of the first worse array, else the first that differs.
 
-    Arrays are compared to the bit, over the targets that both runs reached within their time limit.
+    Arrays are compared to the bit, over the targets reached in both runs within the time limit.
     """
     if pair.old.size != pair.new.size:
         old, new = distinct_texts(pair.old.size, pair.new.size)
@@ -101,7 +101,7 @@ def _statistic(key: RowKey, name: str, gain: float, why: str) -> Iterator[RowCha
 def chance_by_time_limit(pair: Pair) -> float | None:
     """Return the probability of as many differing targets by chance; None without a time limit.
 
-    McNemar's exact test (1947) on the targets that only one of the two runs solved.
+    McNemar's exact test (1947) on the targets solved in only one of the two runs.
     """
     has_targets = SOLVED in pair.old.arrays and SOLVED in pair.new.arrays
     if _TIME_LIMIT not in pair.old.settings or not has_targets:
@@ -122,7 +122,7 @@ def compare_limited_answers(key: RowKey, pair: Pair, chance: float, error_rate: 
 
 
 def _common_targets(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the parts of two arrays that belong to the same targets."""
+    """Return the parts of two arrays for the same targets."""
     if old.ndim == new.ndim == 1:
         count = min(len(old), len(new))
         return old[:count], new[:count]

@@ -1,4 +1,4 @@
-"""Compare two runs row by row, and find the rows that fail a gate."""
+"""Compare two runs row by row, and find the rows failing a gate."""
 
 import json
 import math
@@ -110,10 +110,10 @@ def row_changes(
 
 
 def gate_limits(request: str) -> dict[str, float]:
-    """Return the least changes that fail a gate, from a text such as "solved:1,time:25%".
+    """Return the least changes that fail a gate, from a text like "solved:1,time:25%".
 
     Raises:
-        ValueError: if a part of it is no limit.
+        ValueError: if a part of the text is no limit.
     """
     limits: dict[str, float] = {"gone": 0.0} if request.strip(" ,") else {}
     for part in filter(None, (part.strip() for part in request.split(","))):
@@ -134,13 +134,13 @@ def gate_limits(request: str) -> dict[str, float]:
 
 
 def failing(rows: Iterable[RowChange], limits: Mapping[str, float]) -> list[RowChange]:
-    """Return the rows that fail a gate, with the limit at the end of their sentence."""
+    """Return the rows failing a gate, with the limit at the end of their sentence."""
     exceeded = ((row, _exceeded_limit(row, limits)) for row in rows)
     return [replace(row, why=f"{row.why} ({limit})") for row, limit in exceeded if limit]
 
 
 def _exceeded_limit(row: RowChange, limits: Mapping[str, float]) -> str:
-    """Return the limit that a row exceeds as words, "" if there is none."""
+    """Return in words the limit exceeded by a row, "" if there is none."""
     names = {SHARE: "solved", ERROR: "error"}
     name = names.get(row.quantity, "accuracy")
     limit = limits.get(name, math.inf)
@@ -158,7 +158,7 @@ def _exceeded_limit(row: RowChange, limits: Mapping[str, float]) -> str:
 
 
 def _is_lost(row: RowChange) -> bool:
-    """Return whether a row that was measured is gone, or has failed."""
+    """Return whether a measured row is gone or has failed."""
     has_failed = row.verdict == ChangeVerdict.LESS_RIGHT and not row.quantity
     return row.verdict == ChangeVerdict.GONE or has_failed
 
@@ -202,7 +202,7 @@ def summary(comparison: RunComparison, failed: Sequence[RowChange], width: int) 
 
 
 def _changes(comparison: RunComparison, failed: Sequence[RowChange]) -> list[RowChange]:
-    """Return the rows that differ or are undecided, those that fail the gate first."""
+    """Return the rows that differ or are undecided, rows that fail the gate first."""
     names = {(row.key, row.quantity) for row in failed}
     rows = [row for row in comparison.rows if row.verdict != ChangeVerdict.SAME]
     return [*failed, *(row for row in rows if (row.key, row.quantity) not in names)]

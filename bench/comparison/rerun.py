@@ -57,13 +57,13 @@ class Plan(NamedTuple):
 
 
 def rerun(plan: Plan, place: Path, tell: Callable[[str], None] = lambda _: None) -> RunComparison:
-    """Return the differences between the working copy that contains a folder and a revision of it.
+    """Return the differences between a revision and the working copy that contains a folder.
 
-    Solvers of the user's are addressed from that folder; else the repository is Plumbob's.
+    Solvers of the user's are addressed from this folder; else the repository is Plumbob's.
 
     Raises:
         ValueError: if the folder is in no such repository, there is no such revision, nothing to
-            measure in both, or a process ends before it has measured all.
+            measure in both, or a process ends before all is measured.
     """
     root = _repository(place, plan)
     with _temporary_folder() as folder:
@@ -163,7 +163,7 @@ class Revision:
 
 
 class _Bench(NamedTuple):
-    """The folders of both revisions, the plan, and a function that shows progress."""
+    """The folders of both revisions, the plan, and a function to show progress."""
 
     folders: tuple[Path, Path]
     plan: Plan
@@ -258,7 +258,7 @@ def _ratios(times: TimePairs) -> TimeRatios:
 
 
 def _decided(ratios: TimeRatios) -> TimeRatios:
-    """Return the ratios that are faster or slower beyond chance."""
+    """Return the ratios different from 1 beyond chance."""
     chances = adjusted([ratio.chance for ratio in ratios.values()])
     return {time: ratios[time] for time, chance in zip(ratios, chances, strict=True)
             if chance <= ERROR_RATE}  # fmt: skip
@@ -267,7 +267,7 @@ def _decided(ratios: TimeRatios) -> TimeRatios:
 def _confirmed(first: TimeRatios, second: TimeRatios) -> TimeRatios:
     """Return the second ratios of times decided twice alike; the others count as chance.
 
-    The second estimate is unbiased: it was not selected for its size.
+    The second estimate is unbiased, because no ratio was selected by its size.
     """
     repeated = _decided({time: ratio for time, ratio in second.items() if time in first})
     return {

@@ -1,7 +1,7 @@
 """Measure blocks of a revision, for each line of standard input.
 
-A program of its own, run by path. Of a revision of Plumbob it imports the bench, and uses only what
-the bench has had since its first records; of the user's project it measures the solvers.
+A program of its own, run by path. From a revision of Plumbob the program imports the bench, and
+uses only names as old as the first records. From the user's project it measures the solvers.
 """
 
 import importlib
@@ -13,10 +13,10 @@ from typing import Any
 
 
 def main(folder: str, scale: str, suites: str, solvers: str = "") -> None:
-    """Write the keys of all blocks, and then a record for each key that is read.
+    """Write the keys of all blocks, then a record for each key read.
 
-    `folder` holds the sources of the revision, or is where the addresses of the user's solvers are
-    from; these and the suites are lists in JSON.
+    `folder` holds the sources of the revision, or is the base of the addresses of the user's
+    solvers. Addresses and suites are lists in JSON.
     """
     output = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what an engine prints is no record

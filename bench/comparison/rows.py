@@ -1,4 +1,4 @@
-"""Rows of a comparison: the records that two runs have of the same problem, solver and settings."""
+"""Rows of a comparison: the records of the same problem, solver and settings in two runs."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -64,13 +64,13 @@ class RowChange:
 
 
 def row_key(record: Record) -> RowKey:
-    """Return the key that records of the same row share, whatever version was measured."""
+    """Return the key shared by the records of a row, whatever version was measured."""
     settings = {name: setting for name, setting in record.settings.items() if name != "version"}
     return record_key(record.suite, record.problem, record.solver, settings)
 
 
 def by_row(records: Iterable[Record]) -> dict[RowKey, Record]:
-    """Return the latest record of each row that was measured or failed."""
+    """Return the latest record of each measured or failed row."""
     return {
         row_key(record): record
         for record in sorted(records, key=lambda record: record.when)
@@ -81,7 +81,7 @@ def by_row(records: Iterable[Record]) -> dict[RowKey, Record]:
 def match_rows(
     old: Mapping[RowKey, Record], new: Mapping[RowKey, Record]
 ) -> tuple[dict[RowKey, Pair], list[RowChange]]:
-    """Return the rows that were measured in both runs, and a change for each other row."""
+    """Return the rows measured in both runs, and a change for each other row."""
     pairs, changes = {}, []
     for key in {**old, **new}:
         before, after = old.get(key), new.get(key)
@@ -118,5 +118,5 @@ def worst_first(rows: Iterable[RowChange]) -> list[RowChange]:
 
 
 def contains_any(key: Sequence[str], words: Sequence[str]) -> bool:
-    """Return whether the problem or solver contains one of the words; True without words."""
+    """Return whether the problem or solver contains any of the words; True without words."""
     return not words or any(word in part for word in words for part in key[1:3])

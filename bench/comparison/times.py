@@ -1,6 +1,6 @@
 """Compare times of two runs: confidence intervals of ratios, and the drift of the machine.
 
-Times are compared by the logarithm of their ratio, so that twice and half are equally far from 1.
+Times are compared by the logarithm of their ratio, so twice and half are equally far from 1.
 """
 
 import math
@@ -17,11 +17,11 @@ from .rows import ChangeVerdict, Pair, RowChange, RowKey, TimeRatio
 
 Floats = NDArray[np.float64]
 
-# The probability that any row is called faster or slower although none is.
+# The probability of calling any row faster or slower although no row is.
 ERROR_RATE = 0.05
 CONFIDENCE = 0.95
 RESAMPLES = 200
-# The least drift, however steady the machine seems; and the drift if nothing measures it.
+# The least drift, however steady the machine seems; and the drift if not measured.
 FLOOR, UNKNOWN = 0.01, 0.1
 # Times whose ratio is surely within this margin of 1 are the same.
 MARGIN = 0.1
@@ -57,8 +57,8 @@ def ratio_of_medians(
 ) -> TimeRatio:
     """Return the ratio of two medians by the block bootstrap, and by the machine's drift [log].
 
-    Rounds that follow each other are correlated, so blocks of them are resampled (Künsch 1989). The
-    drift between two runs shows in neither of them, so its variance is added, with the degrees of
+    Successive rounds are correlated, so blocks of rounds are resampled (Künsch 1989). Neither run
+    shows the drift between the two, so the variance of the drift is added, with the degrees of
     freedom of Welch (1947).
     """
     centre = math.log(np.median(new) / np.median(old))
@@ -123,8 +123,8 @@ def pairs_needed(rows: int) -> int:
 def machine_drift(rows: Mapping[RowKey, Pair]) -> Drift:
     """Return the drift between two runs, by the larger of two estimates.
 
-    The first is by solvers with unchanged code, like engines and copies of memory; the second by
-    the fixed loop that is timed beside every record.
+    The first estimate is by solvers with unchanged code, like engines and copies of memory. The
+    second is by the fixed loop timed beside every record.
     """
     estimates = [*_drift_by_controls(rows), *_drift_by_fixed_loop(rows)]
     if not estimates:
@@ -162,7 +162,7 @@ def _is_control(pair: Pair) -> bool:
 def time_ratios(
     rows: Mapping[RowKey, Pair], drift: Drift
 ) -> dict[tuple[RowKey, str], TimeRatio | str]:
-    """Return the ratio of each time that has enough rounds, or why it is not compared."""
+    """Return the ratio of each time with enough rounds, or why the time is not compared."""
     return {
         (key, name): _why_not_compared(pair, name) or _time_ratio(pair, name, drift)
         for key, pair in rows.items()
@@ -172,7 +172,7 @@ def time_ratios(
 
 
 def common_times(pair: Pair) -> list[str]:
-    """Return the names of the times that both runs have."""
+    """Return the names of the times in both runs."""
     suite, new = pair.old.suite, pair.new.arrays
     return [name for name in pair.old.arrays if name in new and is_time(suite, name)]
 
