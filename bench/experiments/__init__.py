@@ -1,4 +1,4 @@
-"""What is measured: each experiment is a folder; `harness.experiment` lists them."""
+"""The experiments, a folder each; `harness.experiment` lists the folders."""
 
 from ..harness.block import SCALES, Block, Measured, Scale
 from ..harness.experiment import EXPERIMENTS, SUITES, blocks

@@ -1,4 +1,4 @@
-"""The records of the lab's arm: curves that it draws, and targets beyond its reach."""
+"""The records of the lab's arm: curves to draw, and targets beyond reach."""
 
 from ...harness.values import Floats1, Integers1, Kind, Values
 from ..chain.values import ChainSolves, SolveDetails
@@ -8,7 +8,7 @@ from . import BEYOND, CURVE
 class FollowedMotion(Values, frozen=True):
     """A motion along a curve, (frame,): an outcome is the number of an `Outcome`.
 
-    The angles are those by which joints rotate from each frame to the next [rad].
+    The angles are the rotations of joints from each frame to the next [rad].
     """
 
     residual: Floats1

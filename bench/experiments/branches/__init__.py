@@ -4,8 +4,8 @@
 BRANCHES = "branches"
 # Random starts of the search at a target.
 STARTS = 128
-# A solution must be listed if it reaches the target within EXACT [m] and [rad], and is false beyond
-# TOLERANCE: solvers without a last polish stay between the two near singular poses.
+# A solution within EXACT [m] and [rad] of the target must be listed; beyond TOLERANCE a solution is
+# false. Near singular poses, solvers without a last polish stay between the two tolerances.
 EXACT, TOLERANCE = 1e-9, 1e-6
 # Solutions are the same within this [rad]: near singular poses an error moves angles by its root.
 SAME = 1e-3

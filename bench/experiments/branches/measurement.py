@@ -1,7 +1,7 @@
 """Lists of all solutions: every solver on the same targets, and a search from random starts.
 
-The solutions of a target are those of any solver, and of the search, that MuJoCo's kinematics
-confirms, within the limits. Solutions that differ by whole revolutions count as one.
+The solutions of a target come from any solver and from the search; MuJoCo's kinematics confirms
+each within the limits. Solutions that differ by whole revolutions count once.
 """
 
 import importlib
@@ -28,7 +28,7 @@ from .values import BranchValues
 
 SUITE = "ik"
 HINGES = 6
-# Targets of a stratum for those of a scale.
+# Targets of a stratum per target of a scale.
 _TARGETS = 0.05
 # Rounds in which calls are timed.
 ROUNDS = 5
@@ -37,7 +37,7 @@ PATIENCE = 1800.0
 
 
 class BranchJob(NamedTuple):
-    """Targets of a robot, and a solver that lists their solutions."""
+    """Targets of a robot, and a solver to list their solutions."""
 
     robot: str
     peer: Peer
@@ -130,7 +130,7 @@ def _distinct(*parts: FloatArray) -> FloatArray:
 
 
 def _search(name: str, targets: Targets) -> Iterator[FloatArray]:
-    """Yield the solutions of each target that Levenberg-Marquardt finds from random starts."""
+    """Yield the solutions of each target by Levenberg-Marquardt from random starts."""
     model = urdf.parse(robot(name).text).articulation
     starts = robot(name).draw(np.random.default_rng(0), STARTS)
     limits: dict[str, Any] = {"restarts": 0, "tolerance": EXACT}

@@ -1,4 +1,4 @@
-"""The records of solvers that list all solutions of a pose."""
+"""The records of solvers listing all solutions of a pose."""
 
 import msgspec
 
@@ -25,7 +25,7 @@ class BranchValues(Values, frozen=True):
 
 
 class BranchDetails(Details, frozen=True):
-    """The version of the solver, the starts of the search, and why it does not take a robot."""
+    """The version of the solver, the starts of the search, and why a robot is not taken."""
 
     version: str
     starts: int

@@ -30,17 +30,17 @@ from .values import ChainSolves
 
 SUITE = "ik"
 TOLERANCE = 1e-4
-# Beyond reach: of the distance from the closest pose; small, so that the chain must be straight.
+# Beyond reach: of the distance from the closest pose; small, to require a straight chain.
 BEYOND_TOLERANCE = 1e-6
 MAX_ITERATIONS = 1000
-# Targets in a stratum, and out of reach, for those of a scale: a solver in Python may need seconds
-# for a target that takes it all iterations. And the least number.
+# Targets in a stratum, and out of reach, per target of a scale, and the least number. A solver in
+# Python may need seconds for a target that takes all iterations.
 _TARGETS, _TARGETS_BEYOND, _LEAST_TARGETS = 0.25, 0.05, 3
-# The residuals of so many iterations are kept for the figure. A user's solver is followed over so
-# many targets and iterations, each by a solve from the start with that many at most.
+# The figure shows the residuals of the first HISTORY iterations. A user's solver is followed over
+# fewer targets and iterations: each iteration count takes a solve from the start.
 HISTORY = 200
 FOLLOWED_TARGETS, FOLLOWED_ITERATIONS = 10, 20
-# Of so many targets one is timed, in so many rounds, but no more than so many.
+# Time every fourth target, at most 20, three times each.
 PER_TIMED, ROUNDS, MAX_TIMED = 4, 3, 20
 NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
 NOT_FOLLOWED = "not followed, for its answers do not depend on max_iterations"
@@ -78,7 +78,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 class ChainJob(NamedTuple):
-    """Targets and a solver: how it answers all of them, and the job that is timed."""
+    """Targets and a solver: the answers to all targets, and the timed job."""
 
     answers: Callable[[], Measured]
     job: Job
@@ -117,7 +117,7 @@ def _answer_of(job: ChainJob) -> Measured:
 def _blocks_on(
     problem: chains.TargetsForSkeleton, stratum: str, limits: SolverLimits, scale: Scale
 ) -> Iterator[Block]:
-    """Yield targets for every solver of ours, for one loop on each engine, and for users'."""
+    """Yield targets for every solver of ours, the loop on each engine, and users' solvers."""
     facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
     adapters: dict[str, dict[str, str]] = {solver: {"solver": solver} for solver in IK_SOLVERS}
     loops = [loop for loop in registry.LOOPS if loop.engine in SKELETON_ENGINES]
@@ -180,8 +180,8 @@ def solve_one_by_one(
 ) -> Measured:
     """Have a solver solve all targets in a process of its own.
 
-    A target without an answer counts as infinitely far from being reached. A slow solver is timed
-    while it answers the first targets, and gets no others.
+    A target without an answer has an infinite residual. A slow solver gets the first targets only,
+    and is timed meanwhile.
     """
     total, outcome = len(problem.targets), answers(job)
     solves, count = outcome.solved, len(outcome.solved)
@@ -237,7 +237,7 @@ def _evaluated(
 
 
 def _history(problem: chains.TargetsForSkeleton, job: Job) -> dict[str, FloatArray]:
-    """Return the residuals by the iterations allowed; nothing if they do not depend on them."""
+    """Return the residuals by the iterations allowed; empty if independent of the iterations."""
     allowed = np.arange(1, FOLLOWED_ITERATIONS + 1)
     starts, targets = problem.every_start[:FOLLOWED_TARGETS], problem.targets[:FOLLOWED_TARGETS]
     first = forward_kinematics(problem.skeleton, starts).positions[:, -1]
@@ -259,7 +259,7 @@ def _history(problem: chains.TargetsForSkeleton, job: Job) -> dict[str, FloatArr
 def _quantiles(history: FloatArray) -> dict[str, FloatArray]:
     """Return the 10th, 50th and 90th percentile over targets of residuals, (target, iteration).
 
-    A target that is done keeps its last residual.
+    A finished target keeps its last residual.
     """
     names = ("history_low", "history_median", "history_high")
     return dict(zip(names, np.quantile(history, [0.1, 0.5, 0.9], axis=0), strict=True))

@@ -32,7 +32,7 @@ _CAPTIONS = Captions(__file__)
 
 
 def solves_row(record: Record) -> Row:
-    """Return the cells that every table of solves has."""
+    """Return the cells common to every table of solves."""
     return {
         "record": record,
         "problem": record.title,
@@ -97,7 +97,7 @@ beyond_reach = _CAPTIONS.layout(
 
 
 def _rival_rows(results: Results) -> list[Row]:
-    """Return a row for each problem that both CCD and FABRIK solved."""
+    """Return a row for each problem solved by both CCD and FABRIK."""
     records = results.all("arm", task=arm.CURVE, warm=True)
     records += results.all("arm", task=arm.BEYOND) + results.all("ik", task=CHAIN)
     groups = [{r.solver: r for r in group} for group in by_problem(records).values()]
@@ -135,7 +135,7 @@ def _rival_summary(rows: Sequence[Row]) -> Summary:
 
 
 def iterations_chart(results: Results) -> Sketch | None:
-    """Show the share of the targets that is reached within so many iterations, by stratum."""
+    """Show the share of the targets reached within each number of iterations, by stratum."""
     groups = ([r for r in group if reported_iterations(r).size] for group in histories(results))
     panels = [Panel(group[0].title, tuple(map(_reached, group))) for group in groups if group]
     chart = _CAPTIONS.figure("iterations")
@@ -151,7 +151,7 @@ def histories(results: Results) -> list[list[Record]]:
 
 
 def _reached(record: Record) -> Series:
-    """Return the share of the targets that is reached within each number of iterations [%]."""
+    """Return the share of the targets reached within each number of iterations [%]."""
     iterations = np.where(within_tolerance(record), record.values.iterations, np.inf)
     rates = np.mean(iterations[:, None] <= COUNTED, axis=0)
     low, high = metrics.wilson(rates, iterations.size)

@@ -1,4 +1,4 @@
-"""The records of a chain that reaches for targets."""
+"""The records of a chain reaching for targets."""
 
 import math
 

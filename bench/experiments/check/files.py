@@ -30,7 +30,7 @@ SHOWS = (
 
 
 class FileGroup(NamedTuple):
-    """The readings of all files of a kind by one engine."""
+    """The readings of all files of a kind by an engine."""
 
     kind: str
     engine: str
@@ -65,7 +65,7 @@ def _readings(kind: str, engine: str, checked: Sequence[CheckedFile]) -> list[Fi
 
 
 def _summary(groups: Sequence[FileGroup], outcomes: set[str], summary: Summary) -> Table:
-    """Return a row for each kind and engine, with the outcomes that there are."""
+    """Return a row for each kind and engine, with a count of each outcome."""
 
     def count(outcome: str, group: FileGroup) -> int:
         return sum(reading.outcome == outcome for reading in group.readings)
@@ -82,14 +82,14 @@ def _summary(groups: Sequence[FileGroup], outcomes: set[str], summary: Summary) 
 
 
 def _outcome(reading: FileReading) -> str:
-    """Return the outcome of a reading, with the difference if there is one."""
+    """Return the outcome of a reading, with any difference."""
     if reading.difference is None:
         return reading.outcome
     return f"{reading.outcome} ({words(reading.difference)})"
 
 
 def _largest_difference(group: FileGroup) -> float | None:
-    """Return the largest difference of the readings that agree, None where none does."""
+    """Return the largest difference of the readings in agreement, None without any."""
     return max((r.difference or 0.0 for r in group.readings if r.outcome == AGREES), default=None)
 
 

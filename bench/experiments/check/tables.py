@@ -12,7 +12,7 @@ from ...tables.layout import Row
 from ...tables.results import counted, listed
 from ...tables.table import NO_SUMMARY, Summary, in_unit, words
 
-# A claim against an engine names it in the description of one of its sides.
+# A claim against an engine names the engine in the description of a side.
 ENGINES = (PINOCCHIO, MUJOCO)
 
 

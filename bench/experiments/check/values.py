@@ -16,7 +16,7 @@ class ClaimValues(Values, frozen=True):
 
 
 class ClaimDetails(Details, frozen=True):
-    """The quantity that we compute, the reason for the tolerance, and why the claim failed.
+    """The quantity computed by us, the reason for the tolerance, and why the claim failed.
 
     An obstacle says why the claim could not be checked.
     """

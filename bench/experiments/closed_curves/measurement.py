@@ -31,9 +31,9 @@ from . import COLD, CURVE, DRIFT, NEAREST, WARM
 from .values import DriftAngles
 
 SUITE = "tracking"
-# The starts of a frame among whose solutions the nearest is taken, and the seed of the random ones.
+# The starts of a frame, of which the nearest solution is taken, and the seed of random starts.
 STARTS, _SEED = 8, 2014
-# On a robot the other solvers take long to compile: a quick run leaves them out.
+# A quick run on a robot has this solver only: the others take long to compile.
 ROBOT_SOLVER = "levenberg_marquardt"
 
 

@@ -20,13 +20,13 @@ from ..chain.tables import within_tolerance
 from . import COLD, CURVE, DRIFT, NEAREST, WARM
 
 MODES = (COLD, WARM, NEAREST)
-# Rotations that differ by at most this share are as large as each other.
+# Rotations within this share of each other are equally large.
 ALIKE = 0.01
 _CAPTIONS = Captions(__file__)
 
 
 def _rows(results: Results) -> list[Row]:
-    """Return a row for each curve that a solver followed in all modes."""
+    """Return a row for each curve followed by a solver in all modes."""
     followed, drifts = (_by_mode(results, task) for task in (CURVE, DRIFT))
     return [
         _row(by_mode, drifts.get((problem.replace("arm/", "drift/"), solver), {}))

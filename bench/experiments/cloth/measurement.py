@@ -34,7 +34,7 @@ HALVED = tuple(H / 2**i for i in range(-1, 6))
 
 @dataclass(frozen=True)
 class ClothSwing:
-    """A cloth that falls and swings, in steps of fixed length."""
+    """A falling and swinging cloth, in steps of fixed length."""
 
     name: str  # of the problem
     system: MassSpring
@@ -97,7 +97,7 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     """Compare steps of a few local/global iterations with converged steps.
 
     The error and distance are measured after a single step from each state of the converged motion.
-    The drift is the distance between the converged motion and a motion of only truncated steps; the
+    The drift is the distance between the converged motion and a motion of only truncated steps. The
     path is the distance of the converged motion from its start.
     """
     integrator = integrator_of(problem, "local_global", 0.0, iterations)
@@ -143,7 +143,7 @@ def integrator_of(
     tolerance: float = TOLERANCE,
     max_iterations: int = 100,
 ) -> ImplicitEuler:
-    """Return an integrator of a cloth; by default it converges in every step."""
+    """Return an integrator of a cloth, by default converged in every step."""
     limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations}
     return ImplicitEuler(problem.system, h=problem.h, solver=solver, **limits)
 

@@ -30,7 +30,7 @@ class DamperDifferences(Values, frozen=True):
 
 
 class StepDetails(Details, frozen=True):
-    """The number of iterations of a step where that is fixed."""
+    """The number of iterations of a step, where fixed."""
 
     iterations: int = 0
 

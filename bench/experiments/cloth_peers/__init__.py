@@ -4,7 +4,7 @@
 ONE_STEP, MOTION = "work of a step", "work of a motion"
 STABILITY, LIU, MISSING = "stability", "Liu 2013", "missing"
 # Errors of a step to which time is measured. A minimiser rounded to single precision is 1e-5 off,
-# so that engines in single precision can reach the last, which is that of a solved step.
+# so engines in single precision can reach the last, the error of a solved step.
 TARGETS = {"1e-2": 1e-2, "1e-4": 1e-4}
 SOLVED = "1e-4"
 # Errors of a motion, relative to the distance moved, to which time is measured.

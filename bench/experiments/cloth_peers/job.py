@@ -17,8 +17,8 @@ from ...peers.protocol import OwnTime, remark_of
 from ...peers.stopwatch import compute_time_of, time_call
 from ...problems.falling_cloth import FRAME
 
-# Each solver moves a small cloth once before the timing, so that everything is compiled, in a frame
-# [s] in which any solver is stable.
+# Before the timing, each solver moves a small cloth once to compile everything, in a frame [s] in
+# which any solver is stable.
 _SMALL, _SHORT = 3, 1e-4
 _compiled: set[tuple[str, ...]] = set()
 UNKNOWN = -1
@@ -43,7 +43,7 @@ class ClothJob(NamedTuple):
     entrant: str = ""  # the name of a user's solver, whose first error is announced
 
     def perform(self) -> Iterator[Message]:
-        """Yield the positions and the time of each frame as soon as it is computed."""
+        """Yield the positions and the time of each frame as soon as computed."""
         try:
             adapter = importlib.import_module(self.module)
             mover, setup = self._prepared(adapter)

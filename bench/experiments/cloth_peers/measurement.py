@@ -1,8 +1,8 @@
 """The same cloth for every installed solver: work and precision, limits of stability.
 
 Each solver runs in a worker process. Its step is compared with the minimiser to 25 digits, its
-motion with the true motion. Every sweep runs every solver with all of its settings, so no figure
-but the times depends on the machine, and solvers whose sweeps differ are seen.
+motion with the true motion. Every sweep runs every solver with all of its settings, so only the
+times depend on the machine. Solvers with different sweeps are seen.
 """
 
 import functools
@@ -43,13 +43,13 @@ from .values import LiuFrame, StabilityLimits, Work
 MARGINS = (1.1, 2.0, 4.0)
 # Implicit steps a frame.
 PARTS = (1, 4, 16)
-# Residual of solvers that converge, in motions.
+# Residual of convergent solvers, in motions.
 RESIDUAL, RESIDUAL_LABEL = 1e-6, "1e-6"
-# Passes over all solvers at a full and at a quick scale, in alternating order, so that the drift of
-# the machine affects all of them; repetitions of one step in each, of which the last counts.
+# Passes over all solvers at a full and at a quick scale: the drift of the machine affects all, as
+# the order alternates. Repetitions of a step in each pass, of which the last counts.
 SWEEPS, QUICK_SWEEPS, REPEATS, LIU_REPEATS = 3, 2, 2, 5
-# A solver that is silent for so long [s] over a frame, or over its set-up, has not finished: far
-# more than any solver takes on any machine in use.
+# A solver silent for this long [s] over a frame, or over its set-up, has not finished. No solver
+# takes nearly as long on any machine in use.
 _PATIENCE, _START_PATIENCE = 120.0, 600.0
 # What errors are measured against.
 _ARBITERS = {
@@ -57,10 +57,10 @@ _ARBITERS = {
     MOTION: "Runge-Kutta with steps halved until they agree",
 }
 
-# A mode is unstable if, from this amplitude [m], it grows by this factor in this number of steps.
+# An unstable mode grows from this amplitude [m] by this factor in this number of steps.
 STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
 BISECTION, _DOUBLINGS = 2e-4, 30
-# An undeclared solver that is stable at this multiple of symplectic Euler's limit is implicit.
+# An undeclared solver stable at this multiple of symplectic Euler's limit is implicit.
 _IMPLICIT_MULTIPLE = 8.0
 
 
@@ -162,7 +162,7 @@ def _works(peer: ClothPeer, cloth: _Cloth, sweep: int) -> Iterator[Block]:
 
 
 def _stability_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
-    """Yield the limit of stability of an explicit solver that does not iterate."""
+    """Yield the limit of stability of an explicit solver without iterations."""
     if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
         stiffnesses = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
         measure, size = partial(stability, peer, stiffnesses), len(stiffnesses)
@@ -208,12 +208,12 @@ def _counted(count: int, name: str) -> str:
     return f"{count:,} {name}{'' if count == 1 else 's'}"
 
 
-# The notes on solvers that did not finish, by their titles and the number of particles.
+# The notes on unfinished solvers, by their titles and the number of particles.
 _unfinished: dict[tuple[str, int], str] = {}
 
 
 def _performed(peer: ClothPeer, cloth: FallingCloth, rung: Rung, shape: Shape) -> JobOutcome:
-    """Return the outcome of a rung; a solver that did not finish is not tried again."""
+    """Return the outcome of a rung; an unfinished solver is not tried again."""
     task = peer.title, len(cloth.start.positions)
     if task in _unfinished:
         return JobOutcome(0.0, [], _unfinished[task])
@@ -227,7 +227,7 @@ def _performed(peer: ClothPeer, cloth: FallingCloth, rung: Rung, shape: Shape) -
 def work(task: str, peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
     """Take the same step, or move on for the same frames, at increasing cost.
 
-    Keep the time for a frame and the error of the last, which is infinite if it was not reached.
+    Keep the time for a frame and the error of the last, infinite if not reached.
     """
     rows, labels, remarks, troubles = [], [], [], []
     for fall in falls:
@@ -268,7 +268,7 @@ def rounding(truth: ClothTruth) -> float:
 
 
 def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
-    """Return the error of a step relative to that of its inertial start y; inf if it diverged.
+    """Return the error of a step over the error of its inertial start y; inf after divergence.
 
     The error is the distance from converged implicit Euler.
     """
@@ -278,10 +278,10 @@ def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
 
 
 def motion_error(positions: np.ndarray, truth: ClothTruth, extent: float = SIDE) -> float:
-    """Return the final distance from the truth over the distance moved; inf if it diverged.
+    """Return the final distance from the truth over the distance moved; inf after divergence.
 
     A motion diverged if a particle is ever farther from its true position than the cloth is wide.
-    Nobody is nearer to the truth than that is known.
+    The result is at least the uncertainty of the truth.
     """
     is_near = np.abs(positions - truth.true) <= extent
     if not is_near.all():

@@ -1,6 +1,6 @@
 """The settings of solvers on falling cloths as points: their errors and times.
 
-A point joins all sweeps: its errors are those of the first, its time is the median.
+A point joins all sweeps: the errors of the first, and the median time.
 """
 
 from collections.abc import Iterator, Sequence
@@ -49,7 +49,7 @@ class Point(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The error of a step or a motion; infinite if it was not reached."""
+        """The error of a step or a motion; infinite if not reached."""
         return self.values["error"]
 
     @property

@@ -1,7 +1,7 @@
 """The same cloth for every solver: steps to the minimiser, and motions to the truth.
 
-They are two problems with a table each: solvers that minimise the objective of an implicit step
-stand in both, all others only in the table of motions.
+The two problems have a table each. Solvers that minimise the objective of an implicit step are in
+both, all others only in the table of motions.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,7 +45,7 @@ CAPTIONS = Captions(
     liu_frame=words_in(published.LIU_2013_FRAME, "ms"),
     liu_tolerance=words(published.LIU_2013["newton"].settings["tolerance"]),
 )
-# Larger errors are those of motions that diverged, and are not drawn.
+# Larger errors belong to diverged motions, and are not drawn.
 MAX_ERROR = 10.0
 
 
@@ -83,7 +83,7 @@ truth_chart = partial(work_precision, "work_precision_truth", MOTION)
 
 
 def _missing(results: Results) -> list[Row]:
-    """Return a row for each engine that is missing."""
+    """Return a row for each missing engine."""
     records = results.all("cloth", task=MISSING)
     return [{"cloth": "every cloth", "solver": r.solver, **r.notes} for r in records]
 
@@ -121,7 +121,7 @@ def _row(settings: Sequence[Point], targets: Mapping[str, float], limits: Mappin
 
 
 def _remarks(row: Row) -> Iterator[str]:
-    """Yield the remarks on a solver, with the settings to which they apply."""
+    """Yield the remarks on a solver, each with its settings."""
     settings: list[Point] = row["points"]
     if settings[0].record.details.kind == LINEARISED and len(settings) == 1:
         yield "one linearised step"

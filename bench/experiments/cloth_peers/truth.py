@@ -1,9 +1,8 @@
 """Reference solutions of a falling cloth: a converged implicit step, and the true motion.
 
-The step is that of our Newton, refined to 25 digits in decimal arithmetic. The true motion is
-computed by the classical Runge-Kutta method, with h far below the limit of stability and halved
-twice: the observed order shows that the three converge, and the last difference bounds the
-remaining error.
+The step is by our Newton, refined to 25 digits in decimal arithmetic. The true motion is computed
+by the classical Runge-Kutta method, with h far below the limit of stability and halved twice. The
+observed order shows convergence, and the last difference bounds the remaining error.
 """
 
 import functools
@@ -19,7 +18,7 @@ from plumbob.reference.arguments import FloatArray
 from ...harness import metrics
 from ...problems.falling_cloth import FRAME, FallingCloth, explicit_substeps
 
-# Newton's rounding floor is above this, so that errors of 1e-8 can be measured.
+# Newton's rounding floor is above this value, so errors of 1e-8 can be measured.
 TOLERANCE, MAX_ITERATIONS = 1e-14, 200
 # Steps of the coarsest of the three motions, relative to symplectic Euler's limit.
 _COARSE = 2.0

@@ -13,7 +13,7 @@ class Work(Values, frozen=True):
     particles: Integers1  # along a side
     seconds: Floats1  # for a frame
     setup: Floats1  # time to set the solver up [s]
-    # |x - x*| / |y - x*| of a step; of a motion the distance from the truth over that moved
+    # |x - x*| / |y - x*| of a step; of a motion, distance from the truth over distance moved
     error: Floats1
     rounding: Floats1 | None = None  # the error of x* rounded to single precision
     order: Floats1 | None = None  # observed, of the true motion

@@ -39,7 +39,7 @@ SUPERNODAL = registry.SUPERNODAL.name
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 # The plain read goes over this much memory again and again: more than most caches hold [bytes].
 STRETCH = 2**28
-# Time limit of a part [s], such as the factor of a million particles, compilation included.
+# Time limit of a part [s], for example the factor of a million particles, with compilation.
 PATIENCE = 1800.0
 
 
@@ -68,7 +68,7 @@ def compiled_and_measured(size: int, library: str) -> dict[str, Any]:
 
 
 def billowing_cloth(size: int) -> tuple[MassSpring, State]:
-    """Return the lab's cloth, a hundred times as stiff, with two rising waves across it."""
+    """Return the lab's cloth, a hundred times as stiff, with two rising waves across."""
     system, flat = scenes.lab_cloth(size=size, stiffness=STIFFNESS)
     x = flat.positions.copy()
     wave = np.sin(np.pi * x[:, 0]) * np.cos(np.pi * x[:, 2])
@@ -142,7 +142,7 @@ def in_turn(
 
 
 def local_bytes(system: MassSpring) -> int:
-    """Return the bytes that a local step reads: the springs, and six numbers per particle."""
+    """Return the bytes read by a local step: the springs, and six numbers per particle."""
     arrays = system.arrays
     springs = (arrays.springs, arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only)
     return sum(array.nbytes for array in springs) + 6 * 3 * 8 * system.particle_count
@@ -169,7 +169,7 @@ _total = Kernel(total, relaxed=True)
 def memory() -> int:
     """Return the peak memory of this process [bytes].
 
-    On Linux `ru_maxrss` includes the memory that the parent had when it started the process.
+    On Linux `ru_maxrss` includes the memory of the parent at the start of the process.
     """
     status = Path("/proc/self/status")
     if status.exists():

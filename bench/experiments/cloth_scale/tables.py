@@ -14,7 +14,7 @@ LABELS = {library.name: library.label for library in registry.FACTORS}
 
 
 def _row(record: Record) -> Row:
-    """Return medians and their ratios; a cell is None if it was not measured."""
+    """Return medians and their ratios; a cell not measured is None."""
     medians = {name: metrics.spread(array).median for name, array in record.arrays.items()}
     medians["particles"] = float(record.details.particles)
     if "step" in medians:

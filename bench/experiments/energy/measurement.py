@@ -22,7 +22,7 @@ H, STEPS, EVERY = 1 / 60, 10_000, 10
 # Steps after which the cloth hangs well below its start, near its rest.
 FALLING = 120
 TOLERANCE = 1e-10
-# Of two integrators that agree step by step, the faster. Local/global converges in a dozen
+# The faster of two integrators in agreement step by step. Local/global converges in a dozen
 # iterations at this stiffness, each a hundredth of the cost of a Newton iteration.
 INTEGRATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
     "symplectic Euler": SIMULATORS["symplectic Euler"],

@@ -17,7 +17,7 @@ CAPTIONS = Captions(__file__, size=str(SIZE), damping=f"{DAMPINGS['damped']:g}")
 
 
 def energy_chart(results: Results) -> Sketch | None:
-    """Show the energy that each integrator leaves over time, undamped and damped."""
+    """Show the energy left by each integrator over time, undamped and damped."""
     panels = (
         Panel(group[0].title, tuple(series(r.solver, r.values.time, r.values.left) for r in group))
         for group in by_problem(results.all("energy")).values()

@@ -11,7 +11,7 @@ class Swing(Values, frozen=True):
 
 
 class SwingDetails(Details, frozen=True):
-    """The damping of every spring [N s/m]; of `every` steps, one is looked at."""
+    """The damping of every spring [N s/m]; each `every`-th step counts."""
 
     damping: float
     every: int

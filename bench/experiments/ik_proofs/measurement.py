@@ -20,7 +20,7 @@ from .values import PoseProofs
 
 SUITE, SOLVER = "ik_proofs", "Plumbob LM"
 TOLERANCE, RESTARTS = 1e-3, 20
-# Targets in a stratum, for those of a scale.
+# Targets in a stratum per target of a scale.
 _TARGETS = 0.025
 
 
@@ -39,8 +39,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
 def prove(name: str, kind: str, count: int, seed: int) -> Measured:
     """Solve and certify all targets of a robot.
 
-    With a target that is proven impossible the answer is an attempt to refute the proof: its
-    distance plus the lever times its angle must not be less than that of every pose.
+    If a target is proven impossible, an answer tries to refute the proof. Its distance plus the
+    lever times its angle must not be less than the bound for all poses.
     """
     targets = (robot_targets if kind == WITHIN_REACH else poses_anywhere)(name, count, seed)
     arm = robot(name)
@@ -74,7 +74,7 @@ def prove(name: str, kind: str, count: int, seed: int) -> Measured:
 
 
 def poses_anywhere(name: str, count: int, seed: int) -> Targets:
-    """Return random poses, uniform in the ball that the sum of the links reaches."""
+    """Return random poses, uniform in the ball with the sum of the links as radius."""
     evaluator, rng = evaluator_of(name), np.random.default_rng([seed, seed_of(name), 2])
     size = count * len(STRATA)
     distance = farthest(evaluator) * rng.random((size, 1, 1)) ** (1.0 / 3.0)

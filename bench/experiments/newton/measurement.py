@@ -21,13 +21,13 @@ from ..cloth.measurement import TOLERANCE, ClothSwing, integrator_of
 from . import FRAME, FRAMES, GRAVITY, STIFFNESSES
 from .values import CertifiedStep
 
-# Iterations of a solver that has to be quick; solvers allowed more than `SLOW` count as slow.
+# Iterations of a quick solver; solvers allowed more than `SLOW` count as slow.
 USUAL, SLOW = 10, 1000
 # At this stiffness [N/m] and above slow solvers also start near Newton's solution, every coordinate
 # perturbed by about `PERTURBATION` [m].
 STIFF, PERTURBATION = 1e5, 1e-6
 FROM_Y, NEAR_NEWTON = "y", "beside Newton’s answer"
-# Particles a side, and the number of random targets of a scale that is full.
+# Particles a side, and the number of random targets of a full scale.
 QUICK, FULL, _FULL_TARGETS = 10, 30, 2000
 
 
@@ -121,7 +121,7 @@ def _solve_from_y(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatAr
 def _solve_near_newton(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
     """Return the solution from a start near Newton's, and the number of iterations.
 
-    Solvers start where the objective starts; the residual stays that of the step from y.
+    Solvers start where the objective starts; the residual is still of the step from y.
     """
     objective = _objective(problem)
     perturbed = copy.copy(objective)

@@ -1,4 +1,4 @@
-"""The poses and cloths that the report draws, and motions that its page plays."""
+"""The poses and cloths drawn in the report, and the motions played on its page."""
 
 # What a record is about.
 ARM, CLOTH = "arm", "cloth"

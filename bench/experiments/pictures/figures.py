@@ -24,11 +24,11 @@ CAPTIONS = Captions(__file__)
 SHADES = 40
 # Frames beside each other in the filmstrip.
 COLUMNS = 3
-# Motions of a kind on the page, those of entrants first: a cloth adds some 60 kB to it.
+# Motions of a kind on the page, entrants first: a cloth adds some 60 kB to the page.
 MAX_ARMS, MAX_CLOTHS = 6, 4
 # Time in which the arm draws the curve [s].
 DRAWING = 12.0
-# A solver that may make more iterations than this converges: its label has no count.
+# A solver with a larger limit of iterations converges: its label has no count.
 FEW = 50
 
 

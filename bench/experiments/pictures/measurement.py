@@ -15,10 +15,10 @@ from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
 from .values import ArmDrawing, ClothDrawing, MovingArm, MovingCloth
 
 GHOSTS, FRAMES = 9, 6
-# Motions that are played: solvers of inverse kinematics; step solvers with their iteration limits.
+# Motions to play: solvers of inverse kinematics; step solvers with their iteration limits.
 FOLLOWING = ("ccd", "fabrik", "levenberg_marquardt")
 SWINGING = (("local_global", 1), ("newton", 100), ("local_global", 10), ("gauss_newton", 1))
-# A step solver that may make more iterations than this works to the tolerance.
+# A step solver with a larger limit of iterations works to the tolerance.
 SOLVED = 50
 # Steps of the cloth; the intervals at which its states and the arm's frames are kept; decimals.
 SWUNG, EVERY, THINNED, PLACES = 200, 4, 2, 6

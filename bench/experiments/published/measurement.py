@@ -1,4 +1,4 @@
-"""The published tables again: the same set-up as far as it is known, with the solvers at hand."""
+"""The published tables again: the same set-up as far as known, with the solvers at hand."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -23,17 +23,17 @@ from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
 from .values import FabrikSolves
 
-# Random targets for those of a scale, and how many of them are timed.
+# Random targets per target of a scale, and how many are timed.
 _TARGETS = 5
 _TIMED_TARGETS = 200
 _SEED = 2011
 _LIMITS = SolverLimits(published.FABRIK.tolerance, published.FABRIK.iterations)
-# The solvers fast enough for 10,000 targets, with restarts as TRAC-IK has them.
+# The solvers fast enough for 10,000 targets, with restarts as in TRAC-IK.
 _FAST = (registry.PLUMBOB_LM, registry.TOOLBOX, registry.TRAC_IK)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield TRAC-IK's table, the toolbox's, FABRIK's; leave out solvers that are not installed."""
+    """Yield TRAC-IK's table, the toolbox's, FABRIK's; leave out solvers not installed."""
     count = _TARGETS * scale.targets
     tolerance = Tolerance(*[math.sqrt(3.0) * published.TRAC_IK.tolerance] * 2)
     for peer in (peer for peer in _FAST if peer.is_installed):
@@ -54,7 +54,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def _toolbox() -> Iterator[tuple[Peer, PeerEntry, float | None]]:
-    """Yield solvers that search once, with the published share of infeasible targets."""
+    """Yield solvers without restarts, with the published share of infeasible targets."""
     plumbob, toolbox = registry.PLUMBOB_LM, registry.TOOLBOX
     entry, iterations = plumbob.entry(ONE_START), {"iterations": published.TOOLBOX.iterations}
     yield plumbob, replace(entry, settings={**entry.settings, **iterations}), None

@@ -1,4 +1,4 @@
-"""Published numbers of solvers, and how they were measured as far as that is known.
+"""Published numbers of solvers, and the measurements as far as known.
 
 `problem.toml` holds the facts, each with its source.
 """
@@ -28,7 +28,7 @@ class PublishedSearch(NamedTuple):
 
 
 class PublishedFrame(NamedTuple):
-    """A time for one frame of a cloth [s], the work done in it, and our settings for the same."""
+    """A time for a frame of a cloth [s], the work done, and our settings for the same."""
 
     seconds: float
     work: str

@@ -18,7 +18,7 @@ from . import problem as published
 
 
 def _rows(results: Results) -> list[Row]:
-    """Return all numbers of the published tables that have records."""
+    """Return all numbers of the published tables with records."""
     strata = list(published.FABRIK.distances)
     trac_ik, toolbox = (
         [record for record in results.all("ik", task=task) if "solved" in record.arrays]
@@ -65,7 +65,7 @@ def _of_trac_ik(records: Sequence[Record]) -> Iterator[Row]:
 
 
 def _of_toolbox(record: Record) -> Iterator[Row]:
-    """Yield the shares of targets that one search does not solve, and its time."""
+    """Yield the shares of targets not solved by a single search, and its time."""
     score = Score(record.title, "", record.solver, (record,))
     rate = record.details.infeasible
     source = "" if rate is None else published.TOOLBOX.source
@@ -99,7 +99,7 @@ def _of_fabrik(record: Record) -> Iterator[Row]:
 
 
 def _percent(score: Score, hits: np.ndarray) -> list[float]:
-    """Return a share with its interval [%]; nothing of a solver that did not finish."""
+    """Return a share with its interval [%]; empty for an unfinished solver."""
     if not score.is_finished:
         return []
     share = metrics.share(hits)

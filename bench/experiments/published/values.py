@@ -1,4 +1,4 @@
-"""The records of published tables that are measured again."""
+"""The records of published tables, measured again."""
 
 from ...harness.values import Details, Floats1, Kind, Values
 from ..robots.values import RobotSolves

@@ -44,7 +44,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def compare(engine: str, model: RobotFile) -> Measured:
-    """Compare a file in random configurations; keep why the engine does not read it."""
+    """Compare a file in random configurations; keep why the engine refuses the file."""
     try:
         comparison = sweep(engine, model)
     except (UnreadableError, ValueError) as error:
@@ -63,7 +63,7 @@ def compare(engine: str, model: RobotFile) -> Measured:
 
 
 def compare_effectors(peer: Peer, name: str) -> Measured:
-    """Compare a robot in a process of the engine's own; keep why the engine does not take it."""
+    """Compare a robot in a process of the engine's own; keep why the engine refuses the robot."""
     outcome = worker_process().perform(Calculation(effector_differences, (peer.module, name)))
     values = outcome.numbers and EffectorDifferences(**outcome.numbers)
     return Measured(values, {"remark": outcome.note})

@@ -1,4 +1,4 @@
-"""Robots and characters: how closely engines that read the same files agree with the reference."""
+"""Robots and characters: how closely engines reading the same files agree with the reference."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -15,21 +15,21 @@ QUANTITIES = ("positions", "rotations", "jacobians")
 
 
 def _rows(results: Results) -> list[Row]:
-    """Return files in both engines, and then robots of the bench in those of peers."""
+    """Return files in both engines, then robots of the bench in the peers' engines."""
     files, robots = _parted(results.all("robot_models"))
     return [*map(_of_file, by_problem(files).values()), *map(_of_robot, robots)]
 
 
 def _parted(records: Iterable[Record]) -> tuple[list[Record], list[Record]]:
-    """Return the records of files of others, and those of the bench's own robots."""
+    """Return the records of others' files, and of the bench's own robots."""
     parts = grouped(records, lambda record: record.facts.get("task") == PEERS)
     return parts.get(False, []), parts.get(True, [])
 
 
 def _of_file(records: Sequence[Record]) -> Row:
-    """Return the row of a file, whose numbers are those of the "valid" records.
+    """Return the row of a file, with numbers from the "valid" records.
 
-    An engine that leaves mimics free has too many freedoms.
+    An engine with free mimics has too many freedoms.
     """
     valid = [record for record in records if record.values and not record.details.cause]
     row: Row = {"records": records, "valid": valid, "robot": records[0].title}
@@ -73,7 +73,7 @@ def _of_robot(record: Record) -> Row:
 
 
 def _largest(quantity: str, records: Sequence[Record]) -> float | None:
-    """Return the largest difference in records, None if they have none."""
+    """Return the largest difference in records, None without any."""
     return max((getattr(record.values, quantity) for record in records), default=None)
 
 

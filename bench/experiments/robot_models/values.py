@@ -10,7 +10,7 @@ class FileValues(Values, frozen=True):
     """The size of a file in an engine, and its largest differences from the reference.
 
     Positions are relative to the extent of the links, rotations are between entries of matrices,
-    Jacobians relative to the extent and one radian.
+    Jacobians relative to the extent and 1 radian.
     """
 
     links: int
@@ -22,7 +22,7 @@ class FileValues(Values, frozen=True):
 
 
 class FileDetails(Details, frozen=True):
-    """Why an engine reads a file otherwise or not at all, and which mimics it leaves free."""
+    """Why an engine reads a file otherwise or not at all, and the mimics left free."""
 
     configurations: int
     cause: str = ""
@@ -38,7 +38,7 @@ class EffectorDifferences(Values, frozen=True):
 
 
 class EngineDetails(Details, frozen=True):
-    """The engine's version, and why it does not take the robot."""
+    """The engine's version, and why the robot is not taken."""
 
     configurations: int
     version: str

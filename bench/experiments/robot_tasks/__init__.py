@@ -1,4 +1,4 @@
-"""Tasks of arms beyond the pose of the effector: who meets them, and in what time."""
+"""Tasks of arms beyond the pose of the effector: success and time of each solver."""
 
 # The task of records.
 ROBOT_TASK = "robot task"

@@ -1,4 +1,4 @@
-"""Tasks of arms that no setting has seen, by the solvers that take tasks."""
+"""Tasks of arms held out from tuning, by the solvers with tasks."""
 
 import importlib
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from . import ROBOT_TASK, TOLERANCE
 from .values import TaskValues
 
 SUITE = "robot_tasks"
-# Targets of a robot for those of a scale.
+# Targets of a robot per target of a scale.
 _TARGETS = 0.01
 
 
@@ -36,7 +36,7 @@ class TaskJob(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield every task of every arm held out, by every installed solver, from one start or more."""
+    """Yield every task of every arm held out, by every installed solver, with one start or more."""
     count = max(1, round(_TARGETS * scale.targets))
     for name in filter(is_installed, HELD_OUT):
         peers = [peer for peer in TASK_SOLVERS if peer.is_installed]

@@ -1,4 +1,4 @@
-"""Tasks of arms: the share that each solver meets, and its time."""
+"""Tasks of arms: the share met by each solver, and its time."""
 
 from collections.abc import Iterator, Sequence
 

@@ -1,4 +1,4 @@
-"""The records of solvers that meet tasks of arms."""
+"""The records of solvers for tasks of arms."""
 
 from ...harness.values import Booleans1, Details, Floats1, Kind, Values
 from . import ROBOT_TASK
@@ -13,7 +13,7 @@ class TaskValues(Values, frozen=True):
 
 
 class TaskDetails(Details, frozen=True):
-    """The attempts of a solver, and why it does not take a task."""
+    """The attempts of a solver, and why a task is not taken."""
 
     kind: str
     remark: str = ""

@@ -1,4 +1,4 @@
-"""Shares of targets that solvers solve against time and the fastest, and a map of all robots."""
+"""Shares of targets solved against time and the fastest, and a map of all robots."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -51,7 +51,7 @@ MAXIMUM_BESIDE = 5
 
 
 def budgets(start: str, results: Results) -> Sketch | None:
-    """Return the shares of targets that are solved within each budget of time."""
+    """Return the shares of targets solved within each budget of time."""
     return _chart("budget", _rates_in_time, _BUDGETS, fields_of(results, start), results)
 
 
@@ -60,7 +60,7 @@ def _rates_in_time(field: Sequence[Score], seconds: Floats) -> list[Floats]:
 
 
 def group_budgets(start: str, results: Results) -> Sketch | None:
-    """Return the same shares over all robots held out, of the solvers that take them all."""
+    """Return the same shares over all robots held out, of the solvers that take all."""
     members = in_groups(fields_of(results, start)).get("held out", {})
     scores = together(list(members), members) if len(members) > 1 else []
     fields = {scores[0].robots: scores} if scores else {}
@@ -115,7 +115,7 @@ def _share(score: Score, x: Floats, rates: Floats) -> Series:
 
 
 class MapCell(NamedTuple):
-    """A solver on a robot: its text, its shade from 0 (worst) to 100, a star if it is unranked."""
+    """A solver on a robot: its text, its shade from 0 (worst) to 100, a star if unranked."""
 
     text: str
     shade: int
@@ -123,7 +123,7 @@ class MapCell(NamedTuple):
 
 
 class MapRow(NamedTuple):
-    """A solver, and its cell for each robot, None where it does not take the robot."""
+    """A solver, and its cell for each robot, None where the robot is not taken."""
 
     solver: str
     is_yours: bool
@@ -195,7 +195,7 @@ def _cell(score: Score, text: str, shade: float) -> MapCell:
 
 
 def heat_map(start: str, results: Results) -> Sketch | None:
-    """Return both maps of one start beside each other; None without solvers."""
+    """Return both maps for a start beside each other; None without solvers."""
     maps = robot_maps(results, start)
     chart = _declared("robots_map", start)
     return Sketch(**chart, data=maps, draw=draw_maps) if maps else None

@@ -1,8 +1,8 @@
-"""Robots: every solver that is installed on every arm and on the character, in all strata.
+"""Robots: every installed solver on every arm and on the character, in all strata.
 
 Each solver works in a process of its own and is given a fixed number of targets. Its answers are
-evaluated here, by an engine that it is not built on. Then the solvers of a robot take turns, and
-are timed.
+evaluated here, by an engine that the solver is not built on. Then the solvers of a robot are timed
+in turns.
 """
 
 import dataclasses
@@ -36,12 +36,12 @@ from .values import RobotSolves
 
 SUITE = "ik"
 TOLERANCE = Tolerance(1e-3, 1e-3)
-# Targets in a stratum, and out of reach of a robot, for those of a scale. Solvers try all of their
-# restarts on targets out of reach, which takes long, so that these are few.
+# Targets in a stratum, and out of reach of a robot, per target of a scale. Targets out of reach are
+# few: solvers try all of their restarts, which takes long.
 _TARGETS, _TARGETS_BEYOND = 0.05, 0.03
-# Of so many targets of a stratum one is timed, in rounds; of so many out of reach, in one round.
+# Time every tenth target of a stratum, in `ROUNDS`; every third out of reach, in `ROUNDS_BEYOND`.
 _PER_TIMED, _PER_TIMED_BEYOND = 10, 3
-# But at least so many of a stratum are timed, so that a clear difference is beyond chance.
+# Time at least four targets of a stratum: a clear difference is then beyond chance.
 _LEAST_TIMED = 4
 ROUNDS, ROUNDS_BEYOND = 3, 1
 # Digits kept of times and residuals: more would fill the disk with noise.
@@ -73,9 +73,9 @@ class RobotJob(NamedTuple):
         return Job(*request, self.peer.entrant_name)
 
     def block(self, problem: str, facts: dict[str, Any]) -> Block:
-        """Return the block of a problem; its settings are all that changes an answer.
+        """Return the block of a problem; only its settings change an answer.
 
-        Solvers of the same targets are measured together; one with a time limit is by itself.
+        Solvers of the same targets are measured together; a solver with a time limit is by itself.
         """
         settings = {
             **self.entry.settings,
@@ -95,7 +95,7 @@ class RobotJob(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield each solver on each robot, and a block for each that is not installed."""
+    """Yield each solver on each robot, and a block for each solver not installed."""
     own = {problem.name: problem for problem in scale.problems if problem.robot is not None}
     for problem in own.values():
         if problem.robot is not None:
@@ -151,9 +151,9 @@ def _blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
 
 
 def _drawn(blocks: Iterable[Block]) -> list[Block]:
-    """Return blocks problem by problem, those of a group in a row, in an order of its own.
+    """Return blocks problem by problem, a group's blocks in a row, in an order of its own.
 
-    It is the same every time, whichever other solvers take part.
+    The order is the same every time, whichever other solvers take part.
     """
     blocks = list(blocks)
     problems = list(dict.fromkeys(block.problem for block in blocks))
@@ -187,7 +187,7 @@ def solve_together(jobs: Sequence[RobotJob]) -> list[Measured]:
 
 
 def _repeats(job: RobotJob, outcome: JobOutcome) -> np.ndarray:
-    """Return how many targets are solved each time that all are solved."""
+    """Return how many targets are solved in each repetition of all targets."""
     announce(f"{job.peer.label_of(job.entry)}: answers again")
     outcomes = [outcome, *(answers(job.job) for _ in range(REPEATS - 1))]
     engine = arbiter_of(job.peer.built_on)
@@ -195,7 +195,7 @@ def _repeats(job: RobotJob, outcome: JobOutcome) -> np.ndarray:
 
 
 def _own_times(job: RobotJob, outcome: JobOutcome) -> Times:
-    """Return the times that were taken with the answers, of a solver with a time limit."""
+    """Return the times taken with the answers, of a solver with a time limit."""
     seconds = [answer.seconds for answer in outcome.solved[: job.timed_count]]
     return Times(np.array([seconds]), np.zeros(0))
 

@@ -1,8 +1,7 @@
-"""Scores of solvers on robots: the targets that they solve, and the times of the first of them.
+"""Scores of solvers on robots: the solved targets, and the times of the first targets.
 
-A solver is not ranked if it did not finish, if a time limit ends its solves, or if its record is of
-other targets than those of most solvers. Robots for tuning, robots held out and the character are
-never averaged together.
+A solver is unranked if unfinished, if a time limit ends its solves, or if its targets differ from
+most solvers'. Robots for tuning, robots held out and the character are never averaged together.
 """
 
 from collections import Counter
@@ -24,13 +23,13 @@ from ...tables.table import words
 from . import REACHABLE, UNREACHABLE
 
 STARTS = (ONE_START, PORTFOLIO, RESTARTS)
-# The time of a target that is not solved in a mean of times [s], if it did not take longer.
+# The least time of an unsolved target in a mean of times [s].
 PENALTY = 0.1
-# Added to times before their geometric mean is taken, so that microseconds do not decide [s].
+# Added to times before their geometric mean is taken: microseconds must not decide [s].
 SHIFT = 1e-5
-# Solvers that take different robots of a group are compared over so many sets, the largest.
+# Solvers with different robots of a group are compared over the two largest sets.
 SETS = 2
-# The outcomes of a target; it counts under the first that applies.
+# The outcomes of a target, counted under the first to apply.
 OUTCOMES = (
     *("solved", "beyond a limit", "wrong claim", "missed"),
     *("exception or crash", "no answer", "not begun"),
@@ -39,7 +38,7 @@ _NO_RANKING = Ranking((), ())
 
 
 class Score(NamedTuple):
-    """A solver over all targets of one robot, or of several."""
+    """A solver over all targets of a robot, or of several."""
 
     robots: str  # their names, or a phrase
     start: str  # one of `STARTS`, "" if all are in one field
@@ -64,11 +63,11 @@ class Score(NamedTuple):
 
     @property
     def is_finished(self) -> bool:
-        """Whether it attempted all of its targets."""
+        """Whether all targets were attempted."""
         return self.attempted("solved").size == self.total
 
     def attempted(self, name: str) -> np.ndarray:
-        """Return an array of the targets that were attempted, (target,)."""
+        """Return an array of the attempted targets, (target,)."""
         return np.concatenate([record.arrays[name] for record in self.records])
 
     def all(self, name: str, default: float) -> np.ndarray:
@@ -84,12 +83,12 @@ class Score(NamedTuple):
 
     @property
     def share(self) -> Share:
-        """The share of all targets that are solved."""
+        """The share of solved targets among all."""
         return metrics.share(self.solved)
 
     @property
     def shares_by_seed(self) -> list[float]:
-        """The share of targets of each seed that are solved."""
+        """The share of solved targets of each seed."""
         return self._by_seed(self.solved, [total(record) for record in self.records])
 
     @property
@@ -129,7 +128,7 @@ class Score(NamedTuple):
 
     @property
     def penalised(self) -> Floats:
-        """The time of each timed target, or the penalty where it is not solved [s]."""
+        """The time of each timed target, or the penalty where unsolved [s]."""
         return metrics.penalised(self.seconds, self.timed_solved, PENALTY)
 
     @property
@@ -141,12 +140,12 @@ class Score(NamedTuple):
 
     @property
     def median_time(self) -> float:
-        """The median time of the targets that are solved [s]; NaN without any."""
+        """The median time of the solved targets [s]; NaN without any."""
         return metrics.spread(self.seconds[self.timed_solved]).median if self.is_timed else np.nan
 
     @property
     def disputed(self) -> int:
-        """The number of answers that the two engines place differently."""
+        """The number of answers placed differently by the two engines."""
         return sum(np.size(record.arrays.get("disputed", ())) for record in self.records)
 
     @property
@@ -156,19 +155,19 @@ class Score(NamedTuple):
 
     @property
     def outcomes(self) -> Counter[str]:
-        """The number of targets by outcome; together they are all that the solver was given."""
+        """The number of targets by outcome; the sum is the number of given targets."""
         return sum(map(_outcomes, self.records), Counter())
 
     @property
     def distances(self) -> Floats:
-        """The distance from each target attempted; NaN without an answer that keeps limits [m]."""
+        """The distance from each target attempted; NaN without an answer within limits [m]."""
         return np.where(
             self.attempted("beyond") <= LIMIT_TOLERANCE, self.attempted("position"), np.nan
         )
 
     @property
     def limits(self) -> str:
-        """Why it is not ranked, "" if it is."""
+        """Why the solver is not ranked, "" if ranked."""
         is_limited = any(record.facts.get("time_limited") for record in self.records)
         reasons = {
             "not finished": not self.is_finished,
@@ -179,7 +178,7 @@ class Score(NamedTuple):
 
     @property
     def _repeats(self) -> str:
-        """The least and the largest share that it solves when it is run again, "" if it is not."""
+        """The least and the largest share solved in repeated runs, "" without repetition."""
         counts = [record.arrays["repeats"] for record in self.records if "repeats" in record.arrays]
         if len(counts) < len(self.records):
             return ""
@@ -190,12 +189,12 @@ class Score(NamedTuple):
 
     @property
     def is_ranked(self) -> bool:
-        """Whether it finished the same targets as most solvers, without a limit of time."""
+        """Whether the solver finished the same targets as most solvers, without a limit of time."""
         return not self.limits
 
     @property
     def leads(self) -> str:
-        """The rankings in which it is first, or ties with the first."""
+        """The rankings in which the solver is first, or ties with the first."""
         rankings = {"most solved": self.success, "shortest time": self.time}
         return ", ".join(
             f"{name} (tie)" if len(ranking.first) > 1 else name
@@ -205,7 +204,7 @@ class Score(NamedTuple):
 
 
 def total(record: Record) -> int:
-    """Return the number of targets that the solver of a record was given, attempted or not."""
+    """Return the number of targets given to the solver of a record, attempted or not."""
     return record.facts.get(FIRST_TARGETS, max(int(record.size), record.arrays["solved"].size))
 
 
@@ -230,7 +229,7 @@ def drift(scores: Iterable[Score]) -> str:
 
 
 def _strata(record: Record) -> np.ndarray:
-    """Return the stratum of every target: they alternate, attempted or not."""
+    """Return the stratum of every target: strata alternate, attempted or not."""
     strata = record.arrays["stratum"]
     following = np.arange(strata.size, total(record)) % max(len(record.details.strata), 1)
     return np.concatenate([strata, following])
@@ -262,7 +261,7 @@ def fields_of(results: Results, start: str, task: str = REACHABLE) -> dict[str, 
 
 
 def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score]]:
-    """Return the solvers that have solves on record: registered ones first, in order."""
+    """Return the solvers with solves on record: registered solvers first, in order."""
     registered = [peer.label_of(entry) for peer in registry.PEERS for entry in peer.entries]
     places = {solver: place for place, solver in enumerate(registered)}
     robots = grouped((r for r in records if "solved" in r.arrays), lambda record: record.title)
@@ -288,7 +287,7 @@ def on_targets_of(solver: str, field: list[Score]) -> list[Score]:
 
 
 def _field(robot: str, start: str, records: Sequence[Record]) -> list[Score]:
-    """Return solvers on one robot; of equally many sets of targets the larger one counts."""
+    """Return solvers on a robot; of equally frequent sets of targets the larger counts."""
     counts = Counter(map(total, records))
     size = max(counts, key=lambda size: (counts[size], size))
     return _ranked([Score(robot, start, r.solver, (r,), total(r) == size) for r in records])
@@ -307,9 +306,9 @@ def _ranked(field: Sequence[Score]) -> list[Score]:
 
 
 def overall(results: Results) -> list[Score]:
-    """Return every solver over each set of robots that it takes, the largest sets first.
+    """Return every solver over each set of its robots, the largest sets first.
 
-    Solvers are compared only over robots of one group that all of them take.
+    Solvers are compared only over their common robots of a group.
     """
     scores = [score for start in STARTS for score in over_sets(fields_of(results, start))]
     groups = list(dict.fromkeys(score.group for score in scores))
@@ -335,7 +334,7 @@ def over_sets(fields: dict[str, list[Score]]) -> list[Score]:
 
 
 def together(robots: Collection[str], fields: dict[str, list[Score]]) -> list[Score]:
-    """Return every solver that takes all of these robots, over them."""
+    """Return the scores, over these robots, of every solver with records of all."""
     names = [robot for robot in fields if robot in robots]
     group = next((field[0].group for robot, field in fields.items() if robot in names), "")
     title = title_of(names, [robot for robot in fields if robot not in robots], group)
@@ -344,7 +343,7 @@ def together(robots: Collection[str], fields: dict[str, list[Score]]) -> list[Sc
 
 
 def title_of(names: Sequence[str], remaining: Sequence[str], group: str = "") -> str:
-    """Return the title of a set of robots of a group: by the remaining ones if these are fewer."""
+    """Return the title of a set of robots of a group: by the remaining robots if fewer."""
     if len(names) == 1:
         return names[0]
     listing = {"tuning": " for tuning", "held out": " held out"}.get(group, "")
@@ -356,7 +355,7 @@ def title_of(names: Sequence[str], remaining: Sequence[str], group: str = "") ->
 
 
 def _by_solver(fields: dict[str, list[Score]]) -> list[dict[str, Score]]:
-    """Return for each solver its score on each robot that it takes."""
+    """Return for each solver its score on each of its robots."""
     scores = (score for field in fields.values() for score in field)
     groups = grouped(scores, lambda score: score.solver)
     return [{score.robots: score for score in group} for group in groups.values()]
@@ -372,7 +371,7 @@ def _over_robots(title: str, parts: Sequence[Score]) -> Score:
 def out_of_reach(results: Results) -> list[Score]:
     """Return every solver on targets out of reach, with the best distances on record.
 
-    The best are those of any solver, with one start or more, to as many targets of a robot.
+    The best are over all solvers, with a single start or more, to as many targets of a robot.
     """
     beyond = scores(results, UNREACHABLE)
     best: dict[tuple[str, int], Floats] = {}
@@ -386,12 +385,12 @@ def out_of_reach(results: Results) -> list[Score]:
 
 
 def ratio_of_times(rival: Score, score: Score) -> metrics.Interval:
-    """Return by what factor a rival takes longer for the targets that both solve; NaN if none."""
+    """Return by what factor a rival takes longer for the targets solved by both; NaN if none."""
     return metrics.paired_ratio(*times_of_both(rival, score))
 
 
 def times_of_both(a: Score, b: Score) -> tuple[Floats, Floats]:
-    """Return the times of two solvers for the targets that both solve [s], (target,) each."""
+    """Return the times of two solvers for the targets solved by both [s], (target,) each."""
     if a.seconds.shape != b.seconds.shape:
         return np.empty(0), np.empty(0)
     solved = a.timed_solved & b.timed_solved

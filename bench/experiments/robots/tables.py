@@ -21,7 +21,7 @@ from .figures import CAPTIONS, FIGURES
 from .readings import OUTCOMES, STARTS, Score, title_of
 from .values import RobotDetails
 
-# The rule for solvers that are not ranked.
+# The rule for unranked solvers.
 RULE = CAPTIONS.shared["rule"]
 MEAN = "time, geometric mean"
 
@@ -30,7 +30,7 @@ MEAN = "time, geometric mean"
 
 
 def _participants(results: Results) -> list[Row]:
-    """Return the peers that have records, and the solvers that users entered."""
+    """Return the peers with records, and the solvers entered by users."""
     records = [r for start in STARTS for r in results.all("ik", task=REACHABLE, kind=start)]
     robots = {record.title: record for record in records if "solved" in record.arrays}
     users = {r.solver: _as_peer(r) for r in records if r.facts.get("entrant") is True}
@@ -43,7 +43,7 @@ def _participants(results: Results) -> list[Row]:
 
 
 def _as_peer(record: Record) -> Peer:
-    """Return a user's solver in the form of the solvers that the bench knows."""
+    """Return a user's solver in the form of the bench's solvers."""
     door = str(record.facts.get("door", ""))
     return Peer(record.solver, "", door, "", "", (PeerEntry(record.details.kind),))
 
@@ -109,7 +109,7 @@ participants = CAPTIONS.layout("participants", _participants, _participant_summa
 
 
 def _row(score: Score) -> Row:
-    """Return the cells that all tables of scores have."""
+    """Return the cells common to all tables of scores."""
     seconds, claims = score.seconds, score.attempted("claimed")
     false_successes = metrics.share((claims == 1) & ~score.attempted("solved"))
     trouble = next((record.trouble for record in score.records if record.trouble), "")
@@ -153,7 +153,7 @@ def _reachable_row(score: Score) -> Row:
 
 
 def _list_by_seed(numbers: Sequence[float]) -> str | None:
-    """Return the numbers of several seeds, in the order of the seeds; None of a single one."""
+    """Return the numbers of several seeds, in the order of the seeds; None of a single seed."""
     return ", ".join(map(words, numbers)) if len(numbers) > 1 else None
 
 
@@ -272,7 +272,7 @@ def _stratum(stratum: int, *scores: Score) -> metrics.Share:
 
 
 def _outcome_columns(rows: Sequence[Row]) -> list[Column]:
-    """Return the columns of outcomes, folded if they never occur, and of strata."""
+    """Return the columns of outcomes, folded if all zero, and of strata."""
 
     def column(title: str, **looks: Any) -> Column:
         return Column(title, read=lambda row: row[title], **looks)
@@ -288,7 +288,7 @@ def _outcome_columns(rows: Sequence[Row]) -> list[Column]:
 
 
 def _outcome_summary(rows: Sequence[Row]) -> Summary:
-    """Return the outcomes of targets that were not solved, and the hardest strata."""
+    """Return the outcomes of unsolved targets, and the hardest strata."""
     points = []
     for solver, group in grouped(rows, lambda row: str(row["solver"])).items():
         counts: Counter[str] = sum((row["score"].outcomes for row in group), Counter())

@@ -8,7 +8,7 @@ from . import REACHABLE, UNREACHABLE
 
 
 class RobotSolves(Values, frozen=True, kw_only=True):
-    """The targets of a solver, (target,); only `setup` is there if it began none.
+    """The targets of a solver, (target,); only `setup` if no target was begun.
 
     Attributes:
         solved: whether the evaluation finds the target solved.
@@ -21,7 +21,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
         exception: whether the solver raised, or its process was lost.
         stratum: the number of each target's stratum.
         setup: how long the solver took before the first [s].
-        overhead: of the time of a solve, what the harness adds [s]; NaN if that is not known.
+        overhead: of the time of a solve, what the harness adds [s]; NaN if unknown.
         bound: how near any pose may come to a target out of reach [m].
         disputed: the numbers of the targets whose answers the engines place differently.
         repeats: how many targets a solver with a time limit solves each time, (repeat,).
@@ -50,10 +50,10 @@ class RobotSolves(Values, frozen=True, kw_only=True):
 
 
 class RobotDetails(Details, frozen=True):
-    """The solver's start and version, why it does not take a robot, and a description of the robot.
+    """The solver's start and version, why a robot is not taken, and a description of the robot.
 
-    Targets, a pose or a position for each effector, are solved within the tolerances [m], [rad];
-    they come from so many seeds in turns, stratum after stratum.
+    Targets, a pose or a position for each effector, are solved within the tolerances [m], [rad].
+    Their seeds alternate, stratum after stratum.
     """
 
     kind: str

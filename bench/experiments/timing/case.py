@@ -55,7 +55,7 @@ class TimedCase:
 def copying(work: TimedWork, size: int, *, passes: int = 1, operations: int = 1) -> TimedCase:
     """Return a yardstick of memory: copies that read and write as many bytes, half and half.
 
-    Each pass moves `size` bytes, so that they come from as near a cache as the work's.
+    Each pass moves `size` bytes, from as near a cache as the bytes of the work.
     """
     prepare = partial(_copies, size // 16, passes)
     return TimedCase(work, LIMIT, prepare, operations, moved=size * passes)
@@ -77,15 +77,15 @@ def streaming(
 ) -> TimedCase:  # fmt: skip
     """Return a yardstick of memory: a compiled loop that reads and writes so many bytes.
 
-    A processor reads the memory that it is about to write (write-allocate), which counts as moved.
-    On several cores the loop is cut into slices that read at least `minimum` bytes each.
+    A processor reads memory before writing (write-allocate), which counts as moved. On several
+    cores the loop is cut into slices of at least `minimum` bytes to read.
     """
     prepare = partial(_streams, read // 8, write // 8, minimum // 8)
     return TimedCase(work, LIMIT, prepare, operations, read + 2 * write, cores=cores)
 
 
 def stream(source: FloatArray, sink: FloatArray) -> None:
-    """Fill a sink, longer than the source: the source plus one, followed by ones."""
+    """Fill a sink, longer than the source: the source plus 1, then 1 to the end."""
     for i in range(len(source)):
         sink[i] = source[i] + 1.0
     for i in range(len(source), len(sink)):

@@ -74,7 +74,7 @@ def mujoco_steps(
 ) -> Callable[[], MujocoMassSpring]:
     """Return a frame of MuJoCo's steps, from and to its own state, without conversions.
 
-    Tolerance and iterations are MuJoCo's defaults, or those of the cross-check.
+    Tolerance and iterations are MuJoCo's defaults, or the cross-check's.
     """
     engine = MujocoMassSpring(problem.system, h=problem.h / count, integrator=integrator)
     option = engine.model.opt
@@ -112,9 +112,9 @@ def moving(problem: ClothSwing) -> State:
 
 
 def solving(work: TimedWork, problem: ClothSwing) -> TimedCase:
-    """Return a copy of the bytes that the triangular solves read: L twice an iteration.
+    """Return a copy of the bytes read by the triangular solves: L twice an iteration.
 
-    A nonzero has eight bytes; a block of them shares its indices.
+    A nonzero has eight bytes; the nonzeros of a block share indices.
     """
     factor = global_factor(problem.system, problem.h)
     assert isinstance(factor, CholeskyFactor)

@@ -18,7 +18,7 @@ STRATA = ("near", "far")
 # Plain Python takes milliseconds a solve; the first targets of the same set are enough.
 TARGETS, FEW_TARGETS = 50, 5
 LIMITS: dict[str, Any] = {"tolerance": TOLERANCE, "max_iterations": MAX_ITERATIONS}
-# The same method as one Python loop on three kinematics.
+# The same method as a Python loop on three kinematics.
 LOOP = "levenberg_marquardt"
 KINEMATICS: dict[str, Callable[[Any], SkeletonEngine]] = {
     registry.OUR_KINEMATICS.name: ReferenceKinematics,

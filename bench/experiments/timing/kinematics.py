@@ -52,7 +52,7 @@ def _work(name: str, title: str) -> TimedWork:
 
 
 def models() -> dict[str, tuple[Skeleton, int]]:
-    """Return the skeletons by name, and the size of a batch that exceeds the nearest caches."""
+    """Return the skeletons by name, and the size of a batch beyond the nearest caches."""
     return {
         "10 balls": (scenes.ball_chain(links=10)[0], 10_000),
         "100 balls": (scenes.ball_chain(links=100)[0], 1_000),
@@ -87,7 +87,7 @@ def engine_poses(name: str, skeleton: Skeleton, *batch: int) -> Callable[[], Any
 
 
 def preset_pose(skeleton: Skeleton) -> Callable[[], Any]:
-    """Return MuJoCo's forward kinematics of a random pose that is in its memory already."""
+    """Return MuJoCo's forward kinematics of a random pose already in its memory."""
     engine = MujocoSkeleton(skeleton)
     engine.update_kinematics(coordinates(engine, _local_rotations(skeleton)))
     return partial(mujoco.mj_kinematics, engine.model, engine.data)

@@ -25,13 +25,13 @@ from .values import RoundTimes
 
 # Time limit of a case [s].
 PATIENCE = 1800.0
-# Sweeps over the cases of a group, in random order, so that the drift of the machine affects all of
-# them; nine is the least number of which a median's interval leaves out the extremes.
+# Sweeps over the cases of a group, in random order: the drift of the machine affects all. Nine is
+# the least number with a median's interval inside the extremes.
 SWEEPS = 9
 # Rounds of a case in all sweeps.
 ROUNDS = 200
-# A call shorter than this [s] is repeated once, uncounted, before each of its later sweeps, so that
-# caches are as in a loop of such calls.
+# A call shorter than this time [s] is repeated once, uncounted, before each of its later sweeps.
+# Caches are then as in a loop of calls.
 QUICK = 1e-3
 
 
@@ -47,7 +47,7 @@ def compared(subject: str, group: str) -> list[TimedCase]:
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield a block a case; its size is the time [s] that it is measured for."""
+    """Yield a block a case; its size is the time for measuring [s]."""
     run = secrets.token_hex(8)
     for case in cases():
         measure = partial(measure_case, run, case, scale.seconds)
@@ -59,7 +59,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 def measure_case(run: str, case: TimedCase, seconds: float) -> Measured:
     """Return the rounds of a case, measured together with its group.
 
-    Its facts are the variation of a fixed loop meanwhile, and a word that the group has in common.
+    Its facts are the variation of a fixed loop meanwhile, and a word common to the group.
 
     Raises:
         RuntimeError: if there are no rounds; the message says why.
@@ -125,7 +125,7 @@ def _rounds(case: TimedCase, seconds: float) -> Iterator[list[float]]:
 def shape(timer: Timer, seconds: float) -> tuple[int, int]:
     """Return the calls of a round, and the rounds of a sweep, that take so long in total.
 
-    The processor's clock takes longer than a short call: many are timed at once, not one by one.
+    The processor's clock takes longer than a short call, so many calls are timed at once.
     """
     shortest = seconds / ROUNDS
     loops, single = 1, timer.timeit(1)

@@ -43,7 +43,7 @@ def median_time(record: Record) -> float:
 
 
 def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
-    """Return the solvers by the medians of shared sweeps, None if they share none."""
+    """Return the solvers by the medians of shared sweeps, None without any."""
     sweeps = {_label(record.solver): _scores(record) for record in records}
     groups = {record.details.together for record in records}
     if len(groups) > 1 or len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
@@ -119,7 +119,7 @@ def _row(record: Record, by_solver: dict[str, Record]) -> Row:
 
 
 def _remarks(record: Record, by_solver: dict[str, Record]) -> Iterator[str]:
-    """Yield the error that a tolerance leaves, the share of setting qpos, and noise."""
+    """Yield the error left by a tolerance, the share of setting qpos, and noise."""
     if record.values.error is not None:
         yield f"error {words(record.values.error)}"
     if record.solver == registry.MUJOCO and (preset := by_solver.get(PRESET)):
@@ -139,7 +139,7 @@ def _columns(unit: str, rows: Sequence[Row]) -> list[Column]:
 
 
 def _noise(rows: Sequence[Row]) -> float:
-    """Return the largest variation of a fixed loop, NaN if it is unknown."""
+    """Return the largest variation of a fixed loop, NaN if unknown."""
     return max((row["record"].details.noise for row in rows), default=math.nan)
 
 

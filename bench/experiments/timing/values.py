@@ -1,4 +1,4 @@
-"""The records of the timing: rounds, and the work that they time."""
+"""The records of the timing: rounds, and the timed work."""
 
 import math
 
@@ -6,7 +6,7 @@ from ...harness.values import Details, Floats2, Kind, Values
 
 
 class RoundTimes(Values, frozen=True):
-    """The seconds of an operation, (sweep, round), and the bytes that it moves as a yardstick."""
+    """The seconds of an operation, (sweep, round), and the bytes moved as a yardstick."""
 
     seconds: Floats2
     moved: float
