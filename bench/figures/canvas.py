@@ -22,7 +22,7 @@ WIDTH = 9.0
 
 @contextlib.contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the common style, without warnings on letters that a font lacks."""
+    """Draw in the common style, without warnings on letters missing from a font."""
     with mpl.rc_context(PARAMETERS), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         warnings.filterwarnings("ignore", "constrained_layout not applied")

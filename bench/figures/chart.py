@@ -14,7 +14,7 @@ from ..peers.registry import Style
 
 Floats = NDArray[np.float64]
 
-# Curves that are labelled; the others are grey.
+# Labelled curves; the others are grey.
 MAX_LABELLED = 6
 LINE, MARKS, SPAN = "line", "marks", "span"
 LESS, GREATER = "less", "greater"
@@ -53,7 +53,7 @@ class Series(NamedTuple):
 def series(
     solver: str, x: Any, y: Any, between: tuple[Any, Any] = ((), ()), form: str = LINE
 ) -> Series:
-    """Return a curve without the points that are not finite.
+    """Return the finite points of a curve.
 
     Raises:
         ValueError: if lengths differ, or an entry is no number.
@@ -83,7 +83,7 @@ NO_AXIS = Axis()
 class Panel(NamedTuple):
     """A diagram of a chart: title, curves, a line across (such as a tolerance), y label.
 
-    An empty label is that of the chart.
+    An empty label stands for the chart's.
     """
 
     title: str
@@ -169,7 +169,7 @@ class Chart:
         return totals
 
     def _mean(self, curve: Series) -> float:
-        """Return the mean of a curve as it is drawn, lower for better; NaN without points."""
+        """Return the mean of a curve as drawn, lower for better; NaN without points."""
         numbers, axis = (curve.x, self.x) if self.rows else (curve.y, self.y)
         with np.errstate(divide="ignore", invalid="ignore"):
             scaled = np.log10(numbers) if axis.log else numbers
@@ -179,7 +179,7 @@ class Chart:
 
 
 def looks(names: Sequence[str]) -> Mapping[str, Style]:
-    """Return the look of each of a few solvers, the same in every chart if it is free.
+    """Return the look of each of a few solvers, the same in every chart if free.
 
     Solvers with a style of their own choose first.
     """
@@ -191,7 +191,7 @@ def looks(names: Sequence[str]) -> Mapping[str, Style]:
 
 
 def _preferred(name: str) -> tuple[Style, ...]:
-    """Return all looks, first that of the solver's own colour, else by a hash of its name."""
+    """Return all looks, the solver's own colour first, else by a hash of its name."""
     colours = [look.colour for look in LOOKS]
     own = registry.find(name).style.colour
     first = colours.index(own) if own in colours else zlib.crc32(name.encode()) % len(LOOKS)

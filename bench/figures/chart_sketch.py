@@ -1,4 +1,4 @@
-"""Sketches of charts, which import the drawing only when they are drawn."""
+"""Sketches of charts, which import the drawing only when drawn."""
 
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -26,9 +26,9 @@ def _draw_chart(chart: Chart) -> "Figure":
 def declared_chart(
     declared: Mapping[str, Any], panels: Iterable[Panel], entrants: frozenset[str], **fields: Any
 ) -> Sketch | None:
-    """Return the sketch of a chart that a `tables.toml` declares; None without panels.
+    """Return the sketch of a chart declared in a `tables.toml`; None without panels.
 
-    `fields` are those of `Chart` that are not declared, or differ.
+    `fields` are the undeclared or different fields of `Chart`.
     """
     chart = {"panels": tuple(panels), "entrants": entrants, **declared, **fields}
     for name in ("x", "y"):

@@ -123,7 +123,7 @@ class _ChartDrawer:
     def name_curves(self, ax: Axes, panel: Panel, all_solvers: bool) -> None:
         """Write the names of labelled curves beside a panel, in the order of their ends.
 
-        With all solvers, those without a curve in the panel follow.
+        With all solvers, solvers without a curve in the panel follow.
         """
         low, high = sorted(ax.get_ylim())
         curves = {
@@ -155,7 +155,7 @@ class _ChartDrawer:
             )
 
     def scale(self, ax: Axes) -> None:
-        """Set up the axes of a panel, when all panels that share them have their curves."""
+        """Set up the axes of a panel, when all panels with the same axes have their curves."""
         _set_axis(ax, "x", self._chart.x, self._letters)
         if self._chart.rows:
             names = [_two_lines(name, _ROW_NAME) for name in self._chart.rows]
@@ -219,7 +219,7 @@ def _set_axis(ax: Axes, name: str, axis: Axis, space: float) -> None:
 def ticks(
     low: float, high: float, log: bool, space: float, size: Callable[[float], float]
 ) -> list[float]:
-    """Return as many round values between two ends as have labels that stand apart, or two.
+    """Return as many round values between two ends as have labels without overlap, or two.
 
     The label of a value takes its size, with a gap, of the space along the axis.
     """

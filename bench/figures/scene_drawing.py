@@ -39,7 +39,7 @@ def draw_cloth(
 ) -> None:
     """Draw a square cloth by the positions of its particles, (particle, 3), far squares first.
 
-    The shares colour it, from 0 to 1 on the colour map, (particle,).
+    The shares colour the cloth, from 0 to 1 on the colour map, (particle,).
     """
     size = round(len(positions) ** 0.5)
     i, j = np.divmod(np.arange((size - 1) ** 2), size - 1)

@@ -62,7 +62,7 @@ _cache: OrderedDict[str, tuple[str, bytes]] = OrderedDict()
 
 
 def drawn(sketch: Sketch, folder: Path | None = None) -> Drawing:
-    """Return a sketch drawn, or its files in a folder if they have the same digest."""
+    """Return a sketch drawn, or its files in a folder with the same digest."""
     digest = sketch.digest()
     files = _cache.get(digest) or _read(sketch.name, folder, digest) or _draw(sketch, digest)
     _cache[digest] = files
@@ -73,7 +73,7 @@ def drawn(sketch: Sketch, folder: Path | None = None) -> Drawing:
 
 
 def _read(name: str, folder: Path | None, digest: str) -> tuple[str, bytes] | None:
-    """Return SVG and PDF of the files in a folder, None if they have another digest."""
+    """Return SVG and PDF of the files in a folder, None for another digest."""
     if folder is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""The common style of figures (`style.toml`), and names in them."""
+"""The common style of figures (`style.toml`), and names in figures."""
 
 import tomllib
 from pathlib import Path
@@ -17,6 +17,6 @@ LONGEST = 60
 
 
 def plain_label(name: str) -> str:
-    """Return a name that matplotlib reads as plain text: neither a formula nor a hidden label."""
+    """Return a name as plain text for matplotlib: neither a formula nor a hidden label."""
     short = shortened(name, LONGEST).replace("$", r"\$")
     return f" {short}" if short.startswith("_") else short or "–"

@@ -21,7 +21,7 @@ _DECIMALS = re.compile(r"(?<![\w#])-?\d+\.\d\d+(?![\w])")
 _FONT = re.compile(r"font: (?:(\d+) )?([\d.]+px) [^;\"]*")
 # Between the letters and numbers of a path, and within a style.
 _SPACES = re.compile(r"(?<=[MLCQz:;]) | (?=[MLCQz][ \d\"-])| (?=\")")
-# Points of a polyline on one horizontal or vertical line, all but the first and the last.
+# Points of a polyline on a horizontal or vertical line, all but the first and the last.
 _STRAIGHT = re.compile(
     r"([ML]-?[\d.]+ (-?[\d.]+))(?:L-?[\d.]+ \2)+(?=L-?[\d.]+ \2(?![\d.]))"
     r"|([ML](-?[\d.]+) -?[\d.]+)(?:L\4 -?[\d.]+)+(?=L\4 )"
@@ -74,7 +74,7 @@ def _with_classes(text: str, prefix: str) -> str:
 
 
 def _shorter_path(path: str) -> str:
-    """Return a path without needless points, each line relative to the point before it."""
+    """Return a path without needless points, each line relative to the point before."""
     path = _STRAIGHT.sub(lambda run: run[1] or run[3], path)
     commands, last = [], [0.0, 0.0]
     for command in _POINT.finditer(path):

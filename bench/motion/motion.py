@@ -1,7 +1,7 @@
 """Motions to be played on a page: an arm on its curve, cloths beside each other, errors in colour.
 
-A scene becomes HTML that contains its data, quantised to 16 bits; `SCRIPT` plays all scenes of a
-page without any request. Errors are measured, not read off the drawing.
+A scene becomes HTML with its data, quantised to 16 bits; `SCRIPT` plays all scenes of a page
+without any request. Errors are measured, not read off the drawing.
 """
 
 import base64
@@ -83,8 +83,8 @@ class Scene(NamedTuple):
     def points(self) -> Floats:
         """Return all positions and the curve, (point, 3), without positions far away.
 
-        A motion that explodes would make the others too small to see. Far is more than the size of
-        the smallest motion from its middle.
+        An exploding motion would make the others too small to see. Far is more than the size of the
+        smallest motion from its middle.
         """
         arrays = [np.asarray(motion.positions, float).reshape(-1, 3) for motion in self.motions]
         arrays = [array[np.isfinite(array).all(axis=-1)] for array in arrays]
@@ -96,7 +96,7 @@ class Scene(NamedTuple):
 
 
 def fragment(scene: Scene) -> Markup:
-    """Return a scene as a part of a page that has `STYLE` and `SCRIPT`."""
+    """Return a scene as a part of a page with `STYLE` and `SCRIPT`."""
     low, high = decades(scene)
     template = environment(_FOLDER).get_template("motion.html")
     text = template.render(
@@ -126,7 +126,7 @@ def page(scene: Scene) -> str:
 
 
 def data_of(scene: Scene) -> dict[str, Any]:
-    """Return a scene as the data that `SCRIPT` reads: numbers, and arrays as base64; no names."""
+    """Return a scene as the data for `SCRIPT`: numbers, and arrays as base64; no names."""
     points = scene.points()
     low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max()) or 1.0

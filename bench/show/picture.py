@@ -1,4 +1,4 @@
-"""A scene as a picture that stands still, in SVG."""
+"""A scene as a still picture, in SVG."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -72,7 +72,7 @@ def draw_frame(
 
 
 def _write_error(ax: Axes, motion: Moving, i: int, title: bool) -> None:
-    """Write the solver, and its error in this frame and up to it."""
+    """Write the solver, and its error in this frame and so far."""
     ax.set_title(plain_label(motion.label) if title else "", fontweight="bold", loc="left")
     error, largest = length(motion.errors[i]), length(np.max(motion.errors[: i + 1]))
     text = f"error {error}, largest {largest}" if np.isfinite(motion.errors[i]) else "diverged"

@@ -15,7 +15,7 @@ from plumbob.verify.door import open_contestant
 
 TRACK, REACH = "track", "inverse_kinematics"
 STEP, MOTION = "mass_spring_step", "mass_spring_motion"
-# The tasks of which a scene needs one.
+# The tasks for scenes: a scene needs any of these.
 ARM_TASKS, CLOTH_TASKS = (TRACK, REACH), (STEP, MOTION)
 SYSTEM = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity")
 TOLERANCE, MAX_ITERATIONS = 1e-4, 100
@@ -25,12 +25,12 @@ Progress = Callable[[int, int], None]
 
 
 class YourSolver:
-    """A solver that is judged by what it answers, open until `close`.
+    """A solver judged by its answers, open until `close`.
 
     Attributes:
         address: as the user gave it.
         name: as the solver gave it, else its address.
-        tasks: that it offers.
+        tasks: as offered.
     """
 
     def __init__(self, address: str, contestant: Contestant) -> None:
@@ -72,7 +72,7 @@ class YourSolver:
         """Return the first of some tasks that the solver offers.
 
         Raises:
-            ValueError: if it offers none of them.
+            ValueError: if none is offered.
         """
         for task in tasks:
             if task in self.tasks:
@@ -86,7 +86,7 @@ class YourSolver:
     def follow_curve(
         self, skeleton: Skeleton, rest: FloatArray, curve: FloatArray, progress: Progress
     ) -> FloatArray:
-        """Return the positions of the joints as they follow a curve, (frame, joint, 3)."""
+        """Return the positions of the joints along a curve, (frame, joint, 3)."""
         inputs = {
             "parents": skeleton.parents,
             "offsets": skeleton.offsets,
@@ -114,7 +114,7 @@ class YourSolver:
     ) -> FloatArray:
         """Return the positions after each step, the start first, (frame, particle, 3).
 
-        They are NaN from the first step with a position that is not finite.
+        Positions are NaN from the first step with a non-finite position.
         """
         fields = self._greeting.system
         inputs: dict[str, Any] = {name: getattr(system, name) for name in SYSTEM} | {"h": H}
@@ -160,7 +160,7 @@ class YourSolver:
 
 
 def _joint_positions(skeleton: Skeleton, answer: dict[str, Any]) -> FloatArray:
-    """Return the positions of joints, by rotations if they were answered."""
+    """Return the positions of joints, by the answer's rotations if any."""
     if "local_rotations" not in answer:
         return _array(answer, "positions")
     rotations = answer["local_rotations"]
