@@ -1,4 +1,4 @@
-"""A block: one problem for one solver, and the choice of blocks of a run."""
+"""A block: a problem for a solver, and the choice of blocks of a run."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ SEED = 1986
 
 
 class Group(NamedTuple):
-    """Blocks that are measured together, so that their times are taken in turns."""
+    """Blocks to measure together, with times taken in turns."""
 
     name: str  # equal for all blocks of the group, which follow each other
     measure: Callable[[Sequence[Any]], "Sequence[Measured]"]  # the results of jobs
@@ -68,9 +68,9 @@ SCALES = {"quick": Scale(targets=200, seconds=0.2), "full": Scale(targets=2000, 
 
 @dataclass(frozen=True)
 class Block:
-    """One problem for one solver with the settings that change the answer, and how to measure it.
+    """A problem for a solver with the settings that change the answer, and how to measure.
 
-    The numbers are made only when `measure` is called.
+    Only a call of `measure` makes the numbers.
     """
 
     suite: str  # the family of problems
@@ -80,8 +80,8 @@ class Block:
     # numbers, words and truth values that change the answer
     settings: Mapping[str, Any] = field(default_factory=dict)
     size: float = 0  # how much is measured, where that varies: targets, or seconds of a benchmark
-    # the names as values: numbers, words, truth values and lists of words. "title" is how the
-    # problem is written, "task" the kind of its numbers, see `harness.values`.
+    # the names as values: numbers, words, truth values and lists of words. "title" is the problem
+    # as written; "task" is the kind of its numbers, see `harness.values`.
     facts: Mapping[str, Any] = field(default_factory=dict)
     times: bool = True  # whether times are among the numbers, or end the work: see `Experiment`
     # of its solver, beside the conditions of every record
@@ -107,7 +107,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Choice:
-    """The blocks of a run: all of them, or the user's selection."""
+    """The blocks of a run: all blocks, or the user's selection."""
 
     name: str  # of the scale, "quick" or "full"
     scale: Scale  # how much is measured, and the user's solvers and problems

@@ -1,7 +1,6 @@
 """Compile the kernels of the reference in a process of its own, while other work goes on.
 
-Compiled kernels are stored on disk, where a later call only reads them. Run as a module it compiles
-and exits.
+Compiled kernels are stored on disk for later calls. Run as a module, this file compiles and exits.
 """
 
 import contextlib
@@ -12,9 +11,9 @@ from collections.abc import Callable, Iterator
 
 @contextlib.contextmanager
 def compiling_ahead() -> Iterator[Callable[[], object]]:
-    """Compile in a process while the block runs; yield a function that waits for its end.
+    """Compile in a process while the block runs; yield a function to wait for its end.
 
-    The process reports no failure, because the first caller of the kernel will meet it again.
+    The process reports no failure: the first caller of the kernel will meet the failure again.
     """
     command = [sys.executable, "-m", __name__]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -26,7 +25,7 @@ def compiling_ahead() -> Iterator[Callable[[], object]]:
 
 
 def compile_kernels() -> None:
-    """Solve one small problem with each solver, the slowest to compile and last needed first."""
+    """Solve a small problem with each solver, the slowest to compile and last needed first."""
     import numpy as np
 
     from plumbob.reference import (

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Experiment(NamedTuple):
-    """A folder of `bench/experiments`, without importing it."""
+    """A folder of `bench/experiments`, not imported."""
 
     package: str  # the folder, by its full name as a package
     suite: str  # its name on the command line; experiments may share a suite
@@ -58,7 +58,7 @@ def blocks(suite: str, scale: Scale) -> Iterator[Block]:
 
 @functools.cache
 def kind_of(suite: str, task: str) -> "Kind | None":
-    """Return the types of the records of a task ("" if they name none); None of other suites.
+    """Return the types of the records of a task ("" if unnamed); None of other suites.
 
     No engine is imported.
 

@@ -51,7 +51,7 @@ def check_lock_file(path: Path) -> None:
 
 
 def _holder(path: Path) -> str:
-    """Return the process that holds a lock, as far as its file says so."""
+    """Return the owner process of a lock, as far as its file says so."""
     number = ""
     with contextlib.suppress(OSError):  # Windows lets nobody else read the file
         number = path.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Run jobs in a process of their own; end it when it stays silent, keep its earlier messages."""
+"""Run jobs in a process of their own; end a silent process, keep its earlier messages."""
 
 import contextlib
 import math
@@ -11,7 +11,7 @@ from plumbob.process.child import SILENT, ChildProcess, Loss, LostError, pickled
 from .progress import Progress, announce
 from .worker import Calculation, Finished, Lap, Message, Numbers, Ready, Solved, Started
 
-# A worker that is silent for so long [s] is ended; before it is ready it may compile.
+# A worker silent for this long [s] is ended; before ready, a worker may compile.
 START_PATIENCE = 180.0
 TARGET_PATIENCE = 60.0
 Calculate = Callable[..., Mapping[str, Any]]
@@ -38,10 +38,10 @@ class JobOutcome(NamedTuple):
 
 
 class WorkerProcess:
-    """A process that performs jobs, started with the first job and again after it was lost.
+    """A process that performs jobs, started with the first job and again after a loss.
 
     Attributes:
-        patience: how long it may be silent over a target [s].
+        patience: how long a worker may be silent over a target [s].
     """
 
     def __init__(
@@ -94,9 +94,9 @@ class WorkerProcess:
         return outcome.numbers
 
     def stream(self, job: Any) -> Generator[Message, None, None]:
-        """Perform a job and yield its messages as they come; the last is `Finished`.
+        """Perform a job and yield its messages on arrival; the last is `Finished`.
 
-        A worker that was lost since its last job costs nothing: a new one takes the job.
+        A worker lost since its last job costs nothing: a new worker takes the job.
         """
         is_used = self._child is not None
         messages = self._messages(job)
@@ -126,7 +126,7 @@ class WorkerProcess:
             raise
 
     def close(self) -> None:
-        """End the worker, if any, and whatever it has started."""
+        """End the worker, if any, with all processes started by the worker."""
         child, self._child = self._child, None
         if child is not None:
             child.end()

@@ -1,4 +1,4 @@
-"""Targets that a solver with its settings solves in order in a worker's process."""
+"""Targets for a solver with its settings, solved in order in a worker's process."""
 
 import contextlib
 import ctypes
@@ -24,16 +24,16 @@ from .progress import TROUBLE, Progress
 from .record import FIRST_TARGETS
 from .worker import Finished, Lap, Message, Ready, Solved
 
-# Times of slow solves are sent whenever they add up to this [s], so that the worker is not silent.
+# Times of slow solves are sent whenever their sum exceeds this [s], lest a worker seem silent.
 _LAP_SECONDS = 0.5
 # A user's solver may take so long for a target, on average, and at least so long in all [s].
 _TARGET_SECONDS, _LEAST_SECONDS = 0.2, 10.0
-# A solver that hangs on so many targets does not finish.
+# A solver that hangs on this many targets does not finish.
 MAXIMUM_SILENCES = 3
 
 
 class Job(NamedTuple):
-    """Targets and the solver that solves them."""
+    """Targets and their solver."""
 
     module: str  # the adapter's module, by its full name
     model: Any  # the robot or skeleton that the adapter is prepared for
@@ -53,7 +53,7 @@ class Job(NamedTuple):
         return seconds if self.entrant else math.inf
 
     def perform(self) -> Iterator[Message]:
-        """Yield the messages of the job, each as soon as it is there."""
+        """Yield the messages of the job, each as soon as available."""
         try:
             adapter = importlib.import_module(self.module)
             ask, setup = time_call(self.prepared)
@@ -77,7 +77,7 @@ class Job(NamedTuple):
         return adapter.prepare(self.model, self.tolerance, **self.settings)
 
     def _overhead(self, adapter: Any) -> float:
-        """Return the time of a solve that the solver does not use [s], NaN of users' solvers."""
+        """Return the part of a solve's time outside the solver [s], NaN of users' solvers."""
         if self.entrant or not self.warms_up:
             return math.nan
         return overhead(adapter, self._prepare, self.targets.request(0))
@@ -110,7 +110,7 @@ class Job(NamedTuple):
     def times(self, ask: Any, count: int) -> Iterator[OwnTime]:
         """Yield the times of the first targets, all converted before the first is solved.
 
-        The first is solved once before, so that caches are as in a loop of solves.
+        The first is solved once before: caches are then as in a loop of solves.
         """
         requests = [self.targets.request(i) for i in range(count)]
         solves = [(digest_of(*request), ask(request)) for request in requests]
@@ -122,16 +122,16 @@ class Job(NamedTuple):
 
 
 def first_targets(job: Job, outcome: JobOutcome) -> dict[str, Any]:
-    """Return as a fact how many targets a slow solver was given, nothing if it was given all."""
+    """Return as a fact how many targets a slow solver was given, nothing if all."""
     count = len(outcome.solved)
     is_cut = 0 < count < job.targets.shape[0] and job.budget < math.inf and not outcome.is_lost
     return {FIRST_TARGETS: count} if is_cut else {}
 
 
 def answers(job: Job) -> JobOutcome:
-    """Return the answers of a job; continue in a new process behind a target that loses the old.
+    """Return the answers of a job; after the loss of a process, continue in a new process.
 
-    A solver that hangs on `MAXIMUM_SILENCES` targets does not finish.
+    Skip the target at a loss. A solver that hangs on `MAXIMUM_SILENCES` targets does not finish.
     """
     count, size = job.targets.shape
     outcome = last = worker_process().perform(job)
@@ -149,7 +149,7 @@ def answers(job: Job) -> JobOutcome:
 
 
 class TimedTurns(NamedTuple):
-    """Solvers of the same targets that take turns, round after round, while they are timed."""
+    """Solvers of the same targets, timed in turns, round after round."""
 
     jobs: tuple[Job, ...]  # the solvers
     target_count: int  # the first targets are timed, so many
@@ -187,7 +187,7 @@ class Times(NamedTuple):
 
 
 def times_in_turns(jobs: Sequence[Job], count: int, rounds: int) -> list[Times | None]:
-    """Return the times of solvers that take turns; None of those that are lost or do not start."""
+    """Return the times of solvers taking turns; None of solvers lost or not started."""
     remaining = list(range(len(jobs)))
     while remaining:
         turns = TimedTurns(tuple(jobs[i] for i in remaining), count, rounds)
@@ -232,7 +232,7 @@ def announced(targets: Iterator[Solved], entrant: str) -> Iterator[Message]:
 def seed_shared_generators(seed: int) -> None:
     """Seed the generators of the process, from which an engine may draw.
 
-    Without it, an answer would depend on the solves before it.
+    Without the seed, an answer would depend on earlier solves.
     """
     random.seed(seed)
     np.random.seed(seed)  # noqa: NPY002 (the shared generator)

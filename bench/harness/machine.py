@@ -23,7 +23,7 @@ PACKAGES = (
 )
 ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("reference", "crosscheck", "verify", "bench", "plumbob/process")
-# Folders that only show numbers; all others may change one. Nothing that measures imports them.
+# Folders that only show numbers, never imported by a measurement; others may change a number.
 PRESENTATION = (
     *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),
     *("bench/tables", "verify/screen"),
@@ -51,10 +51,10 @@ def machine() -> dict[str, Any]:
 
 
 def conditions() -> dict[str, Any]:
-    """Return conditions that may influence a measurement now, but do not invalidate it.
+    """Return conditions that may influence, but do not invalidate, a measurement now.
 
-    "commit" is that of our sources, "pace" how long a fixed piece of work takes [s], which shows
-    the drift of a machine, "affinity" on how many cores this process may run, and "load" the
+    "commit" is the commit of our sources. "pace" is the time of a fixed piece of work [s], to show
+    the drift of a machine. "affinity" is the number of cores for this process, and "load" the
     system's over the last minute.
     """
     affinity = (
@@ -75,12 +75,12 @@ def _our_commit() -> str:
 
 
 def commit_of(root: Path) -> str:
-    """Return the commit of sources, and whether they were changed since; "" outside of git."""
+    """Return the commit of sources, and whether changed since; "" outside of git."""
     return git_commit(root, _PACKAGES) if (root / ".git").exists() else ""
 
 
 def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Return how a stamp differs from another, "" if it does not."""
+    """Return how a stamp differs from another, "" if equal."""
     for part, title in (("machine", "another machine"), ("versions", "other versions")):
         old, new = before.get(part, {}), now.get(part, {})
         changes = [
@@ -95,7 +95,7 @@ def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that take part, "" of a missing package."""
+    """Return the versions of Python and of the packages in use, "" of a missing package."""
     return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
@@ -108,7 +108,7 @@ def source_digest() -> str:
 
 
 def source_files() -> list[Path]:
-    """Return all files of the three packages but files that only show numbers."""
+    """Return all files of the three packages except files that only show numbers."""
     files = []
     for path in (path for name in _PACKAGES for path in (ROOT / name).rglob("*") if path.is_file()):
         parts = path.relative_to(ROOT).parts

@@ -23,7 +23,7 @@ def now() -> str:
 
 
 def measure(block: Block) -> Record:
-    """Measure a block; an exception becomes a record that says why, and costs no other block."""
+    """Measure a block; an exception becomes a record with the reason, and costs no other block."""
     begin = time.perf_counter()
     try:
         measured = block.measure()
@@ -51,7 +51,7 @@ def measure_together(blocks: Sequence[Block]) -> list[Record]:
 
 
 def failure(why: str) -> Measured:
-    """Return the result of a block that could not be measured."""
+    """Return the result of a block after a failed measurement."""
     return Measured(None, {"failed": why})
 
 
@@ -66,7 +66,7 @@ def not_asked(why: str) -> Measured:
 
 
 def record_of(block: Block, measured: Measured, seconds: float) -> Record:
-    """Return the record of a result that was measured here and now."""
+    """Return the record of a result measured here and now."""
     return Record(
         block.suite,
         block.problem,

@@ -1,4 +1,4 @@
-"""Every number that tables and figures show, from arrays, without formatting or drawing."""
+"""Every number of tables and figures, from arrays, without formatting or drawing."""
 
 import functools
 import itertools
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 
 class Share(NamedTuple):
-    """A count out of a total, with the interval that holds the true rate in 95 % of samples."""
+    """A count out of a total, with the 95 % confidence interval of the true rate."""
 
     hits: int
     total: int
@@ -23,7 +23,7 @@ class Share(NamedTuple):
 
 
 class Spread(NamedTuple):
-    """Quantiles of a sample; NaN throughout if it is empty."""
+    """Quantiles of a sample; NaN throughout if empty."""
 
     median: float
     p95: float
@@ -31,7 +31,7 @@ class Spread(NamedTuple):
 
 
 class Interval(NamedTuple):
-    """An estimate, and the interval that holds the true value in 95 % of samples."""
+    """An estimate, and the 95 % confidence interval of the true value."""
 
     value: float
     low: float
@@ -39,7 +39,7 @@ class Interval(NamedTuple):
 
 
 class Ranking(NamedTuple):
-    """Names, the best first, and the names that tie with the first, itself included."""
+    """Names, the best first, and the names tied with the first, itself included."""
 
     order: tuple[str, ...]
     first: tuple[str, ...]
@@ -95,8 +95,8 @@ def spread(values: Floats) -> Spread:
 def median_interval(values: Floats) -> Interval:
     """Return the median and its interval by order statistics; NaN bounds of fewer than six.
 
-    The number of values below the median is that of heads in as many throws of a coin, whatever
-    the distribution (Conover 1999, section 3.2).
+    The number of values below the median is distributed like heads in as many throws of a coin,
+    whatever the distribution of values (Conover 1999, section 3.2).
     """
     ordered = np.sort(np.asarray(values, dtype=float).ravel())
     if not len(ordered):
@@ -122,12 +122,12 @@ def mean_interval(values: Floats) -> Interval:
 
 
 def ranking(scores: Mapping[str, Floats]) -> Ranking:
-    """Return the order by mean score, and the names that tie with the greatest.
+    """Return the order by mean score, and the names tied with the greatest.
 
-    The scores are of the same targets, (target,) each, so they are compared in pairs: a target may
-    be easy or hard for all. Two differ if their mean difference exceeds 95 % of the mean
-    differences under random signs (Fisher 1935, section 21). For truth values that is McNemar's
-    exact test (1947). With several rivals the probabilities are adjusted by Holm (1979).
+    The scores are of the same targets, (target,) each, and compared in pairs, since a target may be
+    easy or hard for all. Two differ if their mean difference exceeds 95 % of the mean differences
+    under random signs (Fisher 1935, section 21). For truth values the test is McNemar's exact test
+    (1947). With several rivals the probabilities are adjusted by Holm (1979).
     """
     order = sorted(scores, key=lambda name: -mean(scores[name]))
     if not order:
@@ -158,7 +158,7 @@ def chance_of_pairs(a: Floats, b: Floats) -> float:
 
 
 def adjusted(chances: Sequence[float]) -> Floats:
-    """Return probabilities that hold over all comparisons at once (Holm 1979).
+    """Return probabilities valid over all comparisons at once (Holm 1979).
 
     A false discovery rate (Benjamini & Hochberg 1995) would not do: a false alarm stops a merge.
     """
@@ -169,7 +169,7 @@ def adjusted(chances: Sequence[float]) -> Floats:
 
 
 def penalised(seconds: Floats, solved: NDArray[np.bool_], penalty: float) -> Floats:
-    """Return seconds where solved; else the penalty, or the seconds if they are more."""
+    """Return seconds where solved; else the penalty, or the seconds if more."""
     return np.where(solved, seconds, np.maximum(np.nan_to_num(seconds, posinf=penalty), penalty))
 
 
@@ -208,7 +208,7 @@ def relative_spread(values: Floats) -> float:
 
 
 def within_budget(seconds: Floats, solved: NDArray[np.bool_], budgets: Floats) -> Floats:
-    """Return the share of all targets that were solved within each budget of time, (budget,)."""
+    """Return the share of all targets solved within each budget of time, (budget,)."""
     if not np.size(seconds):
         return np.full(np.shape(budgets), math.nan)
     hits = np.sort(np.asarray(seconds)[np.asarray(solved, dtype=bool)])
@@ -216,10 +216,10 @@ def within_budget(seconds: Floats, solved: NDArray[np.bool_], budgets: Floats) -
 
 
 def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Floats) -> Floats:
-    """Return the share of targets that each solver solves within a ratio of the fastest's time.
+    """Return the share of targets solved by each solver within a ratio of the fastest's time.
 
-    Dolan & Moré 2002, eq. 2.1: rho(tau) over the targets that any of the solvers solves. The
-    arguments are (solver, target) and (ratio,), ascending; the result is (solver, ratio).
+    Dolan & Moré 2002, eq. 2.1: rho(tau) over the targets solved by any solver. The arguments are
+    (solver, target) and (ratio,), ascending; the result is (solver, ratio).
     """
     times = np.where(solved, seconds, np.inf)
     best = times.min(axis=0, initial=np.inf)
@@ -242,7 +242,7 @@ def paired_ratio(a: Floats, b: Floats) -> Interval:
 
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
-    """Return the spread of counts, as integers where they are."""
+    """Return the spread of counts, as integers where integral."""
     median, p95, largest = (int(part) if part.is_integer() else part for part in spread(values))
     return median, p95, largest
 
@@ -251,8 +251,8 @@ def timing(seconds: Floats) -> Timing:
     """Return the median, the 10th and 90th percentiles of the rounds, and the median's interval.
 
     `seconds` are times of rounds, (round,), or of the rounds of each sweep, (sweep, round). The
-    median is that of all rounds. Successive rounds of a sweep are correlated, so the interval is
-    that of the sweeps' medians.
+    median is over all rounds. Successive rounds of a sweep are correlated, so the interval is of
+    the sweeps' medians.
     """
     rounds = np.asarray(seconds, dtype=float)
     low, median, high = np.quantile(rounds, [0.1, 0.5, 0.9])

@@ -10,7 +10,7 @@ TROUBLE = "trouble"
 
 
 class Progress(NamedTuple):
-    """A step of a measurement; `state` and `message` where it changes the state of a case."""
+    """A step of a measurement; `state` and `message` if the state of a case changes."""
 
     subject: str
     state: str = ""

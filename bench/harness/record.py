@@ -1,7 +1,7 @@
-"""Result files: a record is a line of JSON, appended as it is produced; the last of a key counts.
+"""Result files: a record is a line of JSON, appended when produced; the last of a key counts.
 
 No other file of the bench opens a result file. A record is a block: suite, problem, solver and
-settings, the arrays that came out, and where it was measured.
+settings, the resulting arrays, and the machine.
 """
 
 import contextlib
@@ -25,11 +25,11 @@ from .experiment import kind_of
 
 FORMAT = 3
 FILE_NAME = "records.jsonl"
-# The suite of the records that say of each other suite that it was run to its end.
+# Suite name of the records that mark a suite as complete.
 FINISHED = "finished"
-# The fact that counts the targets of a slow solver, which got the first targets only.
+# The fact with the number of targets of a slow solver, which got the first targets only.
 FIRST_TARGETS = "first_targets"
-# How many invalid lines a warning lists; it counts the others.
+# How many invalid lines a warning lists; the others are counted.
 LISTED_LINES = 5
 # How numbers are written for which JSON has no sign.
 _WORDS = {"nan", "inf", "-inf"}
@@ -89,7 +89,7 @@ class Record:
     size: float = 0.0  # how much was measured, for example the number of random targets
     # the results, arrays of numbers with an entry for each target, frame or step
     arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
-    # words that belong to it; "failed" says why there are no arrays
+    # words on the record; "failed" says why there are no arrays
     notes: Mapping[str, str] = field(default_factory=dict)
     # machine, versions and digest of the sources, see `plumbob.bench.harness.machine`
     stamp: Mapping[str, Any] = field(default_factory=dict)
@@ -97,7 +97,7 @@ class Record:
     seconds: float = 0.0  # how long it took to produce
     # for tables to select and sort by: numbers, words, truth values and lists of words
     facts: Mapping[str, Any] = field(default_factory=dict)
-    # of the measurement, which do not invalidate it: the commit of the sources, affinity, load,
+    # of the measurement, without effect on its validity: the commit of the sources, affinity, load,
     # pace
     conditions: Mapping[str, Any] = field(default_factory=dict)
 
@@ -107,21 +107,21 @@ class Record:
 
     @functools.cached_property
     def values(self) -> Any:
-        """The arrays as the type that the experiment declares; None if there are none."""
+        """The arrays as the type declared in the experiment; None without arrays."""
         kind = self._kind
         return values.read(kind.values, self.arrays) if kind and self.arrays else None
 
     @functools.cached_property
     def details(self) -> Any:
-        """Settings, notes and facts as the type that the experiment declares, None without it."""
+        """Settings, notes and facts as the type declared in the experiment, None without a type."""
         kind = self._kind
         return kind and values.read(kind.details, {**self.settings, **self.notes, **self.facts})
 
     def check(self) -> None:
-        """Make sure that the record is of its type, unless it is superseded.
+        """Check the type of the record, unless superseded.
 
         Raises:
-            ValueError: naming a field that is missing, or of another type.
+            ValueError: naming a missing field, or a field of another type.
         """
         if not self.superseded:
             self.values, self.details  # noqa: B018
@@ -143,17 +143,17 @@ class Record:
 
     @property
     def failed(self) -> str:
-        """Why it could not be measured, "" if it was."""
+        """Why the measurement failed, "" if not."""
         return self.notes.get("failed", "")
 
     @property
     def superseded(self) -> bool:
-        """Whether its block now has other settings: it is kept, but not shown."""
+        """Whether its block now has other settings: the record is kept, but not shown."""
         return "superseded" in self.notes
 
     @property
     def commit(self) -> str:
-        """The commit of the sources as git shortens it, with a plus where they were changed."""
+        """The commit of the sources as shortened by git, with a plus for changed sources."""
         commit, _, changes = str(self.conditions.get("commit", "")).partition(" ")
         return commit[:7] + ("+" if changes else "")
 
@@ -171,7 +171,7 @@ class Reading(NamedTuple):
 
 
 class _DecodedLine(NamedTuple):
-    """A line of a result file: its record or None, and why it is invalid."""
+    """A line of a result file: its record or None, and why invalid."""
 
     number: int
     text: bytes
@@ -188,8 +188,8 @@ class RecordFile:
     def read(self, typed: bool = True) -> Reading:
         """Return the records, the later of two with the same key; none if there is no file.
 
-        Lines without a record are left out and listed in the warning; so are records with fields
-        of another type than their experiment declares, unless `typed` is false.
+        Lines without a record are left out and listed in the warning. So are records with fields of
+        another type than in their experiment, unless `typed` is false.
 
         Raises:
             ValueError: naming the file, if it is no regular file, or no line of it is a record.
@@ -218,11 +218,10 @@ class RecordFile:
     def append(self, records: Iterable[Record]) -> None:
         """Write the records to the end of the file and to the disk: all of them, or none.
 
-        An unfinished record, left by a run that was killed, is cut off first; all else in the file
-        stays.
+        An unfinished record, left by a killed run, is cut off first; all else in the file stays.
 
         Raises:
-            OSError: naming the file, if it cannot be written to, as on a full disk.
+            OSError: naming the file, if writing fails, as on a full disk.
         """
         text = "".join(encode(record) + "\n" for record in records).encode()
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -269,9 +268,9 @@ class RecordFile:
     def arrange(self, order: Iterable[Key]) -> None:
         """Sort the records of these keys among their lines.
 
-        Tables show rows in the order of the file, and blocks that are measured at the same time
-        end in any order. All other lines keep their place, and the old file stays until the
-        new file is complete.
+        Tables show rows in the order of the file, and blocks measured at the same time end in any
+        order. All other lines keep their place, and the old file stays until the new file is
+        complete.
 
         Raises:
             ValueError: as `read` does.
@@ -291,7 +290,7 @@ class RecordFile:
             self._replace(texts)
 
     def _lines(self) -> tuple[list[_DecodedLine], bytes]:
-        """Return all lines with text, and the last if it is a record that was cut off."""
+        """Return all lines with text, and the last line if its record was cut off."""
         check_regular(self.path)
         content = self.path.read_bytes() if self.path.exists() else b""
         *texts, last_line = content.split(b"\n")
@@ -369,7 +368,7 @@ def _is_unfinished(line: bytes) -> bool:
 # A run reads its file again and again; each line is decoded once.
 @functools.lru_cache(maxsize=4096)
 def _decoded(text: bytes) -> tuple[bytes, Record | None, str]:
-    """Return a line, its record or None, and why it is none or of the wrong type."""
+    """Return a line, its record or None, and why the record is missing or of the wrong type."""
     record = None
     try:
         record = untyped(text)
@@ -391,7 +390,7 @@ def encode(record: Record) -> str:
 
 
 def decode(line: bytes | str) -> Record:
-    """Return the record of a line that `encode` wrote.
+    """Return the record of a line written by `encode`.
 
     Raises:
         ValueError: if the line is not JSON, of another format, lacks a field, or has a

@@ -1,4 +1,4 @@
-"""Run suites: measure the blocks that are not yet on record, and store each as it is done."""
+"""Run suites: measure the blocks not yet on record, and store each when done."""
 
 import time
 from collections import Counter
@@ -27,8 +27,8 @@ NOT_RUN = "not run"
 class Event(NamedTuple):
     """A step of a run."""
 
-    # "kept" if a record of it was there, "measuring", "measured", "failed", or "not run" for
-    # records of a solver that are not part of this run
+    # "kept" if on record before, "measuring", "measured", "failed", or "not run" for records of a
+    # solver outside this run
     state: str
     suite: str  # the suite
     subject: str  # problem and solver
@@ -70,7 +70,7 @@ def _run_blocks(
     present: Mapping[Key, Record],
     executor: Executor,
 ) -> Iterator[Event]:
-    """Measure the blocks that are not on record; write each record as it comes."""
+    """Measure the blocks not on record; write each record on arrival."""
     reasons = {block_key(block): why_again(block, present, executor) for block in selected}
     missing = []
     for block in selected:
@@ -101,7 +101,7 @@ def _record_finish(
     executor: Executor,
     file: RecordFile,
 ) -> None:
-    """Record that a suite was run to its end, if all of its blocks are on record."""
+    """Record the end of a suite, if all of its blocks are on record."""
     finished = Record(
         FINISHED, suite, "", size=len(suite_keys), notes={"scale": scale}, stamp=executor.stamp(),
         when=now(), seconds=seconds, conditions=conditions(),
@@ -118,7 +118,7 @@ def _record_finish(
 def _extra_records(
     suite: str, suite_keys: Set[Key], file: RecordFile, is_partial: bool
 ) -> Iterator[Event]:
-    """Report the records of a suite that were not requested; mark records with old settings."""
+    """Report the unrequested records of a suite; mark records with old settings."""
     records = [record for record in file.read().records if record.suite == suite]
     extra = [record for record in records if record.key not in suite_keys]
     if is_partial:
@@ -146,7 +146,7 @@ def _records(count: int) -> str:
 
 
 def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
-    """Return a sentence for each recorded claim of the suites that does not hold."""
+    """Return a sentence for each false claim on record in the suites."""
     if "check" not in suites:
         return []
     checks = [record for record in RecordFile(folder).read().records if record.suite == "check"]
@@ -157,7 +157,7 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
 
 
 def forget(suites: Sequence[str], scale: str | Choice, folder: Path) -> None:
-    """Remove the records of the blocks that are to be measured; others stay.
+    """Remove the records of the blocks to measure; others stay.
 
     Raises:
         ValueError: if the result file cannot be read, or a run writes to it.
@@ -178,18 +178,18 @@ def count(suites: Sequence[str], scale: str | Choice) -> int:
 
 
 def keys(suite: str, scale: str | Choice) -> set[Key]:
-    """Return the keys of the blocks of a suite that are selected."""
+    """Return the keys of the selected blocks of a suite."""
     choice = choice_at(scale)
     return set(map(block_key, filter(choice.takes, blocks(suite, choice.scale))))
 
 
 def choice_at(scale: str | Choice) -> Choice:
-    """Return everything at a scale by its name; a choice is returned as it is."""
+    """Return everything at a scale by its name; a choice is returned as is."""
     return scale if isinstance(scale, Choice) else Choice(scale, SCALES[scale])
 
 
 def why_again(block: Block, present: Mapping[Key, Record], executor: Executor) -> str | None:
-    """Return why a block is measured again, "" if it has no record, None if its record is valid."""
+    """Return why a block is measured again, "" without a record, None if its record is valid."""
     record = present.get(block_key(block))
     if record is None:
         return ""

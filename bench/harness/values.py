@@ -1,7 +1,7 @@
 """Typed fields of records: the numbers of an experiment, and its settings, notes and facts.
 
-An experiment declares its types in `values.py`, in `KINDS`. Records are read into them, so that a
-record that lacks a field, or has a field of another type, is refused.
+An experiment declares its types in `values.py`, in `KINDS`. Records are read into these types: a
+record with a missing field, or a field of another type, is refused.
 """
 
 from collections.abc import Mapping
@@ -16,14 +16,14 @@ Floats3 = np.ndarray[tuple[int, int, int], np.dtype[np.float64]]
 Integers1 = np.ndarray[tuple[int], np.dtype[np.int64]]
 Booleans1 = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
-# The kinds of numbers that a field takes, by its own kind: integers may stand for floats.
+# The kinds of numbers for a field, by its own kind: integers may stand for floats.
 _TAKES = {"f": "fiu", "i": "iu", "b": "b"}
 
 
 class Values(msgspec.Struct, frozen=True, eq=False):
     """The numbers of a block: arrays with axes, and scalars.
 
-    A field that is None is not on record. A name that is no identifier is given as
+    A None field is not on record. A name other than an identifier is given as
     `msgspec.field(name="cold wall")`.
     """
 
@@ -31,7 +31,7 @@ class Values(msgspec.Struct, frozen=True, eq=False):
 class Details(msgspec.Struct, frozen=True):
     """The settings, notes and facts of a block.
 
-    Notes and facts of a measurement need a default, since it may fail.
+    Notes and facts of a measurement need a default, in case of failure.
     """
 
 

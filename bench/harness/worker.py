@@ -1,6 +1,6 @@
 """The messages of a worker process, and its side of the connection: jobs in, messages out.
 
-A solver may print, crash or hang, so it works in a process of its own, which `isolation` starts.
+A solver may print, crash or hang, and so works in a process of its own, started by `isolation`.
 """
 
 import math
@@ -16,11 +16,11 @@ from .progress import Progress, listening
 
 
 class Started(NamedTuple):
-    """The worker has read the job and begins it."""
+    """The worker has read the job and begins."""
 
 
 class Ready(NamedTuple):
-    """The solver is set up and has solved a target that does not count."""
+    """The solver is set up and has solved an uncounted target."""
 
     setup: float  # how long the set-up took, without imports [s]
     remark: str = ""  # how to read the solver's numbers, else ""
@@ -39,7 +39,7 @@ class Solved(NamedTuple):
 
 
 class Lap(NamedTuple):
-    """A part of the times of a solver in a round: it begins, unless there are times."""
+    """A part of a solver's times in a round; without times, the part begins."""
 
     number: int  # of the solver
     times: tuple[OwnTime, ...] = ()  # of successive targets
@@ -64,7 +64,7 @@ Message = Started | Ready | Progress | Solved | Lap | Numbers | Finished
 
 
 class Calculation(NamedTuple):
-    """A job that is a call, which returns numbers by name."""
+    """A call as a job, which returns numbers by name."""
 
     function: Callable[..., Mapping[str, Any]]
     arguments: tuple[Any, ...]
@@ -79,7 +79,7 @@ class Calculation(NamedTuple):
 
 
 def main() -> None:
-    """Perform the jobs of the process that started this one until the connection is closed."""
+    """Perform the jobs of the parent process until the connection is closed."""
     requests, answers = connect()
     with listening(answers.send):
         while True:

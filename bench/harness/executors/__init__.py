@@ -13,7 +13,7 @@ LOCAL, DASK = "local", "dask://"
 
 
 class NotMeasured(NamedTuple):
-    """A block that could not be tried, and why: it has no record."""
+    """A block that could not be tried, and why; there is no record."""
 
     block: Block
     reason: str
@@ -26,11 +26,11 @@ class Executor:
     """Measure blocks in this process, in order; subclasses measure elsewhere."""
 
     def difference(self, block: Block, record: Record) -> str:
-        """Return how a record differs from a measurement made now, "" if it does not."""
+        """Return how a record differs from a measurement made now, "" if equal."""
         return difference(record.stamp, stamp())
 
     def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
-        """Yield each block when it is begun, and its record or why there is none, in any order."""
+        """Yield each block at its beginning, and its record or why there is none, in any order."""
         for name, members in groupby(blocks, lambda block: block.group and block.group.name):
             group = list(members)
             if name:
@@ -42,7 +42,7 @@ class Executor:
                 yield measure(block)
 
     def stamp(self) -> Mapping[str, Any]:
-        """Return the machine that times are taken on, versions and sources."""
+        """Return the machine on which times are taken, versions and sources."""
         return stamp()
 
     def close(self) -> None:

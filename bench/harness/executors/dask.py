@@ -1,4 +1,4 @@
-"""The workers of a Dask cluster: any of them answers, one of them takes all times."""
+"""The workers of a Dask cluster: any worker answers, a single worker takes all times."""
 
 import asyncio
 import functools
@@ -26,7 +26,7 @@ from . import DASK, Executor, NotMeasured, Step
 ANSWER, WORKERS = 10.0, 120.0
 # How often [s] to look for results and workers.
 _LOOK = 1.0
-# A block that is silent for so long [s] is given up.
+# A block silent for this long [s] is given up.
 _SILENCE = 24 * 3600.0
 _of_thread = threading.local()
 
@@ -67,9 +67,9 @@ class DaskExecutor(Executor):
         return {**stamp(), "machine": self._machine}
 
     def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
-        """Yield each block when it is submitted, and its record when it arrives.
+        """Yield each block when submitted, and its record on arrival.
 
-        Times are taken when all answers are there, one block after another.
+        Times are taken when all answers are there, block after block.
         """
         yield from self._measure([block for block in blocks if not block.times], scale)
         for block in blocks:
@@ -146,7 +146,7 @@ def _connected(address: str, patience: float) -> Any:
 
 
 async def _identify(address: str) -> None:
-    """Raise an exception if no scheduler answers; a Client would wait for it without a limit."""
+    """Raise an exception if no scheduler answers; a Client would wait without a limit."""
     from distributed.core import rpc
     from distributed.security import Security
 
@@ -183,7 +183,7 @@ def perform(suite: str, scale: bytes, key: Key, client: Mapping[str, Any]) -> Ma
 
 
 def measured(suite: str, scale: bytes, key: Key) -> Mapping[str, str]:
-    """Return the record of a block as a line, or why it is not measured here."""
+    """Return the record of a block as a line, or why the block is not measured here."""
     try:
         block = _blocks(suite, scale).get(key)
     except Exception as error:  # a user's file may raise anything
