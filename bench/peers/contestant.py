@@ -1,4 +1,4 @@
-"""The user's solver that works in this worker's child, opened at its first use."""
+"""The user's solver in this worker's child, opened at its first use."""
 
 from collections.abc import Mapping
 from time import perf_counter
@@ -40,7 +40,7 @@ class EntrantSolver:
         self._door.close()
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], OwnTime]:
-        """Return its answer and its time, or raise NoAnswerError if it gives no answer."""
+        """Return its answer and its time, or raise NoAnswerError without an answer."""
         begin = perf_counter()
         answer = self._door.answer(Case("of the bench", task, inputs, "bench", _ABOUT))
         round_trip = perf_counter() - begin
@@ -68,5 +68,5 @@ def opened(spec: Spec) -> EntrantSolver:
 
 
 def remark() -> str:
-    """Return how the times of the last solver are taken, where that is not by its own clock."""
+    """Return how the times of the last solver are taken, if not by its own clock."""
     return list(_open.values())[-1].remark if _open else ""

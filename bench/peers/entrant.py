@@ -1,4 +1,4 @@
-"""A solver that a user entered: its name, its address, its tasks."""
+"""A solver entered by a user: its name, its address, its tasks."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,13 +8,13 @@ Spec = str | tuple[str, ...]
 
 CHAIN_TASK, ROBOT_TASK = "inverse_kinematics", "robot_inverse_kinematics"
 STEP_TASK, MOTION_TASK = "mass_spring_step", "mass_spring_motion"
-# The tasks that each suite has for an entrant.
+# The tasks of each suite for an entrant.
 SUITE_TASKS = {"ik": (CHAIN_TASK, ROBOT_TASK), "cloth": (STEP_TASK, MOTION_TASK)}
 
 
 @dataclass(frozen=True)
 class Entrant:
-    """A solver that was opened once to describe itself."""
+    """A solver, opened once to describe itself."""
 
     name: str  # its own, or the user's name for it
     door: str  # its address as the user gave it

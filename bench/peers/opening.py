@@ -1,4 +1,4 @@
-"""Open the solvers that a user enters, once, and note how they describe themselves."""
+"""Open the user's solvers, once, and note how the solvers describe themselves."""
 
 import importlib.metadata
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ GROUP = "plumbob.solvers"
 
 
 class SolverAddress(NamedTuple):
-    """A solver that is to be opened: its address, its spec, and the user's name for it."""
+    """A solver to open: its address, its spec, and the user's name for the solver."""
 
     door: str
     spec: Spec
@@ -51,7 +51,7 @@ def _address(word: str) -> SolverAddress:
 
 
 def installed() -> list[SolverAddress]:
-    """Return the solvers that installed packages offer as entry points."""
+    """Return the solvers offered by installed packages as entry points."""
     points = importlib.metadata.entry_points(group=GROUP)
     return [
         SolverAddress(
@@ -93,7 +93,7 @@ def opened(addresses: Sequence[SolverAddress], suites: Sequence[str]) -> list[En
 def opened_where_possible(
     installed: Sequence[SolverAddress], suites: Sequence[str], entrants: Sequence[Entrant]
 ) -> Iterator[Entrant | str]:
-    """Yield each installed solver with a task of the suites, or why it takes no part."""
+    """Yield each installed solver with a task of the suites, or why the solver takes no part."""
     names = {entrant.name.casefold() for entrant in entrants}
     for address in installed:
         try:
@@ -133,7 +133,7 @@ def _opened(address: SolverAddress) -> Entrant:
 
 
 def _name(address: SolverAddress, greeting: Greeting) -> str:
-    """Return a name that no other solver has: the address is appended where it is needed."""
+    """Return a name that no other solver has, with the address appended where needed."""
     own_name, door = greeting.name, clean(address.door)
     if own_name == Greeting(greeting.protocol, ()).name:  # it has none
         word = address.spec if isinstance(address.spec, str) else address.spec[0]

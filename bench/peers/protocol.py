@@ -1,11 +1,11 @@
-"""The parts that all adapters share: the time that a solver measures itself, and its failures."""
+"""The parts common to all adapters: the time measured by a solver itself, and its failures."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 
 class OwnTime(NamedTuple):
-    """The time that a solver, or its adapter, has measured itself."""
+    """The time measured by a solver or its adapter itself."""
 
     seconds: float  # by its own clock [s]
     round_trip: float = 0.0  # of its requests, 0 without any [s]
@@ -13,7 +13,7 @@ class OwnTime(NamedTuple):
 
 
 def total(times: Iterable[OwnTime | None]) -> OwnTime | None:
-    """Return the time of several calls, None if none of them measured its own."""
+    """Return the time of several calls, None if no call measured its own."""
     measured = [time for time in times if time is not None]
     if not measured:
         return None
@@ -22,11 +22,11 @@ def total(times: Iterable[OwnTime | None]) -> OwnTime | None:
 
 
 class NoAnswerError(Exception):
-    """A solver gave no answer; the message is a sentence that says why."""
+    """A solver gave no answer; the message is a sentence with the reason."""
 
 
 def describe(error: Exception) -> str:
-    """Return an exception on one line; with its type unless it is a `NoAnswerError`."""
+    """Return an exception on a single line; with its type unless a `NoAnswerError`."""
     kind = "" if isinstance(error, NoAnswerError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())[:300]
 

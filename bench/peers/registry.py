@@ -1,8 +1,8 @@
-"""Every solver that the bench knows: its name, its style, how many iterations it is given.
+"""Every solver of the bench: its name, its style, how many iterations are allowed.
 
-A solver of the reference takes part as soon as the reference lists it; an entry in `solvers.toml`
-gives it a label, a style and limits of its own. A peer is an adapter and an entry there. A user's
-solver is a peer of the run that it was entered for. No engine is imported.
+Every solver listed in the reference takes part; an entry in `solvers.toml` gives a label, a style
+and limits. A peer is an adapter and an entry there. A user's solver is a peer of its run only. No
+engine is imported.
 """
 
 import functools
@@ -46,14 +46,14 @@ STYLES = {
     for name, (colour, line, marker) in _DATA["styles"].items()
 }
 OTHER = STYLES["other"]
-# Styles of unknown solvers are made of these: lines that no solver above has.
+# Styles of unknown solvers are made of these: lines unused by the solvers above.
 _COLOURS = ("ink", "blue", "orange", "green", "purple", "brass")
 _LINES: tuple[Any, ...] = ((0, (8, 2)), (0, (3, 1, 1, 1)), (0, (8, 2, 2, 2)))
 
 
 @dataclass(frozen=True)
 class Solver:
-    """A solver as tables and figures show it."""
+    """A solver as in tables and figures."""
 
     name: str  # in records
     label: str  # how it is written
@@ -110,15 +110,15 @@ SUPERNODAL = FACTORS[0]
 def environment_python(name: str) -> Path:
     """Return the path of the Python of a peer's environment, which need not exist.
 
-    Peers with requirements that contradict ours have environments of their own. `make peers` makes
-    them as `peers/NAME` below the environment that runs the bench.
+    Peers with requirements in conflict with ours have environments of their own. `make peers` makes
+    these as `peers/NAME` below the environment of the bench.
     """
     place = "Scripts/python.exe" if sys.platform == "win32" else "bin/python"
     return Path(sys.prefix, "peers", name, place)
 
 
 def _distribution(environment: str, package: str) -> importlib.metadata.Distribution | None:
-    """Return a package in a peer's environment, or in ours if that is "", None if it lacks."""
+    """Return a package in a peer's environment, or in ours if "", None if missing."""
     places = map(str, Path(sys.prefix, "peers", environment).glob("lib/python*/site-packages"))
     path = list(places) if environment else sys.path
     return next(iter(importlib.metadata.distributions(name=package, path=path)), None)
@@ -126,14 +126,14 @@ def _distribution(environment: str, package: str) -> importlib.metadata.Distribu
 
 @functools.cache
 def version(package: str) -> str:
-    """Return the version of a package, "" if it is not installed."""
+    """Return the version of a package, "" if not installed."""
     distribution = _distribution("", package)
     return distribution.version if distribution else ""
 
 
 @functools.cache
 def peers_command() -> str:
-    """Return the command that installs the peers into the environment of this Plumbob."""
+    """Return the command to install the peers into the environment of this Plumbob."""
     distributions = importlib.metadata.distributions(name=PLUMBOB.casefold())
     texts = filter(None, (each.read_text("direct_url.json") for each in distributions))
     origin = json.loads(next(texts, "{}"))
@@ -156,14 +156,14 @@ class Adapter:
     title: str  # how it is written
     module: str  # its adapter
     package: str  # the package that must be installed
-    # of its own, with the Python that runs it; "" if it works in ours
+    # an environment of its own with its own Python; "" for a solver in ours
     environment: str = field(default="", kw_only=True)
     # the user's solver, if any, which is always there
     entrant: Entrant | None = field(default=None, kw_only=True)
 
     @property
     def distribution(self) -> importlib.metadata.Distribution | None:
-        """The package where it is installed, None if it is not."""
+        """The package where installed, None if not installed."""
         return _distribution(self.environment, self.package)
 
     @property
@@ -175,12 +175,12 @@ class Adapter:
 
     @property
     def is_installed(self) -> bool:
-        """Whether it can be used."""
+        """Whether the peer can be used."""
         return bool(self.entrant or self.version)
 
     @property
     def spec(self) -> dict[str, Any]:
-        """Settings of the adapter that open a user's solver."""
+        """Settings of the adapter to open a user's solver."""
         return {"spec": self.entrant.spec} if self.entrant else {}
 
     @property
@@ -200,7 +200,7 @@ _RESTART_COUNT = 20
 
 @dataclass(frozen=True)
 class PeerEntry:
-    """A peer with settings, as it enters the tables."""
+    """A peer with settings, as in the tables."""
 
     kind: str  # `ONE_START`, `PORTFOLIO` or `RESTARTS`
     settings: Mapping[str, Any] = field(default_factory=dict)  # of its adapter
@@ -209,7 +209,7 @@ class PeerEntry:
 
     @property
     def has_time_limit(self) -> bool:
-        """Whether it takes a time limit for each target [s], so that answers depend on the load."""
+        """Whether each target has a time limit [s]: answers then depend on the load."""
         return "seconds" in self.settings
 
 
@@ -220,11 +220,11 @@ class Peer(Adapter):
     license: str  # of the package
     can: str  # the robots that it takes
     entries: tuple[PeerEntry, ...]  # its settings
-    # how it is written, where that is not its title
+    # its name as written, if not its title
     label: str = field(default="", kw_only=True)
     # whether its forward kinematics is compared with ours
     kinematics: bool = field(default=False, kw_only=True)
-    # how exact that is, where it is not in double precision
+    # the precision, if not double
     precision: str = field(default="", kw_only=True)
     # whether its adapter lists all solutions of a pose
     lists_all: bool = field(default=False, kw_only=True)
@@ -233,7 +233,7 @@ class Peer(Adapter):
     built_on: str = field(default="", kw_only=True)  # the engine whose kinematics it works with
     # whether it is a Python loop of ours on the package's kinematics
     loop: bool = field(default=False, kw_only=True)
-    # what one would choose it for
+    # the reason to choose this peer
     use: str = field(default="", kw_only=True)
 
     def label_of(self, entry: PeerEntry) -> str:
@@ -259,7 +259,7 @@ class ChainPeer(Adapter):
 
 # How the settings of a peer for cloths differ from try to try.
 ITERATED, LINEARISED, EXPLICIT = "iterations", "one linear solve", "explicit"
-# A user's solver that does not declare its step is tried with steps of all lengths.
+# A user's solver without a declared step is tried with steps of all lengths.
 UNDECLARED = "undeclared"
 _EXPLICIT_METHODS = ("explicit", "symplectic")
 
@@ -298,7 +298,7 @@ SINGLE_PRECISION = {peer.title: peer.precision for peer in PEERS if peer.precisi
 
 
 def robot_peers(entrants: Iterable[Entrant] = ()) -> list[Peer]:
-    """Return the solvers for robots: `PEERS`, then the user's that take robots."""
+    """Return the solvers for robots: `PEERS`, then the user's for robots."""
     restarts = PeerEntry(RESTARTS, {}, _RESTART_COUNT, f"{_RESTART_COUNT} restarts")
     adapter = (f"{_IK_ADAPTERS}.entrant", "", "", "", (PeerEntry(ONE_START), restarts))
     takers = [entrant for entrant in entrants if ROBOT_TASK in entrant.tasks]
@@ -306,7 +306,7 @@ def robot_peers(entrants: Iterable[Entrant] = ()) -> list[Peer]:
 
 
 def chain_peers(entrants: Iterable[Entrant]) -> list[ChainPeer]:
-    """Return the methods of the user's solvers that take chains of balls."""
+    """Return the methods of the user's solvers for chains of balls."""
     return [
         ChainPeer(title, f"{_IK_ADAPTERS}.entrant_chain", "", method, entrant=entrant)
         for entrant in entrants
@@ -338,12 +338,12 @@ def _entered_cloth_peer(entrant: Entrant) -> ClothPeer:
 
 
 def ik_solvers() -> dict[str, Solver]:
-    """Return the solvers of inverse kinematics that the reference has, by name, in its order."""
+    """Return the reference's solvers of inverse kinematics, by name, in its order."""
     return {name: _IK.get(name) or Solver(name, name.replace("_", " ")) for name in IK_SOLVERS}
 
 
 def step_solvers() -> dict[str, StepSolver]:
-    """Return the solvers of steps that the reference has, by name, in its order."""
+    """Return the reference's solvers of steps, by name, in its order."""
     return {
         name: _STEP.get(name) or StepSolver(name, name.replace("_", " ")) for name in STEP_SOLVERS
     }
@@ -394,7 +394,7 @@ def _by_name(*reference_names: tuple[str, ...]) -> Mapping[str, Solver]:
 
 
 def names() -> set[str]:
-    """Return the names of our solvers and of peers, in records and as they are written."""
+    """Return the names of our solvers and of peers, in records and as written."""
     return {name for solver in _solvers() for name in (solver.name, solver.label)}
 
 

@@ -23,13 +23,13 @@ def digest_of(spec: Spec) -> str:
 
 
 def commit_of(spec: Spec) -> str:
-    """Return the commit of a solver's files, and whether they were changed since; "" if none."""
+    """Return the commit of a solver's files, and whether changed since; "" if none."""
     files = source_files(spec)
     return git_commit(files[0].parent, list(map(str, files))) if files else ""
 
 
 def git_commit(folder: Path, paths: Sequence[str]) -> str:
-    """Return the commit of a folder, and whether these paths differ from it; "" outside of git."""
+    """Return the commit of a folder, and whether these paths differ; "" outside of git."""
     git = ["git", "-C", str(folder)]
     try:
         head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, check=True)

@@ -10,14 +10,14 @@ LONG = 2e-4
 
 
 def time_call(call: Callable[[], T]) -> tuple[T, float]:
-    """Return the result of a call, and how long it took [s]."""
+    """Return the result of a call, and its time [s]."""
     begin = time.perf_counter()
     result = call()
     return result, time.perf_counter() - begin
 
 
 def compute_time_of(call: Callable[[], T]) -> tuple[T, float]:
-    """Return the result of a call in this process, and how long it computed [s].
+    """Return the result of a call in this process, and its computing time [s].
 
     Wall time includes the work of other programs on the same core, so a call longer than `LONG`
     takes its processor time. With several threads the wall time is shorter, and counts.
@@ -29,7 +29,7 @@ def compute_time_of(call: Callable[[], T]) -> tuple[T, float]:
 
 
 class Patience:
-    """A time limit that starts now."""
+    """A time limit from now on."""
 
     def __init__(self, seconds: float) -> None:
         self._end = time.perf_counter() + seconds

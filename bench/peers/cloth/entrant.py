@@ -17,16 +17,16 @@ _PARTS = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinne
 
 
 def prepare(system: MassSpring, frame: float, spec: Spec = "", substeps: int = 1) -> Mover:
-    """Return a user's solver that takes so many steps a frame.
+    """Return a user's solver with so many steps a frame.
 
     Raises:
-        ValueError: if its model cannot hold the system.
+        ValueError: if the solver's model cannot hold the system.
     """
     return _Requests(system, frame / substeps, substeps, spec)
 
 
 class _Requests:
-    """Steps of which each is a request; there is none after a step that is not finite."""
+    """Steps, each a request; the first non-finite step is the last."""
 
     def __init__(self, system: MassSpring, h: float, substeps: int, spec: Spec) -> None:
         self._solver, self._h, self._substeps = opened(spec), h, substeps
@@ -70,7 +70,7 @@ def _check_model(system: MassSpring, greeting: Greeting) -> None:
     """Make sure that a solver's own model can hold a system.
 
     Raises:
-        ValueError: naming the part that it cannot hold.
+        ValueError: naming the part that the model cannot hold.
     """
     can, gravity = greeting.system, system.gravity
     is_down = not gravity[[0, 2]].any() and bool(gravity[1] <= 0.0)

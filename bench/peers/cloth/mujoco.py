@@ -39,7 +39,7 @@ def prepare(
         option.iterations, option.tolerance = iterations, tolerance
     option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)  # energies are not read here
     option.timestep = frame / substeps
-    # MuJoCo would write warnings to a file; a motion that blew up is seen from the positions.
+    # MuJoCo would write warnings to a file; the positions show whether a motion blew up.
     mujoco.set_mju_user_warning(lambda warning: None)
     return _Steps(engine, substeps)
 
@@ -47,7 +47,7 @@ def prepare(
 def _engine(system: MassSpring, flex: bool) -> MujocoMassSpring:
     """Return the engine of an equal system but for stiffness and damping, or a new engine.
 
-    An engine is cached for each number of particles: its construction takes time cubic in it.
+    An engine is cached for each number of particles: its construction takes cubic time.
     """
     key = flex, system.particle_count
     if key in _engines:

@@ -2,13 +2,13 @@
 
 - semi-implicit: symplectic Euler.
 - VBD: vertex block descent minimises the objective of implicit Euler (Chen et al. 2024). Each
-  particle takes a Newton step of its own, all of a colour at once; so neighbours must differ in
-  colour.
+  particle takes a Newton step of its own, all particles of a colour at once, so neighbours must
+  differ in colour.
 - XPBD: extended position based dynamics (Macklin, Müller, Chentanez 2016) corrects all springs at
   once and adds their corrections of a particle, without averaging.
 
-The launches of a frame are captured once and replayed, as Newton's examples do: launched one by one
-from Python they take up to twenty times as long. Collisions between particles are left out, as the
+The launches of a frame are captured once and replayed, as Newton's examples do: separate launches
+from Python take up to twenty times as long. Collisions between particles are left out, as the
 reference has none. A pinned particle has mass zero. A spring's rest length would be taken from the
 particles' places, and is overwritten. `docs/peers/newton.md` gives the reasons for all settings.
 """
@@ -35,7 +35,7 @@ SOLVERS: dict[str, Any] = {
 def prepare(
     system: MassSpring, frame: float, solver: str = "VBD", substeps: int = 1, **limits: int
 ) -> Mover:
-    """Return a solver, stepping so many times a frame, with `iterations` a step if it iterates."""
+    """Return a solver, stepping so many times a frame, with `iterations` a step if iterative."""
     wp.config.log_level = wp.LOG_ERROR
     with wp.ScopedDevice("cpu"):
         particles = model(system)
@@ -72,8 +72,8 @@ class _Frames:
 def model(system: MassSpring) -> Any:
     """Return the model, coloured by Newton's own algorithm along the springs.
 
-    `ModelBuilder.color` sees triangles and bending edges only, so it would give all particles of a
-    model of springs one colour.
+    `ModelBuilder.color` sees triangles and bending edges only: all particles of a model of springs
+    would have the same colour.
     """
     builder = newton.ModelBuilder(gravity=wp.vec3(*system.gravity))
     nowhere = wp.vec3(0.0, 0.0, 0.0)

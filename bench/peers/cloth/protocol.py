@@ -1,9 +1,9 @@
 """The interface of adapters for cloths.
 
-An adapter is a module with a function `prepare(system, frame, **settings)`: it sets the engine up
-for particles and springs and returns a `Mover`, which moves them on, a frame at a time. Only
-`advance` is timed, so conversions cost no solver anything, and set-up is timed apart. For a system
-that it cannot move `prepare` raises a `ValueError`.
+An adapter is a module with a function `prepare(system, frame, **settings)`. `prepare` sets the
+engine up for particles and springs and returns a `Mover`, to move the particles a frame at a time.
+Only `advance` is timed: conversions cost no solver anything, and set-up is timed apart. For an
+unsuitable system `prepare` raises a `ValueError`.
 """
 
 from typing import Protocol
@@ -15,7 +15,7 @@ from ..protocol import OwnTime
 
 
 class Mover(Protocol):
-    """A solver that is set up for a system and the length of a frame."""
+    """A solver set up for a system and the length of a frame."""
 
     def begin(self, state: State) -> None:
         """Put the particles into a state; the solver forgets all earlier states."""
@@ -28,4 +28,4 @@ class Mover(Protocol):
         """
 
     def positions(self) -> FloatArray:
-        """Return the positions of the particles [m], (particle, 3), not finite if they blew up."""
+        """Return the positions of the particles [m], (particle, 3), not finite after a blow-up."""

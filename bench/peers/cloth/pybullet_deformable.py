@@ -1,10 +1,10 @@
 """PyBullet: a deformable body as masses and springs, by symplectic Euler in double precision.
 
-Its springs are the edges of a mesh of triangles, so it takes square cloths only. It adds springs of
-0.1 N/m between neighbours' neighbours; their stiffness is set to zero. Rest lengths are taken anew
-from where the particles are at the first step, which is taken with the cloth flat. Velocities
-cannot be written but are kept when positions are: a step of chosen forces gives the particles
-their first velocities.
+Its springs are the edges of a mesh of triangles, so only square cloths are possible. PyBullet adds
+springs of 0.1 N/m between neighbours' neighbours; their stiffness is set to zero. Rest lengths are
+taken anew from where the particles are at the first step, which is taken with the cloth flat.
+Velocities cannot be written, but stay when positions are written: a step of chosen forces gives the
+particles their first velocities.
 """
 
 import functools
@@ -20,19 +20,19 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 
 from .protocol import Mover
 
-# The length [s] of the step that makes velocities, its gravity in units of the fastest of them, and
-# the length [s] and number of the steps of implicit Euler that find its start.
+# The length [s] of the step to set velocities, and its gravity in units of the fastest velocity.
+# Then the length [s] and number of the steps of implicit Euler to find its start.
 _PUSH, _PULL, _RELAX, _RELAXATIONS, _ITERATIONS = 0.1, 4.0, 1e3, 3, 50
 # Larger cloths take PyBullet minutes to load.
 MAXIMUM_PARTICLES = 2500
 # A step so short [s] moves nothing.
 _INSTANT = 1e-12
-# Rest lengths are those of the flat cloth up to rounding.
+# Rest lengths equal the flat cloth's up to rounding.
 _ROUNDING = 1e-9
 
 
 def prepare(system: MassSpring, frame: float, substeps: int = 1) -> Mover:
-    """Return PyBullet, stepping so many times a frame; `mesh` says which cloths it takes."""
+    """Return PyBullet, stepping so many times a frame; `mesh` says which cloths are possible."""
     return _Steps(system, frame / substeps, substeps)
 
 
@@ -66,7 +66,7 @@ class _Steps:
         return self._body.positions()
 
     def _give(self, velocities: FloatArray) -> None:
-        """Add to the velocities, which particles keep when they are put elsewhere."""
+        """Add to the velocities, which particles keep when put elsewhere."""
         fastest = float(np.abs(velocities).max())
         if fastest:
             gravity = np.array([0.0, -_PULL * fastest / _PUSH, 0.0])
@@ -105,7 +105,7 @@ class _Body:
         return np.array(pybullet.getMeshData(self._number, -1, **flags)[1])
 
     def write(self, positions: FloatArray) -> None:
-        """Put the particles elsewhere; they keep their velocities."""
+        """Put the particles elsewhere with the same velocities."""
         pybullet.resetMeshData(self._number, positions.tolist(), physicsClientId=self._client)
 
     def set(self, gravity: FloatArray, h: float) -> None:

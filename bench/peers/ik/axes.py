@@ -9,7 +9,7 @@ REVOLUTION = 2.0 * np.pi
 
 
 def first_within(robot: BenchRobot, solutions: FloatArray) -> tuple[FloatArray | None, bool]:
-    """Return the first solution, (solution, joint), within the limits, and whether there is one."""
+    """Return the first solution, (solution, joint), within the limits, and whether there is any."""
     valid = all_within(robot, solutions)
     return (valid[0], True) if len(valid) else (None, False)
 
@@ -26,7 +26,7 @@ def all_within(robot: BenchRobot, solutions: FloatArray) -> FloatArray:
 
 
 def axes_at_zero(robot: BenchRobot) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return axes (joint, 3), offsets between them (joint + 1, 3), and the effector's rotation.
+    """Return axes (joint, 3), offsets between axes (joint + 1, 3), and the effector's rotation.
 
     All are in the frame of the root, with every joint at zero.
     """

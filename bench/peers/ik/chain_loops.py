@@ -1,4 +1,4 @@
-"""Plumbob's solvers, and one loop on each engine, for chains of balls one target at a time."""
+"""Plumbob's solvers, and a loop on each engine, for chains of balls, target by target."""
 
 from collections.abc import Callable
 from functools import partial
@@ -21,8 +21,8 @@ def prepare(
 ) -> Callable[[ChainRequest], Solve]:
     """Return a solver of ours by its name, or the loop on an engine by the engine's name.
 
-    An output holds the number of iterations, and the joints' positions in a row; those of a loop
-    come from another engine's kinematics.
+    An output holds the number of iterations, and the joints' positions in a row; the positions of a
+    loop come from another engine's kinematics.
     """
     if engine:
         return _loop(skeleton, tolerance, engine)

@@ -1,8 +1,7 @@
-"""Pinocchio's closed-loop inverse kinematics, as its documentation gives it.
+"""Pinocchio's closed-loop inverse kinematics, as in its documentation.
 
-The error of the effector is the logarithm of the transform from it to its target, the velocity
-v = -J' (J J' + damping I)^-1 e; there, the step is 0.1 s and there are at most 1,000 of them. It
-looks at no limits.
+The velocity is v = -J' (J J' + damping I)^-1 e, with e the logarithm of the transform from the
+effector to its target. The documentation takes at most 1,000 steps of 0.1 s. Limits are ignored.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """DART: its inverse kinematics of an effector, damped steps by its gradient descent solver.
 
 The error is bounded by a cube within the ball of tolerance, and so is a rotation; the solver keeps
-the joints' limits. DART's own restarts draw from a generator without a seed, so they are left out.
+the joints' limits. DART's own restarts draw from a generator without a seed, and are left out.
 """
 
 import dartpy
@@ -20,8 +20,8 @@ def prepare(
 ) -> Ask:
     """Return the solver, set up for a robot.
 
-    A step is clamped to `clamp` for each joint [rad] and the error to `length`; `weight` is that of
-    angles.
+    A step is clamped to `clamp` for each joint [rad] and the error to `length`; `weight` is the
+    weight of angles.
     """
     skeleton = dart_skeleton(robot)
     ik = skeleton.getBodyNode(robot.effectors[0]).getIK(True)

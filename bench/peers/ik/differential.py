@@ -1,4 +1,4 @@
-"""Differential inverse kinematics by quadratic programs, as mink and pink have it alike."""
+"""Differential inverse kinematics by quadratic programs, as in both mink and pink."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -34,9 +34,9 @@ def reaching(
     iterations: int,
     **options: Any,
 ) -> Callable[[Sequence[Any], FloatArray], bool]:
-    """Return a function that steps to targets, one for each task, from coordinates.
+    """Return a function to step from coordinates to targets, a target for each task.
 
-    It makes so many steps at the most, and returns whether the effectors have arrived.
+    The function makes so many steps at the most, and returns whether the effectors have arrived.
     """
     solve, integrate = library(solve_ik), library(configuration.integrate_inplace)
     compute_errors = [library(task.compute_error) for task in tasks]
@@ -66,9 +66,9 @@ def reaching(
 class PhasedReach:
     """A library's task loop in the phases of our Levenberg-Marquardt, see `solve_ik`.
 
-    The first phase is the library's plain loop. Each further one damps by a share of the squared
-    error, turns the effector the long way round at first, and replaces that damping by a posture
-    task for mid-range of the same weight: a step that is damped about mid-range.
+    The first phase is the library's plain loop. Each further phase damps by a share of the squared
+    error, and turns the effector the long way round at first. A posture task for mid-range of the
+    same weight replaces the damping: a step damped about mid-range.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class PhasedReach:
         goal: tuple[BenchRobot, Tolerance, int, int],
         **options: Any,
     ) -> None:
-        """Take tasks of the effector and of the posture, and a function that rotates a target.
+        """Take tasks of the effector and of the posture, and a function to rotate a target.
 
         The goal ends with the number of iterations and of phases.
         """
@@ -95,7 +95,7 @@ class PhasedReach:
         self.posture.set_target(middle(robot))
 
     def __call__(self, targets: Sequence[Any], start: FloatArray) -> bool:
-        """Step from a start to the only target; return whether it arrives."""
+        """Step from a start to the only target; return whether the effector arrives."""
         (self.target,) = targets
         ends: list[tuple[float, int, FloatArray]] = []
         count = self.iterations
@@ -147,7 +147,7 @@ class PhasedReach:
 
 
 def long_way(error: FloatArray) -> FloatArray:
-    """Return the matrix that rotates a target so that the way to it is about the opposite axis.
+    """Return the matrix that rotates a target so the way there is about the opposite axis.
 
     The error is the rotation vector from the effector to the target [rad].
     """
@@ -167,7 +167,7 @@ def meeting(
 ) -> Callable[[TaskRequest], Solve]:
     """Return the solver of a task, whose parts are tasks of the library in the same order.
 
-    It steps to what the goal's configuration has; a posture is approached only.
+    The targets are the parts of the goal's configuration; a posture is approached only.
     """
     exact = [
         (part.compute_error, np.asarray(part.cost) > 0.0)

@@ -1,11 +1,10 @@
 """Drake: inverse kinematics as a nonlinear program, solved by a solver of its wheel.
 
-There is no objective unless one is asked for: effectors are constrained to a box and a cone about
-their targets, coordinates to their limits. The program is built once for a robot; frames in the
-world are moved to the targets. Solvers stop at the edge of the constraints, so a part of the
-tolerance is set. Drake bounds an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's
-usual tolerance on constraints of 1e-6: a smaller tolerance is given, or half of its claims are
-false.
+By default there is no objective. Effectors are constrained to a box and a cone about their targets,
+coordinates to their limits. The program is built once for a robot; frames in the world are moved to
+the targets. Solvers stop at the edge of the constraints, so a part of the tolerance is set. Drake
+bounds an angle by 2 (1 - cos angle), which at 1e-3 is as small as SNOPT's usual tolerance on
+constraints of 1e-6. A smaller tolerance is given, or half of its claims are false.
 """
 
 import logging
@@ -43,9 +42,9 @@ def prepare(
 ) -> Ask:
     """Return the program, set up for a robot.
 
-    `feasibility` is the solver's tolerance on constraints, `inside` the part of the bench's
-    tolerance that is asked for, `centring` the weight of the squared distance from the middle of
-    the limits, which is then the objective.
+    `feasibility` is the solver's tolerance on constraints, `inside` the requested part of the
+    bench's tolerance. `centring` is the weight of the squared distance from the middle of the
+    limits, which is then the objective.
     """
     logging.getLogger("drake").setLevel(logging.ERROR)  # IPOPT gives advice at each failure
     plant, frames = drake_plant(robot)

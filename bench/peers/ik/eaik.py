@@ -1,8 +1,8 @@
 """EAIK: all solutions at once by subproblems, for arms with suitable axes.
 
-Some of its solutions are least-squares answers to insoluble targets, marked `is_LS`; they are left
-out, and so are solutions beyond the limits, after whole revolutions are tried. It needs no start.
-Its time is that of `calculate_IK`: the choice among all solutions is its user's.
+Some of its solutions are least-squares answers to insoluble targets, marked `is_LS`, and are left
+out. So are solutions beyond the limits, after whole revolutions are tried. EAIK needs no start. Its
+time is the time of `calculate_IK`: the choice among all solutions is its user's.
 """
 
 from collections.abc import Callable
@@ -20,10 +20,10 @@ MAXIMUM_HINGES = 6
 
 
 def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
-    """Return the solver, set up for a robot; it takes no tolerance.
+    """Return the solver, set up for a robot; there is no tolerance.
 
     Raises:
-        UnableError: if it knows no decomposition of this robot.
+        UnableError: if EAIK knows no decomposition of this robot.
     """
     return _asking(robot, lambda solutions: first_within(robot, solutions))
 

@@ -17,7 +17,7 @@ from .protocol import SolverOutput
 
 __all__ = ["joint_positions", "prepare", "remark"]
 
-# Positions without rotations count if they keep every link to this share of its length.
+# Positions without rotations must keep every link's length to this share.
 STRETCH = 1e-6
 
 
@@ -29,7 +29,7 @@ def prepare(
     An output holds the iterations, NaN if unstated, and the joints' positions in a row.
 
     Raises:
-        NoAnswerError: if it gives no answer when an iteration is allowed.
+        NoAnswerError: if there is no answer with an iteration allowed.
     """
     solver, arbiter = opened(spec), SKELETON_ENGINES[arbiter_of("")](skeleton)
     constants = {"parents": skeleton.parents, "offsets": skeleton.offsets, "tolerance": tolerance}
@@ -59,10 +59,10 @@ def joint_positions(
 ) -> FloatArray:
     """Return where an answer puts the joints [m], (joint, 3).
 
-    If it has rotations, an engine's kinematics of them counts.
+    If the answer has rotations, an engine's kinematics of the rotations counts.
 
     Raises:
-        ValueError: if it has neither rotations nor positions, or positions that stretch links.
+        ValueError: if there are neither rotations nor positions, or positions stretch links.
     """
     if "local_rotations" in answer:
         local = rotation.unit("local_rotations", answer["local_rotations"])

@@ -1,6 +1,6 @@
 """ikpy: SciPy's least squares over the chain's transforms, within its limits.
 
-It solves for the last link of a chain, which is the effector here, and does not say whether it did.
+ikpy solves for the last link of a chain, which is the effector here, and reports no success.
 """
 
 import warnings
@@ -20,9 +20,10 @@ def prepare(
     precision: float = 0.0,
     method: str = "",
 ) -> Ask:
-    """Return the solver, set up for a robot; it takes no tolerance on poses.
+    """Return the solver, set up for a robot; there is no tolerance on poses.
 
-    `precision` is that of its optimizer, if any, `method` one of that in SciPy.
+    `precision` is the precision of its optimizer, if any, `method` a method of the optimizer in
+    SciPy.
     """
     robot.require_chain()
     with robot.file() as file, warnings.catch_warnings():

@@ -1,8 +1,8 @@
 """Levenberg-Marquardt on anyone's kinematics: the reference's method as a loop for all.
 
 The velocities v = J' (J J' + mu I)^-1 e bring the effector closer by the error e. The damping
-follows the error, mu = |e|² / 2 (Sugihara 2011), so that it is large far from the target and
-vanishes at it. Three unknowns at a time, for any number of joints.
+follows the error, mu = |e|² / 2 (Sugihara 2011), large far from the target and zero at the target.
+Three unknowns at a time, for any number of joints.
 """
 
 from typing import NamedTuple
@@ -66,8 +66,8 @@ class ReferenceKinematics(SkeletonEngine):
     def jacobian(self, q: FloatArray, joint: int) -> FloatArray:
         """Update forward kinematics; return the joint's velocity per velocity, (3, 3 joint).
 
-        A joint i of the path rotates the arm r = x - x_i, and with it the effector, by R_i w x r:
-        its column for the axis a is (R_i a) x r.
+        A joint i of the path moves the effector, at the arm r = x - x_i, by R_i w x r. Its column
+        for the axis a is (R_i a) x r.
         """
         self._positions, rotations = forward_kinematics(self.skeleton, q[self.columns])
         path = self.skeleton.path(joint)

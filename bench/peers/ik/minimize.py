@@ -1,7 +1,7 @@
 """mujoco.minimize: box-constrained nonlinear least squares (Gauss-Newton with damping).
 
 The residual is the effector's displacement and rotation vector from the target, with the Jacobians
-of both. It works on coordinates, not on rotations, so it takes hinges only.
+of both. Its unknowns are coordinates, not rotations, so only hinges are possible.
 """
 
 from typing import Any
@@ -26,7 +26,8 @@ def prepare(
 ) -> Ask:
     """Return the solver, set up for a robot.
 
-    `minimum` is the least damping, `factor` what changes it, `scale` its rule for coordinates.
+    `minimum` is the least damping, `factor` the change of damping, `scale` the rule for
+    coordinates.
     """
     robot.require_chain()
     bounds = [robot.lower[:, None], robot.upper[:, None]]
@@ -82,7 +83,7 @@ class _Reach:
         mujoco.mj_jacBody(self._model, self._data, linear, angular, self._effector)
         slope = np.empty((3, 3))
         mujoco.mjd_subQuat(self._rotation, self._data.xquat[self._effector], None, slope)
-        # The derivative is by rotation vectors in the effector's frame, J has them in the world's.
+        # The derivative is by rotation vectors in the effector's frame, J is in the world's.
         R = self._data.xmat[self._effector].reshape(3, 3)
         return np.vstack([linear, slope @ R.T @ angular])
 

@@ -1,8 +1,8 @@
 """mink: differential inverse kinematics on MuJoCo by quadratic programs, iterated to a target.
 
-Each step asks for a part of the error (`gain`, over 1 s) within the joint limits, and takes at most
-the part `limit_gain` of the way to a limit. With full steps, the damping of the task must not be
-zero: they then jump about.
+Each step asks for a part of the error (`gain`, over 1 s) within the joint limits. A step takes at
+most the part `limit_gain` of the way to a limit. Without damping of the task, full steps jump
+about.
 """
 
 from collections.abc import Callable

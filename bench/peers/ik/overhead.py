@@ -1,8 +1,8 @@
-"""The time inside the clock that a solver's library does not use: what the harness adds.
+"""The time inside the clock but outside a solver's library: the overhead of the harness.
 
-Most adapters time a single call of their library, so that the harness adds the reading of the clock
-and one call. An adapter that calls its library in a loop passes the functions through `library` and
-says `METERED = True`.
+Most adapters time a single call of their library: the harness adds the reading of the clock and a
+call. An adapter with a loop around its library passes the functions through `library` and says
+`METERED = True`.
 """
 
 import math
@@ -20,7 +20,7 @@ _library_seconds: list[float] = []
 
 
 def library(function: Function) -> Function:
-    """Return a library's function; one that adds up its time while an overhead is measured."""
+    """Return a library's function, with a sum of its time while an overhead is measured."""
     if not is_metered():
         return function
 
@@ -40,16 +40,16 @@ def is_metered() -> bool:
 
 
 def report_library(seconds: float) -> None:
-    """Report the time that a library took in another process [s]."""
+    """Report the time of a library in another process [s]."""
     if is_metered():
         _library_seconds[0] += seconds
 
 
 def overhead(adapter: Any, prepare: Callable[[], Ask], request: PoseRequest) -> float:
-    """Return the median time of a solve that its solver's library does not use [s].
+    """Return the median time of a solve outside its solver's library [s].
 
-    It is an upper bound, for reading the clock costs time too; NaN if the solver raises. `prepare`
-    sets the solver up by its adapter.
+    The result is an upper bound, for reading the clock costs time too; NaN if the solver raises.
+    `prepare` sets the solver up by its adapter.
     """
     _library_seconds.append(0.0)
     try:

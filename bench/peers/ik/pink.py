@@ -1,10 +1,10 @@
 """pink: differential inverse kinematics by quadratic programs, iterated to a target.
 
-Each step asks for a part of the error (`gain`, over 1 s) within the joint limits, and takes at most
-the part `limit_gain` of the way to a limit. An effector without a target rotation has no cost for
-it. Velocity limits are left out: there is no motion here. With pink's own damping of 1e-12 the
-quadratic program is infeasible, and pink raises `NoSolutionFound`, once a step leaves a joint 1e-7
-beyond its limit; with 1e-6 it never is here.
+Each step asks for a part of the error (`gain`, over 1 s) within the joint limits. A step takes at
+most the part `limit_gain` of the way to a limit. Without a target rotation, an effector's rotation
+costs nothing. Velocity limits are left out: there is no motion here. With pink's own damping of
+1e-12, a joint 1e-7 beyond its limit makes the quadratic program infeasible, and pink raises
+`NoSolutionFound`. With 1e-6 all programs here are feasible.
 """
 
 import logging

@@ -1,7 +1,7 @@
 """PlaCo: differential inverse kinematics by quadratic programs, iterated to a target.
 
-Its wheels pin a Pinocchio older than ours, so it works in a process of an environment of its own,
-`placo_program`, which measures its own time: the connection is not timed.
+Its wheels pin a Pinocchio older than ours, so PlaCo works in a process with an environment of its
+own. The program, `placo_program`, measures its own time: the connection is not timed.
 """
 
 import dataclasses
@@ -75,7 +75,7 @@ def prepare_task(
 
 
 def _program(robot: BenchRobot, goal: dict[str, Any]) -> Callable[..., Callable[[], SolverOutput]]:
-    """Return a function that asks a program for a goal of a robot."""
+    """Return a function to ask a program for a goal of a robot."""
     robot.require_chain()
     program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
     chain = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
@@ -97,7 +97,7 @@ def _program(robot: BenchRobot, goal: dict[str, Any]) -> Callable[..., Callable[
 
 
 def _answer(program: ChildProcess, question: object) -> Any:
-    """Return the program's answer, or raise ConnectionError if it has ended."""
+    """Return the program's answer, or raise ConnectionError after its end."""
     try:
         program.send(f"{json.dumps(question)}\n".encode())
         return json.loads(program.receive())

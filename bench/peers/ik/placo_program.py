@@ -3,8 +3,8 @@
 Its input and output are lines of JSON. The first is {"text": a URDF, "effector", "joints", "parts",
 "iterations", "limits": [m] and [rad], "regularization", "weight", "is_metered"} and is answered by
 true. A question is {"target": a transform, "start"} or, where a goal gives the targets of the
-parts, {"goal": coordinates, "start"}; the answer is whether it has arrived, the time [s], the
-coordinates, and the time of PlaCo's own functions [s], 0 unless metered.
+parts, {"goal": coordinates, "start"}. The answer is whether the target is reached, the time [s],
+the coordinates, and the time of PlaCo's own functions [s], 0 unless metered.
 """
 
 import json
@@ -19,18 +19,18 @@ import placo
 
 # Where a posture counts, iterations go on until a step is smaller than this [rad].
 SETTLED_STEP = 1e-3
-# PlaCo's centre of mass is that of the base too, which stands still: the links' is off by more.
+# PlaCo's centre of mass includes the base, which stands still: the links' is off by more.
 SHARE_OF_LINKS = 0.5
 
 
 class PlacoArm:
-    """A robot whose base stands still, and tasks that are solved within its joints' limits."""
+    """A robot with a fixed base, and tasks to solve within its joints' limits."""
 
     def __init__(self, task: dict[str, Any]) -> None:
         """Read the robot. Add up the time of PlaCo's functions if metered.
 
         Without `regularization`, the tasks of a redundant arm do not determine a step; `weight` is
-        that of the effector's rotation.
+        the weight of the effector's rotation.
 
         Raises:
             ValueError: if PlaCo orders the joints otherwise.
@@ -63,7 +63,7 @@ class PlacoArm:
             set_target(question)
 
     def solve(self, start: Sequence[float]) -> tuple[bool, np.ndarray]:
-        """Return whether it has arrived, and the coordinates."""
+        """Return whether the target is reached, and the coordinates."""
         self._place(start)
         largest, is_solved = self._largest, self._is_at()
         for _ in range(self._task["iterations"]):

@@ -1,4 +1,4 @@
-"""Plumbob's own solvers, through their public interface, on the model that its readers make."""
+"""Plumbob's own solvers, through their public interface, on the model made by its readers."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -104,7 +104,7 @@ def prepare_task(
 def _task(
     robot: BenchRobot, part: TaskPart, arm: Robot, goal: tasks.Configuration, base: str
 ) -> tasks.IKTask:
-    """Return a part of a task as a configuration of the goal meets it."""
+    """Return a part of a task as met by a configuration of the goal."""
     effector = robot.effectors[0]
     frame, reference = goal.frame(effector), goal.frame(base if part.is_relative else None)
     match part.kind:

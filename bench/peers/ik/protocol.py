@@ -1,10 +1,10 @@
 """The interface of adapters for robots.
 
-An adapter is a module with a function `prepare(robot, tolerance, **settings)`: it sets the engine
-up for a robot and returns a function `ask(request)`. That puts a target in the engine's own types
-and returns a `Solve`, of which only the solver's own calls are timed: neither conversions nor
-set-up count. For a robot that it cannot solve `prepare` raises `UnableError`. An adapter that calls
-its solver in a loop of its own passes the solver's functions through `overhead.library`.
+An adapter is a module with a function `prepare(robot, tolerance, **settings)`. `prepare` sets the
+engine up for a robot and returns a function `ask(request)`. `ask` puts a target in the engine's own
+types and returns a `Solve`. Only the solver's own calls are timed: neither conversions nor set-up
+count. For an unsuitable robot `prepare` raises `UnableError`. An adapter with a loop around its
+solver passes the solver's functions through `overhead.library`.
 
 If the engine's kinematics is compared as well, its adapter has a function `kinematics(robot)`,
 which returns a `Forward`.
@@ -30,17 +30,17 @@ class SolverOutput(NamedTuple):
 
     q: FloatArray | None  # the coordinates, in the robot's order; None if it returns none
     claim: bool | None  # whether it says that they solve the target; None if it does not say
-    # as the adapter or its process measured it; None where the call is timed
+    # as measured by the adapter or its process; None where the call is timed
     time: OwnTime | None = None
     error: str = ""  # the exception of the solver, else ""
 
 
 @dataclass(frozen=True, slots=True)
 class Solve:
-    """A target that is to be solved.
+    """A target to solve.
 
     Attributes:
-        call: the calls of the solver that its user makes for a target, which are timed.
+        call: the calls of the solver by its user for a target, which are timed.
         read: converts what `call` returns to coordinates, None for none, and a claim.
     """
 
@@ -54,7 +54,8 @@ class Solve:
 
 
 Ask = Callable[[PoseRequest], Callable[[], SolverOutput]]
-# From coordinates to the transforms of the effectors, (effector, 4, 4), or of the only one, (4, 4).
+# From coordinates to the transforms of the effectors, (effector, 4, 4), or of the only effector,
+# (4, 4).
 Forward = Callable[[FloatArray], FloatArray]
 
 

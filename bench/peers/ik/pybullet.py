@@ -1,9 +1,9 @@
 """PyBullet: `calculateInverseKinematics`, damped least squares in double precision.
 
-Without limits it takes a damping; the default of 0.5 converges too slowly for our tolerance. With
-limits it pulls towards them in the null space of the effector's motion, does not take the damping,
-hardly arrives and oversteps them all the same. It never says whether it has arrived: for restarts
-`check` compares the forward kinematics of its answer with the target, untimed. `IK_SDLS` ends the
+Without limits there is a damping; the default of 0.5 converges too slowly for our tolerance. With
+limits PyBullet pulls towards the limits in the null space of the effector's motion, without the
+damping, hardly arrives and still oversteps limits. There is no report of success: for restarts
+`check` compares the forward kinematics of an answer with the target, untimed. `IK_SDLS` ends the
 process, and is left out.
 """
 
@@ -29,7 +29,7 @@ def prepare(
 ) -> Ask:
     """Return the solver, set up for a robot, with a damping or with limits.
 
-    It stops within the part `inside` of the tolerance, which bounds a distance; angles come along.
+    The solver stops within the part `inside` of the tolerance on distance; angles come along.
     """
     body = BulletBody(robot)
     options: dict[str, Any] = {

@@ -13,9 +13,9 @@ _SEED = 1986
 
 
 def restarted(ask: Ask, robot: BenchRobot, restarts: int) -> Ask:
-    """Return a solver that makes up to `restarts` further attempts from seeded random poses.
+    """Return a solver with up to `restarts` further attempts from seeded random poses.
 
-    An attempt succeeds if it claims an answer within the limits, which not all solvers look at; an
+    An attempt succeeds by claiming an answer within the limits, which some solvers ignore; an
     exception is a failure. The poses depend on the target only, and all attempts are prepared
     before the clock runs.
     """
@@ -53,7 +53,7 @@ def generator_of(*target: Any) -> np.random.Generator:
 
 
 def digest_of(*target: Any) -> int:
-    """Return an unsigned number of 32 bits that depends on all parts of a target."""
+    """Return an unsigned number of 32 bits from all parts of a target."""
     digest = 0
     for part in target:
         digest = zlib.crc32(np.ascontiguousarray(part).tobytes(), digest)

@@ -1,8 +1,8 @@
 """roboplan: OInK, differential inverse kinematics by quadratic programs in C++ on Pinocchio.
 
-Each step asks for a part of the error (`gain`) within the joint limits, and takes at most the part
-`limit_gain` of the way to a limit. `damping` is the regularization of the program. Its solutions
-keep limits to 1e-6 only, so joints are clamped, as its users would.
+Each step asks for a part of the error (`gain`) within the joint limits. A step takes at most the
+part `limit_gain` of the way to a limit. `damping` is the regularization of the program. Its
+solutions keep limits to 1e-6 only, so joints are clamped, as its users would.
 """
 
 from math import hypot
@@ -72,7 +72,7 @@ def kinematics(robot: BenchRobot) -> Forward:
 
 
 def scene_of(robot: BenchRobot) -> core.Scene:
-    """Return a scene that holds the chain, its joints in a group.
+    """Return a scene with the chain, its joints in a group.
 
     Raises:
         UnableError: if the robot is no chain.

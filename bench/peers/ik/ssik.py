@@ -1,8 +1,8 @@
-"""ssik: closed forms for arms of six and seven hinges, in a module that `ssik build` writes.
+"""ssik: closed forms for arms of six and seven hinges, in a module written by `ssik build`.
 
-Its authors recommend that module for use, and the call for one solution nearest to the start,
+Its authors recommend the module for use, and the call for a single solution nearest to the start,
 within the limits. Without the start, a single solution takes seconds on arms whose axes do not meet
-(PR2). It takes no tolerance: its answers, checked by its forward kinematics, are exact to rounding.
+(PR2). There is no tolerance: answers, checked by ssik's forward kinematics, are exact to rounding.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from ...problems.robots import UnableError
 from ..protocol import describe
 from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
-# Arms for which it works on a module for more than seven minutes of processor time.
+# Arms whose modules take ssik more than seven minutes of processor time.
 LONG_BUILDS = ("baxter", "tiago_pro")
 
 
@@ -41,7 +41,7 @@ def _read(solutions: list[Any]) -> tuple[FloatArray | None, bool]:
 
 
 def prepare_all(robot: BenchRobot) -> Ask:
-    """Return the solver of all solutions, a single angle of those that differ by revolutions."""
+    """Return the solver of all solutions, without copies by whole revolutions."""
     run = built_solver(robot).solve
 
     def ask(request: PoseRequest) -> Solve:
@@ -60,10 +60,10 @@ def kinematics(robot: BenchRobot) -> Forward:
 
 
 def built_solver(robot: BenchRobot) -> ModuleType:
-    """Return the module that it builds for a robot.
+    """Return ssik's module for a robot.
 
     Raises:
-        UnableError: if it builds none.
+        UnableError: if ssik builds no module.
     """
     robot.require_chain()
     if robot.name in LONG_BUILDS:

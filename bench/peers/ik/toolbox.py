@@ -1,7 +1,7 @@
 """Robotics Toolbox: its compiled Levenberg-Marquardt `ik_LM` and its relatives, with restarts.
 
 Its `tol` bounds half the squared error, positions and angles together, so the default of 1e-6 lets
-1.4e-3 pass; we give the equivalent of our tolerance. The chain is put together from the same file.
+1.4e-3 pass. We give the equivalent of our tolerance. The chain is put together from the same file.
 """
 
 import warnings
@@ -36,7 +36,7 @@ def prepare(
     robot.require_chain()
     chain = chain_of_transforms(robot)
     options: dict[str, Any] = {"ilimit": iterations, "slimit": searches, "joint_limits": limits}
-    # Half the square of an error that meets the tolerance in position and in rotation alike.
+    # Half the square of an error at the tolerance in both position and rotation.
     options["tol"] = 0.5 * min(tolerance) ** 2
     if method == "LM":
         options |= {"method": damping, "k": factor}

@@ -1,8 +1,9 @@
 """TRAC-IK by pytracik: two searches at once, in two threads, restarted until time is up.
 
-The first is Newton's with random jumps, the second sequential quadratic programming. It stops when
-the six components of the error are within eps. Its limits are single precision. The evaluation's
-tolerance is on two norms of three components each, so eps is that over the square root of three.
+The first is Newton's with random jumps, the second sequential quadratic programming. TRAC-IK stops
+when the six components of the error are within eps. Its limits are single precision. The
+evaluation's tolerance is on two norms of three components each, so eps is the tolerance over the
+square root of three.
 """
 
 import math
