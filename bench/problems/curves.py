@@ -1,4 +1,4 @@
-"""Curves followed by the lab's arm and a robot of seven hinges; targets that are too far away."""
+"""Curves followed by the lab's arm and a robot of seven hinges; targets too far away."""
 
 import functools
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from plumbob.reference.formats import urdf
 from .chains import TargetsForSkeleton, unit
 from .robots import robot
 
-# Samples of each curve, as the lab takes them; the custom curve is resampled from a raw drawing.
+# Samples of each curve, as taken in the lab; the custom curve is resampled from a raw drawing.
 FRAMES = {"circle": 150, "square": 150, "heart": 150, "triangle": 150, "star": 400}
 CUSTOM = "plumb_bob"
 CUSTOM_SAMPLES = 1200
@@ -24,17 +24,17 @@ _SEED = 1986
 # Closed curves, and where a robot draws them.
 ARM_CURVES = ("circle", "heart", "triangle", "star")
 ROBOT, ROBOT_CURVES = "iiwa14", ("circle", "heart")
-# A pose with the elbow bent and the wrist over the table [°], and where the curves are drawn [m]:
-# upright, in front of the robot, so small that all of it is within reach.
+# A pose with the elbow bent and the wrist over the table [°], and where the curves are drawn [m].
+# Curves are upright, in front of the robot, and small enough to be all within reach.
 _START = (0.0, 35.0, 0.0, 80.0, 0.0, 65.0, 0.0)
 _CENTRE, _SCALE = (0.5, 0.0, 0.5), 0.4
-# Frames of the heart where it is drawn several times.
+# Frames of the heart where drawn several times.
 DRIFT_FRAMES = 60
 
 
 @dataclass(frozen=True)
 class FollowedCurve:
-    """A curve that an effector follows, frame by frame."""
+    """A curve for an effector to follow, frame by frame."""
 
     name: str  # of the problem
     title: str  # how it is written
@@ -60,7 +60,7 @@ def spaced(name: str) -> str:
 
 
 def custom_curve() -> FloatArray:
-    """Return the custom curve as it is drawn, unevenly sampled [m], (point, 3)."""
+    """Return the custom curve as drawn, unevenly sampled [m], (point, 3)."""
     return curves[CUSTOM](CUSTOM_SAMPLES)
 
 
@@ -70,7 +70,7 @@ def evened_custom_curve() -> FloatArray:
 
 
 def arm_beyond(count: int) -> TargetsForSkeleton:
-    """Return seeded targets in all directions, farther from the arm's root than it can reach."""
+    """Return seeded targets in all directions, farther from the arm's root than its reach."""
     skeleton, rest = scenes.lab_arm()
     rng = np.random.default_rng(_SEED)
     distances = skeleton.reach() * rng.uniform(*BEYOND, count)

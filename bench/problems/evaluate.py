@@ -1,9 +1,9 @@
 """Evaluate solutions of inverse kinematics by engines that share no code with the solver.
 
-MuJoCo is the arbiter of solvers that are built on Pinocchio, Pinocchio that of all others; both
-place every answer, so that answers on which they differ are known. Where Pinocchio is absent,
-MuJoCo evaluates all answers. The same is measured for every solver: the distance and the angle of
-each effector from its target, and by how much a joint is beyond its limits.
+MuJoCo is the arbiter of solvers built on Pinocchio, Pinocchio of all others. Both place every
+answer, so their disagreements are known. Where Pinocchio is absent, MuJoCo evaluates all answers.
+Every solver is measured alike: the distance and the angle of each effector from its target, and the
+excess of joints over their limits.
 """
 
 import functools
@@ -193,7 +193,7 @@ class Evaluator:
     ) -> Evaluation:
         """Return the errors of answers (target, coordinate) to the first targets; NaN is none.
 
-        The arbiter is an engine, by default that of our solvers.
+        The arbiter is an engine, by default our solvers' arbiter.
         """
         is_answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
         poses = np.where(is_answered[:, None], q, targets.starts[:count])
@@ -226,7 +226,7 @@ def _distances(
 
 
 def angle_between(A: FloatArray, B: FloatArray) -> FloatArray:
-    """Return the angle of the rotation from A to B [rad], exact also where it is tiny, (...).
+    """Return the angle of the rotation from A to B [rad], exact also where tiny, (...).
 
     |A - B| in the norm of Frobenius is 2 sqrt 2 sin(angle / 2).
     """

@@ -1,9 +1,9 @@
 """A square cloth in mid-fall, finer and stiffer: the same piece of fabric for every solver.
 
-It has the lab's springs without dampers, two metres a side and a mass of 1 kg however many
-particles it is made of, and hangs from two corners. It has fallen for a while by symplectic Euler,
-damped, so that its motion is smooth. It began a little uneven: an even cloth stays mirror-symmetric
-until rounding decides to which side it folds.
+The cloth has the lab's springs without dampers, two metres a side and a mass of 1 kg for any number
+of particles. Two corners are pinned. A damped fall by symplectic Euler has made its motion smooth.
+The fall began a little uneven: an even cloth stays mirror-symmetric until rounding decides the side
+of the fold.
 """
 
 import functools
@@ -25,8 +25,8 @@ STIFFNESSES = (1e2, 1e3, 1e4)
 FRAME = 1 / 60
 FALLING = 24
 _SEED = 2013
-# Steps of the fall, in units of those at the limit of stability; a spring's damping over a
-# particle's mass [1/s] in it; the random displacement at first, in units of the spacing.
+# Steps of the fall, in units of the limit of stability; a spring's damping over a particle's mass
+# [1/s] meanwhile; the random displacement at first, in units of the spacing.
 _FALL_MARGIN, _FALL_DAMPING, _UNEVEN = 1.5, 20.0, 1e-3
 
 
@@ -50,7 +50,7 @@ class FallingCloth:
 
 @functools.lru_cache(maxsize=4)
 def own_cloth(problem: OwnProblem) -> FallingCloth:
-    """Return a user's cloth, which falls from the state that it is given in."""
+    """Return a user's cloth, which falls from its given state."""
     assert problem.cloth is not None
     system, start = problem.cloth
     frequency = highest_frequency(system, start.positions)
@@ -86,7 +86,7 @@ def level_cloth(size: int, stiffness: float) -> tuple[MassSpring, State]:
 
 @functools.cache
 def hanging_cloth(size: int, stiffness: float) -> tuple[MassSpring, FloatArray]:
-    """Return the cloth and where it hangs at rest after its fall, (particle, 3)."""
+    """Return the cloth and its positions at rest after its fall, (particle, 3)."""
     cloth = falling_cloth(size, stiffness)
     return cloth.system, equilibrium(cloth.system, cloth.start)
 
@@ -94,7 +94,7 @@ def hanging_cloth(size: int, stiffness: float) -> tuple[MassSpring, FloatArray]:
 def highest_frequency(system: MassSpring, positions: FloatArray) -> float:
     """Return the square root of the largest eigenvalue of M^-1 K, pins held [rad/s].
 
-    An eigenvalue errs by the square of its vector's error: a hundredth of that is enough.
+    An eigenvalue errs by the square of its vector's error: a hundredth of the vector's is enough.
     """
     largest, _ = highest_mode(system, positions, tolerance=1e-2)
     return math.sqrt(largest)

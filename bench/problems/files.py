@@ -60,7 +60,7 @@ def _read(path: Path, effector: str | None) -> Iterator[OwnProblem]:
 
 
 def _in_python(path: Path) -> Iterator[OwnProblem]:
-    """Yield the problem of each function without arguments: of a cloth if it has springs."""
+    """Yield the problem of each function without arguments: of a cloth if with springs."""
     read_bytes(path)  # refuses a file without end
     try:
         members = runpy.run_path(str(path), run_name=path.stem)

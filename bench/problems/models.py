@@ -36,7 +36,7 @@ def robot(path: Path, name: str, effector: str | None) -> BenchRobot:
 
 
 def _path(skeleton: reference.Skeleton, effector: str | None) -> list[int]:
-    """Return the joints to one given by name, else to the leaf with the most joints before it."""
+    """Return the joints up to a named joint, else up to the leaf with the most joints before."""
     if effector is not None:
         return skeleton.path(effector).tolist()
     leaves = sorted({*range(skeleton.joint_count)} - {*skeleton.parents.tolist()})

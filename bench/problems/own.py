@@ -26,7 +26,7 @@ def clean(name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class OwnProblem:
-    """A problem that a user entered: targets of balls, a chain of hinges, or a cloth."""
+    """A user's problem: targets of balls, a chain of hinges, or a cloth."""
 
     name: str  # as it stands in tables
     targets: TargetsForSkeleton | None = None  # of a skeleton of balls, its last joint the effector
@@ -36,7 +36,7 @@ class OwnProblem:
 
     @property
     def suite(self) -> str:
-        """The suite that measures it."""
+        """The suite for this problem."""
         return "cloth" if self.cloth else "ik"
 
     @property

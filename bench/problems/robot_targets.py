@@ -1,8 +1,7 @@
-"""Targets for the effectors of robots: strata, all from seeded poses, so that they can be reached.
+"""Targets for the effectors of robots: strata, all reachable by construction from seeded poses.
 
-Targets come from a pool of random poses within the limits. A stratum is drawn from the poses of
-the pool that belong to it. Unreachable targets lie farther from the first joint than the
-sum of all link lengths.
+Targets come from a pool of random poses within the limits. A stratum is drawn from its poses in the
+pool. Unreachable targets lie farther from the first joint than the sum of all link lengths.
 """
 
 import functools
@@ -24,7 +23,7 @@ STRATA = {
     "near singular": "the twentieth with the smallest least singular value of the Jacobian",
     "at a limit": "uniform in joint space, then one joint put at one of its limits",
 }
-# Poses in the pool for each target of a stratum, and the share that makes an extreme stratum.
+# Poses in the pool for each target of a stratum, and the share in an extreme stratum.
 _POOL = 40
 _EXTREME = 0.05
 # Cells a side of the grid by which effectors are spread evenly over space.
@@ -65,7 +64,7 @@ def _drawn_targets(name: str, count: int, seed: int) -> Targets:
 def stratum_poses(
     evaluator: Evaluator, rng: np.random.Generator, count: int
 ) -> dict[str, FloatArray]:
-    """Return the poses that define the targets, (count, coordinate) for each stratum."""
+    """Return the poses behind the targets, (count, coordinate) for each stratum."""
     pool = evaluator.robot.draw(rng, _POOL * count)
     effectors, _ = evaluator.forward(pool)
     distance = np.linalg.norm(effectors - evaluator.first_joint, axis=-1).max(axis=-1)
@@ -95,7 +94,7 @@ def unreachable_targets(name: str, count: int, seed: int = SEED) -> Targets:
 def least_distances(name: str, targets: Targets) -> FloatArray:
     """Return a lower bound of the farther effector's distance from its target [m], (target,).
 
-    The target's distance from the first joint exceeds the sum of all link lengths by that much.
+    The target's distance from the first joint exceeds the sum of all link lengths by this bound.
     """
     evaluator = evaluator_of(name)
     distance = np.linalg.norm(targets.positions - evaluator.first_joint, axis=-1)
@@ -130,9 +129,9 @@ def _extreme(rng: np.random.Generator, measure: FloatArray, count: int) -> Float
 
 
 def spread(rng: np.random.Generator, effectors: FloatArray, count: int) -> FloatArray:
-    """Return the numbers of poses that spread the first effector over all occupied cells.
+    """Return the numbers of poses with the first effector spread over all occupied cells.
 
-    A cell is drawn first, then a pose within it.
+    A cell is drawn first, then a pose within the cell.
     """
     points = effectors[:, 0]
     edge = np.ptp(points, axis=0).max() / _CELLS

@@ -37,7 +37,7 @@ class RobotTask:
 
 
 class TaskRequest(NamedTuple):
-    """A goal, as the coordinates of a configuration that has it, and a start, (coordinate,)."""
+    """A goal, as the coordinates of a configuration at the goal, and a start, (coordinate,)."""
 
     goal: FloatArray
     start: FloatArray
@@ -54,7 +54,7 @@ def middle(robot: BenchRobot) -> FloatArray:
 
 
 def first_link(evaluator: Evaluator) -> str:
-    """Return the first link that moves."""
+    """Return the first moving link."""
     return str(evaluator.model.body(evaluator.model.jnt_bodyid[0]).name)
 
 

@@ -2,8 +2,8 @@
 
 An arm is the chain of links from a root to an effector. Everything that is not kinematics is
 dropped from the file, and so are soft limits, which some readers take for the limits. Continuous
-joints are limited to two revolutions in either direction, so that every solver has a number for
-each joint. All solvers and the evaluation read this same text.
+joints are limited to two revolutions in either direction, to give every solver a number for each
+joint. All solvers and the evaluation read this same text.
 """
 
 import contextlib
@@ -33,7 +33,7 @@ LIMIT_TOLERANCE = 1e-6
 
 
 class AbsentError(Exception):
-    """A package is not installed; the message names it."""
+    """A package is not installed; the message names the package."""
 
 
 class UnableError(ValueError):
@@ -42,7 +42,7 @@ class UnableError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class BenchRobot:
-    """A robot or character, as text that any reader understands."""
+    """A robot or character, as text for any reader."""
 
     name: str  # of the robot
     title: str  # how it is written
@@ -58,23 +58,23 @@ class BenchRobot:
 
     @property
     def is_chain(self) -> bool:
-        """Whether it is a chain of hinges, as URDF describes it, with a single effector."""
+        """Whether the robot is a chain of hinges, as in URDF, with a single effector."""
         return not self.balls and len(self.effectors) == 1
 
     def require_chain(self) -> None:
-        """Refuse a robot that is not a chain of hinges with a single effector.
+        """Refuse a robot other than a chain of hinges with a single effector.
 
         Raises:
-            UnableError: if it is not.
+            UnableError: if the robot is anything else.
         """
         if not self.is_chain:
             raise UnableError("takes one chain of hinges only")
 
     def check_order(self, engine: str, names: Sequence[str]) -> None:
-        """Make sure that an engine orders the joints as the robot does.
+        """Check the order of joints in an engine against the robot's.
 
         Raises:
-            ValueError: if it does not.
+            ValueError: if the orders differ.
         """
         if tuple(names) != self.joints:
             raise ValueError(f"{engine} orders the joints as {', '.join(names)}")
@@ -108,7 +108,7 @@ class Link(NamedTuple):
 _DATA: dict[str, Any] = tomllib.loads(
     Path(__file__).with_name("robots.toml").read_text(encoding="utf-8")
 )
-# Arms on which settings of solvers are chosen, and arms that no setting has seen.
+# Arms on which settings of solvers are chosen, and arms held out from tuning.
 TUNING, HELD_OUT = tuple(_DATA["tuning"]), tuple(_DATA["held_out"])
 CHARACTER = "character"
 ROBOTS = (*TUNING, *HELD_OUT, CHARACTER)
@@ -224,7 +224,7 @@ def _limits(joint: ElementTree.Element) -> tuple[float, float]:
 
 
 def _urdf(name: str, root: str, joints: Sequence[ElementTree.Element]) -> str:
-    """Return a URDF of only these joints; every link has the mass that some readers require."""
+    """Return a URDF of only these joints; every link has a mass, as some readers require."""
     tree = ElementTree.Element("robot", name=name)
     for link_name in (root, *(_link(joint, "child") for joint in joints)):
         link = ElementTree.SubElement(tree, "link", name=link_name)
@@ -264,7 +264,7 @@ def _character() -> BenchRobot:
     """Return the character as MJCF, angles in radians."""
     tree = ElementTree.Element("mujoco", model=CHARACTER)
     ElementTree.SubElement(tree, "compiler", angle="radian")
-    # One body carries all others, though it stands still: some readers take one tree only.
+    # A fixed body carries all others: some readers take a single tree only.
     bodies = {"": _body(ElementTree.SubElement(tree, "worldbody"), "pelvis", "0 0 0")}
     limits: list[tuple[float, ...]] = []
     balls, bones, hands = [], _DATA[CHARACTER]["bones"], _DATA[CHARACTER]["hands"]
