@@ -1,7 +1,7 @@
-"""The first screen: who is best and who is the best other solver, where others win, who is absent.
+"""The first screen: the best solver, the best other solver, where others win, absent solvers.
 
 Plumbob takes part like everyone else. Solvers that `metrics.ranking` does not distinguish from the
-first tie with it, as in the tables. Our own Python loops on engines are nobody's rivals.
+first are tied, as in the tables. Our own Python loops on engines count as no rivals.
 """
 
 from collections import Counter
@@ -54,12 +54,12 @@ _SUBJECTS = {
     "jacobians": "the Jacobian of an effector",
     "cloth": "a step of a cloth",
 }
-# The goals of cloths: what is solved, to which error, and the table that ranks it.
+# The goals of cloths: the problem, the error, and the table with the ranking.
 _CLOTH_GOALS = {
     ONE_STEP: (f"a step solved to {SOLVED}", TARGETS[SOLVED], "cloth_peers_step"),
     MOTION: (f"a motion within {NEAR} of the truth", MOTION_TARGETS[NEAR], "cloth_peers_motion"),
 }
-# The groups of robots: those that no setting has seen come first.
+# The groups of robots, first the group held out from tuning.
 _GROUPS = ["held out", "tuning", CHARACTER, "yours"]
 # Behind the name of an engine among absent solvers.
 _IN_CLOTH = " (cloth)"
@@ -94,7 +94,7 @@ def overview(results: Results) -> Overview:
 
 
 def verdict(results: Results) -> ClaimCount | None:
-    """Return the result of the cross-check, None if it was not run."""
+    """Return the result of the cross-check, None if not run."""
     claims = [record for record in results.all("check") if record.values]
     if not claims:
         return None
@@ -105,9 +105,9 @@ def verdict(results: Results) -> ClaimCount | None:
 
 
 def headlines(results: Results) -> list[Headline]:
-    """Return the best solver and the best other one of each task, as far as measured.
+    """Return the best solver and the best other solver of each task, as far as measured.
 
-    Robots that no setting has seen come first. A sentence on other solvers counts the absent ones.
+    Robots held out from tuning come first. A sentence on other solvers counts absent solvers.
     """
     missing = absent(results)
     engines = sum(name.endswith(_IN_CLOTH) for name in missing)
@@ -145,7 +145,7 @@ def scale(results: Results) -> str:
 
 
 def absent(results: Results) -> list[str]:
-    """Return the peers that were asked and are not installed."""
+    """Return the requested peers that are not installed."""
     records = results.all("ik", task=REACHABLE)
     requested = {record.solver for record in records}
     present = {record.solver for record in records if record.details.version}
@@ -185,7 +185,7 @@ def _robot_groups(results: Results) -> Iterator[tuple[str, str, dict[str, list[S
 
 
 def _robot_headlines(group: str, start: str, fields: dict[str, list[Score]]) -> Iterator[Headline]:
-    """Yield who solves the most, and who is the fastest, on robots that most solvers take."""
+    """Yield the solver of the most targets, and the fastest, on robots that most solvers take."""
     rows = {row.solver: row for row in _most_compared(fields)}
     if len(rows) < 2:
         return
@@ -246,10 +246,10 @@ def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:
 
 
 def _fastest(rows: dict[str, Score], times: Sequence[str], best: str) -> str:
-    """Return who is the fastest of the solvers that solve as many as the best, "" without rivals.
+    """Return the fastest of the solvers that solve as many as the best, "" without rivals.
 
-    Times are compared on the poses that both solve: a miss costs no time here, so solvers that
-    solve fewer poses are compared with the best only if none solves as many.
+    Times are compared on poses solved by both, so a miss costs no time here. Solvers of fewer poses
+    are compared with the best only if no other solver solves as many.
     """
     equals = [solver for solver in times if solver in rows[best].success.first] if best else []
     first = _first(equals)
@@ -408,7 +408,7 @@ class Win(NamedTuple):
 
 
 def wins_of_others(results: Results) -> list[Headline]:
-    """Return where other solvers beat ours beyond chance, among all rows that are compared."""
+    """Return where other solvers beat ours beyond chance, among all compared rows."""
     wins = [win for group in _robot_groups(results) for win in _robot_wins(*group)]
     wins += [win for race in _races(results) for win in _race_wins(race)]
     return [
@@ -447,7 +447,7 @@ def _robot_wins(group: str, start: str, fields: dict[str, list[Score]]) -> Itera
 
 
 def _faster(rows: dict[str, Score], own: str) -> str:
-    """Return the fastest solver that is faster than ours on the poses that both solve, else ""."""
+    """Return the fastest solver that beats ours on the poses solved by both, else ""."""
     rivals = [solver for solver in rows[own].time.order if best_rival(own, [solver])]
     pairs = [times_of_both(rows[own], rows[rival]) for rival in rivals]
     logs = [(np.log(times), np.log(rival_times)) for times, rival_times in pairs]

@@ -14,9 +14,9 @@ from .report import BenchReport
 from .sections import tables
 from .standings import Headline
 
-# The most headlines and wins of other solvers that are printed.
+# The most headlines, and wins of other solvers, to print.
 HEADLINES, WINS = 3, 1
-# Lines on a report without those on the user's solvers; tables that a bench summarises.
+# Lines on a report, not counting the user's solvers; tables summarised by a bench.
 LINES, TABLES = 14, 4
 # The most lines on the scale and the absent peers.
 ABSENT_LINES = 2

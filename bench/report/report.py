@@ -35,7 +35,7 @@ class BenchReport(NamedTuple):
 
 
 def write(folder: Path) -> BenchReport:
-    """Write the report of a folder's records into it.
+    """Write the report of a folder's records into the folder.
 
     Raises:
         ValueError: if there are no records, or none that can be read and shown.

@@ -47,7 +47,7 @@ MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
 
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:
-    """Return the tables of an experiment, imported only now; empty if it has none."""
+    """Return the tables of an experiment, imported only now; empty without tables."""
     name = f"{experiment.package}.tables"
     if importlib.util.find_spec(name) is None:
         return ()
@@ -56,7 +56,7 @@ def offered(experiment: Experiment) -> tuple[Layout, ...]:
 
 
 def tables(results: Results, suites: Iterable[str] | None = None) -> list[Table]:
-    """Return the tables of the chapters that show one of these suites, or all, in order."""
+    """Return the tables of the chapters on any of these suites, or all, in order."""
     return [
         layout(results)
         for section in SECTIONS

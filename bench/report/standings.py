@@ -20,9 +20,9 @@ MAX_CLOTHS = 3
 
 
 class Headline(NamedTuple):
-    """A question, its answer in one complete sentence, and the name of the table that shows it.
+    """A question, its answer in a complete sentence, and the name of the table with the numbers.
 
-    The chapter is one of the page's, "" for a solver of the user's. A sentence is understood
+    The chapter is a chapter of the page, "" for a solver of the user's. A sentence is understood
     without the question, which is a heading of a few words.
     """
 
@@ -95,7 +95,7 @@ def _rank(row: readings.Score, rows: Mapping[str, readings.Score]) -> str:
 
 
 def percent(share: metrics.Share) -> str:
-    """Return a share in three digits, or in as many as tell it from 100 %."""
+    """Return a share in three digits, or in as many as tell the share from 100 %."""
     rate = 100 * share.hits / share.total
     digits = next(n for n in range(3, 12) if rate == 100 or float(f"{rate:.{n}g}") < 100)
     return f"{rate:.{digits}g} %"
@@ -119,7 +119,7 @@ def best_rival(solver: str, order: Sequence[str]) -> str:
 
 
 def _fastest(order: Sequence[str]) -> list[str]:
-    """Return the first solver, and the first of Plumbob's solvers if that is another."""
+    """Return the first solver, and the first of Plumbob's solvers if different."""
     rivals = [solver for solver in order if not registry.is_loop(solver)]
     return list(dict.fromkeys((*rivals[:1], *list(filter(registry.is_ours, rivals))[:1])))
 

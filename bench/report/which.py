@@ -16,8 +16,8 @@ from .standings import full_name, percent
 def solvers_on_robot(results: Results, name: str) -> Table:
     """Return a row for each solver with its best settings, the best first, and advice as summary.
 
-    `results` are of one robot of this name. A solver is better if it solves more targets, then if
-    the median of its times is smaller; times are of all targets, solved or not.
+    `results` are of one robot of this name. A better solver solves more targets, or as many with a
+    smaller median time. Times are of all targets, solved or not.
 
     Raises:
         ValueError: if no solver could be tried.
@@ -44,7 +44,7 @@ def solvers_on_robot(results: Results, name: str) -> Table:
 
 
 def advice(entries: Sequence[Score]) -> str:
-    """Return which solver to choose: the fastest of those that chance cannot tell from the best."""
+    """Return which solver to choose: the fastest of the solvers tied with the best."""
     first = [e for e in entries if e.solver in e.success.first and e.share.hits]
     first = [entry for entry in first if not registry.is_loop(entry.solver)]
     if not first:
@@ -78,7 +78,7 @@ def _title(score: Score) -> str:
 
 
 def _missing(present: set[str]) -> Sequence[str]:
-    """Return sentences on installed solvers without a result, and on those not installed."""
+    """Return sentences on installed solvers without a result, and on solvers not installed."""
     installed = [peer.title for peer in registry.PEERS if peer.is_installed]
     refused = [title for title in installed if not {title, f"{title} (ours)"} & present]
     absent = [peer.title for peer in registry.PEERS if not peer.is_installed]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from ...tables.table import number_of, words
 from .page_tables import PageTable
 
-# Decades of the strip of claims, and the width of a dot on it [%].
+# Decades of the strip of claims, and the width of a dot [%].
 DECADES, DOT = 8, 1.3
 
 

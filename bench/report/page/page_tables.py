@@ -22,7 +22,7 @@ from ...tables.table import (
 )
 from ...tables.writers import POWER
 
-# The column that the page's switch between one start and restarts replaces.
+# The column replaced by the page's switch between one start and restarts.
 STARTS = "starts"
 # Spaces as wide as a digit and as a decimal point.
 _DIGIT, _POINT = "\u2007", "\u2008"
@@ -31,8 +31,8 @@ _DIGIT, _POINT = "\u2007", "\u2008"
 class PageHead(NamedTuple):
     """A heading: its classes, the best of the column, and whether it filters rows.
 
-    `lead` is the part of the title that the heading of its group repeats, and is hidden; `unit` is
-    the unit of numbers, or the number of trials behind shares.
+    `lead` is the part of the title repeated in the heading of its group, and hidden. `unit` is the
+    unit of numbers, or the number of trials behind shares.
     """
 
     classes: str
@@ -106,7 +106,7 @@ def _head(table: Table, j: int, folded: bool, names_solver: bool) -> PageHead:
 
 
 def _solver_column(table: Table) -> int | None:
-    """Return the column that names the solver of each row, None if there is none."""
+    """Return the column that names the solver of each row, None without any."""
     titles = [column.title for column in table.columns]
     if "solver" in titles:
         return titles.index("solver")
@@ -122,7 +122,7 @@ def _names_solvers(table: Table, j: int) -> bool:
 
 
 def _rows(table: Table) -> list[PageRow]:
-    """Return the rows; a first cell that repeats the cell above it is marked."""
+    """Return the rows; a first cell equal to the cell above is marked."""
     best = best_cells(table)
     ties = Counter((table.rows[i][: table.compared], j) for i, j in best)
     columns, titles = range(len(table.columns)), [column.title for column in table.columns]
