@@ -1,1 +1,1 @@
-"""Tables as values: columns and layout, and the formats in which they are written."""
+"""Tables as values: columns and layout, and the formats of written tables."""

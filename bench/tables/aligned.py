@@ -45,8 +45,8 @@ def aligned(table: Table, width: int) -> AlignedTable:
 def _fitting(table: Table, width: int) -> tuple[list[int], list[float]]:
     """Return the columns that fit, and the lowest width of each.
 
-    The columns that name a row always stay, and another; folded columns never do. The others are
-    left out from the right, columns with best cells last.
+    The columns that name a row always stay, with one other column; folded columns never stay. The
+    others are left out from the right, columns with best cells last.
     """
     names = naming(table)
     for part in _PARTS:

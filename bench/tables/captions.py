@@ -39,9 +39,9 @@ class Captions:
     ) -> Layout:
         """Return the layout of a table, its texts and declared columns from the file.
 
-        `measured` returns, from the subjects of the table, what stands in the braces of the
-        sentence on how they were measured; other braces hold the settings of their records. The
-        fields are those of `Layout` beside the texts.
+        `measured` returns, from the subjects of the table, the words in braces of the sentence on
+        the measurement. Other braces hold the settings of the subjects' records. The fields are the
+        fields of `Layout` beside the texts.
         """
         texts = {**self._tables[name]}
         template = texts.pop("measured")
@@ -71,7 +71,7 @@ class Captions:
         return {"name": name, **fields}
 
     def columns(self, name: str) -> tuple[Column, ...]:
-        """Return the columns of a table; each shows the cell that a row has under its title."""
+        """Return the columns of a table; each shows a row's cell under its title."""
         visible, folded = self._columns
         looks = [*visible[name], *({**look, "folded": True} for look in folded.get(name, []))]
         return tuple(_column(title, **look) for look in looks for title in look["titles"])

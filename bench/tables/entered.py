@@ -20,7 +20,7 @@ def _why_not_asked(record: Record) -> str:
 
 
 def remarks_of_entrants(results: Results, suites: Iterable[str]) -> list[str]:
-    """Return a sentence on each entrant of some suites that was not asked for every task."""
+    """Return a sentence on each entrant of some suites not asked for every task."""
     records = [record for suite in suites for record in results.all(suite, entrant=True)]
     remarks = (f"{r.solver} was {why}." for r in records if (why := _why_not_asked(r)))
     return list(dict.fromkeys(remarks))
@@ -36,7 +36,7 @@ def _version(records: EntrantRecords) -> str:
 
 
 def _commit(records: EntrantRecords) -> str:
-    """Return the commit of the solver's own sources, with a plus if they were changed."""
+    """Return the commit of the solver's own sources, with a plus if changed."""
     conditions = {"commit": records[-1].conditions.get("solver_commit", "")}
     return replace(records[-1], conditions=conditions).commit or "–"
 

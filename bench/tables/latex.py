@@ -1,6 +1,6 @@
 """A table as LaTeX: rules of booktabs, numbers aligned by siunitx, every text as data for TeX.
 
-The cells are those of the table in Markdown. Widths, fonts and page breaks are set by the paper.
+The cells are the same as in Markdown. Widths, fonts and page breaks are set by the paper.
 """
 
 import math
@@ -37,12 +37,12 @@ _NAMES = """alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu n
 sigma tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"""
 _GREEK = zip("αβγδεζηθικλμνξπρςστυφχψωΓΔΘΛΞΠΣΥΦΨΩ", _NAMES.split(), strict=True)
 _SPECIAL |= {letter: rf"\ensuremath{{\{name}}}" for letter, name in _GREEK}
-# Letters that LaTeX has read as they are since 2020, beside letters with accents.
+# Letters read unchanged by LaTeX since 2020, beside letters with accents.
 _PLAIN, _LAST_LATIN = set("–“”‘’…µ°¹²³×±·→"), 0x17F
 
 
 def latex(table: Table) -> str:
-    """Return a table as LaTeX, the best cells bold; comments state the packages that it needs."""
+    """Return a table as LaTeX, the best cells bold; comments state the needed packages."""
     best = best_cells(table)
     formats = [_number_format([row[j] for row in table.rows]) for j in range(len(table.columns))]
     kinds = [
@@ -76,7 +76,7 @@ def latex(table: Table) -> str:
 
 
 def _cell(cell: Cell, is_best: bool) -> str:
-    """Return a cell: a number as it is, words in braces, which siunitx does not read."""
+    """Return a cell: a number as is, words in braces, which siunitx does not read."""
     bold = r"\bfseries " if is_best else ""
     text = words(cell)
     return bold + (text.replace(",", "") if _is_number(cell) else f"{{{escaped(text)}}}")

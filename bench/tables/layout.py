@@ -41,7 +41,7 @@ class Layout:
     name: str  # the stem of its files
     title: str  # its heading
     subjects: Callable[[Results], Iterable[Any]]  # of the rows, such as records
-    # of the table, or a function that makes them from all subjects
+    # of the table, or a function from all subjects to the words
     columns: Sequence[Column] | Callable[[Any], Sequence[Column]]
     shows: str | Callable[[Any], str]  # a sentence on the contents, or a function of all subjects
     # a sentence on how the numbers were measured, or a function of all subjects
@@ -53,7 +53,7 @@ class Layout:
     # whether a subject may be best in its group
     ranked: Callable[[Any], bool] = lambda subject: True
     optional: bool = False  # whether an empty table is no omission
-    # for a subject, whether it is best by titles of columns, where a test of its own decides
+    # by titles of columns, whether a subject is best, where a test of its own decides
     leads: Callable[[Any], Mapping[str, bool]] = lambda subject: {}
 
     def __call__(self, results: Results) -> Table:
@@ -79,7 +79,7 @@ class Layout:
         return with_rows(self._with_leaders(table, subjects), ranked_rows(table))
 
     def _with_leaders(self, table: Table, subjects: Sequence[Any]) -> Table:
-        """Return a table whose best cells are those of the tests that decide, where there are.
+        """Return a table whose best cells follow the deciding tests, if any.
 
         Where all rows tie, none is best.
         """
@@ -110,7 +110,7 @@ def source(subject: Any) -> Source:
 
 
 def records_of(subject: Any) -> Iterator[Record]:
-    """Yield the records in a subject; only its attribute `record` if it has one."""
+    """Yield the records in a subject; only its attribute `record` if present."""
     if isinstance(subject, Record):
         yield subject
     elif isinstance(getattr(subject, "record", None), Record):
@@ -163,7 +163,7 @@ def _plumbob_and_python(versions: Mapping[str, Any]) -> str:
 
 
 def _engine_version(record: Record) -> str:
-    """Return the package and version of a record's solver, "" if it is ours or unknown."""
+    """Return the package and version of a record's solver, "" if ours or unknown."""
     engine = registry.find(record.solver).engine
     package = _PACKAGES.get(engine, engine) or record.solver
     version = record.settings.get("version") or record.stamp.get("versions", {}).get(package)

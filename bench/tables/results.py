@@ -40,7 +40,7 @@ class Results:
 
     @property
     def entrants(self) -> frozenset[str]:
-        """The solvers that a user has entered."""
+        """The solvers entered by a user."""
         return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
 
     def all(self, suite: str, failed: bool = False, **facts: Any) -> list[Record]:
@@ -69,7 +69,7 @@ def results_of(folder: Path) -> tuple[Results, str]:
     """Return the results in a folder, and a warning on lines that cannot be read, or "".
 
     Raises:
-        ValueError: if there are no records, or they cannot be read.
+        ValueError: if there are no records, or records cannot be read.
     """
     records, warning = on_record(folder)
     results = Results(records)
@@ -119,7 +119,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def most_often(firsts: Sequence[str], noun: str) -> str:
-    """Return the name that is first most often, "nobody" if there is none: "A on 3 of 5 robots"."""
+    """Return the name most often first, "nobody" without names: "A on 3 of 5 robots"."""
     if not firsts:
         return "nobody"
     name, count = Counter(firsts).most_common(1)[0]

@@ -39,7 +39,7 @@ def selected(
 
 
 def _passing(table: Table, filters: Sequence[str]) -> list[int]:
-    """Return the numbers of the rows that pass one filter of each column that has any."""
+    """Return the numbers of the rows that pass a filter of each filtered column."""
     places = {-1: {*range(len(table.rows))}}  # by column; no column has number -1
     for text in filters:
         name, sign, value = (*re.split("([=~])", text, maxsplit=1), "", "")[:3]
@@ -90,7 +90,7 @@ def column_numbers(table: Table, text: str) -> list[int]:
 
 
 def _by_name(table: Table) -> dict[str, int]:
-    """Return the columns by their headings, and by titles that only one column has."""
+    """Return the columns by their headings, and by unique titles."""
     titles = [_plain(column.title) for column in table.columns]
     unique = {title: j for j, title in enumerate(titles) if titles.count(title) == 1}
     return unique | {_plain(column.heading): j for j, column in enumerate(table.columns)}

@@ -13,7 +13,7 @@ Cell = str | int | float | bool | Share | None
 
 
 class Summary(NamedTuple):
-    """The message of a table: a sentence, and points below it; empty if there is none."""
+    """The message of a table: a sentence, and points below; empty without a message."""
 
     sentence: str = ""
     points: tuple[str, ...] = ()
@@ -27,12 +27,12 @@ INTERVAL = "95 % interval"
 NO_ANSWER = "no answer"
 # One metre, second, radian, byte or whole in other units.
 UNITS = {"ms": 1e3, "µs": 1e6, "ns": 1e9, "°": 180.0 / math.pi, "%": 100.0, "GiB": 2.0**-30}
-# The most problems or solvers that a command names, and the most columns that name a row.
+# The most problems or solvers in a command, and the most columns that name a row.
 MAX_OPTIONS, _MAX_NAMES = 3, 3
 
 
 def in_unit(value: float, unit: str) -> float:
-    """Return a value in SI units, or a share of one, in a unit such as "ms", "°" or "ns/solve"."""
+    """Return a value in SI units, or a share of 1, in a unit like "ms", "°" or "ns/solve"."""
     return UNITS.get(unit.partition("/")[0], 1.0) * value
 
 
@@ -47,9 +47,9 @@ class Column:
     title: str  # of the column
     unit: str = ""  # of its numbers
     words: bool = False  # whether the cells are text, aligned left
-    # format of a cell, such as `INTERVAL`; left out where its parts have own columns
+    # format of a cell, for example `INTERVAL`; left out where its parts have own columns
     note: str = ""
-    # returns the cell of a subject, in SI units or as a share of one
+    # returns the cell of a subject, in SI units or as a share of 1
     read: Callable[[Any], Any] = field(default=_identity, compare=False)
     factor: float | None = None  # of the cell, if not that of the unit
     best: str = ""  # "least" or "greatest", "" if no cell is best
@@ -89,9 +89,9 @@ class Source(NamedTuple):
 
     @property
     def command(self) -> str:
-        """The command that measures the row again, "" without measurements.
+        """The command to measure the row again, "" without measurements.
 
-        It measures the whole suite where a row has many problems or solvers.
+        For a row of many problems or solvers, the command measures the whole suite.
         """
         options = []
         for option, names in (("--solver", self.solvers), ("--problem", self.problems)):
@@ -117,7 +117,7 @@ class Table:
     measured: str = ""  # a sentence on how the numbers were measured
     summary: Summary = NO_SUMMARY  # generated from the numbers
     compared: int = 1  # rows with so many equal first cells are compared; 0: all are
-    # numbers of rows that are never best, such as those of a solver cut short
+    # numbers of rows that are never best, for example a solver cut short
     unranked: frozenset[int] = frozenset()
     sources: tuple[Source, ...] = ()  # the measurements behind each row; empty if unknown
     provenance: str = ""  # number of samples, machine and versions
@@ -146,10 +146,10 @@ def is_blank(table: Table) -> bool:
 
 
 def best_cells(table: Table) -> set[tuple[int, int]]:
-    """Return row and column of each cell that is best among the rows it is compared with.
+    """Return row and column of each cell that is best among the compared rows.
 
-    Ties are all best: shares whose intervals overlap with that of the best, numbers that are
-    written alike. Where all rows tie, as where there is one, no cell is best.
+    Ties are all best: shares whose intervals overlap with the best's interval, or numbers written
+    alike. Where all rows tie, as in a single row, no cell is best.
     """
     if table.best is not None:
         return set(table.best)
@@ -208,7 +208,7 @@ def with_rows(table: Table, places: Sequence[int]) -> Table:
 
 
 def number_of(cell: Cell) -> float:
-    """Return a cell as a number: a share as a part of one, NaN for words or without trials."""
+    """Return a cell as a number: a share as a part of 1, NaN for words or without trials."""
     if isinstance(cell, Share):
         return cell.hits / cell.total if cell.total else math.nan
     return math.nan if cell is None or isinstance(cell, str) else float(cell)
@@ -245,9 +245,9 @@ def naming(table: Table) -> int:
 
 
 def column_widths(lowest: Sequence[float], natural: Sequence[float], space: float) -> list[float]:
-    """Return a width for each column, between its lowest and natural width, that fill a space.
+    """Return widths of columns to fill a space, each between its lowest and natural width.
 
-    Columns that need little more get all of it; the others share the remaining space evenly.
+    Columns in need of little more get their natural width; the others share the rest evenly.
     """
     widths, spare = list(lowest), space - sum(lowest)
     needs = [max(0.0, wide - narrow) for narrow, wide in zip(lowest, natural, strict=True)]

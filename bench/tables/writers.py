@@ -17,7 +17,7 @@ from .table import Cell, Table, best_cells, words
 POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?!\w)")
 # An apostrophe, or the start of a formula in a spreadsheet; not a number, nor a sign alone.
 _FORMULA = re.compile(r"'|[=@＝＠]|[-+－＋](?![\d.]*$|[\d.]+e[-+]?\d+$)", re.IGNORECASE)
-# Marks anywhere, and the start of a list, a rule or a heading; no number is one of these.
+# Marks anywhere, and the start of a list, a rule or a heading; no number is among these.
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=](?=[-+=\s]|$)|(?<=^\d)[.)](?=\s|$))")
 
 
