@@ -34,7 +34,7 @@ QUANTITIES = {
 
 
 def claims_about(subject: str, *engine: str) -> list[Claim]:
-    """Return the claims about a subject of `claims.toml`, against an engine if it names one."""
+    """Return the claims about a subject of `claims.toml`, against an engine if given."""
     return [_claim(name, entry, *engine) for name, entry in _TABLE[subject].items()]
 
 

@@ -62,7 +62,7 @@ def ik_answers(engine: str, case: int) -> Comparison:
 
 
 def full_reach(skeleton: Skeleton) -> float:
-    """Return the largest distance that any joint can have from the root [m]."""
+    """Return the largest possible distance of any joint from the root [m]."""
     distances = np.zeros(skeleton.joint_count)
     for joint in range(1, skeleton.joint_count):
         distances[joint] = distances[skeleton.parents[joint]] + skeleton.link_lengths[joint]

@@ -1,4 +1,4 @@
-"""Random systems on which claims are checked, seeded so that case i is the same in every run."""
+"""Random systems to check claims, seeded: case i is the same in every run."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ MINIMUM_PARTICLES, MAXIMUM_PARTICLES = 5, 500
 SIZES = 10
 # h omega of a smooth problem, with omega its highest rate.
 RESOLVED = 0.04
-# Quantities that all springs of a uniform network share.
+# Quantities common to all springs of a uniform network.
 ALIKE = ("stiffnesses", "dampings")
 
 
@@ -26,10 +26,10 @@ def generator(quantity: str, case: int) -> np.random.Generator:
 
 
 def skeleton(case: int) -> Skeleton:
-    """Return a chain (even cases) or a tree (odd ones) of 2 to 50 joints, 50 in cases 0 and 1.
+    """Return a chain (even cases) or a tree (odd cases) of 2 to 50 joints, 50 in cases 0 and 1.
 
-    The names are shuffled, so that their order differs from ours and from an engine's. Small
-    skeletons are more frequent because Pinocchio's memory grows with the cube of the joints.
+    The names are shuffled: their order differs from ours and from an engine's. Small skeletons are
+    more frequent because Pinocchio's memory grows with the cube of the joints.
     """
     rng = generator("skeleton", case)
     joints = MAXIMUM_JOINTS if case < 2 else int(2 * (MAXIMUM_JOINTS / 2) ** rng.uniform())
@@ -70,10 +70,10 @@ class StepProblem(NamedTuple):
 
 
 def network(case: int, *, damped: bool = True) -> StepProblem:
-    """Return a random network of 5 to 500 unequal particles, one or two of them pinned.
+    """Return a random network of 5 to 500 unequal particles, of which one or two are pinned.
 
     Every spring is stretched or compressed by up to a third; none is at its rest length, where
-    MuJoCo's integrator "discrete" omits its stiffness. In every fifth case the ends of one spring
+    MuJoCo's integrator "discrete" omits its stiffness. In every fifth case the ends of a spring
     coincide, and in odd cases half of the springs are tension-only.
     """
     n, tension_only = particles(case), 0.5 * (case % 2)

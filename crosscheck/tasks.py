@@ -22,7 +22,7 @@ from .verdict import Comparison
 
 BODIES, CONFIGURATIONS = 8, 3
 BALLS = (1, 4, 5)  # bodies on balls or slides, others are on hinges or slides
-# Equalities of the sort of bodies that MuJoCo reads, with places for six random numbers.
+# Equalities of bodies as read by MuJoCo, with places for six random numbers.
 EQUALITIES = """
 <connect body1="b2" body2="b7" anchor="{} {} {}"/>
 <weld body1="b3" body2="b6" anchor="{} {} {}"/>
@@ -34,7 +34,7 @@ CLOSURES = '<connect body1="b2" body2="b7" anchor="{}"/><weld body1="b3" body2="
 
 
 class EngineFrame(NamedTuple):
-    """A link as an engine has it."""
+    """A link in an engine."""
 
     position: FloatArray  # [m], (3,)
     matrix: FloatArray  # (3, 3)
@@ -46,7 +46,7 @@ class EngineFrame(NamedTuple):
         return self.position + self.matrix @ point
 
     def velocity(self, point: FloatArray) -> FloatArray:
-        """Return the derivative of where it is, (3, freedom)."""
+        """Return the derivative of the position, (3, freedom)."""
         return self.linear + np.cross(self.angular.T, self.matrix @ point).T
 
 
@@ -121,7 +121,7 @@ def postures(engine: str, case: int) -> Comparison:
 
 
 def closures(engine: str, case: int) -> Comparison:
-    """Compare by how much links leave the places that connect and weld keep them at."""
+    """Compare by how much links violate connect and weld."""
     anchor, anchor_weld = samples.generator("closures", case).normal(size=(2, 3))
     links = ["b2", "b7", "b3", "b6"]
     numbers = [" ".join(map(repr, point.tolist())) for point in (anchor, anchor_weld)]
@@ -176,7 +176,7 @@ def _compared(
     actual: Callable[[FloatArray], FloatArray],
     expected: Callable[[FloatArray], FloatArray],
 ) -> Comparison:
-    """Compare two functions of the coordinates; nothing would move if all were those of home."""
+    """Compare two functions of the coordinates, with home as baseline."""
     return Comparison(
         np.array([actual(q) for q in rows]),
         np.array([expected(q) for q in rows]),
@@ -213,7 +213,7 @@ def _freedoms(robot: Robot) -> dict[str, int]:
 
 
 def _frames(robot: Robot, adapter: RobotEngine, q: FloatArray) -> Iterator[EngineFrame]:
-    """Yield links b7 and b3 as an engine has them at q."""
+    """Yield links b7 and b3 of an engine at q."""
     adapter.update_kinematics(_coordinates(robot, q))
     x, R = adapter.link_poses(["b7", "b3"])
     J = adapter.jacobians(["b7", "b3"], _freedoms(robot))
@@ -226,7 +226,7 @@ def _rows(robot: Robot, case: int) -> FloatArray:
 
 @functools.cache
 def _sample(engine: str, case: int) -> tuple[Robot, RobotEngine, FloatArray]:
-    """Return a random tree as the reference and an engine read it, and configurations."""
+    """Return a random tree as read by the reference and an engine, and configurations."""
     text = _text(case)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "tree.xml")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class ClaimTolerance(NamedTuple):
-    """The largest difference allowed between two correct results, and the reason for it."""
+    """The largest difference allowed between two correct results, and the reason."""
 
     value: float  # relative to the scale of the comparison
     reason: str

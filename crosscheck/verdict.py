@@ -1,4 +1,4 @@
-"""A claim that two independent computations agree, and the function that checks it."""
+"""A claim that two independent computations agree, and the function to check the claim."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from plumbob.reference.arguments import FloatArray
 
 from .tolerances import ClaimTolerance
 
-# Least distance of our quantity from its baseline, relative to the scale. It exceeds all tolerances
-# by far, so that a comparison of two results at rest proves nothing.
+# Least distance of our quantity from its baseline, relative to the scale. The least distance
+# exceeds all tolerances by far: comparing two results at rest proves nothing.
 LEAST_DISPLACEMENT = 1e-4
 
 
@@ -55,7 +55,7 @@ class ClaimVerdict:
 
     @property
     def words(self) -> str:
-        """The verdict as tables show it."""
+        """The verdict as in tables."""
         if self.claim.obstacle:
             return f"not checked: {self.claim.obstacle}"
         return "MISSED" if self.failure else "held"
@@ -69,7 +69,7 @@ def each_case(compare: Callable[[int], Comparison]) -> Callable[[int], Iterable[
 def check_claim(claim: Claim, cases: int | None = None) -> ClaimVerdict:
     """Compare all cases of a claim, or the first few, and return the verdict.
 
-    Raise a ValueError if it is no claim, or the number not an integer of at least 0.
+    Raise a ValueError for no claim, or a number other than an integer of at least 0.
     """
     arguments.instance("claim", claim, Claim)
     count = claim.cases if cases is None else arguments.integer("cases", cases, minimum=0)

@@ -29,19 +29,19 @@ FLEX_RADIUS = 1e-4
 class MujocoMassSpring:
     """A mass-spring system as a MuJoCo model: point masses on three slides, springs as tendons.
 
-    A free particle is a body at the world's origin with three slide joints, so that its qpos are
-    its global position; a pinned one is a body without joints, positioned by `update_forces`. A
-    spring is a spatial tendon between the sites of two bodies. Its `springlength` is the rest
-    length, or for a tension-only spring the interval from zero to it. `columns` are the indices of
+    A free particle is a body at the world's origin with three slide joints: its qpos are its global
+    position. A pinned particle is a body without joints, positioned by `update_forces`. A spring is
+    a spatial tendon between the sites of two bodies. Its `springlength` is the rest length, or for
+    a tension-only spring the interval from zero to the rest length. `columns` are the indices of
     each free particle's coordinates in qpos and qvel, (free, 3).
 
-    The integrator "discrete" omits the stiffness of a tendon that is exactly at its rest length and
-    then differs from Gauss-Newton: do not start from the rest lengths.
+    The integrator "discrete" omits the stiffness of a tendon exactly at its rest length and then
+    differs from Gauss-Newton: do not start from the rest lengths.
 
     "implicitfast" keeps the entries of the damping matrix in the sparsity pattern of MuJoCo's mass
-    matrix. For point masses on three slides along the axes, which MuJoCo marks `body_simple`, that
-    is its diagonal. Otherwise it would be the 3 x 3 blocks, as for "implicit". Both drop the
-    coupling of different bodies.
+    matrix. For point masses on three slides along the axes, which MuJoCo marks `body_simple`, the
+    pattern is the diagonal. Otherwise the pattern would be the 3 x 3 blocks, as for "implicit".
+    Both drop the coupling of different bodies.
     """
 
     def __init__(self, system: MassSpring, *, h: float = 1e-3, integrator: str = "Euler") -> None:
@@ -65,9 +65,9 @@ class MujocoMassSpring:
     def _build(self, system: MassSpring) -> mujoco.MjModel:
         """Return the model with the springs as tendons.
 
-        The direction of our springs is from the second particle to the first, that of a tendon from
-        the first site to the second: the sites are in reverse order. This matters only where they
-        coincide, because MuJoCo, too, then sets the direction to (1, 0, 0).
+        Our springs point from the second particle to the first, a tendon from the first site to the
+        second: the sites are in reverse order. The order matters only for coincident ends, because
+        MuJoCo, too, then sets the direction to (1, 0, 0).
         """
         spec = particles_spec(system)
         for i, j in system.springs:
@@ -89,7 +89,7 @@ class MujocoMassSpring:
         self.model.opt.integrator = INTEGRATORS[choice("integrator", integrator, INTEGRATORS)]
 
     def write(self, state: State, external_forces: ArrayLike | None = None) -> None:
-        """Reset MuJoCo's data, then write a state and external forces [N], (particle, 3), into it.
+        """Reset MuJoCo's data, then write a state and external forces [N], (particle, 3).
 
         The reset clears the solution of the last step, from which "discrete" would start.
         """
@@ -116,7 +116,7 @@ class MujocoMassSpring:
     def step(
         self, state: State, external_forces: ArrayLike | None = None, *, steps: int = 1
     ) -> State:
-        """Return the state after some time steps, by default one, of MuJoCo's integrator."""
+        """Return the state after some time steps, by default 1, of MuJoCo's integrator."""
         self.write(state, external_forces)
         self.advance(steps)
         return self.read()
@@ -155,7 +155,7 @@ class MujocoMassSpring:
 
 
 class MujocoFlex(MujocoMassSpring):
-    """A mass-spring system in MuJoCo whose springs are the edges of a flex of dimension one.
+    """A mass-spring system in MuJoCo whose springs are the edges of a flex of dimension 1.
 
     All edges of a flex have the same stiffness and damping, and none is tension-only. An edge
     between two pinned particles is rigid and stores no energy. The integrator "discrete" does not
@@ -170,7 +170,7 @@ class MujocoFlex(MujocoMassSpring):
         """Return the model.
 
         MuJoCo computes the rest lengths of edges from the initial positions and does not accept
-        zero: the bodies start at distinct positions, which are then reset to the origin while the
+        zero. The bodies start at distinct positions, which are then reset to the origin while the
         rest lengths are overwritten. MuJoCo sorts the edges. Raise a ValueError if the springs
         differ in stiffness or in damping, or there are none.
         """
@@ -192,7 +192,7 @@ class MujocoFlex(MujocoMassSpring):
 
 
 class MujocoJointChain:
-    """A chain of particles on the x axis, each joined to the one before it; the first is pinned.
+    """A chain of particles on the x axis, each joined to its predecessor; the first is pinned.
 
     Each particle is a child body of the previous one, connected by a joint with a spring and a
     damper. The coordinate of the joint is the length of the spring, and the mass matrix couples all
@@ -285,7 +285,7 @@ def particle_name(i: int) -> str:
 
 
 def _common(name: str, per_spring: FloatArray) -> float:
-    """Return the number that all springs share; a ValueError if they differ."""
+    """Return the common number of all springs; a ValueError if springs differ."""
     if len(np.unique(per_spring)) != 1:
         distinct = np.unique(per_spring)
         raise ValueError(f"{name}: expected the same for all springs, got {distinct}")

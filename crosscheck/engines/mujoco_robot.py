@@ -15,13 +15,13 @@ from plumbob.reference.arguments import FloatArray
 from .file_kind import URDF, file_kind, xml_root
 from .robot_engine import LinkPoses, RobotEngine
 
-# Elements of a URDF that kinematics does not need and that MuJoCo may refuse.
+# Elements of a URDF without effect on kinematics, which MuJoCo may refuse.
 LEFT_OUT = ("visual", "collision", "inertial")
 UNIT_INERTIA = """<inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"""
 PLANAR = "joint[@type='planar']"
 SETTINGS = '<mujoco><compiler fusestatic="false" balanceinertia="true"/></mujoco>'
-# Elements to remove from an MJCF file that MuJoCo refuses, those that refer to others first.
+# Elements to remove from an MJCF file refused by MuJoCo, elements with references first.
 SHAPES = (
     "keys", "sensors", "actuators", "tendons", "equalities", "pairs", "excludes", "skins",
     "flexes", "sites", "geoms", "meshes", "hfields", "materials", "textures",
@@ -41,11 +41,11 @@ class Follower(NamedTuple):
 class MujocoRobot(RobotEngine):
     """The kinematics of a file as MuJoCo reads it.
 
-    Its links are MuJoCo's bodies. A body without a name is called "body#3" by its index, a joint
-    without one "body#3/hinge1". MuJoCo orders bodies and joints depth first: all are found by name.
-    A URDF's mimic joints become equality constraints, which kinematics does not enforce: this class
-    sets the coordinates of followers, each after its leader, and adds their columns of the Jacobian
-    to those of their leaders.
+    Its links are MuJoCo's bodies. A body without a name is called "body#3" by its index, a nameless
+    joint "body#3/hinge1". MuJoCo orders bodies and joints depth first: all are found by name. A
+    URDF's mimic joints become equality constraints, which kinematics does not enforce. This class
+    sets the coordinates of followers, each after its leader, and adds followers' columns of the
+    Jacobian to their leaders' columns.
     """
 
     def _read(self, path: Path, mimic: bool) -> None:
@@ -113,8 +113,8 @@ class MujocoRobot(RobotEngine):
 def mujoco_urdf(path: Path) -> mujoco.MjModel:
     """Return the model of the links and joints of a URDF file, or raise a ValueError.
 
-    Shapes are removed because their files may be missing, inertias are replaced because MuJoCo
-    refuses many, and MuJoCo's fusion of links connected by fixed joints is disabled.
+    Shapes are removed because their files may be missing; inertias are replaced because MuJoCo
+    refuses many. MuJoCo's fusion of links connected by fixed joints is disabled.
     """
     root = xml_root(path)
     for link in root.findall("link"):
@@ -131,7 +131,7 @@ def mujoco_mjcf(path: Path) -> mujoco.MjModel:
     """Return the model of an MJCF file, or raise a ValueError.
 
     Shapes are removed and masses made equal if MuJoCo refuses the file, as files of shapes may be
-    missing and it refuses some masses.
+    missing and some masses are refused.
     """
     try:
         return mujoco.MjModel.from_xml_path(str(path))
@@ -149,7 +149,7 @@ def mujoco_mjcf(path: Path) -> mujoco.MjModel:
 
 
 def _joint_name(model: mujoco.MjModel, bodies: list[str], joint: int) -> str:
-    """Return a joint's name, or else one made of its body, its type and its index there."""
+    """Return a joint's name, or else a name of its body, its type and its index there."""
     body = model.jnt_bodyid[joint]
     index = joint - model.body_jntadr[body] + 1
     return model.joint(joint).name or f"{bodies[body]}/{KINDS[model.jnt_type[joint]]}{index}"

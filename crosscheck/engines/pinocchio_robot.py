@@ -35,9 +35,9 @@ class PinocchioRobot(RobotEngine):
     """The kinematics of a file as Pinocchio reads it, with a root fixed to the world.
 
     Its links are Pinocchio's body frames. The coordinates of a hinge without limits in a URDF are
-    cosine and sine, quaternions are (x, y, z, w), and the linear velocity of a free or planar joint
-    is in its own, moving frame. Several joints of one body in an MJCF file form one composite
-    joint, whose parts are found from the file.
+    cosine and sine; quaternions are (x, y, z, w). The linear velocity of a free or planar joint is
+    in its own, moving frame. Several joints of a body in an MJCF file form a composite joint, whose
+    parts are found from the file.
     """
 
     def _read(self, path: Path, mimic: bool) -> None:
@@ -88,7 +88,7 @@ class PinocchioRobot(RobotEngine):
         )
 
     def centre_of_mass(self) -> FloatArray:
-        """Return the current centre of mass of all that moves [m], (3,)."""
+        """Return the current centre of mass of all moving links [m], (3,)."""
         return np.array(pinocchio.centerOfMass(self.model, self.data, self._q))
 
     def _centre_of_mass_jacobian(self) -> FloatArray:
@@ -102,7 +102,7 @@ class PinocchioRobot(RobotEngine):
     def _jacobians(self, links: list[str]) -> FloatArray:
         """Return the Jacobians of links with respect to all joints, (link, 6, column).
 
-        The velocity of a free joint is v = R^T p' in its moving frame and p' in the fixed one.
+        The velocity of a free joint is v = R^T p' in its moving frame and p' in the fixed frame.
         `getFrameJacobian` crashes for a model without freedoms and returns a single column as a
         vector.
         """
@@ -136,7 +136,7 @@ def _check_mjcf(root: ElementTree.Element) -> None:
 
 
 def _pinocchio_coordinates(q: FloatArray, nq: int) -> FloatArray:
-    """Return our coordinates of one joint as Pinocchio's, nq of them."""
+    """Return our coordinates of a joint as Pinocchio's, (nq,)."""
     if nq == 2 or len(q) == 3:
         return np.array([*q[:-1], np.cos(q[-1]), np.sin(q[-1])])
     if nq in (4, 7):
@@ -147,7 +147,7 @@ def _pinocchio_coordinates(q: FloatArray, nq: int) -> FloatArray:
 def _joints_by_body(
     model: pinocchio.Model, root: ElementTree.Element
 ) -> Iterator[tuple[str, pinocchio.JointModel]]:
-    """Yield each joint of an MJCF file that is a child of a body, with its name."""
+    """Yield each joint below a body of an MJCF file, with its name."""
     joints = {f.name: f.parentJoint for f in model.frames if f.type == pinocchio.FrameType.BODY}
     for body in root.iter("body"):
         name = body.get("name", "")
@@ -164,7 +164,7 @@ def _about_z(angle: float) -> FloatArray:
 
 
 def _kind(joint: pinocchio.JointModel) -> str:
-    """Return the type of a joint as MJCF calls it."""
+    """Return the type of a joint in MJCF's words."""
     if joint.nq in (4, 7):
         return "ball" if joint.nq == 4 else "free"
     return "slide" if joint.shortname().startswith("JointModelP") else "hinge"

@@ -15,7 +15,7 @@ XYZW = np.array([3, 0, 1, 2])
 class PinocchioSkeleton(SkeletonEngine):
     """A skeleton as a Pinocchio model, whose root is fixed to the world at its offset.
 
-    Joints are found by name. Pinocchio does not normalise quaternions: they must be unit ones.
+    Joints are found by name. Pinocchio does not normalise: quaternions must be of unit length.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:

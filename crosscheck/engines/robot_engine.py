@@ -1,4 +1,4 @@
-"""A robot in an engine that reads files itself; links and joints have names."""
+"""A robot in an engine with its own reader of files; links and joints have names."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -22,14 +22,14 @@ class LinkPoses(NamedTuple):
 
 
 class RobotEngine(ABC):
-    """A robot or character as an engine reads it from its file.
+    """A robot or character as read by an engine from its file.
 
     A joint without a name is called "arm/hinge1" by its body, its type and its index in the body.
 
-    Coordinates, by the name of the file's joint, follow our conventions: a number for a hinge [rad]
-    or slide [m], (w, x, y, z) for a ball, and for a free joint a position [m] and (w, x, y, z),
-    both in the frame of its zero configuration. Velocities are the angular velocity of a ball in
-    its own frame and, of a free joint, the rate of its position followed by its angular velocity.
+    Coordinates, by the name of the file's joint, follow our conventions. A hinge has an angle
+    [rad], a slide a length [m], a ball (w, x, y, z). A free joint has a position [m] and (w, x, y,
+    z) in the frame of its zero configuration. A ball's velocity is angular, in its own frame; a
+    free joint's is the rate of its position, then the angular velocity.
     """
 
     links: Mapping[str, int]  # the engine's index of each link or body, by name
@@ -74,13 +74,13 @@ class RobotEngine(ABC):
 
     @abstractmethod
     def _displacement(self, start: Mapping[str, FloatArray]) -> FloatArray:
-        """Set coordinates; return the velocity from them to those before, (column,)."""
+        """Set coordinates; return the velocity back to the previous coordinates, (column,)."""
 
     def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
         """Return the Jacobians of links with respect to joints, given with their freedoms.
 
-        They are the linear [m], then the angular velocity of the links' origins in the frame of the
-        world, (link, 6, freedom); columns of unknown joints are zero.
+        Rows are the linear [m], then the angular velocity of the links' origins in the frame of the
+        world, (link, 6, freedom). Columns of unknown joints are zero.
         """
         return self._matched(self._jacobians(links), freedoms)
 
@@ -91,7 +91,7 @@ class RobotEngine(ABC):
     def displacement(
         self, start: Mapping[str, FloatArray], freedoms: Mapping[str, int]
     ) -> FloatArray:
-        """Set coordinates; return the velocity of joints to those before, (freedom,)."""
+        """Set coordinates; return joint velocities back to the previous coordinates, (freedom,)."""
         return self._matched(self._displacement(start), freedoms)
 
     def _matched(self, values: FloatArray, freedoms: Mapping[str, int]) -> FloatArray:

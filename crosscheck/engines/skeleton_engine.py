@@ -15,8 +15,8 @@ from .mujoco_mass_spring import add_point_mass
 class SkeletonEngine(Protocol):
     """A skeleton in an engine, with the engine's coordinates q.
 
-    In both engines a velocity consists of the angular velocities of the balls, each in the frame of
-    its own joint: `integrate` multiplies rotations from the right.
+    In both engines a velocity is the angular velocities of the balls, each in the frame of its own
+    joint: `integrate` multiplies rotations from the right.
     """
 
     columns: np.ndarray  # indices of each joint's (w, x, y, z) in q, shape (joint, 4)
@@ -42,8 +42,8 @@ class SkeletonEngine(Protocol):
 class MujocoSkeleton(SkeletonEngine):
     """A skeleton as a MuJoCo model, with a body and a ball joint for each joint.
 
-    MuJoCo orders bodies depth first: joints are found by name. It normalises quaternions itself,
-    and requires masses, which do not affect kinematics.
+    MuJoCo orders bodies depth first: joints are found by name. MuJoCo normalises quaternions
+    itself, and requires masses, which do not affect kinematics.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:

@@ -12,8 +12,8 @@ from .. import samples
 from ..engines import MujocoMassSpring
 from ..verdict import Comparison
 
-# A step of length h minimises E + M |x - y|²/(2 h²) and reduces the distance to the equilibrium by
-# a factor of (h omega)^-2, less than 1e-5 even for the slowest mode.
+# A step of length h minimises E + M |x - y|²/(2 h²). The step reduces the distance to the
+# equilibrium by (h omega)^-2, less than 1e-5 even for the slowest mode.
 LONG_STEP = 1e3
 LONG_STEPS, ITERATIONS = 3, 25
 
@@ -48,8 +48,8 @@ def cloths(case: int) -> Comparison:
 def equilibrium(system: MassSpring, state: State) -> FloatArray:
     """Return an equilibrium near a state, by Newton's method on the potential energy.
 
-    It is the limit for long h of a step of implicit Euler without velocity, where g becomes the
-    energy.
+    The equilibrium is the limit for long h of an implicit Euler step without velocity, where g
+    becomes the energy.
     """
     euler = ImplicitEuler(
         system, h=LONG_STEP, solver="newton", tolerance=0.0, max_iterations=ITERATIONS
@@ -84,7 +84,7 @@ def rope(case: int) -> tuple[MassSpring, State]:
 
 
 def cloth(case: int) -> tuple[MassSpring, State]:
-    """Return a cloth of 5 x 5 particles or more that has fallen for two seconds."""
+    """Return a cloth of 5 x 5 particles or more after a fall of two seconds."""
     system, state = scenes.lab_cloth(size=5 + 2 * case, damping=0.2)
     for _ in range(FALL_STEPS):
         state = symplectic_euler(system, state, FALL_STEP)

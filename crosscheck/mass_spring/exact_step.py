@@ -1,7 +1,7 @@
 """The end of an implicit Euler step to 25 digits, to measure errors against.
 
-Newton's answer in float64 is about 1e-13 of the step away from it. Newton steps with a gradient in
-40 decimal digits, which are the same on every platform, refine it.
+Newton's answer in float64 is off by about 1e-13 of the step. Newton steps with a gradient in 40
+decimal digits, the same on every platform, refine the answer.
 """
 
 import decimal
@@ -17,7 +17,7 @@ from plumbob.reference.implicit_euler.objective import Objective
 from plumbob.reference.mass_spring import MassSpring, State
 
 DIGITS, REFINEMENTS = 40, 20
-# Refinement ends with a correction that is smaller than this, over the norm of the positions.
+# Refinement ends with a correction smaller than this, over the norm of the positions.
 CORRECTION_LIMIT = 1e-26
 
 
@@ -37,7 +37,7 @@ class ExactStep(NamedTuple):
 
 
 def exact_step(system: MassSpring, state: State, h: float, x: FloatArray) -> ExactStep:
-    """Return the end of a step of length h [s] from a state, next to Newton's answer x to it."""
+    """Return the end of a step of length h [s] from a state, next to Newton's answer x."""
     solve = scipy.sparse.linalg.splu(Objective(system, state, h).hessian_at(x).tocsc()).solve
     with decimal.localcontext(decimal.Context(prec=DIGITS)):
         gradient, exact = _gradient(system, state, Decimal(h)), _decimals(x)

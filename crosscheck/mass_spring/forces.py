@@ -27,7 +27,7 @@ DIFFERENCE_STEP = 5e-4
 
 @functools.cache
 def engine_of(case: int, *, damped: bool = True) -> MujocoMassSpring:
-    """Return the engine of a random network, cached for all claims; they set its state."""
+    """Return the engine of a random network, cached for all claims, which set its state."""
     system, _, _, h = samples.network(case, damped=damped)
     return MujocoMassSpring(system, h=h)
 
@@ -53,7 +53,7 @@ def tendon_forces(elements: str, case: int) -> Comparison:
 
 
 def tendon_stiffness(case: int) -> Comparison:
-    """Compare K times a direction with differences of MuJoCo's forces along it.
+    """Compare K times a direction with differences of MuJoCo's forces in the same direction.
 
     Cases in which the ends of a spring coincide are left out: its force has no derivative there.
     """
@@ -90,7 +90,7 @@ def flex_forces(case: int) -> Comparison:
 
 
 def flex_potential(case: int) -> Comparison:
-    """Compare the energy of springs and gravity with that of a flex, like `tendon_potential`."""
+    """Compare the energy of springs and gravity with a flex's, like `tendon_potential`."""
     return _compare_potential(samples.uniform(case), flex(case))
 
 

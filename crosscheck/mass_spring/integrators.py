@@ -128,5 +128,5 @@ def energy_series(
 
 
 def mechanical_energy(system: MassSpring, state: State) -> float:
-    """Return the kinetic energy plus that of springs and gravity [J]."""
+    """Return the kinetic energy plus the energy of springs and gravity [J]."""
     return kinetic_energy(system, state) + potential_energy(system, state.positions)

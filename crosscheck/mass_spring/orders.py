@@ -76,7 +76,7 @@ def angular_momenta(names: Sequence[str], case: int) -> Comparison:
 def scalar_spring_energies(case: int) -> Comparison:
     """Compare the ratio of the energies of a spring after and before n steps of implicit Euler.
 
-    It is (1 + h² omega²)^-n for a spring of rest length zero, whose force is linear in x.
+    The ratio is (1 + h² omega²)^-n for a spring of rest length zero, whose force is linear in x.
     """
     system, state, h = samples.oscillator(case)
     omega = np.sqrt(system.stiffnesses[0] / system.masses[1])

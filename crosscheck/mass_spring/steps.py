@@ -68,9 +68,9 @@ def balance_residual(
 ) -> float:
     """Return the relative residual of the balance of forces at the end x of a step, (particle, 3).
 
-    It is |M (x - y) - h² f(x)| / (|M (x - y)| + h² sum |spring force|) over the free particles,
-    where f are MuJoCo's forces at x; see `_forces_at_end` for the dampers. Pins affect the forces
-    only; x contains their positions at the end of the step.
+    The residual is |M (x - y) - h² f(x)| / (|M (x - y)| + h² sum |spring force|) over the free
+    particles. f are MuJoCo's forces at x; see `_forces_at_end` for the dampers. Pins affect the
+    forces only; x contains their positions at the end of the step.
     """
     inertia, impulse, _, scale = _balance(system, state, x, h, external_forces)
     return float(np.linalg.norm(inertia - impulse) / scale)
@@ -138,10 +138,10 @@ def _forces_at_end(
 ) -> tuple[FloatArray, float]:
     """Return MuJoCo's forces at the end x of an implicit step [N], (free, 3), and all tension [N].
 
-    Springs and gravity are MuJoCo's at x. The damper of the step is -c (l(x) - l_n)/h, a tendon of
-    stiffness c/h and rest length l_n in MuJoCo, with l_n its own length of the spring at x_n.
-    MuJoCo's damper at the velocity (x - x_n)/h differs: it takes the component of the velocity
-    along the spring at x, which is not zero for a spring that only rotates.
+    Springs and gravity are MuJoCo's at x. The damper of the step is -c (l(x) - l_n)/h: in MuJoCo a
+    tendon of stiffness c/h and rest length l_n, MuJoCo's length of the spring at x_n. MuJoCo's
+    damper at the velocity (x - x_n)/h differs. Its velocity is the component along the spring at x,
+    not zero for a spring that only rotates.
     """
     dampers = MassSpring(
         system.masses,

@@ -21,7 +21,7 @@ from ..verdict import Comparison
 from .models import RobotFile, comparable, moving_joints, random_coordinates
 
 CONFIGURATIONS = 5
-# Jacobians are compared for so many links at a time that they hold at most this many numbers.
+# Jacobians are compared for a few links at a time, with at most this many numbers in all.
 PART = 2**22
 
 

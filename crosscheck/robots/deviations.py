@@ -29,7 +29,7 @@ QUATERNION = "the quat_xyzw of an origin is not read"
 
 
 def known_deviations(path: Path, engine: str = "Pinocchio") -> list[str]:
-    """Return a sentence for each known deviation of an engine that affects a file."""
+    """Return a sentence for each known deviation of an engine on a file."""
     try:
         kind, root = file_kind(path), xml_root(path)
         deviations = DEVIATIONS[kind, engine](root) if (kind, engine) in DEVIATIONS else {}

@@ -26,7 +26,7 @@ from .independent_bvh import global_poses
 from .models import RobotFile
 
 SECOND_READER = "second reader"
-# Elements of an MJCF file with attributes that are obsolete: MuJoCo refuses files for them.
+# Elements of an MJCF file with obsolete attributes, for which MuJoCo refuses files.
 SETTINGS = ("option", "size", "visual", "statistic")
 SUFFIXES = (".urdf", ".bvh", ".xml", ".mjcf")
 ENGINES = {URDF: tuple(ROBOT_ENGINES), MJCF: tuple(ROBOT_ENGINES), BVH: (SECOND_READER,)}
@@ -37,11 +37,11 @@ UNREAD, REFUSED, NEITHER, CRASHED = "not read", "not read by us", "read by neith
 class FileReading(NamedTuple):
     """The comparison of the reference and an engine on a file.
 
-    The outcome is AGREES or DIFFERS if both read it, DEVIATES if they differ and another engine
-    agrees; UNREAD if only the engine does not read it, REFUSED if only the reference does not,
-    NEITHER if both do not; CRASHED if the process crashed or took too long. The difference is the
+    The outcome is AGREES or DIFFERS if both read the file, DEVIATES if both differ and another
+    engine agrees. UNREAD: only the reference reads the file; REFUSED: only the engine; NEITHER:
+    neither reads the file. CRASHED: the process crashed or took too long. The difference is the
     largest of positions and linear velocities, relative to the extent of the links, and of rotation
-    matrices and angular velocities; None unless both read it.
+    matrices and angular velocities. Without two readings the difference is None.
     """
 
     engine: str
@@ -52,7 +52,7 @@ class FileReading(NamedTuple):
 
 
 class ModelFile(NamedTuple):
-    """A file, its kind, and the folder that must contain the files it includes."""
+    """A file, its kind, and the folder that must contain all included files."""
 
     path: Path
     kind: str
@@ -135,7 +135,7 @@ def compare(engine: str, file: ModelFile) -> FileReading:
 
 
 def prepare() -> None:
-    """Compile the kernels that all comparisons call."""
+    """Compile the kernels of all comparisons."""
     arm = Articulation(Skeleton([-1, 0], np.eye(2, 3)), ["free", "hinge"])
     forward_kinematics(arm, arm.neutral()[None])
     jacobians.jacobians(arm, arm.neutral()[None])
@@ -191,7 +191,7 @@ def _with_causes(
 ) -> tuple[FileReading, ...]:
     """Explain a difference of an engine if the other engine agrees with the reference.
 
-    Where MuJoCo refuses the file, it reads a copy without settings, which kinematics does not need.
+    If MuJoCo refuses the file, a copy without settings is read: kinematics needs no settings.
     """
     outcomes = {reading.engine: reading.outcome for reading in readings}
     if file.kind == MJCF and (outcomes.get("Pinocchio"), outcomes["MuJoCo"]) == (DIFFERS, UNREAD):
@@ -223,7 +223,7 @@ def _without_settings(file: ModelFile, folder: Path) -> ModelFile:
 
 
 def _files_below(path: Path) -> list[Path]:
-    """Return the regular files with known suffixes at a path or below it, in order."""
+    """Return the regular files with known suffixes at or below a path, in order."""
     if not path.is_dir():
         return [path] if path.is_file() else []
     files = (Path(folder) / name for folder, _, names in os.walk(path) for name in names)
@@ -231,7 +231,7 @@ def _files_below(path: Path) -> list[Path]:
 
 
 def _includes(file: ModelFile) -> list[Path]:
-    """Return the files that an MJCF file includes, relative to its folder."""
+    """Return the files included in an MJCF file, relative to its folder."""
     if file.kind != MJCF:
         return []
     with contextlib.suppress(ValueError):

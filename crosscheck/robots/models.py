@@ -69,7 +69,7 @@ def _names(family: str, root: Path) -> list[str]:
 
 
 def comparable(family: str, engine: str, *, moving: bool = False) -> list[RobotFile]:
-    """Return the models that an engine reads without known deviations and that have freedoms.
+    """Return the models with freedoms that an engine reads without known deviations.
 
     With `moving`, leave out models whose links only rotate in place.
     """
@@ -80,7 +80,7 @@ def comparable(family: str, engine: str, *, moving: bool = False) -> list[RobotF
 
 
 def folder(package: str) -> Path | None:
-    """Return the folder of a package's files, None if it is not installed."""
+    """Return the folder of a package's files, None if not installed."""
     try:
         distribution = importlib.metadata.distribution(package)
     except importlib.metadata.PackageNotFoundError:
@@ -89,7 +89,7 @@ def folder(package: str) -> Path | None:
 
 
 def left_out() -> str:
-    """Return a sentence on the packages with files that are not installed, "" if all are."""
+    """Return a sentence on missing packages with files, "" if all are installed."""
     packages = [package for family in PACKAGES.values() for package in family]
     missing = [package for package in packages if folder(package) is None]
     if not missing:
