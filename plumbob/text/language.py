@@ -1,4 +1,4 @@
-"""The language that sentences are told in: English, or one that has a gettext catalogue."""
+"""The language of sentences: English, or a language with a gettext catalogue."""
 
 import gettext
 import os
@@ -8,9 +8,9 @@ from pathlib import Path
 
 LOCALES = Path(__file__).with_name("locale")
 DOMAIN = "plumbob"
-# The languages by the names that `--lang` takes, with their catalogues; English needs none.
+# The languages by their names in `--lang`, with catalogues; English needs none.
 LANGUAGES = {"en": "", "zh": "zh_CN"}
-# The first of these that says something decides, as POSIX has it.
+# The first non-empty variable decides, as in POSIX.
 _VARIABLES = ("LC_ALL", "LC_MESSAGES", "LANG")
 
 
@@ -30,7 +30,7 @@ def language_of(option: str | None = None, environment: Mapping[str, str] = os.e
 
 
 def translator(language: str) -> Callable[[str], str]:
-    """Return a function that translates templates, those without a translation unchanged."""
+    """Return a function to translate templates; templates without a translation stay unchanged."""
     catalogue = gettext.translation(
         DOMAIN, LOCALES, [LANGUAGES[language] or language], fallback=True
     )

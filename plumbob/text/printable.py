@@ -14,7 +14,7 @@ def shortened(text: str, length: int) -> str:
 
 
 def visible(text: str) -> str:
-    """Return one line in which whatever does not print is written as an escape, as in Python."""
+    """Return a line in which unprintable characters are written as escapes, as in Python."""
     spaced = " ".join(text.split())
     if spaced.isprintable():
         return spaced

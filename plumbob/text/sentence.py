@@ -15,7 +15,7 @@ class Sentence(NamedTuple):
     values: Mapping[str, object]
 
     def text(self, translate: Callable[[str], str] = str) -> str:
-        """Return the words, the template and all sentences within it translated."""
+        """Return the words, with the template and all inner sentences translated."""
         values = {
             name: value.text(translate) if isinstance(value, Sentence) else value
             for name, value in self.values.items()
@@ -56,7 +56,7 @@ def without_repetition(words: Sentence, texts: set[str]) -> Sentence:
 
 
 def codes_in(words: Sentence) -> tuple[str, ...]:
-    """Return the codes of the faults that a sentence names, each once, in the order of the text."""
+    """Return the codes of the faults in a sentence, each once, in the order of the text."""
     codes = [code for key, code in words.values.items() if key == "code" and isinstance(code, str)]
     for part in words.values.values():
         codes += codes_in(part) if isinstance(part, Sentence) else ()
