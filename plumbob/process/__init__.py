@@ -1,1 +1,1 @@
-"""The ground floor of processes: a program that may crash, hang or fill the memory."""
+"""The ground floor of processes: programs that may crash, hang or fill the memory."""

@@ -1,9 +1,9 @@
-"""A program in a process of its own: it may crash, hang or send garbage without harming others.
+"""A program in a process of its own: crashes, hangs and garbage do no harm to others.
 
-Pipes are read and written without blocking, whether a program does not read or prints without end.
-Memory is limited by checks of the resident memory: limits of the address space (RLIMIT_AS,
-RLIMIT_DATA) would forbid programs that reserve far more than they use, as Java, JavaScript,
-compiled Python and every program under a sanitizer do.
+Pipes are read and written without blocking, even if a program never reads or prints without end.
+Memory is limited by checks of the resident memory. Limits of the address space (RLIMIT_AS,
+RLIMIT_DATA) would forbid programs that reserve far more than they use. Examples are Java,
+JavaScript, compiled Python and every program under a sanitizer.
 """
 
 import contextlib
@@ -29,21 +29,21 @@ from .tree import Process, carry, end_group, family, guard, new_marker
 
 CallResult = TypeVar("CallResult")
 
-# Period of the checks of a process while it is awaited [s].
+# Period of the checks of an awaited process [s].
 TICK = 0.05
-# Length of the end of standard error that is kept [B].
+# Length of the kept end of standard error [B].
 STDERR_LENGTH = 4096
 # Below this share of a processor a program waits rather than computes.
 IDLE = 0.1
-# Time for a process that closed one of its pipes to answer, or to end [s].
+# Time for a process to answer or to end after closing a pipe [s].
 GRACE = 1.0
 _CHUNK = 1 << 18
 # Limit of the duration of a call over its limit of processor time: the processor is shared.
 _WALL = 10
 # Limit of the time to load and compile before the first call [s].
 _START = 300.0
-# In safe-path mode (-P) nothing is imported from the working directory; our packages come from
-# where this file is, before any other that the path may lead to.
+# In safe-path mode (-P) nothing is imported from the working directory. Our packages come from the
+# location of this file, before any others on the path.
 _ROOT = Path(__file__).parents[2]
 _PATH = "import sys; sys.path.insert(0, sys.argv[1]); "
 
@@ -52,16 +52,16 @@ class Loss(Enum):
     """Why a process is lost."""
 
     ENDED = auto()
-    TRUNCATED = auto()  # it ended in the middle of a message
-    CLOSED = auto()  # it closed its output, but runs on
+    TRUNCATED = auto()  # ended in the middle of a message
+    CLOSED = auto()  # closed its output, but runs on
     GARBLED = auto()  # its output is no message
     TOO_LONG = auto()  # a message without an end
     MEMORY = auto()
-    PROCESSOR = auto()  # it took too much time of a processor
+    PROCESSOR = auto()  # took too much processor time
     # No message came in time:
-    DEAF = auto()  # it closed its input before it had read the request
-    UNFINISHED = auto()  # it sent a part of a message
-    UNREAD = auto()  # it did not read the whole request
+    DEAF = auto()  # closed its input before reading the request
+    UNFINISHED = auto()  # sent a part of a message
+    UNREAD = auto()  # did not read the whole request
     COMPUTING = auto()
     WAITING = auto()
 
@@ -88,7 +88,7 @@ def take_line(received: bytearray) -> tuple[bytes, ...]:
 
 
 def take_pickle(received: bytearray) -> tuple[Any, ...]:
-    """Remove the first object, as `multiprocessing.connection.Connection` sends it."""
+    """Remove the first object, as sent by `multiprocessing.connection.Connection`."""
     if len(received) < 4:
         return ()
     size: int = struct.unpack_from("!i", received)[0]
@@ -102,7 +102,7 @@ def take_pickle(received: bytearray) -> tuple[Any, ...]:
 
 
 def pickled(message: object) -> bytes:
-    """Return an object as `take_pickle` and a Connection read it."""
+    """Return an object as bytes for `take_pickle` and a Connection."""
     content = pickle.dumps(message)
     return struct.pack("!i", len(content)) + content
 
@@ -110,7 +110,7 @@ def pickled(message: object) -> bytes:
 class ChildProcess:
     """A program in a session of its own, with messages on its three pipes.
 
-    It ends with this object, and with this process, however this process ends. `partial` holds the
+    The program ends with this object and with this process, whatever the cause. `partial` holds the
     bytes received after the last message, `last_words` the end of its standard error.
     """
 
@@ -123,12 +123,12 @@ class ChildProcess:
         memory: float = math.inf,
         longest: float = math.inf,
     ) -> None:
-        """Start a program; raise OSError if that fails, ValueError if the command holds NUL.
+        """Start a program; raise OSError on failure, ValueError if the command holds NUL.
 
-        `take` removes the first message from the received bytes and returns it, or () if there is
-        none yet; with pickled objects, prints of the program are discarded. A program whose memory,
-        with all that it starts, is limited [B] is not trusted: processes that leave its group and
-        session are ended with it. `longest` limits its messages [B].
+        `take` removes and returns the first message of the received bytes, or returns () if there
+        is none yet; with pickled objects, prints of the program are discarded. `memory` limits the
+        memory of the program and its descendants [B]. A limited program is not trusted: processes
+        that leave its group and session are ended too. `longest` limits its messages [B].
         """
         self._take, self._memory, self._longest = take, memory, longest
         self._marker = new_marker() if memory < math.inf else 0
@@ -142,7 +142,7 @@ class ChildProcess:
             env=environment,
             start_new_session=True,
             pipesize=_CHUNK,  # fewer changes of context for large messages
-            # A limit that is set later would miss what the program starts at once.
+            # A limit set later would miss processes started at once.
             preexec_fn=partial(carry, self._marker) if self._marker else None,
         )
         self.pid: int = self._process.pid
@@ -161,12 +161,12 @@ class ChildProcess:
 
     @property
     def code(self) -> int:
-        """The exit code of a process that has ended, or minus the signal."""
+        """The exit code of an ended process, or minus the signal."""
         return int(self._process.returncode)
 
     @property
     def ending(self) -> str:
-        """How it ended: "with code 3" or "by SIGSEGV"."""
+        """How the process ended: "with code 3" or "by SIGSEGV"."""
         if self.code >= 0:
             return f"with code {self.code}"
         try:
@@ -176,7 +176,7 @@ class ChildProcess:
 
     @property
     def recent_words(self) -> bytes:
-        """The part of `last_words` that came after the last message was sent."""
+        """The part of `last_words` since the last message was sent."""
         count = self._heard - self._heard_before
         return bytes(self.last_words[-count:]) if count else b""
 
@@ -222,7 +222,7 @@ class ChildProcess:
         return has_left, strays
 
     def end(self) -> None:
-        """Kill it and all that it has started."""
+        """Kill the program and all of its descendants."""
         self._end()
 
     def _next_message(self) -> tuple[Any, ...]:
@@ -287,7 +287,7 @@ class ChildProcess:
             self._selector.unregister(pipe)
 
     def _ends_within(self, seconds: float) -> bool:
-        """Return whether it ends in time; discard its output until then."""
+        """Return whether the program ends in time; discard its output until then."""
         deadline, length = time.monotonic() + seconds, len(self.partial)
         while not (has_ended := self._has_ended()) and time.monotonic() < deadline:
             self._pump(TICK / 10)
@@ -302,7 +302,7 @@ class ChildProcess:
         return os.waitid(os.P_PID, self.pid, options) is not None
 
     def _look(self, processor: float) -> None:
-        """Raise if it ended or exceeds a limit; record its processes."""
+        """Raise if the program ended or exceeds a limit; record its processes."""
         if self._has_ended():  # while another process holds its pipes
             before = len(self.partial)
             self._exchange(0.0)
@@ -318,7 +318,7 @@ class ChildProcess:
             raise LostError(Loss.PROCESSOR)
 
     def _used(self) -> float:
-        """Return the processor time that it used since its first record [s]."""
+        """Return the program's processor time since its first record [s]."""
         first, last = (sum(p.seconds for p in self._looks[i][1]) for i in (0, -1))
         return last - first
 
@@ -385,13 +385,13 @@ def python_process(statement: str) -> ChildProcess:
 
 
 def one_thread() -> dict[str, str]:
-    """Return an environment that limits the linear algebra of NumPy and SciPy to one core."""
+    """Return an environment to limit the linear algebra of NumPy and SciPy to a single core."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     return {**os.environ, **dict.fromkeys(names, "1")}
 
 
 def take_streams() -> tuple[int, int]:
-    """Return the descriptors of requests and answers, and hide them from solvers.
+    """Return the descriptors of requests and answers, and hide both from solvers.
 
     Solvers then read an empty input, and print to standard error.
     """
@@ -411,7 +411,7 @@ def connect() -> tuple[Connection, Connection]:
 
 
 class CallProcess:
-    """A process that performs calls one by one; it starts at the first call and after a loss."""
+    """A process that performs calls in turn, started at the first call and after a loss."""
 
     def __init__(self, prepare: Callable[[], object], patience: float) -> None:
         """Set the first call of each process, and the limit of processor time of a call [s]."""
@@ -433,7 +433,7 @@ class CallProcess:
             raise
 
     def close(self) -> None:
-        """End the process, if there is one."""
+        """End the process, if any."""
         child, self._child = self._child, None
         if child is not None:
             child.end()

@@ -8,10 +8,10 @@ LARGEST = 1 << 30
 
 
 def check_regular(path: Path) -> None:
-    """Make sure that a path is a file that can be read to its end, or does not exist.
+    """Check that a path is a regular file, or does not exist.
 
     Raises:
-        ValueError: if it is a folder, a pipe or a device, or larger than `LARGEST`.
+        ValueError: for a folder, a pipe or a device, or a file larger than `LARGEST`.
     """
     try:
         mode, size = path.stat().st_mode, path.stat().st_size
@@ -24,10 +24,10 @@ def check_regular(path: Path) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Make sure that a path is a folder, or does not exist.
+    """Check that a path is a folder, or does not exist.
 
     Raises:
-        ValueError: if it is a file, a pipe or a device.
+        ValueError: for a file, a pipe or a device.
     """
     if path.exists() and not path.is_dir():
         raise ValueError(f"{path}: expected a folder, got a {_kind_of_file(path.stat().st_mode)}")

@@ -1,9 +1,9 @@
-"""Find, measure and kill the processes that a program has started.
+"""Find, measure and kill the processes started by a program.
 
 A program's tree is its process group and session, its descendants and, on Linux, the processes with
-its marker, even if they fork twice and leave the session. The marker is a limit of
-real-time computing: processes inherit limits through every fork, setsid and exec, and a limit of
-tens of thousands of years has no effect.
+its marker. The marker stays after forking twice and leaving the session. It is a limit of real-time
+computing: processes inherit limits through every fork, setsid and exec. A limit of tens of
+thousands of years has no effect.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import psutil
 
-# Searches for processes that fork while they are killed, and the pause between two [s].
+# Searches for processes forked during the killing, and the pause between searches [s].
 ROUNDS, PAUSE = 200, 0.005
 LIMIT = getattr(resource, "RLIMIT_RTTIME", None)
 # Wait for the end of the input; then kill the group and, thrice, the processes with marker $2.
@@ -30,7 +30,7 @@ _GUARD = (
 
 
 class Process(NamedTuple):
-    """A process that runs."""
+    """A running process."""
 
     pid: int
     memory: int  # its resident memory [B]
@@ -45,10 +45,10 @@ def new_marker() -> int:
 
 
 def carry(marker: int) -> None:
-    """Mark this process and all that it will start; switch core dumps off.
+    """Mark this process and all of its later descendants; switch core dumps off.
 
-    A child calls this between fork and exec, where locks of other threads stay locked: it must do
-    nothing else.
+    A child calls this between fork and exec, where locks of other threads stay locked: nothing else
+    is allowed there.
     """
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -57,9 +57,9 @@ def carry(marker: int) -> None:
 
 
 def family(leader: int, marker: int = 0) -> list[Process]:
-    """Return the running processes of a program: its group's leader and all that it has started.
+    """Return the running processes of a program: its group's leader and all descendants.
 
-    `marker` is that of the program, 0 if it has none.
+    `marker` is the program's marker, 0 if none.
     """
     members: set[int] = set()
     for pid in [leader, *filter(lambda pid: _belongs(pid, leader, marker), psutil.pids())]:
@@ -86,7 +86,7 @@ def _descendants(pid: int) -> list[int]:
 
 
 def _measured(pid: int) -> Process | None:
-    """Return a process, None if it has ended."""
+    """Return a process, None after its end."""
     with contextlib.suppress(psutil.Error):
         process = psutil.Process(pid)
         with process.oneshot():
@@ -100,7 +100,7 @@ def _measured(pid: int) -> Process | None:
 def main_thread_seconds(process: int) -> float:
     """Return the processor time of the first thread of a process, to the nanosecond [s].
 
-    It is 0 if the process has ended, or where it is unknown. psutil counts ticks of 10 ms.
+    The time is 0 after the end of the process, or where unknown. psutil counts ticks of 10 ms.
     """
     with contextlib.suppress(OSError), open(f"/proc/{process}/schedstat", "rb") as file:
         return 1e-9 * int(file.read().split()[0])
@@ -108,9 +108,9 @@ def main_thread_seconds(process: int) -> float:
 
 
 def end_group(leader: int, marker: int = 0) -> None:
-    """Kill a program's group and, if it has a marker, all that it has started.
+    """Kill a program's group and, with a marker, all descendants.
 
-    The leader must not have been waited for, so that its process number is not reused.
+    The leader must not have been waited for, lest its process number be reused.
     """
     for attempt in range(ROUNDS if marker else 1):
         pids = [process.pid for process in family(leader, marker)] if marker else []
