@@ -105,7 +105,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
 
 
 def _print_plan(names: list[str], choice: "Choice", output: Path | None) -> int:
-    """Print the problems and solvers, or with a folder what would be measured for it."""
+    """Print the problems and solvers, or with a folder the measurements planned there."""
     from . import plan
 
     lines = plan.dry_run(names, choice, output) if output else plan.listed(names, choice)
@@ -123,7 +123,7 @@ def _measure(
     address: str,
     verbose: bool,
 ) -> int:
-    """Measure suites and print the answer, after every table if that is wished."""
+    """Measure suites and print the answer, on request after every table."""
     from plumbob.bench.harness.executors import executor_at
 
     writable(output)
@@ -219,9 +219,9 @@ def run_with_progress(
 
 
 def _listener(bar: Any, task: Any, events: "Sequence[Event]") -> Callable[[Progress], None]:
-    """Return a function that shows progress, and prints the first failure of each solver at once.
+    """Return a function to show progress, and to print the first failure of each solver at once.
 
-    `events` are all so far if blocks are measured one after the other, else empty.
+    `events` are all events so far if blocks are measured in turn, else empty.
     """
     solvers: set[str] = set()
 

@@ -29,7 +29,7 @@ def interruption(arguments: Sequence[str]) -> str:
 def open_closed_streams() -> None:
     """Open the null device in place of closed standard streams.
 
-    The next files would otherwise take their numbers, and receive all that is printed.
+    The next files would otherwise take their numbers, and receive all output.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -42,7 +42,7 @@ def leave_at_interrupt() -> None:
 
 
 def handle_interrupt(handler: Any) -> None:
-    """Call a handler at Ctrl-C, unless it is ignored, as in the background of a script."""
+    """Call a handler at Ctrl-C, unless ignored, as in the background of a script."""
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, handler)
 

@@ -1,4 +1,4 @@
-"""Parts of the help that several commands share, fitted to the width of the terminal."""
+"""Parts of the help common to several commands, fitted to the width of the terminal."""
 
 import re
 import shutil
@@ -52,13 +52,13 @@ class FittingFormatter(_Formatter):  # type: ignore[misc]
         super().write_dl(rows, min(col_max, self.columns // 3), col_spacing)
 
     def getvalue(self) -> str:
-        """Return the help, lines that are too wide continued in the next."""
+        """Return the help, each line that is too wide continued in the next."""
         lines = super().getvalue().splitlines()
         return "".join(f"{part}\n" for line in lines for part in fitted(line, self.columns))
 
 
 def _without_type(name: str) -> str:
-    """Return an argument without its Python type, or an option with a word in place of it."""
+    """Return an argument without its Python type, or an option with a word in its place."""
     if not name.startswith("-"):
         return re.sub(r" <[^>]*>$", "", name)
     return re.sub(r"<([^>]*)>$", lambda match: "N" if "int" in match[1] else "NAME", name)
@@ -86,13 +86,13 @@ def fitted(line: str, width: int) -> list[str]:
 
 
 class FittingContext(_Context):  # type: ignore[misc]
-    """A context with help that fits the terminal."""
+    """A context with help fitted to the terminal."""
 
     formatter_class = FittingFormatter
 
 
 class Command(TyperCommand):
-    """A command with help that fits the terminal."""
+    """A command with help fitted to the terminal."""
 
     context_class = FittingContext
 
@@ -102,7 +102,7 @@ class Command(TyperCommand):
 
 
 class FittingGroup(TyperGroup):
-    """A group of commands with help that fits the terminal."""
+    """A group of commands with help fitted to the terminal."""
 
     context_class = FittingContext
 

@@ -1,4 +1,4 @@
-"""Exit codes and options that several commands share, and checks of arguments."""
+"""Exit codes and options common to several commands, and checks of arguments."""
 
 import difflib
 import re
@@ -32,7 +32,7 @@ def flag(text: str, *names: str) -> Any:
 
 
 def is_name(text: str) -> bool:
-    """Return whether a text names a file: it is not blank and has no control characters."""
+    """Return whether a text names a file: not blank, and without control characters."""
     return bool(text.strip()) and not re.search(r"[\x00-\x1f\x7f-\x9f]", text)
 
 
@@ -83,10 +83,10 @@ def write_text(path: Path, text: str) -> None:
 
 
 def valid_name(kind: str, name: str, valid: Iterable[str]) -> str:
-    """Return a name that is valid.
+    """Return a valid name.
 
     Raises:
-        ValueError: if it is not; the message offers the nearest.
+        ValueError: if invalid; the message offers the nearest.
     """
     names = list(valid)
     if name in names:

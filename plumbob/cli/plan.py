@@ -22,7 +22,7 @@ from plumbob.bench.tables.results import counted, grouped
 from .terminal import width
 
 NOT_INSTALLED = "not installed"
-# Names of problems or solvers in the list of all suites, and lines for them.
+# Names of problems or solvers in the list of all suites, and their lines.
 _MAX_NAMES, _MAX_LINES = 6, 2
 _PACKAGES = {registry.PLUMBOB: "plumbob", registry.PINOCCHIO: "pin", registry.MUJOCO: "mujoco"}
 OWN_RECORD, OTHER_RECORDS, BUDGET = "its own record", "records of others", "budgets"
@@ -47,7 +47,7 @@ def listed(suites: Sequence[str], choice: Choice) -> Iterator[str]:
 
 
 def _problems(selection: Iterable[Block]) -> dict[str, str]:
-    """Return the titles of problems by their names, "" for a title that repeats the name."""
+    """Return the titles of problems by their names, "" for a title equal to the name."""
     return {
         block.problem: _unless_repeated(block.problem, str(block.facts.get("title", "")))
         for block in selection
@@ -56,7 +56,7 @@ def _problems(selection: Iterable[Block]) -> dict[str, str]:
 
 
 def _problems_of(selection: Iterable[Block], solver: tuple[str, ...]) -> str:
-    """Return the problems that a solver takes, counted by families: "chain (4); published (2)"."""
+    """Return the problems of a solver, counted by families: "chain (4); published (2)"."""
     own = [block for block in selection if block.solver == solver[0]]
     problems = dict.fromkeys(block.problem for block in own if not _measures(block, not_asked))
     families = Counter(problem.partition("/")[0] for problem in problems)
@@ -95,7 +95,7 @@ def _measures(block: Block, *functions: Callable[..., Any]) -> bool:
 
 
 def _version(block: Block) -> str:
-    """Return the version of a block's solver: its own, or that of its engine."""
+    """Return the version of a block's solver: its own, or its engine's."""
     version = block.settings.get("version")
     if block.facts.get("entrant") is True:
         return ", ".join(str(part) for part in (version, "entered", block.facts["door"]) if part)
@@ -113,7 +113,7 @@ def _aligned(rows: Iterable[Sequence[str]]) -> Iterator[str]:
 
 
 def _in_short(noun: str, names: Iterable[str]) -> Iterator[str]:
-    """Yield the number of names, and the first of them or of their families."""
+    """Yield the number of names, and the first names or families."""
     names = list(names)
     families = list(dict.fromkeys(name.partition("/")[0] for name in names))
     for count in range(_MAX_NAMES, 0, -1):
@@ -126,7 +126,7 @@ def _in_short(noun: str, names: Iterable[str]) -> Iterator[str]:
 
 
 class PlannedBlock(NamedTuple):
-    """A block to be measured, the reason if again, its time [s], and the source of that."""
+    """A block to be measured, the reason if again, its time [s], and the source of the time."""
 
     block: Block
     reason: str

@@ -94,7 +94,7 @@ def _list_columns(table: "Table") -> int:
 
 
 def formatted(table: "Table", form: str) -> str:
-    """Return a table in one of `FORMATS`."""
+    """Return a table in any of `FORMATS`."""
     from plumbob.bench.tables import writers
     from plumbob.bench.tables.latex import latex
 

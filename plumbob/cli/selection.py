@@ -1,4 +1,4 @@
-"""Select solvers, problems and robots by the names that a user gives, which may be abbreviated."""
+"""Select solvers, problems and robots by the user's names, which may be abbreviated."""
 
 import difflib
 import sys
@@ -19,7 +19,7 @@ from plumbob.text.printable import visible
 
 # The tasks whose problems are robots.
 ROBOT_TASKS = (REACHABLE, UNREACHABLE, TRAC_IK, TOOLBOX)
-# The most names that a message lists.
+# The most names in a message.
 _MAX_LISTED = 12
 
 
@@ -48,7 +48,7 @@ class MeasurementRequest(NamedTuple):
 
 
 def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Choice:
-    """Return the measurements that a user asks for, after opening the user's solvers and problems.
+    """Return the requested measurements, after opening the user's solvers and problems.
 
     Raises:
         ValueError: if a solver or problem cannot be opened, or a name is unknown.
@@ -126,7 +126,7 @@ def _recorded(
     every: Iterable[Block],
     read: Callable[[Block], tuple[str, list[str]]],
 ) -> list[str]:
-    """Return the names in records, one or several each, of the words of a user."""
+    """Return the names in records of a user's words, one or several each."""
     recorded: dict[str, list[str]] = {}
     for name, aliases in map(read, every):
         for alias in aliases:

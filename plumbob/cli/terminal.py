@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from plumbob.bench.tables.table import Table
     from plumbob.crosscheck.verdict import ClaimVerdict
 
-# The width of a pipe: each row and each sentence is one line.
+# The width of a pipe: each row and each sentence is a single line.
 IN_A_PIPE = 10**6
 # Seconds until a pipe gets its first line on progress, and the longest pause between lines.
 PAUSE, LONGEST_PAUSE = 10.0, 60.0
@@ -51,7 +51,7 @@ def _results(suites: Sequence[str], output: Path) -> "Results":
 
 
 def print_filled(text: str, indent: str = "") -> None:
-    """Print a text in lines that fit, indented; nothing if it is empty."""
+    """Print a text in lines that fit, indented; nothing if empty."""
     from plumbob.bench.tables.aligned import filled
 
     if text:
@@ -59,7 +59,7 @@ def print_filled(text: str, indent: str = "") -> None:
 
 
 def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe") -> None:
-    """Print title, summary and rows of a table, and how to see the columns that do not fit."""
+    """Print title, summary and rows of a table, and how to see the remaining columns."""
     from plumbob.reference.arguments import name_list
 
     print()
@@ -121,8 +121,8 @@ def print_verdicts(verdicts: Sequence["ClaimVerdict"]) -> None:
 def progress() -> Any:
     """Return a progress bar, invisible in a pipe.
 
-    The description takes the space that bar, count and time left do not need. The field "kept" of
-    its task counts steps that took no time.
+    The description takes the space unused by bar, count and time left. The field "kept" of its task
+    counts steps without time.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn
@@ -159,7 +159,7 @@ def progress() -> Any:
 def lines_in_a_pipe(bar: Any, pauses: tuple[float, float] | None = None) -> Iterator[None]:
     """Print the state of a progress bar now and then, where standard error is no terminal.
 
-    `pauses` are the first pause and the longest one [s].
+    `pauses` are the first and the longest pause [s].
     """
     end = threading.Event()
 
@@ -179,7 +179,7 @@ def lines_in_a_pipe(bar: Any, pauses: tuple[float, float] | None = None) -> Iter
 
 
 def _progress_line(task: Any) -> str:
-    """Return the state of a bar's task: how far it is, the time left, and what it is."""
+    """Return the state of a bar's task: its progress, the time left, and its description."""
     if task.total is None:
         return f"{task.elapsed or 0.0:.0f} s: {task.description}"
     left = time_left(task.elapsed, task.completed, task.total, task.fields)

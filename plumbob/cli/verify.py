@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from plumbob.verify.verify import Notify
 
 PROGRAM = "plumbob.program"
-# The seconds between lines on progress in a pipe: a service that waits longer may take it for hung.
+# Seconds between lines on progress in a pipe: after a longer silence, a service may assume a hang.
 LINE_PAUSE = 6.0
 
 
@@ -40,7 +40,7 @@ class SolverCommand(Command):
 
 
 def program_of(context: typer.Context) -> list[str]:
-    """Return the program behind --, without that; empty if there is none."""
+    """Return the program behind --, without the dashes; empty if none."""
     return list(context.meta.get(PROGRAM, ()))[1:]
 
 
@@ -90,7 +90,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         from plumbob.verify.schema import text
 
         return _print([text()])
-    # Solver and reference are timed on one thread each; NumPy is not imported yet.
+    # Solver and reference are timed on a thread each; NumPy is not imported yet.
     from plumbob.process.child import one_thread
 
     os.environ |= {**one_thread(), **os.environ}
@@ -124,7 +124,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 def _listed(
     question: "Question", names: bool, template: str | None, export: Path | None, say: "Say"
 ) -> Iterable[str]:
-    """Return lines on the tasks, or on the starter or cases that it writes."""
+    """Return lines on the tasks, or on the starter or cases to write."""
     from plumbob.verify.screen import listings
 
     if template and not names:
