@@ -238,7 +238,7 @@ def test_a_reader_that_leaves_ends_it_without_a_word(arguments, buffered):
     both = arguments == READERS["complaint"]
     done = subprocess.run(
         [sys.executable, "-c", script], stdout=write, stderr=write if both else subprocess.PIPE,
-        env={**os.environ, "PYTHONUNBUFFERED": buffered}, cwd=Path(cli.__file__).parent.parent,
+        env={**os.environ, "PYTHONUNBUFFERED": buffered}, cwd=Path(cli.__file__).parents[2],
         check=False,
     )  # fmt: skip
     os.close(write)
@@ -447,7 +447,7 @@ NUMBA = {
 @pytest.mark.parametrize(("arguments", "variable", "code", "err"), NUMBA.values(), ids=NUMBA)
 def test_variables_of_numba_cost_no_traceback(empty_folder, arguments, variable, code, err):
     name, value = variable.split("=")
-    root = str(Path(cli.__file__).parents[1])
+    root = str(Path(cli.__file__).parents[2])
     done = subprocess.run(
         [sys.executable, "-m", "plumbob", *arguments], cwd=empty_folder, check=False, text=True,
         capture_output=True, env={**os.environ, "PYTHONPATH": root, name: value},

@@ -25,13 +25,13 @@ import signal, sys
 
 sys.modules |= dict.fromkeys(("fcntl", "grp", "pwd", "resource"))
 del signal.SIGHUP, signal.SIGKILL, signal.setitimer
-from plumbob import cli
+from plumbob.cli import main as cli
 
 cli.main(["check", sys.argv[1]])
 """
 PROGRAM = """
 import json, sys
-from plumbob import cli
+from plumbob.cli import main as cli
 
 for line in json.loads(sys.argv[1]):
     code = cli.run_command(line)

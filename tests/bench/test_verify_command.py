@@ -331,7 +331,7 @@ test_wrong = laws(forward_kinematics=wrong.forward_kinematics, seed=1)
 """
 
 
-ROOT = str(Path(cli.__file__).parents[1])
+ROOT = str(Path(cli.__file__).parents[2])
 CODE = "from plumbob.cli.main import main; main()"
 
 
@@ -360,7 +360,7 @@ def test_laws_run_under_plain_pytest(folder):
 WITHOUT_PYTEST = """
 import sys
 sys.modules["pytest"] = None  # as if it were not installed
-from plumbob import cli
+from plumbob.cli import main as cli
 from plumbob.testing import laws
 assert cli.run_command(["verify", "--list"]) == 0
 try:

@@ -463,7 +463,7 @@ def test_a_search_states_its_coverage(targets, dense, rng):
 @pytest.mark.parametrize("restarts", [1, 12, 40])
 @pytest.mark.parametrize("seed", [0, 3])
 def test_what_is_unseen_is_the_share_of_solutions_found_once(restarts, seed, rng):
-    """Good 1953: the starts are drawn and solved here as well, and counted by their ends."""
+    """The starts are drawn and solved here as well, and counted by their ends."""
     arm = arm_of(*GENERAL)
     target = target_of(arm, arm.random(rng))
     solutions = all_solutions(arm, target, restarts=restarts, seed=seed)

@@ -177,23 +177,25 @@ def test_full_reach_is_not_too_far_however_long_or_far_off(links, away, machine,
 
 
 @pytest.mark.parametrize(
-    ("kinds", "limits", "reach"),
+    ("kinds", "limits", "sum_of_lengths", "reach"),
     [
-        (["hinge", "hinge", "fixed"], {}, 3.0),
-        (["ball", "slide", "fixed"], {"lower": -0.5, "upper": 1.0}, 4.0),
-        (["slide", "hinge", "fixed"], {"lower": -2.0, "upper": 1.0}, 5.0),
+        (["hinge", "hinge", "fixed"], {}, 3.0, 3.0),
+        (["ball", "slide", "fixed"], {"lower": -0.5, "upper": 1.0}, 4.0, 10.0**0.5),
+        (["slide", "hinge", "fixed"], {"lower": -2.0, "upper": 1.0}, 5.0, 3.0),
         (["hinge", "slide", "fixed"], {"mimics": {1: Mimic(0, 0.5, 0.25)}, "upper": 1.0,
-                                       "lower": -2.0}, 4.25),
-        (["fixed", "fixed", "fixed"], {}, 0.0),
+                                       "lower": -2.0}, 4.25, 3.0),
+        (["fixed", "fixed", "fixed"], {}, 0.0, 0.0),
     ],
 )  # fmt: skip
-def test_beyond_all_links_and_slides_a_target_is_unreachable(kinds, limits, reach, solver, backend):
-    """Links of one and two metres along x from a root at (5, 0, 0)."""
+def test_beyond_all_links_and_slides_a_target_is_unreachable(
+    kinds, limits, sum_of_lengths, reach, solver, backend
+):
+    """Links of one and two metres along x from a root at (5, 0, 0), slides along z."""
     chain = Skeleton([-1, 0, 1], [[5.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
     model = Articulation(chain, kinds, [0.0, 0.0, 1.0], **limits)
     start = 8.0 if kinds[0] == "fixed" else 5.0
-    for excess, unreachable in ((1e-3, True), (-1e-3, False)):
-        target = [start + reach + excess, 0.0, 0.0]
+    for distance, unreachable in ((sum_of_lengths + 1e-3, True), (reach - 1e-3, False)):
+        target = [start + distance, 0.0, 0.0]
         solution = solve_ik(model, model.neutral(), target, solver, max_iterations=5)
         if unreachable:
             assert solution.outcome.unreachable
