@@ -1,8 +1,8 @@
 """Inverse kinematics: local rotations or coordinates that bring effectors to targets.
 
 The route of a call: `solve_ik` checks settings, model and targets; `solve.py` hands arrays to the
-kernel of a solver; that begins from each start (`solve_chain.py`, `solve_mechanism.py`) and runs
-the two loops of `restarts.py`, which call the solver's sweep or update (`fabrik.py`, `ccd.py`,
+kernel of a solver. From each start the kernel (`solve_chain.py`, `solve_mechanism.py`) runs the two
+loops of `restarts.py`. The loops call the solver's sweep or update (`fabrik.py`, `ccd.py`,
 `jacobian_methods.py`).
 """
 
@@ -56,35 +56,37 @@ def solve_ik(
     """Return the pose that brings effectors to targets, from a start pose.
 
     The root of a Skeleton rotates but does not move. Joints that move no effector keep their
-    rotation, as does an effector whose own rotation is free. A pose is always returned; `outcome`
-    says how the solve ended. A start that is stuck, like a straight chain collinear with its
-    target, is first bent, always alike. All joints keep their limits, also those that move no
-    effector; a start outside of them is brought within.
+    rotation; so does an effector whose own rotation is free. A pose is always returned; `outcome`
+    says how the solve ended. A stuck start, like a straight chain collinear with its target, is
+    first bent, always alike. All joints keep their limits, also joints that move no effector; a
+    start outside its limits is brought within.
 
-    On limited joints Levenberg-Marquardt from one start most often fails where a limit stops it.
-    It is therefore a portfolio (Huberman, Lukose & Hogg 1997) of phases, always the same, without
-    random numbers. The first is the plain method. If its error has not been halved in 50
-    iterations, a phase begins anew from the same start, and after 10 such iterations the next: each
-    turns effectors the long way round at first (a rotation has two quaternions), uses the null
-    space to stay near mid-range (Liegeois 1977), and has a damping of its own (Chan & Lawrence
-    1988), down to 0.001 of the squared error. At last the best of them goes on. Mid-range draws
-    later phases together: two of them from different starts often end in the same pose.
-    `phases=1` is the plain method.
+    On limited joints Levenberg-Marquardt from a single start fails mostly where a limit stops a
+    joint. The solver is therefore a fixed portfolio of phases without random numbers (Huberman,
+    Lukose & Hogg 1997). The first phase, the only one with `phases=1`, is the plain method. If the
+    error has not been halved in 50 iterations, in later phases in 10, the next phase begins from
+    the same start. Later phases first turn effectors the long way round (a rotation has two
+    quaternions), and use the null space to stay near mid-range (Liegeois 1977). Each has a damping
+    of its own (Chan & Lawrence 1988), down to 0.001 of the squared error. In the end the best phase
+    goes on. Mid-range draws phases together: two phases from different starts often share their
+    end.
 
-    Restarts never make a solution worse: a target reached with fewer is reached with more, else the
-    merit is no greater than with fewer, or than that of a single attempt; of solvers without phases
-    even of one of (1 + restarts) `max_iterations`, which the first makes in the end. With several
-    effectors each restart of Levenberg-Marquardt redraws only the limbs whose effectors fail, and
-    joints that others share every other time. Otherwise an attempt that was given up early is
-    finished if no other reaches the target. All make up to (1 + 2 restarts) `max_iterations`, for
-    one position on a Skeleton (2 + 3 restarts). Attempts at a target proven out of reach end at the
-    least distance that geometry allows, or where no small motion comes nearer: there two or three
-    restarts mostly find the nearest pose.
+    More restarts never give a worse answer: a reached target stays reached, and the merit of a
+    missed target can only fall. Nor is the merit greater than after a single attempt. For solvers
+    without phases this even holds for an attempt of (1 + restarts) `max_iterations`, which the
+    first attempt makes in the end. With several effectors each restart of Levenberg-Marquardt
+    redraws only the limbs whose effectors fail, and every other time also the joints that limbs
+    share. Otherwise, if no attempt reaches the target, the attempts that were given up early are
+    finished. All attempts together make up to (1 + 2 restarts) `max_iterations`, for one position
+    on a Skeleton (2 + 3 restarts). Attempts at a target proven out of reach end at the least
+    distance that geometry allows, or where no small motion comes nearer. Two or three restarts then
+    mostly find the nearest pose.
 
-    A solve on joints that fails says UNREACHABLE too where limits or a hole inside the reach keep
-    the effector from the target's distance, or with a rotation a point on its last axis. An
-    effector's first failure computes the least and greatest distance, in 5 to 100 ms. Further
-    proofs of `certify_ik` search for each target: without them the outcome stays STALLED.
+    A failed solve on joints is also UNREACHABLE where limits or a hole inside the reach keep the
+    effector from the target's distance. With a rotation the same goes for a point on the effector's
+    last axis. An effector's first failure computes the least and greatest distance, in 5 to 100 ms.
+    `certify_ik` has further proofs, which search for each target; without a proof failure is
+    STALLED.
 
     Args:
         skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot
@@ -99,9 +101,9 @@ def solve_ik(
             default the last joint of a Skeleton, and the only tip of an Articulation.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
-        max_iterations: of each attempt, of all its phases together; by default 100, but 2,000 where
+        max_iterations: of each attempt over all its phases; by default 100, but 2,000 where
             geometry proves the target out of reach, so that most solves settle.
-        restarts: how many further attempts to make from random poses, until one reaches the target.
+        restarts: number of further attempts from random poses, made until one reaches the target.
             By default 20 where the solver is the default Levenberg-Marquardt, 100 with several
             effectors, else 0.
         phases: of Levenberg-Marquardt on joints, at most, 1 to 8; by default all. With `phases=1`
@@ -109,14 +111,14 @@ def solve_ik(
         seed: of the random poses.
         record: keep the residuals of all iterations in `history`.
         prefer: "nearest" for the solution with the least sum of squared displacements from the
-            start, "nearest_linf" for the least largest displacement of a freedom [rad or m], among
-            those of `all_solutions`, of the start and of all restarts; for a single start and
+            start; "nearest_linf" for the least largest displacement of a freedom [rad or m].
+            Candidates are `all_solutions`, the start and all restarts; for a single start and
             target of an Articulation.
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion is further than
-            1e-6 from unit length, a number is out of range, a name unknown, or an Articulation has
-            several tips and no effector is named.
+            1e-6 from unit length, a number is out of range, or a name is unknown. Also if an
+            Articulation has several tips and no effector is named.
     """
     if type(target) is list and len(target) == 1 and type(target[0]) is Target:
         target = target[0]  # it takes the shorter route

@@ -1,8 +1,8 @@
 """Anderson acceleration of sweeps (Anderson 1965; Walker & Ni 2011, the unconstrained form).
 
-A sweep leads from x to g. The affine combination of the last sweeps whose changes g - x cancel best
-is tried in place of g, brought back to what the joints allow. Where it is no nearer to the target
-than g, it is dropped and all sweeps are forgotten: the error falls as steadily as without.
+A sweep leads from x to g. Acceleration tries, in place of g, the affine combination of the last
+sweeps whose changes g - x cancel best, brought back to what the joints allow. If this is no nearer
+to the target than g, all sweeps are forgotten: the error falls as steadily as without acceleration.
 """
 
 from typing import NamedTuple
@@ -12,12 +12,12 @@ import numpy as np
 from ..arguments import FloatArray
 from .linear_algebra import ROUNDING_DAMPING, inner, solve
 
-# So many sweeps before the last are combined with it: with 10 there are hardly fewer sweeps.
+# Earlier sweeps to combine with the last: with 10 there are hardly fewer sweeps.
 DEPTH = 5
 
 
 class Mixing(NamedTuple):
-    """The last sweeps, over the numbers x that they change; empty where nothing is accelerated."""
+    """The last sweeps, over the numbers x that they change; empty without acceleration."""
 
     sweep_count: FloatArray  # of the sweeps since all were forgotten, (1,)
     start: FloatArray  # x before the last sweep
@@ -54,10 +54,10 @@ def forget(mixing):
 
 
 def mix(mixing, x):
-    """Remember the sweep from `start` to x and move x to the combination; return whether it is one.
+    """Remember the sweep from `start` to x and move x to a combination; return whether x moved.
 
-    With scaled changes f and the differences dF and dG of f and of x between sweeps, that is x less
-    dG w, where w minimises |f - dF w|.
+    Let f be the scaled changes, and dF and dG the differences of f and of x between sweeps. The
+    combination is x less dG w, where w minimises |f - dF w|.
     """
     count, ends, changes = int(mixing.sweep_count[0]), mixing.ends, mixing.changes
     depth, row, trace = min(count, DEPTH), (count - 1) % DEPTH, 0.0

@@ -1,11 +1,11 @@
 """The linear system of a task, and the steps of the Jacobian methods within limits, by active sets.
 
-The errors of all effectors are stacked: the vector from an effector to its target [m] and, where
-its rotation matters, the rotation vector to its target's times a lever [m], each times the root of
-the effector's weight. The Jacobian, transposed, holds a row a freedom: how its unit moves them.
+The errors of all effectors are stacked: the vector to the target [m] and, where the rotation
+matters, a lever [m] times the rotation vector. Both are times the root of the effector's weight.
+The Jacobian, transposed, holds a row a freedom: the motion of the effectors by its unit.
 
 The damped step J' (J J' + damping 1)^-1 e needs a matrix of the size of e only, however many joints
-there are. A freedom that a limit stops is active: the others are solved for again without it.
+there are. A freedom stopped by a limit is active: the others are solved for again without it.
 """
 
 import math
@@ -47,8 +47,8 @@ class TaskSystem(NamedTuple):
     step: FloatArray  # of the freedoms, lengths over the reach, (freedom,)
     # 1 where the upper limit stops a freedom, -1 where the lower does, else 0, (freedom,)
     active: FloatArray
-    # towards targets out of reach, see `far_step`: the Hessian of |e|²/2, the same damped and then
-    # its factors, (freedom, freedom); J e, and the two sides of a linear system, (freedom,)
+    # towards targets out of reach, see `far_step`: the Hessian of |e|²/2, the damped Hessian and
+    # then its factors, (freedom, freedom); J e, and both sides of a linear system, (freedom,)
     H: FloatArray
     damped: FloatArray
     gradient: FloatArray
@@ -105,11 +105,11 @@ def fill_jacobian(mechanism, target, data, J):
 
 
 def damped_step(mechanism, data, system, damping):
-    """Fill the step that minimises |e - J q|^2 + damping |q|^2 within the limits.
+    """Fill the minimising step of |e - J q|^2 + damping |q|^2 within the limits.
 
-    A freedom that the step would take beyond its limit becomes active: it goes to the limit, its
-    effect is taken from e, and the others are solved for again. An active freedom that would
-    then rather step back is released.
+    A freedom becomes active if the step would take it beyond its limit. The freedom goes to the
+    limit, its effect is taken from e, and the others are solved for again. An active freedom is
+    released if it would rather step back.
     """
     clear(system.active)
     clear(system.step)
@@ -126,9 +126,9 @@ def damped_step(mechanism, data, system, damping):
 
 
 def turn_the_long_way(mechanism, target, system):
-    """Replace the rotation errors by those the other way round, of 2 pi less the angle.
+    """Replace the rotation errors by the errors of the other way round, of 2 pi less the angle.
 
-    A rotation has two quaternions, Q and -Q; the solvers otherwise turn by the nearer one.
+    A rotation has two quaternions, Q and -Q; the solvers otherwise turn by the nearer.
     """
     for i in range(len(mechanism.effectors)):
         if mechanism.effectors["oriented"][i]:
@@ -144,8 +144,8 @@ def turn_the_long_way(mechanism, target, system):
 def lean(mechanism, data, system):
     """Put hinges and slides amid their limits, and leave in e what the step has to make up for.
 
-    Of the poses that bring the effectors alike to their targets, the step then finds the nearest to
-    mid-range, not to the present pose. Joints without two limits, or with a full circle, stay.
+    Among poses equally near to the targets, the step then finds the nearest to mid-range, not to
+    the present pose. Joints without two limits, or with a full circle, stay.
     """
     joints = mechanism.joints
     for j in range(len(joints)):
@@ -159,7 +159,7 @@ def lean(mechanism, data, system):
 
 
 def activate_limits(mechanism, data, system):
-    """Make the freedoms active that the step takes beyond a limit; return whether there are any."""
+    """Make the freedoms active that the step takes beyond a limit; return whether any are."""
     joints, any_active = mechanism.joints, False
     for j in range(len(joints)):
         k = joints["freedom"][j]
@@ -178,9 +178,9 @@ def activate_limits(mechanism, data, system):
 
 
 def release(system):
-    """Release the active freedom that would most step back from its limit; return whether any.
+    """Release the active freedom that most steps back from its limit; return whether any is.
 
-    With z = (e - J q) / damping, a freedom k that is free steps J_k z.
+    With z = (e - J q) / damping, a free freedom k steps J_k z.
     """
     worst, largest = -1, 0.0
     for k in range(len(system.step)):
@@ -197,7 +197,7 @@ def release(system):
 
 
 def transposed_step(mechanism, data, system):
-    """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without the freedoms that limits stop."""
+    """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without freedoms that limits stop."""
     clear(system.active)
     for _ in range(len(system.step) + 1):
         clear(system.z)
@@ -236,12 +236,12 @@ def freedom_unit(mechanism, j):
 
 
 def has_bounds(joints, j):
-    """Return whether a joint is a hinge or slide that moves by itself."""
+    """Return whether a joint is a hinge or slide, and no follower."""
     return joints["kind"][j] in (HINGE, SLIDE) and joints["leader"][j] == j
 
 
 def solve_system(system, damping):
-    """Fill z of (J J' + damping 1) z = e over the freedoms that are not active."""
+    """Fill z of (J J' + damping 1) z = e over the freedoms not active."""
     m = len(system.e)
     if m == 6:  # the compiler lays out what is of known size
         fill_matrix(system, damping, 6)
@@ -257,7 +257,7 @@ def solve_system(system, damping):
 def fill_matrix(system, damping, m):
     """Fill the lower triangle of A = J J' + damping 1, (m, m), over the freedoms not active.
 
-    The damping is held above rounding, so that A has factors even where J J' is singular.
+    The damping is held above rounding: A has factors even where J J' is singular.
     """
     A, J = system.A, system.J
     for i in range(m):
@@ -292,7 +292,7 @@ def take_step(mechanism, data, system):
 
 
 def covers_circle(joints, j):
-    """Return whether a hinge's limits leave all angles, so that none of them need stop it."""
+    """Return whether a hinge's limits leave all angles, so that no limit need stop the hinge."""
     span = joints["upper"][j] - joints["lower"][j]
     return joints["kind"][j] == HINGE and span >= FULL_CIRCLE and not joints["followed"][j]
 

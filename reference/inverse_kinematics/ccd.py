@@ -1,13 +1,14 @@
 """Cyclic coordinate descent (Wang & Chen 1991).
 
-Out of reach it needs many sweeps. Near the straight pose it is the method of Gauss and Seidel on a
-Hessian of r_i r_k + g r_min(i, k), with arms r of the joints, the shorter r_min, and the gap g to
-the target. The first part has rank one, so that of n joints n - 1 directions rest on the second:
-the smaller the gap and the longer the chain, the more sweeps. To 1e-4 of the reach n = 3, 10 and 40
-balls take 18, 88 and 452 where g is the reach, 40, 223 and 1,203 at a fifth of it, and 243, 1,340
-and 7,741 at a fiftieth. Over-relaxation does not help: rotations 1.5 times as far take as many
-sweeps, 1.8 times as far three times as many. Anderson's acceleration does (`anderson.py`): at a
-fiftieth its sweeps are 13, 58 and 257. FABRIK lays such a chain straight in one.
+Out of reach CCD needs many sweeps. Near the straight pose it is the method of Gauss and Seidel on a
+Hessian of r_i r_k + g r_min(i, k). Here r are the arms of the joints, r_min the shorter arm, and g
+the gap to the target. The first term has rank one: of n joints n - 1 directions rest on the second
+term. A smaller gap and a longer chain hence need more sweeps. To 1e-4 of the reach n = 3, 10 and 40
+balls take 18, 88 and 452 where g is the reach. For g of a fifth of the reach they take 40, 223 and
+1,203, for a fiftieth 243, 1,340 and 7,741. Over-relaxation does not help: rotations 1.5 times as
+far take as many sweeps, 1.8 times as far three times as many. Anderson's acceleration does
+(`anderson.py`): at a fiftieth its sweeps are 13, 58 and 257. FABRIK lays such a chain straight in
+one.
 """
 
 import math
@@ -55,10 +56,10 @@ from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, 
 
 
 def ccd_sweep(chain, target):
-    """Point each joint, from the effector's parent to the root, so that its effector is nearest.
+    """Point each joint, from the effector's parent to the root, to bring the effector nearest.
 
-    A joint moves the joints below it only, so that on the way up only the effector needs to be
-    followed; the rotations are then applied from the root down, each to its joint and all below.
+    A joint moves only the joints below, so on the way up only the effector is followed. The
+    rotations are then applied from the root down, each to its joint and all below.
     """
     n = len(chain.lengths)
     effector = load_vector(chain.positions, n)
@@ -75,7 +76,7 @@ def ccd_sweep(chain, target):
 
 
 def anderson_ccd_sweep(chain, target):
-    """Make a sweep, and mix its joint positions with those of the sweeps before."""
+    """Make a sweep, and mix its joint positions with the results of earlier sweeps."""
     x, mixing = chain.row[: 3 * len(chain.positions)], chain.mixing
     copy_row(x, mixing.start)
     ccd_sweep(chain, target)
@@ -90,10 +91,10 @@ def anderson_ccd_sweep(chain, target):
 
 
 def pointing(joint, effector, target):
-    """Return the shortest rotation about a joint that brings the effector nearest to the target.
+    """Return the shortest rotation about a joint to bring the effector nearest to the target.
 
-    The effector moves on a sphere about the joint, and the point nearest to the target lies on the
-    ray from the joint to the target: the distance cannot grow. Returns that point as well.
+    The effector moves on a sphere about the joint. The point nearest to the target lies on the ray
+    from the joint to the target: the distance cannot grow. Returns this point as well.
     """
     arm, direction = subtract(effector, joint), subtract(target, joint)
     square = dot(direction, direction)
@@ -104,10 +105,10 @@ def pointing(joint, effector, target):
 
 
 def ccd_update(state, target):
-    """Move each joint, from the effectors to the root, to bring all effectors below it nearest.
+    """Move each joint, from the effectors to the root, to bring all effectors below nearest.
 
-    A joint rotates all below it as a body: Wahba's problem, for a hinge about its axis. A hinge or
-    slide stops at its limit; a ball stays if its limits leave only worse rotations.
+    A joint rotates everything below as a body: Wahba's problem, for a hinge about its axis. A hinge
+    or slide stops at its limit; a ball stays if its limits leave only worse rotations.
     """
     mechanism, data, work = state.mechanism, state.data, state.workspace
     joints = mechanism.joints
@@ -120,7 +121,7 @@ def ccd_update(state, target):
 
 
 def anderson_ccd_update(state, target):
-    """Make a sweep, and mix its coordinates with those of the sweeps before, within the limits."""
+    """Make a sweep, and mix its coordinates with earlier sweeps, within the limits."""
     mechanism, data, mixing = state.mechanism, state.data, state.mixing
     joints, q = mechanism.joints, data.q
     copy_row(q, mixing.start)
@@ -211,7 +212,7 @@ def unlimited_rotation(mechanism, target, data, work, j, M):
 
 
 def rotate_effectors(mechanism, data, j, Q):
-    """Rotate the effectors below joint j about it."""
+    """Rotate the effectors below joint j about the joint."""
     x = load_vector(data.positions, j)
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:

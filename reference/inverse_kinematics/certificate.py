@@ -1,28 +1,29 @@
-"""A proof about a pose q: how near its target it is, an exact solution nearby, or that none exists.
+"""Proofs about a pose q: its distance from the target, and an exact solution nearby or nowhere.
 
-**Reached.** With u = 2^-53 a joint's local rotation is known to 48 u: 16 u of half an angle's sine
-and cosine, 20 u of three quaternions made unit and two products with them, 11 u of the sum and the
-product with the parent's. Behind j joints the quaternion is off by e_j = 48 u j, and a vector of
-length l that it rotates by (6 e_j + 48 u) l. With 82 u for the offset and its sum, joint j of a
-path with link lengths l_j, slides included, adds l_j (6 e_j + 130 u), and 2 u |x| the position x:
-about 1e-13 m for an arm. Arguments of mimic joints add their own rounding.
+**Reached.** With u = 2^-53 a joint's local rotation is known to 48 u. Half an angle's sine and
+cosine contribute 16 u, three quaternions made unit and two products with them 20 u. The sum and the
+product with the parent's quaternion contribute 11 u. Behind j joints the quaternion is off by e_j =
+48 u j, and a rotated vector of length l by (6 e_j + 48 u) l. With 82 u for the offset and its sum,
+joint j adds l_j (6 e_j + 130 u) on a path with link lengths l_j, slides included. The position x
+adds 2 u |x|; the sum is about 1e-13 m for an arm. Arguments of mimic joints add their own rounding.
 
 **An exact solution.** F holds distances over the reach and, for a target rotation, twice the vector
-part of the quaternion from target to effector. Newton's method polishes q to p within the limits;
-joints that come to their limits stay there, as do balls with limits, which keep them to rounding.
-Let J be the Jacobian of F for the free joints, B an approximate right inverse, and L a Lipschitz
-constant of J. With a = 1 - |I - J B| > 0,
+part of the quaternion from target to effector. Newton's method polishes q to p within the limits.
+Joints that come to their limits stay there, as do balls with limits, whose limits hold only to
+rounding. Let J be the Jacobian of F for the free joints, B an approximate right inverse, and L a
+Lipschitz constant of J. With a = 1 - |I - J B| > 0,
 
     2 L |B|² |F(p)| < a²  =>  F(p + B z) = 0 for some |z| <= r = 2 |F(p)| / (a + sqrt(a² - ...))
 
-(Kantorovich 1948). Proof: M(z) = z - F(p + B z) has |M'(z)| <= 1 - a + L |B|² |z|, so that
-|M(z)| <= |F(p)| + (1 - a) |z| + L |B|² |z|² / 2 <= r in the ball of radius r, which M maps into
-itself (Brouwer). Joint i moves by at most |B_i| r, which must stay within its limits.
+(Kantorovich 1948). Proof: M(z) = z - F(p + B z) has |M'(z)| <= 1 - a + L |B|² |z|. So |M(z)| <=
+|F(p)| + (1 - a) |z| + L |B|² |z|² / 2 <= r in the ball of radius r: M maps the ball into itself
+(Brouwer). Joint i moves by at most |B_i| r, which must stay within its limits.
 
-L follows from lever arms. Of two rotations the second derivative of the position is at most the
-distance of the lower joint from the effector, of a rotation and a slide below it 1, of two slides
-0; of twice a quaternion it is 1/2. A ball counts as three rotations: in Q exp(v) the first and
-second derivatives are bounded in the same way. L is the norm of Frobenius of the bounds.
+L follows from lever arms. The second derivative of the position by two rotations is at most the
+distance of the lower joint from the effector. By a rotation and a slide below it, the bound is 1;
+by two slides 0. The bound for twice a quaternion is 1/2. A ball counts as three rotations: in Q
+exp(v) the first and second derivatives are bounded in the same way. L is the Frobenius norm of the
+bounds.
 
 **Impossible.** See `reach`.
 """
@@ -57,13 +58,13 @@ from .solve import balls, solve_checked
 
 # Roundings of UNIT by a joint: of its quaternion, and of its offset.
 QUATERNION_ROUNDINGS, OFFSET_ROUNDINGS = 48, 130
-# Factor that covers the rounding errors of the bounds themselves.
+# Factor to cover the rounding errors of the bounds themselves.
 SLACK = 1.0 + 1e-8
 # The answer is polished to this distance [m] and angle [rad], and then by a few Newton steps.
 POLISHED, NEWTON_STEPS = 1e-11, 3
 # A Newton step by more leads to no solution [rad or m].
 LARGEST_STEP = 1e9
-# A joint nearer to its limit than this stays where it is [rad or m].
+# A joint this near to its limit stays where it is [rad or m].
 MARGIN = 1e-7
 # Displacements [rad or m] for which lengths of slides and angles of mimic joints are bounded.
 EXTENT = 1.0
@@ -87,15 +88,15 @@ class IKCertificate:
     """Proven bounds for a pose as the answer to targets, rounding included.
 
     Attributes:
-        residual: no effector is further from its target than this [m].
-        residual_rotation: or rotated from it by more [rad]; 0 where the rotation is free.
+        residual: upper bound of the distance from any effector to its target [m].
+        residual_rotation: upper bound of the angle between the two [rad]; 0 with a free rotation.
         rounding: the part of `residual` that covers forward kinematics in floating point [m].
         reached: whether both are within the tolerances, and all joints within their limits.
         coverage: whether an exact solution is proven, or proven impossible, or why neither.
-        distance: radius about the pose that contains an exact solution within the limits: the root
-            of the sum of squares of joint displacements [rad, of slides m]; infinite without one.
+        distance: radius about the pose that contains an exact solution within the limits, infinite
+            without a proof: the root of the sum of squares of joint displacements [rad, slides m].
         least_distance: for every pose within the limits some effector's distance [m] plus `lever`
-            times its angle [rad] is at least this; 0 if that is not proven.
+            times its angle [rad] is at least this bound; 0 without a proof.
         lever: of the angle [m]; 0 if the rotation is free.
     """
 
@@ -132,10 +133,11 @@ def certify_ik(
     """Return what is proven about a pose as the answer to targets, with the rounding errors.
 
     `pose` holds the local rotations of a Skeleton, (joint, 4), or the coordinates of an
-    Articulation or a Robot, (coordinate,), from any solver; the other arguments are as for
-    `judge_pose`. An exact solution is a pose in exact arithmetic of the model and target that the
-    floating-point inputs define, quaternions and axes made unit. Where none is proven, shells of
-    reach try to prove that there is none; they are computed once for an effector of a model.
+    Articulation or a Robot, (coordinate,). Any solver may have found the pose; the other arguments
+    are as for `judge_pose`. An exact solution is a pose in exact arithmetic of the model and target
+    which the floating-point inputs define, quaternions and axes made unit. Without a proven
+    solution, shells of reach try to prove the target impossible; a model caches the shells of an
+    effector.
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion is further than
@@ -167,7 +169,7 @@ def certify_ik(
 
 
 class Path(NamedTuple):
-    """The motions by the joints of a path: a hinge has one, a ball three, a free joint six."""
+    """The motions by the joints of a path: one by a hinge, three by a ball, six by a free joint."""
 
     joints: IndexArray  # from the root on
     lengths: FloatArray  # of their offsets [m], (joint,)
@@ -178,7 +180,7 @@ class Path(NamedTuple):
 
 
 class PathBounds(NamedTuple):
-    """Bounds that hold within EXTENT of a pose."""
+    """Bounds within EXTENT of a pose."""
 
     arms: FloatArray  # from each joint on the path to the effector [m], (joint,)
     position: float  # rounding error of the effector's position [m]

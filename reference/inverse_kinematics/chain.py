@@ -27,7 +27,7 @@ from .anderson import Mixing, mixing_on, mixing_size
 
 # A chain and target are collinear if no joint is further off their line than this, over the reach.
 LINE_TOLERANCE = 1e-9
-# Such a chain is bent by this angle [rad] in all, shared evenly by its joints.
+# A collinear chain is bent by this angle [rad] in all, shared evenly by its joints.
 BEND = 2.0
 # Distances are computed to a few of these, over the reach plus the target's distance.
 POSITION_ROUNDING = 8 * 2.220446049250313e-16
@@ -87,7 +87,7 @@ def rotate_links(chain):
     """Rotate every joint so that its link points at the next joint's position.
 
     The shortest arc from the link's old to its new direction multiplies the global rotation from
-    the left, so that the joint keeps its twist about the link.
+    the left: the joint keeps its twist about the link.
     """
     for k in range(len(chain.lengths)):
         R = load_quaternion(chain.rotations, k)
@@ -118,8 +118,8 @@ def root_distance(chain, target):
 def least_distance(chain, d):
     """Return the least distance of the effector from a target at distance d from the root [m].
 
-    It reaches all of the shell between its reach and the inner radius that the longest link leaves
-    when all others fold back: max(0, d - reach, 2 longest - reach - d).
+    The effector reaches the shell between the reach and the inner radius. The longest link leaves
+    an inner radius when all others fold back: max(0, d - reach, 2 longest - reach - d).
     """
     return max(0.0, d - chain.reach, 2.0 * chain.longest - chain.reach - d)
 
@@ -152,8 +152,8 @@ def drawn_near(chain, target, beyond):
 def is_collinear(chain, target):
     """Return whether all joints and the target lie on a line through the root.
 
-    On it every solver that rotates links towards the target in their common plane has no plane to
-    rotate them in, and stays there.
+    Solvers rotate links towards the target in their common plane; on a line there is no plane to
+    rotate in, and the chain stays there.
     """
     root = load_vector(chain.positions, 0)
     direction = subtract(target, root)

@@ -1,10 +1,10 @@
 """Forward and backward reaching (Aristidou & Lasenby 2011, Algorithm 1).
 
-The backward pass gives each joint a backward position. On mechanisms the forward pass rotates and
-translates joints instead of moving points, each to bring its children nearest to their backward
-positions: a hinge about its axis, a ball within its limits, a single rotation for all children of
-a branch, a free joint as a body. A joint with followers goes down the gradient. The remaining
-distances are the residual.
+The backward pass gives each joint a backward position. On mechanisms the forward pass does not move
+points: joints rotate and translate to bring their children nearest to the children's backward
+positions. A hinge rotates about its axis, a ball within its limits, and a free joint moves as a
+body; all children of a branch share a rotation. A joint with followers goes down the gradient. The
+remaining distances are the residual.
 """
 
 import numpy as np
@@ -40,10 +40,10 @@ from .mechanism import (
 )
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
 
-# The weight of the identity, beside that of one arm as long as the reach, in fitting a free joint:
-# the fit is unique up to rounding, and unchanged where the arms are right already.
+# The weight of the identity in fitting a free joint, beside a single arm as long as the reach. The
+# fit is then unique up to rounding, and unchanged where the arms are right already.
 IDENTITY_WEIGHT = 1e-6
-# A joint's backward position [m], and its weight, 0 where it has none.
+# A joint's backward position [m], and its weight, 0 if the joint has no backward position.
 BACKWARD = np.dtype([("position", np.float64, 3), ("weight", np.float64)], align=True)
 
 
@@ -63,7 +63,7 @@ def fabrik_sweep(chain, target):
 
 
 def reach_backward(chain, target):
-    """Put the effector on the target and pull the joints after it, up to the root."""
+    """Put the effector on the target and pull the joints after the effector, up to the root."""
     store_vector(chain.positions, len(chain.lengths), target)
     for k in range(len(chain.lengths) - 1, -1, -1):
         after = load_vector(chain.positions, k + 1)
@@ -72,7 +72,7 @@ def reach_backward(chain, target):
 
 
 def reach_forward(chain):
-    """Put the root back and pull the joints after it, down to the effector."""
+    """Put the root back and pull the joints after the root, down to the effector."""
     store_vector(chain.positions, 0, load_vector(chain.offsets, 0))
     for k in range(len(chain.lengths)):
         before = load_vector(chain.positions, k)
@@ -81,10 +81,10 @@ def reach_forward(chain):
 
 
 def lay_on_line(chain, target, sign):
-    """Lay the longest link towards the target and all other links towards it (1) or back (-1).
+    """Lay the longest link towards the target and the other links towards it (1) or back (-1).
 
-    Beyond reach all point at the target; nearer than the longest link allows all others
-    fold back, and the effector comes to rest on the inner radius.
+    Beyond reach all links point at the target. If the target is nearer than the longest link
+    allows, all others fold back, and the effector comes to rest on the inner radius.
     """
     root = load_vector(chain.positions, 0)
     direction = subtract(point_towards(root, target, 1.0), root)
@@ -97,7 +97,7 @@ def lay_on_line(chain, target, sign):
 
 
 def point_towards(start, end, length):
-    """Return the point at a distance from start in the direction of end, of x if they coincide."""
+    """Return the point at a distance from start towards end; along x if start and end coincide."""
     direction = subtract(end, start)
     distance = norm(direction)
     if distance == 0.0:
@@ -106,7 +106,7 @@ def point_towards(start, end, length):
 
 
 def fabrik_update(state, target):
-    """Find the backward positions, then move joint after joint towards them."""
+    """Compute the backward positions, then move joint after joint towards them."""
     mechanism, data, work = state.mechanism, state.data, state.workspace
     backward_pass(mechanism, target, data, work.backward)
     joints = mechanism.joints
@@ -119,7 +119,7 @@ def fabrik_update(state, target):
 def backward_pass(mechanism, target, data, backward):
     """Fill the joints' positions with the effectors on their targets and all lengths kept.
 
-    A joint with several children takes the weighted mean of the positions that they pull it to.
+    A joint with several children takes the weighted mean of the positions to which they pull.
     """
     parents = mechanism.joints["parent"]
     for j in range(len(backward)):
@@ -162,7 +162,7 @@ def add_backward(backward, j, weight, x):
 def update_joint_pose(joints, data, backward, j):
     """Update a joint's pose in the world from its parent's and its coordinates.
 
-    A ball with a backward position below keeps the rotation in the world that it had.
+    A ball with a backward position below keeps its earlier rotation in the world.
     """
     x, R = joint_in_world(joints, j, data.q, data.positions, data.rotations)
     store_vector(data.positions, j, x)
@@ -200,9 +200,9 @@ def forward_free(mechanism, target, data, work, j):
     """Move a free joint as a body to bring the joints below nearest to their backward positions.
 
     The centre of the arms goes to the centre of their backward positions, and the rotation is the
-    best about it (Horn 1987): a joint that first went to its own backward position and then rotated
-    about that would overshoot and oscillate. Where all arms are collinear, the smallest of the best
-    rotations is taken.
+    best about this centre (Horn 1987). A joint moved to its own backward position and then rotated
+    would overshoot and oscillate. Where all arms are collinear, the smallest of the best rotations
+    is taken.
     """
     joints, x = mechanism.joints, load_vector(data.positions, j)
     M, total, arms, ends = fit_arms(mechanism, target, data, work.backward, j)
@@ -219,7 +219,7 @@ def forward_free(mechanism, target, data, work, j):
 
 
 def forward_rotation(mechanism, target, data, work, j):
-    """Return the rotation of joint j that brings adjacent points nearest, for one the shortest."""
+    """Return the best rotation of joint j for adjacent points, the shortest for a single point."""
     backward, joints = work.backward, len(mechanism.joints)
     count, arm, to = 0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):
@@ -239,8 +239,8 @@ def forward_rotation(mechanism, target, data, work, j):
 def fit_arms(mechanism, target, data, backward, j):
     """Return Wahba's M of the arms from joint j to adjacent joints and to all effectors below.
 
-    Effectors further below count as well: a hinge often cannot bring its child to its backward
-    position, and would else never make up for the remaining distance.
+    Effectors further below count as well. A hinge often cannot bring its child to its backward
+    position, and would otherwise never make up for the remaining distance.
 
     Returns:
         M; the sum of the weights; and the weighted sums of the arms and of their targets [m].
@@ -266,7 +266,7 @@ def fit_arms(mechanism, target, data, backward, j):
 
 
 def mean_displacement(mechanism, target, data, backward, j):
-    """Return the weighted mean of the vectors from joint j's children to their goals [m]."""
+    """Return the weighted mean of the vectors from joint j's children to their targets [m]."""
     total, mean = 0.0, ZERO
     for e in range(len(mechanism.effectors)):
         if mechanism.effectors["joint"][e] == j:

@@ -1,16 +1,16 @@
 """Newton steps towards targets proven out of reach, within the limits.
 
-There the Jacobian methods leave out of the Hessian of |e|²/2 the second derivatives of the effector
-times e, which does not vanish: they creep or swing about the nearest pose. With w_i the angular
-velocity by freedom i and v_k the velocity of the effector by freedom k of the same joint or of a
-lower one, d²x / dq_i dq_k = w_i x v_k. For the rotation vector f to the target, |f|²/2 has the
-Hessian w_k · (1 + c [f x]²) w_i - f · (w_i x w_k) / 2, c = (1 - |f|/2 cot |f|/2) / |f|², by the
-inverse right Jacobian of the rotations (Sola et al. 2018).
+The Jacobian methods leave the effector's second derivatives times e out of the Hessian of |e|²/2.
+Out of reach e does not vanish: the methods creep or swing about the nearest pose. Let w_i be the
+angular velocity by freedom i, and v_k the effector's velocity by freedom k of the same joint or of
+a lower joint. Then d²x / dq_i dq_k = w_i x v_k. For the rotation vector f to the target, |f|²/2 has
+the Hessian w_k · (1 + c [f x]²) w_i - f · (w_i x w_k) / 2. Here c = (1 - |f|/2 cot |f|/2) / |f|²,
+by the inverse right Jacobian of the rotations (Sola et al. 2018).
 
-From one start 79 % of positions and 52 % of poses end within 1 % of the nearest pose known, over 16
-arms: the others settle as well, in local minima with two to four joints at limits, where those have
-one. Two restarts take three times the iterations and find 97 and 83 %. The phases of targets within
-reach would find 90 and 85 % for five times the iterations, and could jump between equal poses.
+From a single start, over 16 arms, 79 % of positions and 52 % of poses end within 1 % of the nearest
+pose known. The others settle in local minima, with two to four joints at limits on arms with
+limits. Two restarts take three times the iterations and find 97 and 83 %. The phases of targets
+within reach would find 90 and 85 % for five times the iterations, and could jump between poses.
 """
 
 import math
@@ -28,13 +28,13 @@ from .mechanism import (
     rotation_weight,
 )
 
-# The damping, over the reach times the error: of the first step, the least, by how much it grows
-# where the error rose, shrinks where it fell, and grows where the Hessian is not positive.
+# The damping, over the reach times the error: of the first step, and the least. Then its factors:
+# growth where the error rose, decay where the error fell, growth where the Hessian is not positive.
 FIRST_DAMPING, SMALLEST_DAMPING, GROWTH, DECAY, STIFFENING = 0.1, 1e-7, 4.0, 8.0, 2.0
-# Dampings that are tried; more only where numbers overflow.
+# Dampings to try; more only where numbers overflow.
 LARGEST_TRIES = 64
-# Limits of balls are met by projection only, so that the error may rise again and again: each time
-# the decay is raised to this power.
+# Limits of balls are met by projection only, so the error may rise again and again. Each rise
+# raises the decay to this power.
 FATIGUE = 0.9
 # Below this angle [rad] a series is exact to rounding.
 SMALL_ANGLE = 1e-4
@@ -49,7 +49,7 @@ def step_towards(mechanism, target, data, system, damping):
 
 
 def newton_step(mechanism, target, data, system):
-    """Fill the step that minimises the quadratic model of |e|²/2 within the limits.
+    """Fill the minimising step of the quadratic model of |e|²/2 within the limits.
 
     The damping (Marquardt 1963) follows the error, by the factor, the squared error and the decay
     of the last step in `data.far_step`. `system` has been linearised; its errors are used up.
@@ -111,7 +111,7 @@ def bow_of(angle):
 
 
 def add_curvatures(mechanism, data, H, j, column, moment):
-    """Subtract what a freedom of joint j has with all freedoms of it and of the joints above."""
+    """Subtract the second derivatives of a freedom of joint j and all freedoms of j and above."""
     joints, i = mechanism.joints, j
     while i >= 0:
         share = 0.5 if i == j else 1.0  # two freedoms of a ball meet twice
@@ -126,8 +126,8 @@ def add_curvatures(mechanism, data, H, j, column, moment):
 def step_within_limits(mechanism, data, system, damping):
     """Fill the step with a damping; return whether the damped Hessian is positive.
 
-    A freedom that the step would take beyond its limit becomes active, as in `damped_step`. Those
-    that the gradient holds at their limits are so from the start (Bertsekas 1982).
+    A freedom becomes active if the step would take it beyond its limit, as in `damped_step`.
+    Freedoms held at their limits by the gradient are active from the start (Bertsekas 1982).
     """
     n, any_active = len(system.step), hold_at_limits(mechanism, data, system)
     for _ in range(2 * n + 1):
@@ -145,7 +145,7 @@ def step_within_limits(mechanism, data, system, damping):
 
 
 def hold_at_limits(mechanism, data, system):
-    """Make the freedoms active that the gradient holds at limits; return whether there are any."""
+    """Make the freedoms active that the gradient holds at limits; return whether any are."""
     n = len(system.step)
     clear(system.active)
     for k in range(n):
@@ -173,7 +173,7 @@ def fill_damped(system, damping):
 
 
 def release(system, damping):
-    """Release the active freedom whose limit holds it most; return whether there is any."""
+    """Release the active freedom that its limit holds most; return whether one is released."""
     worst, largest = -1, 0.0
     for k in range(len(system.step)):
         if system.active[k] != 0.0:

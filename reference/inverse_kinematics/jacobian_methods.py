@@ -1,12 +1,12 @@
 """The methods that step along a Jacobian, each as a sweep of a chain and an update of a mechanism.
 
 - The transposed Jacobian (Wolovich & Elliott 1984; Balestrino et al. 1984; its step: Buss 2004).
-- Damped least squares with one fixed damping (Wampler 1986; Nakamura & Hanafusa 1986).
+- Damped least squares with a fixed damping (Wampler 1986; Nakamura & Hanafusa 1986).
 - Levenberg-Marquardt, whose damping mu = 1/2 |e|^2 plus a bias follows the squared error (Sugihara
-  2011). Far from the target, or where it cannot be reached, the step is short and safe; near it
-  convergence is quadratic even where the Jacobian loses rank.
+  2011). Far from the target, or where the target is beyond reach, the step is short and safe; near
+  the target convergence is quadratic even where the Jacobian loses rank.
 
-With r_k the arm from joint k of a chain to the effector, a rotation w_k of joint k moves the
+Let r_k be the arm from joint k of a chain to the effector. A rotation w_k of joint k moves the
 effector by w_k x r_k: J_k w = w x r_k and J_k^T z = r_k x z. J J^T is 3 x 3 however many joints
 there are: sum over k of |r_k|^2 1 - r_k r_k^T. The form for mechanisms (`box_step.py`) makes the
 same iterations on a chain of ten balls, but a solve takes nine times as long.
@@ -37,8 +37,9 @@ from .chain import LINE_TOLERANCE, bend, drawn_near, update_positions
 from .far_step import step_towards
 from .linear_algebra import ROUNDING_DAMPING, inner
 
-# How far beyond reach a chain's target may be, over the reach; it is drawn nearer. From further off
-# steps would swing about the nearest point; at reach itself they would be slower the nearer it is.
+# How far beyond reach a chain's target may be, over the reach; a further target is drawn nearer.
+# Steps towards a far target would swing about the nearest point; the nearer to reach itself, the
+# slower they would be.
 BEYOND_TRANSPOSED, BEYOND_DAMPED = 0.2, 0.02
 # The square of the fixed damping factor, over the reach squared: a tenth of the reach.
 FIXED_DAMPING = 0.01
@@ -48,16 +49,16 @@ DAMPING_OF_POSITIONS, DAMPING_OF_POSES = 0.5, 0.1
 # The phases after the first: the damping, over the squared error, and how many iterations turn the
 # long way round. Chosen on the bench's tuning robots alone, from 1e-4 to 2 and from 0 to 15.
 PHASES = ((0.1, 3), (0.1, 4), (0.01, 2), (0.01, 3), (0.01, 4), (0.001, 2), (0.001, 0))
-# The first iterations of each of them, which lean to mid-range.
+# The first iterations of each of these phases, which lean to mid-range.
 LEANING = 8
-# Over the reach squared; it only keeps a division by zero away.
+# Over the reach squared; only to keep a division by zero away.
 BIAS = 1e-24
 
 
 def jacobian_transpose_sweep(chain, target):
     """Rotate all joints by a J^T e, a = <e, J J^T e> / |J J^T e|^2.
 
-    That step brings the effector nearest if it moves by a J J^T e in a straight line.
+    This step brings the effector nearest if the effector moves by a J J^T e in a straight line.
     """
     e, A = linearise(chain, target, BEYOND_TRANSPOSED * chain.reach)
     move = times(A, e)
@@ -102,8 +103,8 @@ def levenberg_marquardt_sweep(chain, target):
 def levenberg_marquardt_update(state, target):
     """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits.
 
-    From a start that stalls, most often at a limit, the further PHASES solve again. They first take
-    the way round that is not the shortest, and the null space to mid-range (Liegeois 1977).
+    The further PHASES solve again from a start that stalls, mostly at a limit. At first they rotate
+    the longer way round, and the null space leans to mid-range (Liegeois 1977).
     """
     mechanism, data, system = state.mechanism, state.data, state.workspace.system
     linearise_task(mechanism, target, data, system)
@@ -123,13 +124,13 @@ def levenberg_marquardt_update(state, target):
 
 
 def levenberg_marquardt_phase(state, n):
-    """Begin phase n of Levenberg-Marquardt; return whether there is one."""
+    """Begin phase n of Levenberg-Marquardt; return whether the phase exists."""
     state.data.phase[0], state.data.phase[1] = n, 0.0
     return n <= len(PHASES)
 
 
 def only_phase(_state, n):
-    """Return whether phase n is the first, of a solver that has no other."""
+    """Return whether phase n is the first, the only phase of other solvers."""
     return n == 0
 
 
@@ -137,7 +138,7 @@ def linearise(chain, target, beyond):
     """Return e, from the effector to the target [m], and J J^T.
 
     The chain is bent first where every arm lies along e: there no rotation brings the effector
-    nearer at first order. A target further than `beyond` [m] out of reach is drawn that near.
+    nearer at first order. A target further than `beyond` [m] out of reach is drawn to `beyond`.
     """
     target = drawn_near(chain, target, beyond)
     for _ in range(2):

@@ -1,8 +1,8 @@
-"""The joints that move some effector, and its position by them: for the general solvers.
+"""The joints that move some effector, and the effectors' positions, for the general solvers.
 
 Chains of unlimited balls with a single position to reach have `chain.py`. All other problems are
 mechanisms: joints of all kinds with limits, several effectors, positions and rotations. Fixed
-joints are merged into the joints below them. See `reduce.py` for how one is made.
+joints are merged into the joints below. `reduce.py` makes mechanisms.
 """
 
 import math
@@ -56,13 +56,13 @@ TARGET = np.dtype(
 class Mechanism(NamedTuple):
     """Joints, and effectors attached to them; parents precede children."""
 
-    # those that move, fixed ones merged; coordinates are the mechanism's own, (joint,)
+    # the moving joints, fixed joints merged; coordinates are the mechanism's own, (joint,)
     joints: RecordArray
     columns: IndexArray  # of its coordinates among the articulation's, (coordinate,)
     effectors: RecordArray  # (effector,)
     moves: BoolArray  # whether a joint moves an effector, (joint, effector)
-    # whether a joint moves a joint below it, or an effector, and no joint between them does,
-    # (joint, joint + effector)
+    # whether a joint moves a joint below, or an effector, with no moving joint between, (joint,
+    # joint + effector)
     adjacent: BoolArray
     # the length of the longest path from the root to an effector, slides left out unless there is
     # nothing else [m]
@@ -74,7 +74,7 @@ class Mechanism(NamedTuple):
 class ConfigurationData(NamedTuple):
     """A mechanism's coordinates with their forward kinematics; effectors come behind the joints."""
 
-    # an attempt continues from it: `q`, `far_step` and `phase`, (coordinate + 5,)
+    # where an attempt continues: `q`, `far_step` and `phase`, (coordinate + 5,)
     state: FloatArray
     q: FloatArray  # (coordinate,)
     far_step: FloatArray  # see `far_step`, (3,); zero before the first step
@@ -145,7 +145,7 @@ def position_error(mechanism, target, data, e):
 
 
 def rotation_error(mechanism, target, data, e):
-    """Return the rotation in the world that takes an effector's rotation to its target's."""
+    """Return the rotation in the world from an effector's rotation to its target's."""
     R = effector_rotation(mechanism, data, e)
     return multiply(load_quaternion(target["rotation"], e), conjugate(R))
 
@@ -153,7 +153,7 @@ def rotation_error(mechanism, target, data, e):
 def rotation_weight(mechanism):
     """Return the weight of half the squared distance of two rotation matrices, lever²/2 [m²].
 
-    That is 3 - tr R for the rotation R between them, the square of the angle where it is small.
+    This distance is 3 - tr R for the rotation R between the two; for a small angle, its square.
     """
     lever = LEVER * mechanism.reach
     return 0.5 * lever * lever
@@ -182,9 +182,9 @@ def errors(mechanism, target, data, e):
 def residuals(state, target):
     """Return the largest distance [m] and angle [rad] from effector to target, their sum, a bound.
 
-    The sum [m] is of all distances, and of all angles times the lever: it shows the progress of an
-    effector while another, further from its target, stays. No effector is further above its own
-    least distance than the bound [m] is above the largest of the least distances.
+    The sum [m] is of all distances, and of all angles times the lever. It shows the progress of an
+    effector while another effector, further from its target, stays. No effector is further above
+    its own least distance than the bound [m] is above the largest of the least distances.
     """
     mechanism, data = state.mechanism, state.data
     largest, largest_angle, total, largest_bound, excess = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -255,7 +255,7 @@ def store_ball(joints, q, j, Q):
 def rotate_to(joints, q, j, frame, R):
     """Rotate a ball or free joint to R in the world as far as its limits allow.
 
-    Returns the rotation it then has; `frame` is that where its coordinates are zero.
+    Returns the rotation reached; at the rotation `frame` the coordinates are zero.
     """
     Q = normalised(multiply(conjugate(frame), R))
     if joints["kind"][j] != FREE:

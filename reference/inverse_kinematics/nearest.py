@@ -32,10 +32,10 @@ def nearest_solution(
 ) -> IKSolution:
     """Return the solution whose displacement from the start has the least norm.
 
-    Solutions come from the start, from random restarts, all of which are made, for a single pose
-    from `all_solutions`, where that takes the model, and from the solve without a preference, whose
-    solution it is where nothing reaches the targets. Angles are those within the limits that are
-    nearest to the start's.
+    Candidates are solutions from the start, from all random restarts, from the solve without a
+    preference, and for a single pose of a suitable model from `all_solutions`. If nothing reaches
+    the targets, the result is the solution without a preference. Each angle is the nearest to the
+    start's within the limits.
     """
     order = PREFERENCES[arguments.choice("prefer", prefer, PREFERENCES)]
     if not isinstance(model, Articulation):

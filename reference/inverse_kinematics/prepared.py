@@ -26,9 +26,10 @@ class PreparedIK(threading.local):
     Each thread that shares the object has arrays of its own, NaN before its first call.
 
     Attributes:
-        coordinates: of the last solution, read-only views of what the next call fills: the local
-            rotations of a Skeleton, (joint, 4), or coordinates of an Articulation, (coordinate,).
-        positions: of all joints in that pose [m], likewise, (joint, 3).
+        coordinates: of the last solution, read-only views of the arrays that the next call fills:
+            the local rotations of a Skeleton, (joint, 4), or coordinates of an Articulation,
+            (coordinate,).
+        positions: of all joints in this pose [m], likewise, (joint, 3).
         figures: of IKSolution the residual, residual_rotation, iterations, outcome, merit and
             excess, likewise, (6,).
     """
@@ -75,8 +76,8 @@ class PreparedIK(threading.local):
 
         Args:
             start: local rotations, (joint, 4), or coordinates, (coordinate,).
-            target: the effector's position [m], (3,), and where it is oriented its rotation after
-                that, (7,).
+            target: the effector's position [m], (3,); of an oriented effector also its rotation,
+                (7,).
 
         Raises:
             ValueError: as `solve_ik` does. The solution is then not defined.
@@ -125,8 +126,8 @@ def prepare_ik(
 ) -> PreparedIK:
     """Return `solve_ik` for many single targets: `prepare_ik(model)(start, target)`.
 
-    Arguments are those of `solve_ik`; `oriented` is whether targets have rotations. The kernel is
-    of the backend that is in force now.
+    Arguments are as in `solve_ik`; `oriented` is whether targets have rotations. The kernel is of
+    the backend now in force.
 
     Raises:
         ValueError: if an argument is not valid, or targets on a Skeleton are oriented or restarted.

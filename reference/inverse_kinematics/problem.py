@@ -19,9 +19,9 @@ from .restarts import Limits
 from .solve_chain import ON_CHAINS
 from .solve_mechanism import ON_MECHANISMS
 
-# The defaults of `solve_ik`: iterations of an attempt, the same towards a target out of reach, and
-# restarts where the solver is left to us and is not FABRIK, with one effector and with several, of
-# which a restart redraws the limbs that fail.
+# The defaults of `solve_ik`: iterations of an attempt, and of an attempt towards a target out of
+# reach. Then restarts of the default Levenberg-Marquardt, with one effector and with several, where
+# a restart redraws the limbs that fail.
 MAX_ITERATIONS, FAR_ITERATIONS, RESTARTS, LIMB_RESTARTS = 100, 2000, 20, 100
 # The phases of each solver, the first of which is the plain method; of others 1.
 PHASE_COUNTS = {"levenberg_marquardt": 1 + len(PHASES)}
@@ -37,11 +37,11 @@ class _TargetFields(NamedTuple):
 
 
 class Target(_TargetFields):
-    """The position, and perhaps the rotation, that a joint is to reach; both are copied.
+    """The position, and perhaps the rotation, for a joint to reach; both are copied.
 
     Attributes:
         position: global position [m], shape (3,), or (..., 3) for a batch.
-        rotation: global rotation, shape (4,) or (..., 4); None if it is free.
+        rotation: global rotation, shape (4,) or (..., 4); None for a free rotation.
         effector: the joint, by index or name; None for the default of `solve_ik`.
         weight: of its squared error, relative to other targets.
     """
@@ -55,7 +55,7 @@ class Target(_TargetFields):
         effector: int | str | None = None,
         weight: float = 1.0,
     ) -> "Target":
-        """Copy the arrays; they are checked where the target is used."""
+        """Copy the arrays; the function that uses the target checks them."""
         x = arguments.snapshot(position)
         Q = arguments.snapshot(rotation)
         return super().__new__(cls, x, Q, effector, weight)
@@ -66,11 +66,11 @@ class IKSolution(NamedTuple):
 
     Attributes:
         local_rotations: the pose, shape (..., joint, 4).
-        positions: all joints' global positions in that pose [m], shape (..., joint, 3).
+        positions: all joints' global positions in this pose [m], shape (..., joint, 3).
         residual: distance from effector to target [m], by forward kinematics of the pose; the
             largest of several.
         iterations: the number of iterations made.
-        outcome: how it ended; for a batch an integer array of Outcome values.
+        outcome: how the solve ended; for a batch an integer array of Outcome values.
         history: residuals [m] before and after each iteration, shape (..., iterations + 1) if
             recorded, else empty. In a batch each row repeats its last residual to the longest.
         residual_rotation: angle from effector to target [rad], the largest of several; 0 where all
@@ -78,11 +78,11 @@ class IKSolution(NamedTuple):
         coordinates: the pose in the form of the start: the coordinates of an Articulation, (...,
             coordinate), or the local rotations of a Skeleton.
         merit: the cost by which attempts are compared [m]: the root of the sum over targets of
-            weight (distance² + (lever angle)²), the heaviest weight taken as 1, the angle only
-            where the rotation is not free, the lever half the reach.
+            weight (distance² + (lever angle)²). The heaviest weight counts as 1, the lever is half
+            the reach, and the angle is left out where the rotation is free.
         excess: `residual` less a lower bound by geometry [m]: the distance beyond all links and
-            slides, and on a Skeleton with a single position also inside the inner radius that
-            the longest link leaves; else 0.
+            slides. On a Skeleton with a single position also the distance inside the inner radius
+            that the longest link leaves; else 0.
     """
 
     local_rotations: FloatArray
@@ -117,8 +117,8 @@ def checked_targets(
     """Return the targets of all effectors, their numbers not yet checked.
 
     Raises:
-        ValueError: if it is no position or target; if a joint does not exist, two targets are for
-            the same joint, or target and argument name different joints.
+        ValueError: if the argument is no position or target, or a joint does not exist. Also if two
+            targets are for the same joint, or target and argument name different joints.
     """
     if isinstance(target, Target):
         return [_checked(model, target, effector)]
@@ -134,7 +134,7 @@ def checked_targets(
 
 
 def are_targets(target: Any) -> TypeGuard[Sequence[Target]]:
-    """Return whether an argument is a sequence that holds a Target."""
+    """Return whether an argument is a sequence with a Target."""
     return isinstance(target, list | tuple) and any(isinstance(x, Target) for x in target)
 
 
@@ -168,7 +168,7 @@ def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:
 
 
 def check_single(targets: list[CheckedTarget]) -> list[CheckedTarget]:
-    """Return the targets; a ValueError if they are a batch."""
+    """Return the targets; a ValueError for a batch."""
     for target in targets:
         for name, values, length in (
             ("target", target.position, 3),
@@ -209,7 +209,7 @@ class Settings:
 
     @functools.cached_property
     def numbers(self) -> FloatArray:
-        """The limits as an array, as kernels take them."""
+        """The limits as an array, for kernels."""
         return np.array(self.limits, dtype=np.float64)
 
 

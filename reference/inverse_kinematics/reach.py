@@ -1,24 +1,23 @@
 """Proven bounds of the distances that a chain of limited joints can give: shells of reach.
 
 Let P be a point fixed to the end of a chain, C a point fixed to its base, and r = |P - C|. For
-joint i let D_i bound the distance of C from its axis over all configurations, and d_i that of P:
-the chain is followed from either end, from each axis to the nearest point of the next. With the
-lengths replaced by 1 for a slide,
+joint i let D_i bound the distance of C from its axis over all configurations, and d_i the distance
+of P. The chain is followed from either end, from each axis to the nearest point of the next. With
+the lengths replaced by 1 for a slide,
 
     |dr / dq_i| <= min(D_i, d_i),    |d²(r²) / dq_i dq_j| <= 2 D_min(i,j) d_max(i,j) = H_ij,
 
-because r² depends on both q_i and q_j only through twice the product of a vector of length D_i
-and one of length d_j. In a box of coordinates of half-widths w, with g the gradient of r² in its
-middle,
+because r² depends on both q_i and q_j only through twice the product of two vectors of lengths D_i
+and d_j. In a box of coordinates of half-widths w, with g the gradient of r² in its middle,
 
     |r² - r²(middle)| <= |g| w + w H w / 2.
 
-Boxes are halved until a bound is within 1e-3 of the length of the chain, or a fixed number of
-boxes is used up; the bound holds in either case. Mimic joints count as independent joints.
+Boxes are halved until a bound is within 1e-3 of the length of the chain, or a fixed number of boxes
+is used up. The bound holds in either case. Mimic joints count as independent joints.
 
 Rounding: with n joints and u = 2^-53 the forward kinematics of a chain of length S has an error of
-at most (289 n + 131) u S, an axis of (288 n + 64) u (see `certificate`); hence r² and g w are known
-to 3000 (n + 1) u S² (1 + sum of w).
+at most (289 n + 131) u S. The error of an axis is (288 n + 64) u (see `certificate`). Hence r² and
+g w are known to 3000 (n + 1) u S² (1 + sum of w).
 """
 
 import math
@@ -37,14 +36,14 @@ UNIT = 2.0**-53
 ROUNDINGS = 3000
 # The accuracy of a shell, over the length of the chain, and the boxes for a shell and for a target.
 ACCURACY, SHELL_BOXES, TARGET_BOXES = 1e-3, 20_000, 2_000
-# Factor that covers the rounding errors of widths and lengths, which have few operations.
+# Factor to cover the rounding errors of widths and lengths, from few operations.
 WIDER = 1.0 + 1e-12
-# Axes count as parallel if the square of the sine between them is smaller.
+# Axes count as parallel if the squared sine between them is smaller.
 PARALLEL = 1e-6
 
 
 class ReachShell(NamedTuple):
-    """The shell of a point on a path, by the joints above it within their limits."""
+    """The shell of a point on a path, by the joints above within their limits."""
 
     base: FloatArray  # its centre, in the world [m], (3,)
     joint: int  # whose axis the point is on, by its position on the path; beyond it the effector's
@@ -58,8 +57,9 @@ class ReachShell(NamedTuple):
 class Reach(NamedTuple):
     """The shells of the points on a path.
 
-    The first are about a point on the axis of the first joint that moves, of which that joint
-    changes no distance; the others about points around it, which show the limits of that joint.
+    The first shells are about a point on the axis of the first moving joint, which changes no
+    distance from that point. The other shells are about points around it, and show the joint's
+    limits.
     """
 
     path: list[int]  # joints from the root on
@@ -96,14 +96,14 @@ def least_distance(
 
     Without the whole reach only the first shell is tried, in microseconds.
 
-    These are the distance [m] and the angle [rad] of the effector from its target in any pose
-    within the limits; the bound is 0 if none is proven, and the lever 0 without a target rotation.
+    For any pose within the limits, these are the effector's distance [m] and angle [rad] from its
+    target. The bound is 0 without a proof, the lever 0 without a target rotation.
 
-    Proof: the effector's pose fixes the centre of a shell in the effector's frame, up to the
-    distance and, as the centre is `lever` from the target, up to the lever times the angle. The
-    joints above a point on an axis keep it within the shell; for the effector to be at its target
-    the joints below would have to bring it there, and `separation` bounds by how much they fail.
-    Where none of these moves, the effector's pose fixes the point, and the lever is its arm.
+    Proof: the effector's pose fixes the centre of a shell in the effector's frame. As the centre is
+    `lever` from the target, it is known up to the distance plus the lever times the angle. The
+    joints above keep a point on an axis within its shell. The joints below would have to bring the
+    point there for the effector to be at its target; `separation` bounds their failure. Where no
+    joint below moves, the effector's pose fixes the point, and the lever is its arm.
     """
     reach = reach_of(model, joint, Q is not None, whole)
     for shell in reach.shells:
@@ -127,9 +127,9 @@ def least_distance(
 def reach_of(model: Articulation, joint: int, oriented: bool, whole: bool = True) -> Reach:
     """Return the shells of the points on the path to a joint, kept by the model.
 
-    With a rotation to reach there are shells of every hinge and ball, the last first, of the
-    point on its axis nearest to the next; else only that of the effector's origin. Unless the
-    whole reach is asked for there is only the first of all, if its point is fixed to the effector.
+    With a rotation to reach, every hinge and ball has a shell, the last first, of the point on its
+    axis nearest to the next axis. Otherwise the only shell is of the effector's origin. Unless
+    `whole`, only the first shell is returned, if its point is fixed to the effector.
     """
     key = "reach", joint, oriented, whole
     if key not in model.mechanisms:

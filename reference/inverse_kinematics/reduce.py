@@ -18,11 +18,11 @@ from ..articulation import (
 from ..quaternion import IDENTITY, add, load_quaternion, load_vector, multiply, rotate
 from .mechanism import EFFECTOR, Mechanism
 
-# Points are in one spot if they are no further apart than this, over the reach.
+# Points coincide if their distance is at most this, over the reach.
 SPOT = 1e-9
 # Random poses are drawn so many at a time.
 BLOCK = 16
-# An articulation keeps so many prepared mechanisms, the latest: each seed makes a new one.
+# An articulation keeps this many prepared mechanisms, the latest: each seed makes a new one.
 LARGEST_CACHE = 256
 
 
@@ -48,7 +48,7 @@ def prepare(
     prepared = articulation.mechanisms.get(key)
     if prepared is None:
         mechanism, rng = _mechanism(articulation, effectors, oriented), np.random.default_rng(seed)
-        # in blocks: the first poses are those of any larger number of restarts
+        # in blocks: the first poses are the same for any larger number of restarts
         blocks = [articulation.random(rng, BLOCK) for _ in range(-(-restarts // BLOCK))]
         poses = np.concatenate([*blocks, np.empty((0, articulation.coordinate_count))])[:restarts]
         effector_frames = np.empty((0, len(effectors), 7))
@@ -103,9 +103,9 @@ def _mechanism(
 def _moving(
     articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
 ) -> IndexArray:
-    """Return the joints that move on the paths to the effectors, and their leaders.
+    """Return the moving joints on the paths to the effectors, and their leaders.
 
-    An effector's own ball or hinge rotates it, but does not move it.
+    An effector's own ball or hinge only rotates the effector.
     """
     path, kinds = articulation.skeleton.path_array, articulation.joints["kind"]
     needed: set[int] = set()
@@ -134,7 +134,7 @@ def _attached(
     oriented: tuple[bool, ...],
     number: dict[int, int],
 ) -> RecordArray:
-    """Return the effectors, each with the moving joint it is attached to and its place there."""
+    """Return the effectors, each with the moving joint that carries it and its place there."""
     ends = np.zeros(len(effectors), EFFECTOR)
     ends["source"], ends["oriented"] = effectors, oriented
     sizes = np.where(oriented, 6, 3)
@@ -167,7 +167,7 @@ def _moving_joints(
 
 
 def _adjacent(joints: RecordArray, ends: RecordArray, margin: float) -> BoolArray:
-    """Return which joints and effectors each joint is the last above them to move.
+    """Return which joints and effectors each joint moves as the last joint above.
 
     A point on a hinge's axis or in a ball's centre stays, and the next joints down are adjacent.
     """

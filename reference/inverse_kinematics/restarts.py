@@ -1,6 +1,6 @@
 """The loops of every solver: iterations of an attempt, attempts from further starts, and phases.
 
-They work on the state of a chain of unlimited balls (`solve_chain.py`) or of a mechanism
+The loops work on the state of a chain of unlimited balls (`solve_chain.py`) or of a mechanism
 (`solve_mechanism.py`), through its `Operations`. Both states have a `row` of numbers that an
 attempt continues from.
 """
@@ -12,28 +12,28 @@ from ..arguments import FloatArray
 from ..backend.compiled import PythonKernel
 from ..outcome import Outcome
 
-# An attempt that others may follow is given up once PATIENCE iterations have not brought the error
-# to this share of what it was. If no other reaches the target it goes on, MORE_PATIENT times as
-# patient each time.
+# If further attempts may follow, give up an attempt when PATIENCE iterations have not brought its
+# error down to the share PROGRESS. If no attempt reaches the target, attempts go on, MORE_PATIENT
+# times as patient each time.
 PATIENCE, PROGRESS, MORE_PATIENT = 3, 0.5, 4
-# The patience of the phases of a single start: of the first, which then still reaches all but 1 or
-# 2 in 1,000 of the targets that it ever would, and of each further one.
+# The patience of the phases of a single start: of the first phase, and of each further phase. The
+# first costs 1 or 2 in 1,000 of the targets that the phase would ever reach.
 FIRST_PATIENCE, FURTHER_PATIENCE = 50.0, 10.0
-# How an attempt ended: within the tolerances, or of the nearest point that geometry allows; with no
-# more progress; with its iterations used; given up early.
+# How an attempt ended: within the tolerances, or of the nearest point that geometry allows; without
+# further progress; with its iterations used; given up early.
 REACHED, STALLED, LIMITED, GIVEN_UP = range(4)
-# Columns of progress: iterations made, how the attempt ended, its merit [m], its patience, the
-# error of which a share is its next progress [m], infinite at first, the iterations since then, and
-# how many it may make.
+# Columns of progress: iterations made, end of the attempt, its merit [m] and its patience. Then an
+# error [m] whose share PROGRESS is the next progress, at first infinite; the iterations since the
+# last progress; and the largest number of iterations.
 COUNT, STATE, COST, WAIT, MILESTONE, SINCE, LIMIT = range(7)
-# Rows behind those of the attempts, of progress and of saved states: the best end of a phase, the
-# start, and the best attempt, where iterations are those of all attempts.
+# Rows behind the rows of attempts, of progress and of saved states: the best end of a phase, the
+# start, and the best attempt. In the last row iterations are the sum over all attempts.
 BEST_PHASE, START, BEST = -3, -2, -1
 SPARE_ROWS = 3
 INFINITY = math.inf
-# Columns of Result.figures: the largest distance from effector to target [m], the largest angle
-# between them [rad], the number of iterations, the value of the outcome, the merit [m], and the
-# distance above the least that geometry allows [m].
+# Columns of Result.figures: the largest distance [m] and angle [rad] from effector to target, the
+# number of iterations, and the value of the outcome. Then the merit [m], and the distance above the
+# least that geometry allows [m].
 RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = range(6)
 
 
@@ -42,17 +42,16 @@ class Operations(NamedTuple):
 
     update: PythonKernel  # (state, target): make one iteration of a solver
     # (state, target): return the largest distance [m] and angle [rad] from effector to target, the
-    # sum of all distances and levered angles [m], which shows progress, and the distance that has
-    # to be small
+    # sum of all distances and levered angles [m] to show progress, and the distance to make small
     error: PythonKernel
     merit: PythonKernel  # (state, target): return the cost by which attempts are compared [m]
-    # (state, target, criteria, first): move the first attempt, whose row of progress is `first`, if
-    # it is stuck, and return whether it was
+    # (state, target, criteria, first): move a stuck first attempt, whose row of progress is
+    # `first`; return whether it was stuck
     perturb: PythonKernel
     place: PythonKernel  # (state): bring the state to what has been copied to its row
     # (state, target, criteria, n): take from the configuration of random restart n = 1, 2 ...
     draw: PythonKernel
-    # (state, n): begin phase n = 0, 1 ... of the solver; return whether there is one
+    # (state, n): begin phase n = 0, 1 ... of the solver; return whether the phase exists
     begin: PythonKernel
 
 
@@ -71,8 +70,7 @@ class Limits(NamedTuple):
 class Criteria(NamedTuple):
     """The end criteria of attempts at a target."""
 
-    # at most this far from the target counts as reached [m], some of it left for the rounding of
-    # the final pose
+    # distance from the target that counts as reached [m], less the rounding of the final pose
     distance: float
     angle: float  # the same for rotations [rad]
     margin: float  # an error that changes by no more has stalled [m]
@@ -86,8 +84,8 @@ class Result(NamedTuple):
     local: FloatArray  # local rotations, (target, joint, 4)
     positions: FloatArray  # global positions [m], (target, joint, 3)
     figures: FloatArray  # (target, 6), see above
-    # distances before and after each iteration [m], (target, iteration); (1, 1) if they are not to
-    # be recorded. Entries after the last iteration are not filled
+    # distances before and after each iteration [m], (target, iteration); (1, 1) if not recorded.
+    # Entries after the last iteration are not filled
     history: FloatArray
     # of an articulation, (target, coordinate); of a skeleton its local rotations
     coordinates: FloatArray
@@ -104,14 +102,15 @@ def limits_of(numbers):
 def solve_with_restarts(operations, state, saved, progress, target, limits, criteria, history):
     """Attempt from the start, then from random configurations, until the target is reached.
 
-    While others may follow, an attempt at a target in reach is given up early. If none reaches it,
-    all are finished, unless each has redrawn the failing limbs of the one before. At last a solver
-    of several phases goes through them as from a single start; another one's first attempt makes as
-    many iterations as all of them may, and its ends after each attempt's number of iterations count
-    as attempts too. So the result is no worse than from a single start, or with fewer restarts.
+    While others may follow, an attempt at a target in reach is given up early. If no attempt
+    reaches the target, all are finished, unless each has redrawn the failing limbs of its
+    predecessor. Finally a solver of several phases goes through all phases as from a single start.
+    With any other solver the first attempt makes as many iterations as all attempts may. Its ends
+    after each attempt's number of iterations count as attempts too. So the result is no worse than
+    from a single start, or with fewer restarts.
 
-    The rows of `saved`, a row of the state each, and of `progress`, see the columns above, are of
-    attempts and then the spare ones. The best attempt is saved in the last row.
+    The rows of `saved`, states, and of `progress`, see the columns above, are of attempts and then
+    the spare rows. The best attempt is saved in the last row.
 
     Returns:
         The iterations of all attempts, and whether the best of them stalled.
@@ -147,7 +146,7 @@ def solve_with_restarts(operations, state, saved, progress, target, limits, crit
 
 
 def begin_rows(progress, criteria, in_reach, phased):
-    """Fill the rows of attempts that are yet to be made; the start has the patience of its phases.
+    """Fill the rows of attempts to be made; the start has the patience of its phases.
 
     Towards a target out of reach no attempt is given up.
     """
@@ -161,7 +160,7 @@ def begin_rows(progress, criteria, in_reach, phased):
 
 
 def perturb(operations, state, saved, progress, target, criteria):
-    """Move the first attempt, and so the start, if it is stuck, once; return whether it was."""
+    """Move the first attempt and the start, once, if they are stuck; return whether they were."""
     start, first = progress[START], progress[0]
     if start[STATE] != LIMITED or progress[BEST, COUNT] != first[COUNT]:
         return False
@@ -173,7 +172,7 @@ def perturb(operations, state, saved, progress, target, criteria):
 
 
 def begin_attempt(operations, state, saved, progress, target, criteria, k):
-    """Begin the attempt after attempt k, or one that was given up; return which, -1 if none."""
+    """Begin the attempt after attempt k, or an attempt given up; return its index, -1 if none."""
     if k + 1 < len(progress) - SPARE_ROWS and progress[k + 1, COST] == INFINITY:
         operations.draw(state, target, criteria, k + 1)
         return k + 1
@@ -199,7 +198,7 @@ def begin_start(operations, state, saved, progress, phased):
 
 
 def extend_first(progress, criteria, limits, n):
-    """Give the first attempt the iterations of another, the n-th; return whether it needs them."""
+    """Give the first attempt the iterations of the n-th; return whether the first needs more."""
     progress[0, LIMIT] = (n + 1) * criteria.max_iterations
     progress[0, WAIT] = INFINITY
     return n <= limits.restarts and progress[0, STATE] == LIMITED
@@ -208,7 +207,7 @@ def extend_first(progress, criteria, limits, n):
 def begin_phase(operations, state, saved, progress, limits, n):
     """Begin phase n, behind the last go on with the best; return whether there is anything to do.
 
-    The phase before it has just ended, and all have the iterations of one attempt together.
+    The phase before has just ended, and all phases have the iterations of one attempt together.
     """
     first, best = progress[0], progress[BEST_PHASE]
     left = first[LIMIT] - first[COUNT]
@@ -231,13 +230,13 @@ def begin_phase(operations, state, saved, progress, limits, n):
 
 
 def reset(attempt, patience):
-    """Make a row of progress that of an attempt not yet made."""
+    """Reset a row of progress to an attempt not yet made."""
     attempt[COUNT], attempt[STATE], attempt[COST], attempt[WAIT] = 0.0, LIMITED, INFINITY, patience
     attempt[MILESTONE], attempt[SINCE] = INFINITY, 0.0
 
 
 def go_on(operations, state, saved, progress, k, target, criteria, history):
-    """Continue attempt k; save its end, and once more if it is the best."""
+    """Continue attempt k; save its end, and again if it is the best."""
     attempt, total = progress[k], progress[BEST]
     total[COUNT] += solve_once(
         operations, state, target, criteria, attempt, history, int(total[COUNT])
@@ -306,7 +305,7 @@ def copy_row(source, target):
 
 
 def store_if_inside(row, i, value):
-    """Write entry i of a row, if there is one."""
+    """Write entry i of a row, if the entry exists."""
     if i < len(row):
         row[i] = value
 

@@ -1,8 +1,8 @@
 """From arguments to the kernels of a solver, and from their results to a solution.
 
-`solve_checked` accepts anything. For a single start and target it takes as long as the kernel, a
-third of a call on a chain of ten balls; `solve_plain` does the same in fewer steps for float64
-arrays of the right shape, and leaves all else to it.
+`solve_checked` accepts anything. For a single start and target its own steps take as long as the
+kernel, a third of a call on a chain of ten balls. `solve_plain` has fewer steps for float64 arrays
+of the right shape, and leaves all else to `solve_checked`.
 """
 
 from typing import Any
@@ -38,7 +38,7 @@ SLICE_ON_CHAINS, SLICE_ON_MECHANISMS = 128, 16
 OUTCOMES = {outcome.value: outcome for outcome in Outcome}
 # Outcomes after which a chain is not restarted.
 FINAL_OUTCOMES = [outcome for outcome in Outcome if outcome.unreachable or outcome.solved]
-# Outcomes of failed solves, and those where a shell of reach proves that no pose is near enough.
+# Outcomes of failed solves, and their outcomes where a shell of reach proves every pose too far.
 PROVEN = {
     Outcome.STALLED.value: Outcome.UNREACHABLE.value,
     Outcome.ITERATION_LIMIT.value: Outcome.UNREACHABLE_UNSETTLED.value,
@@ -101,7 +101,7 @@ def prove_unreachable(
     model: Articulation, joints: tuple[int, ...], oriented: tuple[bool, ...],
     targets: RecordArray, figures: FloatArray, limits: Limits,
 ) -> None:  # fmt: skip
-    """Change the outcomes of failed solves, where the first shell of an effector proves it.
+    """Change the outcomes of failed solves, where the first shell of an effector is the proof.
 
     Targets are records TARGET, (target, effector); `figures` is that of Result.
     """
@@ -120,12 +120,12 @@ def solve_checked(
     targets: list[CheckedTarget],
     settings: Settings,
 ) -> IKSolution:
-    """Return the solution for targets that are checked but for their numbers.
+    """Return the solution for targets that are checked except for their numbers.
 
     If the settings are chained, each solve starts from the solution before.
 
     Raises:
-        ValueError: that names a number which a kernel has refused.
+        ValueError: naming a number which a kernel has refused.
         FloatingPointError: if a frame is wrong from which the next frame starts.
     """
     is_skeleton, name = isinstance(model, Skeleton), coordinates_name(model)
@@ -200,8 +200,8 @@ def run(
 ) -> tuple[FloatArray, ...]:
     """Return the fields of Result as a kernel fills them; none if some number is not valid.
 
-    `arrays` are the model's that the kernel reads. The starts are rows, (target, ...), or
-    one for all targets; the targets are positions [m], (target, 3), of a mechanism records TARGET,
+    `arrays` are the model's, read by the kernel. The starts are rows, (target, ...), or a single
+    row for all targets. The targets are positions [m], (target, 3), of a mechanism records TARGET,
     (target, effector). `coordinates` is how many a solution on a mechanism has, None on a chain.
     """
     n, history = len(targets), UNRECORDED
@@ -236,7 +236,7 @@ def run(
 
 
 def balls(skeleton: Skeleton) -> Articulation:
-    """Return the skeleton as an Articulation of unlimited balls, made once and kept by it."""
+    """Return the skeleton as an Articulation of unlimited balls, cached by the skeleton."""
     cache = skeleton.__dict__
     if "balls" not in cache:
         cache["balls"] = Articulation(skeleton, "ball")
@@ -342,7 +342,7 @@ def _single_solution(
     _history: FloatArray,
     coordinates: FloatArray,
 ) -> IKSolution:
-    """Return the solution of the only target, with the history that it is to show."""
+    """Return the solution of the only target, with its history."""
     pose, x = local[0], positions[0]
     pose.setflags(False)  # by its name it takes twice as long
     x.setflags(False)

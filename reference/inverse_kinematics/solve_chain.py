@@ -50,10 +50,10 @@ def solve_chains(
 ):
     """Solve target after target; return whether all starts and targets were valid.
 
-    Arrays come separately, since tuples of them take longer from Python: the skeleton's, the joints
-    from the root to the effector, the numbers of Limits, local rotations to start from, (start,
-    joint, 4), used by the targets in turn, global positions [m], (target, 3),
-    and the fields of Result but its coordinates.
+    Arrays come separately, since tuples take longer from Python. The first are the skeleton's, the
+    joints from the root to the effector, and the numbers of Limits. Then come the local rotations
+    to start from, (start, joint, 4), used by the targets in turn, and the global positions [m],
+    (target, 3). The last are the fields of Result except its coordinates.
     """
     limits = limits_of(numbers)
     chain = new_chain(offsets, path, depth)
@@ -107,7 +107,7 @@ def chain_error(chain, target):
 
 
 def perturb_chain(chain, target, criteria, first):
-    """Bend a chain that starts collinear with its target, which no solver would leave."""
+    """Bend a chain that starts collinear with its target: no solver would leave the line."""
     if first[COUNT] > 0 or effector_error(chain, target) <= criteria.distance:
         return False
     if is_beyond_reach(chain, root_distance(chain, target)) or not is_collinear(chain, target):
@@ -117,11 +117,11 @@ def perturb_chain(chain, target, criteria, first):
 
 
 def place_chain(_chain):
-    """Leave a chain as it is: its row holds its positions and rotations themselves."""
+    """Leave a chain unchanged: its row holds its positions and rotations themselves."""
 
 
 def draw_chain(_chain, _target, _criteria, _n):
-    """Leave a chain as it is: its random restarts are made on a mechanism."""
+    """Leave a chain unchanged: its random restarts are made on a mechanism."""
 
 
 def begin_sweeps(_chain, n):

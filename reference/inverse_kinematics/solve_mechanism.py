@@ -78,17 +78,17 @@ from .restarts import (
     solve_with_restarts,
 )
 
-# A start that stalls within so few iterations away from its target is stuck, such as a straight
-# chain, perhaps folded since, whose target lies on its own line.
+# A start is stuck if it stalls within so few iterations away from its target. An example is a
+# straight chain, perhaps folded since, with its target on its own line.
 STUCK = 6
-# Out of reach an error that changes by no more than this share of the tolerance has stalled.
+# Out of reach an error has stalled if it changes by no more than this share of the tolerance.
 FAR_MARGIN = 1e-8
 # A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)
 
 
 class Workspace(NamedTuple):
-    """Arrays that the solvers write to."""
+    """Arrays for the solvers to write to."""
 
     system: TaskSystem  # of the Jacobian methods, and of CCD for joints that others follow
     backward: RecordArray  # of FABRIK, records BACKWARD, (joint,)
@@ -96,7 +96,7 @@ class Workspace(NamedTuple):
 
 
 class MechanismState(NamedTuple):
-    """A mechanism, where it is, and where it may be restarted."""
+    """A mechanism, its configuration, and its restarts."""
 
     mechanism: Mechanism  # what moves
     data: ConfigurationData  # its configuration
@@ -104,7 +104,7 @@ class MechanismState(NamedTuple):
     mixing: Mixing  # the last sweeps, of an accelerated solver
     workspace: Workspace  # of the solver
     restarts: FloatArray  # coordinates of the mechanism for further attempts, (restart, coordinate)
-    # where they put the effectors, positions [m] and rotations, (restart, effector, 7)
+    # the effectors of these restarts, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
     ranks: FloatArray  # how far the restarts not yet taken are from the target [m], (restart,)
 
@@ -114,11 +114,11 @@ def solve_mechanisms(
 ):
     """Solve target after target; return whether all starts and targets were valid.
 
-    The model is a plain tuple, since named ones take longer from Python: the joints of the
-    articulation, the fields of Mechanism, the restarts of MechanismState and their effectors. The
-    others are the numbers of Limits, coordinates of the articulation to start from, (start,
-    coordinate), used by the targets in turn, targets, records TARGET, (target, effector), to be
-    made unit here, and the fields of Result.
+    The model is a plain tuple, since named tuples take longer from Python: the joints of the
+    articulation, the fields of Mechanism, and the restarts of MechanismState with their effectors.
+    Then come the numbers of Limits, and coordinates of the articulation to start from, (start,
+    coordinate), used by the targets in turn. The targets are records TARGET, (target, effector),
+    made unit here. The last are the fields of Result.
     """
     joints, mechanism_fields, restarts, restart_frames = model
     limits, mechanism = limits_of(numbers), Mechanism(*mechanism_fields)
@@ -171,7 +171,7 @@ def new_workspace(mechanism):
 
 
 def scale_lengths(mechanism, scale):
-    """Divide coordinates that are lengths by the reach, where sweeps are compared."""
+    """Divide coordinates in metres by the reach, to compare sweeps."""
     joints = mechanism.joints
     for j in range(len(joints)):
         at, kind = joints["coordinate"][j], joints["kind"][j]
@@ -180,7 +180,7 @@ def scale_lengths(mechanism, scale):
 
 
 def normalise_target(target):
-    """Make the rotations of a target unit; return whether they and all other numbers were valid."""
+    """Make the rotations of a target unit; return whether all its numbers were valid."""
     valid = True
     for e in range(len(target)):
         for k in range(3):
@@ -210,7 +210,7 @@ def mechanism_criteria(mechanism, bound, limits):
 
 
 def place_effectors(mechanism, data, positions, rotations):
-    """Put the effectors where a pose of all joints of the articulation has them."""
+    """Put the effectors where a pose of all joints of the articulation puts them."""
     for e in range(len(mechanism.effectors)):
         j = mechanism.effectors["source"][e]
         x, R = load_vector(positions, j), load_quaternion(rotations, j)
@@ -218,7 +218,7 @@ def place_effectors(mechanism, data, positions, rotations):
 
 
 def perturb_mechanism(state, _target, _criteria, first):
-    """Bend a mechanism that stalled at once, away from its target: all joints share an angle."""
+    """Bend a mechanism stuck away from its target: all joints share an angle."""
     mechanism, q, angle = state.mechanism, state.data.q, BEND / max(len(state.mechanism.joints), 1)
     joints, missed_target = mechanism.joints, first[COST] > POSITION_ROUNDING * mechanism.reach
     if not (first[STATE] == STALLED and first[COUNT] < STUCK and missed_target):
@@ -244,8 +244,8 @@ def place_mechanism(state):
 def draw_mechanism(state, target, criteria, n):
     """Bring the mechanism to the random configuration with the n-th nearest effectors.
 
-    Where there are several limbs, only those whose effectors fail go to a random configuration, the
-    n-th; joints that they share with others do so every other time.
+    With several limbs, only limbs whose effectors fail go to a random configuration, the n-th; the
+    joints that limbs share do so every other time.
     """
     if criteria.redraws_limbs:
         redraw_limbs(state, target, criteria, n)
@@ -259,7 +259,7 @@ def draw_mechanism(state, target, criteria, n):
 
 
 def redraw_limbs(state, target, criteria, n):
-    """Copy the coordinates of joints that move effectors away from their targets from restart n."""
+    """Copy from restart n the coordinates of joints that move effectors away from their targets."""
     mechanism, q, restart = state.mechanism, state.data.q, state.restarts[n - 1]
     joints = mechanism.joints
     for j in range(len(joints)):
@@ -278,7 +278,7 @@ def redraw_limbs(state, target, criteria, n):
 
 
 def moves_effector(mechanism, j, e):
-    """Return whether a joint, or one that follows it, moves an effector."""
+    """Return whether a joint or one of its followers moves an effector."""
     moves = False
     for i in range(len(mechanism.joints)):
         moves |= mechanism.joints["leader"][i] == j and mechanism.moves[i, e]
@@ -308,7 +308,7 @@ def rough_angle(a, b):
 
 
 def take_nearest(state, q):
-    """Copy the nearest of the random configurations that has not yet been taken."""
+    """Copy the nearest random configuration not yet taken."""
     nearest = 0
     for r in range(1, len(state.restarts)):
         if state.ranks[r] < state.ranks[nearest]:

@@ -1,8 +1,8 @@
-"""Levenberg-Marquardt on tasks: exact ones are met, the others approached as far as those allow.
+"""Levenberg-Marquardt on tasks: exact tasks are met, the others approached as far as possible.
 
-An augmented Lagrangian (Rockafellar 1973) holds the exact tasks: their residuals r are
-shifted by multipliers u, and where the minimum of the sum of squares of r + u and of the other
-residuals does not meet them, u grows by r. The damping follows the gain (Nielsen 1999).
+An augmented Lagrangian (Rockafellar 1973) holds the exact tasks: multipliers u shift their
+residuals r. Where the minimum of the sum of squares of r + u and of the other residuals does not
+meet the exact tasks, u grows by r. The damping follows the gain (Nielsen 1999).
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,34 +30,34 @@ from .tasks import Configuration, FrameTask, IKTask, configuration
 MAX_ITERATIONS = 200
 # The first damping and the largest, over the largest diagonal entry of J J' at first.
 FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
-# An attempt settles where a step promises to lower the cost by less than this share, and between
-# two updates of the multipliers by less than the second: with it costs are half a per cent higher
-# at most, after half as many iterations.
+# An attempt settles where a step promises to lower the cost by less than the first share, or the
+# second between two updates of the multipliers. The second share halves the iterations, and costs
+# are half a per cent higher at most.
 SETTLED, SETTLED_BETWEEN = 1e-8, 1e-3
 # At a minimum a step at the first damping promises to lower the cost by no more than the first
-# share, or than the second where a descent along with exact tasks has settled: ten times what nine
-# of ten descents leave. In that step errors of exact tasks count HELD times as much.
+# share. Where a descent with exact tasks has settled, the second share counts: ten times the
+# remainder of nine in ten descents. In this step errors of exact tasks count HELD times as much.
 MINIMUM, MINIMUM_BETWEEN, HELD = 1e-6, 1e-2, 1e4
 # A step counts if the cost falls by this share of what was promised.
 ACCEPTED = 1e-3
-# After an update of the multipliers that leaves more than PROGRESS of the error exact tasks count
-# PENALTY times as much, at most PENALTIES times.
+# If an update of the multipliers leaves more than PROGRESS of the error, exact tasks count PENALTY
+# times as much, at most PENALTIES times.
 PROGRESS, PENALTY, PENALTIES = 0.1, 10.0, 6
-# Factors of exact residuals with which the others are approached: without one these may lead away
-# for good, with a large one to dearer minima. The second is tried if the first lowers no cost.
+# Factors of exact residuals while the others are approached. Without a factor the others may lead
+# away for good, with a large one to dearer minima. The second is tried if the first lowers no cost.
 STRENGTHS = 1.0, 30.0
 
 
 class TaskSolution(NamedTuple):
-    """The configuration that `solve_tasks` finds.
+    """The configuration returned by `solve_tasks`.
 
     Attributes:
         coordinates: within the limits, (coordinate,).
         errors: the largest entry of each task's residual [m or rad], (task,).
-        cost: the sum of weight |residual|² of the tasks that are not exact.
+        cost: the sum of weight |residual|² of the tasks not exact.
         iterations: of all attempts.
-        outcome: CONVERGED if every exact task is met, and the others are at a local minimum or met
-            too; else STALLED, or ITERATION_LIMIT if more iterations may do better. `errors` show
+        outcome: CONVERGED if every exact task is met, and the others are met or at a local minimum.
+            Otherwise STALLED, or ITERATION_LIMIT if more iterations may do better. `errors` show
             which tasks are met.
     """
 
@@ -92,15 +92,15 @@ def solve_tasks(
     Args:
         model: an Articulation, or a Robot read from a file.
         q: the start, brought within the limits, (coordinate,).
-        tasks: of `plumbob.tasks`, own ones with the members of `IKTask`, and Targets.
+        tasks: of `plumbob.tasks`, own classes with the members of `IKTask`, and Targets.
         tolerance: the largest entry of a residual that counts as met [m or rad].
         max_iterations: of each attempt.
-        restarts: how many further attempts to make from random configurations, until one meets the
-            exact tasks.
-        seed: of these.
+        restarts: number of further attempts from random configurations, until the exact tasks are
+            met.
+        seed: of the configurations.
 
     Raises:
-        ValueError: if an argument is not valid, or a task names a joint that does not exist.
+        ValueError: if an argument is not valid, or the joint of a task does not exist.
     """
     articulation = checked_model(model, "model")
     if not isinstance(articulation, Articulation):
@@ -181,13 +181,13 @@ class TaskProblem:
         return bool((state.errors[self.is_exact] <= tolerance).all())
 
     def cost(self, state: _Evaluation) -> float:
-        """Return the weighted sum of squares of the tasks that are not exact."""
+        """Return the weighted sum of squares of the tasks not exact."""
         return float(np.sum(state.r[~self.exact] ** 2))
 
     def is_minimum(self, state: _Evaluation, tolerance: float, share: float) -> bool:
-        """Return whether a motion that keeps limits and exact tasks lowers the cost by no more.
+        """Return whether motions within limits and exact tasks lower the cost at most by `share`.
 
-        The bound is a share of the cost. Tasks that are met have nothing left to lower.
+        Met tasks have nothing left to lower.
         """
         if (state.errors[~self.is_exact] <= tolerance).all():
             return True
@@ -203,9 +203,9 @@ class TaskProblem:
 
 
 def _attempt(problem: TaskProblem, q: FloatArray, tolerance: float, limit: int) -> TaskSolution:
-    """Return the solution from a start: the exact tasks first, then the others along with them.
+    """Return the solution from a start: first the exact tasks, then all tasks together.
 
-    Where these end away from the exact tasks, those are met again from there.
+    If these end away from the exact tasks, the exact tasks are met again from there.
     """
     exact = problem.exact.astype(float)
     state, count, stalled = _descend(problem, q, exact, tolerance, limit)
@@ -231,7 +231,7 @@ def _attempt(problem: TaskProblem, q: FloatArray, tolerance: float, limit: int) 
 def _descend(
     problem: TaskProblem, q: FloatArray, scale: FloatArray, tolerance: float, limit: int
 ) -> tuple[_Evaluation, int, bool]:
-    """Minimise the scaled residuals from q; with tasks that are not exact, hold the exact ones.
+    """Minimise the scaled residuals from q; if other tasks exist, hold the exact tasks.
 
     Returns:
         The end; the iterations; and whether it has settled.

@@ -1,7 +1,7 @@
-"""Tasks of inverse kinematics: quantities that a configuration is to bring to zero.
+"""Tasks of inverse kinematics: quantities for a configuration to bring to zero.
 
 A task evaluates its residual and the residual's derivative by the velocity of `jacobians`. Exact
-tasks are to be met; the others, such as a posture, are approached as far as those allow. With
+tasks are met; the others, such as a posture, are approached as far as exact tasks allow. With
 `weight` w a task adds w |residual|² to what `solve_tasks` minimises. Residuals are in metres and
 radians. Frames are joints of the model, by index or name; None is the world.
 """
@@ -75,7 +75,7 @@ class IKTask(Protocol):
 
     @property
     def exact(self) -> bool:
-        """Whether it is to be met, not approached."""
+        """Whether the task has to be met, not approached."""
 
     def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
         """Return the residual, (row,), and its derivative by the velocity, (row, freedom)."""
@@ -85,20 +85,20 @@ class IKTask(Protocol):
 class FrameTask(KeepsReadOnly):
     """A position, a rotation, or both, of a frame in the world or relative to another frame.
 
-    The position is that of `point`. Its error is along the axes of the target rotation, if there is
-    one, else of the reference frame; the rotation's error is the rotation vector from the target in
-    the axes of the frame, so that axis (0, 0, 1) with a free rotation about z points where the
-    target's does.
+    The position is that of `point`. Its error is along the axes of the target rotation, or of the
+    reference frame if there is no target rotation. The error of the rotation is the rotation vector
+    from the target, in the axes of the frame. With a free rotation about z, axis (0, 0, 1) then
+    points where the target's does.
 
     Attributes:
         frame: the frame to be placed.
-        position: target of the point in the reference frame [m], (3,); None if it is free.
-        rotation: target in the reference frame, unit quaternion (4,); None if it is free.
+        position: target of the point in the reference frame [m], (3,); None for a free position.
+        rotation: target in the reference frame, unit quaternion (4,); None for a free rotation.
         relative_to: the reference frame.
         point: in the frame [m], (3,).
-        axes: factors of the six errors, three of position and three of rotation; 0 leaves one free.
+        axes: factors of the six errors, three of position and three of rotation; 0 frees an axis.
         weight: of the squared error.
-        exact: whether it is to be met.
+        exact: whether the task has to be met.
     """
 
     frame: int | str
@@ -156,10 +156,10 @@ class LookAt(KeepsReadOnly):
         frame: the frame that looks.
         target: the point looked at, in `target_frame` [m], (3,).
         axis: the axis in the frame, of any length but zero, (3,).
-        origin: the point of the frame from which it looks [m], (3,).
+        origin: the point of the frame to look from [m], (3,).
         target_frame: the frame of the target.
         weight: of the squared error.
-        exact: whether it is to be met.
+        exact: whether the task has to be met.
     """
 
     frame: int | str
@@ -200,9 +200,9 @@ class CentreOfMass(KeepsReadOnly):
             to meshes, whose masses are not computed.
         centres: their centres in the frames of the joints [m], (joint, 3); `Robot.centres`.
         position: target in the world [m], (3,).
-        axes: factors of the three errors; 0 leaves one free, such as the height.
+        axes: factors of the three errors; 0 frees an axis, such as the height.
         weight: of the squared error.
-        exact: whether it is to be met.
+        exact: whether the task has to be met.
     """
 
     masses: Values
@@ -240,9 +240,9 @@ class Posture(KeepsReadOnly):
 
     Attributes:
         coordinates: of the whole model, (coordinate,).
-        axes: factors of the displacements, one or (freedom,); 0 leaves one free.
+        axes: factors of the displacements, a number or (freedom,); 0 frees a displacement.
         weight: of the squared displacement.
-        exact: whether it is to be met.
+        exact: whether the task has to be met.
     """
 
     coordinates: Values
@@ -277,13 +277,13 @@ class Coupling(KeepsReadOnly):
     """A hinge or slide follows a polynomial of another: q - q0 = sum of c_k (leader - leader0)^k.
 
     Attributes:
-        joint: that follows.
-        leader: that leads; None holds the joint at q0 + c_0.
-        coefficients: c_0, c_1, ..., at least one.
+        joint: the follower.
+        leader: the leading joint; None holds the joint at q0 + c_0.
+        coefficients: c_0, c_1, ..., at least c_0.
         zero: q0 [rad or m].
         leader_zero: leader0 [rad or m].
         weight: of the squared error.
-        exact: whether it is to be met.
+        exact: whether the task has to be met.
     """
 
     joint: int | str
@@ -329,7 +329,7 @@ class Coupling(KeepsReadOnly):
 
 
 def matrix_of(q: tuple[float, float, float, float]) -> FloatArray:
-    """Return the matrix of one rotation, (3, 3), sooner than `rotation.to_matrix`."""
+    """Return the matrix of a single rotation, (3, 3), sooner than `rotation.to_matrix`."""
     return np.array([rotate(q, axis) for axis in AXES]).T
 
 

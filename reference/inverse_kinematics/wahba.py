@@ -1,18 +1,18 @@
 """The rotation that brings several directions nearest to others (Wahba 1965).
 
 To rotate vectors a onto b, weighted, maximise the sum of w b . S a = tr(S M'), M the sum of w b a'.
-For a quaternion q of S that is q' K q with Davenport's symmetric 4 x 4 matrix K (Horn 1987), so
-that q is its eigenvector of the largest eigenvalue; about a fixed axis it is an angle.
+For a quaternion q of S this is q' K q with Davenport's symmetric 4 x 4 matrix K (Horn 1987). The
+best q is the eigenvector of the largest eigenvalue; about a fixed axis the unknown is an angle.
 """
 
 import math
 
 from ..quaternion import dot
 
-# Where all vectors are collinear many rotations are best: the identity, added by this share of
-# M's norm, makes the smallest of them the best. It brings no vector further from its own.
+# Where all vectors are collinear many rotations are best. The identity, added by this share of M's
+# norm, makes the smallest rotation the best. The addition brings no vector further from its own.
 IDENTITY_WEIGHT = 1e-6
-# Below this share of M's norm the angle that is best is known to no digit.
+# Below this share of M's norm rounding hides the best angle.
 ANGLE_ROUNDING = 1e-15
 SWEEPS = 12
 ZERO_MATRIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -82,7 +82,7 @@ def magnitude(M):
 def best_rotation(M, K, V):
     """Return the rotation S that maximises tr(S M'); K and V are overwritten, (4, 4).
 
-    Jacobi's rotations diagonalise K; V collects them, and the column of the largest is q.
+    Jacobi's rotations diagonalise K and make up V; q is the column of the largest eigenvalue.
     """
     extra = IDENTITY_WEIGHT * magnitude(M)
     trace = M[0] + M[4] + M[8] + 3.0 * extra

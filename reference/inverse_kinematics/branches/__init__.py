@@ -1,7 +1,7 @@
-"""All solutions of a pose: closed forms where the axes of an arm allow them, else a search.
+"""All solutions of a pose: closed forms where the axes of an arm allow, else a search.
 
-`arms.py` brings a robot down to arms of at most six joints, `closed_forms.py` solves them by the
-angles of `subproblems.py`, and `settle.py` checks what comes out by forward kinematics.
+`arms.py` brings a robot down to arms of at most six joints; `closed_forms.py` solves them by the
+angles of `subproblems.py`. `settle.py` checks the results by forward kinematics.
 """
 
 import itertools
@@ -37,24 +37,24 @@ SEARCH_TOLERANCE = 1e-6
 
 
 class IKSolutions(NamedTuple):
-    """All solutions of a pose that a method finds, up to whole revolutions; arrays are read-only.
+    """All solutions of a pose found by a method, up to whole revolutions; arrays are read-only.
 
     Attributes:
-        coordinates: (solution, coordinate). Each angle is the one within the limits that is nearest
-            to their middle, or to zero without limits; `with_turns` adds whole revolutions, which
-            are not listed. Joints that do not move the effector are at neutral.
+        coordinates: (solution, coordinate). Each angle is the nearest to the middle of its limits,
+            or without limits to zero; `with_turns` adds whole revolutions. Joints that do not move
+            the effector are at neutral.
         residual: distances from effector to target [m], by forward kinematics, (solution,).
-        residual_rotation: angles between them [rad], (solution,).
+        residual_rotation: angles between effector and target [rad], (solution,).
         method: the name of the closed form, or "restarts".
-        complete: whether the method proves that there are no other solutions within the limits, up
-            to whole revolutions; with a grid, at its values. Never near a singular pose, where the
+        complete: whether the method proves that no other solutions exist within the limits, up to
+            whole revolutions; with a grid, at its values. Never near a singular pose, where the
             number of solutions is in doubt: an empty list then proves nothing.
         continuum: whether the target is singular, within 1e-7 of the reach and in angle: solutions
             form a continuum, of which the list has single members, or none.
-        unseen: the probability that a further restart would find a solution that is not listed,
-            estimated as the share of those found once (Good 1953); 0 of closed forms.
+        unseen: the probability that a further restart would find an unlisted solution; 0 of closed
+            forms. The estimate is the share of solutions found once (Good 1953).
         grid: the values at which joints were locked, by their names.
-        turn_limits: lower and upper limits [rad] of angles that `with_turns` moves, else infinite,
+        turn_limits: lower and upper limits [rad] of angles moved by `with_turns`, else infinite,
             (2, coordinate).
     """
 
@@ -71,7 +71,7 @@ class IKSolutions(NamedTuple):
     def with_turns(self) -> Iterator[FloatArray]:
         """Yield each solution, (coordinate,), at all whole revolutions within the limits.
 
-        Six hinges with limits of ±2 pi have 64 such rows for a solution. Angles without two limits,
+        Six hinges with limits of ±2 pi have 64 rows for a solution. Angles without two limits,
         locked joints and joints with followers do not turn.
         """
         is_limited = np.isfinite(self.turn_limits).all(axis=0)
@@ -103,12 +103,13 @@ def all_solutions(
     restarts: int = RESTARTS,
     seed: int = 0,
 ) -> IKSolutions:
-    """Return all joint coordinates within the limits that bring an effector to a pose.
+    """Return all joint coordinates within the limits which bring an effector to a pose.
 
-    Six hinges have closed forms if the last or the first three axes meet (Pieper 1968), or if the
-    second to fourth, or third to fifth, are parallel and the two at the end meet (Elias & Wen 2022,
-    by subproblems of Paden 1986 and Kahan 1983). They prove their lists complete where the axes do
-    so to rounding. Every other arm is searched by Levenberg-Marquardt from random starts.
+    Six hinges have closed forms if the last or the first three axes meet (Pieper 1968). So have
+    hinges whose second to fourth, or third to fifth, are parallel if the two at the end meet (Elias
+    & Wen 2022, by subproblems of Paden 1986 and Kahan 1983). Closed forms prove their lists
+    complete where the axes meet or are parallel to rounding. Every other arm is searched by
+    Levenberg-Marquardt from random starts.
 
     The list is up to whole revolutions, which `IKSolutions.with_turns` adds. An arm whose closed
     form comes to no solution near a singular pose is searched as well.
@@ -120,7 +121,7 @@ def all_solutions(
     Args:
         robot: an Articulation or a Robot; hinges and slides move the effector.
         target: the pose, with a rotation.
-        effector: the joint that is to reach it, as for `solve_ik`.
+        effector: the joint to reach the pose, as for `solve_ik`.
         grid: joints to lock, each with a value or several, which are combined. By default, of seven
             joints the most redundant whose arm has a closed form, at 16 values between its limits.
         restarts: the number of starts of a search, at each value of the grid.
@@ -181,7 +182,7 @@ def _closed_form(arm: Arm, pose: CheckedTarget) -> tuple[FloatArray, bool, bool]
 
 
 def _solutions_of(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:
-    """Return the solutions of an arm, by its closed form if it has one."""
+    """Return the solutions of an arm, by its closed form if there is one."""
     if arm.method == SEARCH:
         return _by_search(arm, pose, restarts, seed, SEARCH_TOLERANCE)
     rows, is_certain, continuum = _closed_form(arm, pose)

@@ -22,8 +22,8 @@ from .settle import middle
 SEARCH = "restarts"
 # Values of the redundant joint of seven, evenly spaced, if the caller gives none.
 GRID_VALUES = 16
-# Random configurations in which the redundant joint is sought, and the share in the motion of all
-# joints that leaves the effector below which a joint is not redundant.
+# Random configurations to search for the redundant joint, and its least share in the joint motion
+# that leaves the effector in place.
 SAMPLES, LEAST_SHARE = 16, 0.01
 
 
@@ -49,7 +49,7 @@ class Arms(NamedTuple):
 
 
 def arms_of(model: Articulation, effector: int, grid: Mapping[Any, ArrayLike] | None) -> Arms:
-    """Return the arms of a robot, by default cached by it.
+    """Return the arms of a robot, by default cached by the robot.
 
     Raises:
         ValueError: if a joint above the effector is no hinge or slide, a joint of the grid has no
@@ -111,7 +111,7 @@ def _checked_grid(model: Articulation, grid: Mapping[Any, ArrayLike]) -> dict[in
 def _default_grid(
     model: Articulation, mechanism: Mechanism, effector: int
 ) -> dict[int, FloatArray]:
-    """Return values of the joint that moves most while the effector stays.
+    """Return values of the joint with the largest motion while the effector stays.
 
     Joints without which the arm has a closed form come first.
     """
@@ -171,7 +171,7 @@ def _is_singular(model: Articulation, mechanism: Mechanism, effector: int) -> bo
 
 
 def _locked(model: Articulation, q: FloatArray, joints: Mapping[int, float]) -> Articulation:
-    """Return a robot with some joints, and those that follow them, fixed at coordinates."""
+    """Return a robot with some joints and their followers fixed at coordinates."""
     kinds, frames, offsets = list(model.kinds), model.frames.copy(), model.skeleton.offsets.copy()
     for j, leader in enumerate(model.joints["leader"].tolist()):
         if leader in joints:

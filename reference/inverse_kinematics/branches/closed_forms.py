@@ -4,8 +4,8 @@ With every joint at zero, joint i rotates about an axis a_i through a point o_i.
 displacement from there to its target is G = E1(q1) ... E6(q6), a product of exponentials, E_i a
 rotation about the axis of joint i (Paden 1986). Lengths are over the reach.
 
-An arm whose first three axes meet, or whose third to fifth are parallel, is solved backwards: the
-inverse of G is such a product too, with the joints in reverse order and opposite axes.
+An arm whose first three axes meet, or whose third to fifth are parallel, is solved backwards. The
+inverse of G is also a product of exponentials, with the joints in reverse order and opposite axes.
 """
 
 import math
@@ -54,18 +54,18 @@ LARGEST_COUNT, CANDIDATES = 16, 32
 
 
 class ClosedForm(NamedTuple):
-    """An arm of which a closed form is known; the joints are in the order in which it solves."""
+    """An arm with a known closed form; the joints are in the order of solution."""
 
     form: int  # WRIST or PARALLEL
     backwards: bool  # whether the joints are in reverse order
-    # unit axes, and points on them over the reach, (6, 6); then the effector with all joints at
-    # zero, position [m] and, in a row of its own, rotation
+    # unit axes, and points on them over the reach, (6, 6); then the effector at zero coordinates,
+    # position [m] and, in a row of its own, rotation
     geometry: FloatArray  # (8, 6)
     deviation: float  # how far the axes are from those of the form, over the reach
 
 
 class AngleRoots(NamedTuple):
-    """Rows that the kernels write to: angles as cosines and sines, and candidates."""
+    """Rows for the kernels to write to: angles as cosines and sines, and candidates."""
 
     first: FloatArray  # the roots of the angle that is solved for first, (24, 2)
     second: FloatArray  # of the next, (2, 2)
@@ -150,9 +150,9 @@ def _feet(axes: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def fill_candidates(arm, reach, target, work):
-    """Fill the candidates for a target; return their number and how sure it is.
+    """Fill the candidates for a target; return their number and its certainty.
 
-    A candidate stands for its continuum: an angle that nothing determines is zero.
+    A candidate stands for its continuum: an undetermined angle is zero.
     """
     R = multiply(
         load_quaternion(target["rotation"], 0), conjugate(load_quaternion(arm.geometry, HINGES + 1))
@@ -178,7 +178,7 @@ def point_on(arm, i):
 
 
 class Shoulder(NamedTuple):
-    """The first two axes with the point that they are to bring a point of the third link to."""
+    """The first two axes, and the point to which they bring a point of the third link."""
 
     first: tuple[float, float, float]  # their axes
     second: tuple[float, float, float]
@@ -197,7 +197,7 @@ def solve_wrist(arm, R, x, work):
 
     The first rotation leaves height and length of the goal, E1^-1 G w less the foot on its axis.
     Both equations for v = E3 w less the foot on the second axis are linear in cosine and sine of
-    q2, with coefficients that are linear in those of q3.
+    q2. Their coefficients are linear in cosine and sine of q3.
     """
     w, o1, o2, o3 = point_on(arm, 3), point_on(arm, 0), point_on(arm, 1), point_on(arm, 2)
     a1, a2, a3 = axis_of(arm, 0), axis_of(arm, 1), axis_of(arm, 2)
@@ -266,7 +266,7 @@ def second_angles(arm, shoulder, v, roots):
 
 
 def solve_orientation(arm, R, angles, total, work):
-    """Add the candidates of three angles; return how many there are and how sure that is.
+    """Add the candidates of three angles; return their number and its certainty.
 
     R4 R5 R6 is known: its effect on the last axis, then on a vector across it.
     """
@@ -291,8 +291,8 @@ def solve_orientation(arm, R, angles, total, work):
 def solve_parallel(arm, R, x, work):
     """Solve an arm whose axes 2 to 4 are parallel to a, and whose last two meet (Elias & Wen 2022).
 
-    P = E2 E3 E4 = E1^-1 G E6^-1 E5^-1 leaves a, and heights along it. The height of o6, where the
-    last two axes meet, depends on q1 only; that of a6 on q5 as well.
+    P = E2 E3 E4 = E1^-1 G E6^-1 E5^-1 leaves a, and heights along a. The height of o6, where the
+    last two axes meet, depends on q1 only; the height of a6 on q5 as well.
     """
     a1, a, a5 = axis_of(arm, 0), axis_of(arm, 1), axis_of(arm, 4)
     a6, o1, o6 = axis_of(arm, 5), point_on(arm, 0), point_on(arm, 5)
@@ -317,8 +317,8 @@ def solve_parallel(arm, R, x, work):
 def solve_plane(arm, R, x, angles, total, work):
     """Add the candidates of the first, fifth and sixth angle, which leave a motion of the plane.
 
-    Returns how many there are and how sure that is. In the plane across a the arm of two
-    links has an elbow on either side (subproblem 3).
+    Returns their number and its certainty. In the plane across a the arm of two links has an elbow
+    on either side (subproblem 3).
     """
     first, fifth, sixth = angles
     a1, a, a5, a6 = (
@@ -370,5 +370,5 @@ def difference(a, b):
 
 
 def sign_of(arm, a, i):
-    """Return 1 if an axis has the direction of a, which it is parallel to, else -1."""
+    """Return 1 if an axis has the direction of its parallel a, else -1."""
     return 1.0 if dot(a, axis_of(arm, i)) > 0.0 else -1.0

@@ -22,27 +22,27 @@ from .subproblems import CERTAIN
 
 # A solution reaches its target within this, over the reach, and this angle [rad].
 TOLERANCE = 1e-9
-# Solutions whose coordinates differ by no more, over the reach for slides, are one.
+# Solutions are the same if their coordinates differ by no more, over the reach for slides.
 DUPLICATE = 1e-6
-# A candidate that misses the target or a limit by less proves neither that it is none nor that it
-# is one: rounding moves double roots by its square root.
+# Up to this from the target or a limit a candidate may or may not be a solution: near a double
+# root, rounding by e moves the root by sqrt(e).
 DOUBTFUL = 1e-6
 # Errors below this, over the reach, are rounding of the forward kinematics.
 ROUNDING = 64 * 2.220446049250313e-16
 # A candidate this far beyond its limits, over the reach or [rad], does not come back.
 BEYOND_RETURN = 0.1
-# Steps of Newton's method; closed forms need none or one, except for near double roots.
+# Steps of Newton's method; closed forms need none or a single step, except near double roots.
 NEWTON_STEPS = 12
 # Columns behind the coordinates: distance [m], angle [rad], and how many candidates came there.
 FIGURES = 3
 
 
 def solve_closed_form(mechanism_fields, form_fields, position, rotation, rows):
-    """Fill the solutions of a closed form; return their number, -1 of a target that is not valid.
+    """Fill the solutions of a closed form; return their number, -1 for an invalid target.
 
-    Also return how sure the number of candidates is, and how many of them are in doubt. The fields
-    of Mechanism and of ClosedForm come in plain tuples, as for `solve_mechanisms`. Position [m] and
-    rotation are the target's; a row to fill has coordinates of the mechanism, then FIGURES.
+    Also return the certainty of the number of candidates, and how many of them are in doubt. The
+    fields of Mechanism and of ClosedForm come in plain tuples, as for `solve_mechanisms`. Position
+    [m] and rotation are the target's; a row to fill has coordinates of the mechanism, then FIGURES.
     """
     target = np.empty(1, TARGET)
     for k in range(3):
@@ -93,7 +93,7 @@ def settle(mechanism, target, candidates, rows):
 
 
 def polish(mechanism, target, data, system):
-    """Improve coordinates by Newton's method while it does; see `TaskSystem` for the errors."""
+    """Improve coordinates by Newton's method while steps help; see `TaskSystem` for the errors."""
     update_forward_kinematics(mechanism, data)
     fill_errors(mechanism, target, data, system.e)
     square, rounding = inner(system.e, system.e), ROUNDING * mechanism.reach

@@ -1,28 +1,28 @@
 """Subproblems of closed forms: angles that solve one or two geometric equations.
 
-An angle is a pair of its cosine and sine, so that most steps need no trigonometry. The subproblems
-are those of Paden (1986) and Kahan (1983) and, with a quartic, of Elias & Wen (2022).
+An angle is a pair of its cosine and sine: most steps need no trigonometry. The subproblems are from
+Paden (1986) and Kahan (1983) and, with a quartic, from Elias & Wen (2022).
 """
 
 import math
 
 from ...quaternion import add, cross, dot, scale, subtract
 
-# Coefficients no greater than this, over those of lengths and rotations near one, are zero.
+# Coefficients up to this are zero, relative to coefficients of lengths and rotations near 1.
 ZERO = 1e-12
 # A quartic this near to zero at an extremum has a double root there.
 DOUBLE_ROOT = 1e-14
-# Angles within this of a double root [rad] are taken for it: it has half the digits of rounding.
+# Angles within this of a double root [rad] are taken for the root: it has half the digits.
 SAME_ROOT = 1e-7
-# A cosine beyond one by less is one: an angle found before may be that far off.
+# A cosine beyond 1 by less is 1: an earlier angle may be off by as much.
 CLAMPED = 1e-7
-# How sure a number of roots is: certain; in doubt, with a cosine within NEARLY_DOUBLE of one, a
-# quartic as near to zero, or vectors as near to the axis; every angle is a root.
+# The certainty of a number of roots: certain; in doubt; every angle is a root. In doubt with a
+# cosine within NEARLY_DOUBLE of 1, a quartic as near to zero, or vectors as near to the axis.
 CERTAIN, DOUBTFUL, EVERY_ANGLE = range(3)
 NEARLY_DOUBLE = 1e-8
-# A vector no longer across an axis than this has no angle about it.
+# A vector has no angle about an axis if its part across the axis is no longer than this.
 SINGULAR = 1e-7
-# Halvings of an interval that holds a root, at the most: those of its length down to rounding.
+# The largest number of halvings of an interval with a root, from its length down to rounding.
 HALVINGS = 60
 
 
@@ -50,9 +50,9 @@ def projection(u, axis, v):
 
 
 def angle_between(axis, v, w):
-    """Return the angle about an axis that brings v into the half-plane of w (subproblem 1).
+    """Return the angle about an axis from v to the half-plane of w (subproblem 1).
 
-    Also return how sure it is: if one of them is on the axis every angle does, and it may be zero.
+    Also return its certainty: if v or w is on the axis, every angle is a solution, here zero.
     """
     c, s = dot(v, w) - dot(axis, v) * dot(axis, w), dot(axis, cross(v, w))
     product = math.sqrt(c * c + s * s)
@@ -67,7 +67,7 @@ def line_roots(k, a, b, deviation, roots):
 
     A deviation of the coefficients may hide or part a double root: the angles are then near it.
 
-    Returns their number, and how sure it is; where every angle is one it fills in zero.
+    Returns the number of angles and its certainty; if every angle is a root, fills in zero.
     """
     r = math.sqrt(a * a + b * b)
     if r <= ZERO:
@@ -97,9 +97,9 @@ def every_angle(roots):
 
 
 def product(f, g):
-    """Return the product of two linear forms k + a cos + b sin, as `conic_roots` takes it.
+    """Return the product of two linear forms k + a cos + b sin, as taken by `conic_roots`.
 
-    That is p0 + p1 cos + p2 sin + p3 cos 2 + p4 sin 2.
+    The product is p0 + p1 cos + p2 sin + p3 cos 2 + p4 sin 2.
     """
     cosines, sines = f[1] * g[1], f[2] * g[2]
     return (
@@ -112,7 +112,7 @@ def product(f, g):
 
 
 def weighted_sum(s, p, t, q):
-    """Return s p + t q of two such products."""
+    """Return s p + t q of two products."""
     return (
         s * p[0] + t * q[0], s * p[1] + t * q[1], s * p[2] + t * q[2], s * p[3] + t * q[3],
         s * p[4] + t * q[4],
@@ -123,9 +123,9 @@ def conic_roots(p, deviation, roots, work):
     """Fill the angles of p0 + p1 cos + p2 sin + p3 cos 2 + p4 sin 2 = 0, as `line_roots` does.
 
     These are the intersections of a conic with the unit circle (Elias & Wen 2022, subproblems 5 and
-    6). In t, the tangent of half the angle, it is a quartic; t in [-1, 1] about 0 and about pi
-    covers the circle, and a root at an end may come twice. `work`, (5, 12), holds the roots of the
-    derivatives.
+    6). In t, the tangent of half the angle, the equation is a quartic. Two intervals t in [-1, 1],
+    about 0 and about pi, cover the circle; a root at an end may come twice. `work`, (5, 12), holds
+    the roots of the derivatives.
     """
     size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(p[3]) + abs(p[4])
     if size <= ZERO * ZERO:
