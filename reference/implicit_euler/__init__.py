@@ -1,4 +1,4 @@
-"""Implicit Euler: the step as a minimisation in `objective`, one file for each solver."""
+"""Implicit Euler: the step as a minimisation in `objective`, a file for each solver."""
 
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass, field
@@ -19,12 +19,12 @@ from .objective import STARTS, Iterate, Objective
 
 
 class StepMethod(Protocol):
-    """A minimiser of g for one system and one step length."""
+    """A minimiser of g for a system and a step length."""
 
     default_iterations: int
 
     def __init__(self, system: MassSpring, h: float) -> None:
-        """Compute what all steps share, such as a factor or a sparsity pattern."""
+        """Compute the data shared by all steps, such as a factor or a sparsity pattern."""
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield the start, then the iterate after each iteration, without end.
@@ -43,20 +43,20 @@ STEP_SOLVERS: dict[str, type[StepMethod]] = {
     "gauss_newton": GaussNewton,
 }
 
-# Stop early once the least residual was found at least PATIENCE iterations ago, and at least
-# PATIENCE_RATIO of all iterations ago: the residual of an accelerated solver oscillates, with a
-# period that grows as its convergence slows down.
+# Stop early if the least residual is at least PATIENCE iterations and PATIENCE_RATIO of all
+# iterations old. The residual of an accelerated solver oscillates, with a period that grows as its
+# convergence slows down.
 PATIENCE, PATIENCE_RATIO = 3, 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """The result of one step of implicit Euler.
+    """The result of a step of implicit Euler.
 
     Attributes:
         state: positions x and velocities (x - x_n) / h after the step.
         residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles; infinity if the
-            start overflows or the result exceeds 1e75, in which case the state is the initial one.
+            start overflows or the result exceeds 1e75. The state is then the initial state.
         iterations: number of iterations.
         outcome: why the solver stopped. CONVERGED and AT_ROUNDING are about the gradient only and
             may stand at a saddle point, except for `newton`, which says SADDLE there.
@@ -81,8 +81,8 @@ class ImplicitEuler:
     Attributes:
         system: particles and springs.
         h: the step [s].
-        solver: one of `STEP_SOLVERS`.
-        tolerance: residual at which the iterations stop; 0 runs all of them.
+        solver: a name in `STEP_SOLVERS`.
+        tolerance: residual to stop at; 0 runs all iterations.
         max_iterations: most iterations in a step; None means the solver's default.
         start: first iterate, "y" or "x_n"; None means y for all but gauss_newton, which starts at
             x_n by definition. Residuals are relative to y in both cases.
@@ -126,7 +126,7 @@ class ImplicitEuler:
             state: positions and velocities at the start of the step.
             external_forces: [N], shape (particle, 3), besides gravity; constant during the step.
             pin_positions: positions of the pinned particles, in ascending order, at the end of the
-                step [m], shape (pinned, 3); by default they do not move. Their velocity in the
+                step [m], shape (pinned, 3); by default pins do not move. Their velocity in the
                 result is their displacement over h.
 
         Raises:
@@ -143,7 +143,7 @@ class ImplicitEuler:
         external_forces: ArrayLike | None = None,
         pin_positions: ArrayLike | None = None,
     ) -> Objective:
-        """Return g of the step from this state; arguments and errors are those of `step`."""
+        """Return g of the step from this state; arguments and errors are as for `step`."""
         start = self.start or STARTS[0]
         return Objective(self.system, state, self.h, external_forces, pin_positions, start)
 
@@ -157,8 +157,8 @@ class ImplicitEuler:
         """Return a proven bound on the distance from a result to the minimiser of g.
 
         `result` is a `StepResult` or positions, shape (particle, 3) [m]; the other arguments are
-        those of the step, which a result does not keep. It costs about as much as three iterations
-        of Newton's method; `certificate` states the proof.
+        the step's, which a result does not keep. The cost is about three iterations of Newton's
+        method; `certificate` states the proof.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             objective = self.objective(state, external_forces, pin_positions)
@@ -178,7 +178,7 @@ class ImplicitEuler:
         return self._solver.iterates(self.objective(state, external_forces, pin_positions))
 
     def _solve(self, state: State, objective: Objective) -> StepResult:
-        """Return the result of the last finite iterate, or the initial state if it overflows."""
+        """Return the result of the last finite iterate, or the initial state on overflow."""
         last: Iterate | None = None
         residuals: list[float] = []
         objectives: list[float] = []
@@ -216,9 +216,9 @@ class ImplicitEuler:
         """Return the outcome if the solver stops at this iterate, else None.
 
         The floor is an upper bound, often a thousand times the actual rounding error. A gradient
-        below it therefore stops the solver only once the least residual, the one at index `best`,
-        is no longer improved, or if the start is at rest. Newton's method goes on from where the
-        Hessian is indefinite as long as it can.
+        below the floor therefore stops the solver only if the start is at rest, or once the least
+        residual, at index `best`, is no longer improved. Newton's method goes on from an indefinite
+        Hessian as long as possible.
         """
         count = len(residuals) - 1
         final = count >= self._iteration_limit

@@ -1,20 +1,19 @@
 """A proven upper bound on the distance from positions x to a minimiser of g.
 
 Let mu > 0 be a lower bound of the smallest eigenvalue of H, the Hessian of g at x over the free
-particles, let eta be an upper bound of |H^-1 grad g(x)|, the length of the Newton step, and let L
-be a Lipschitz constant of the Hessian within 2 eta of x. Then
+particles. Let eta be an upper bound of |H^-1 grad g(x)|, the length of the Newton step. Let L be a
+Lipschitz constant of the Hessian within 2 eta of x. Then
 
     L eta < mu / 2  =>  a minimiser lies within d = 2 eta / (1 + (1 - 2 L eta / mu)^1/2),
 
 and no other stationary point within 2 eta (Kantorovich 1948). Proof: let N(z) = z - H^-1 grad g(z).
-Within 2 eta of x, |N'(z)| = |H^-1 (H - H(z))| <= 2 L eta / mu < 1 and, by integration from x,
-|N(z) - x| <= eta + L |z - x|² / (2 mu) <= 2 eta: N contracts that ball into itself and has one
-fixed point there. Its distance t from x has t <= eta + L t² / (2 mu) and t <= 2 eta < mu / L, so
-that t <= d, the smaller root; and H(z) >= mu - L d = mu (1 - 2 L eta / mu)^1/2 > 0 there.
+Within 2 eta of x, |N'(z)| = |H^-1 (H - H(z))| <= 2 L eta / mu < 1. By integration from x, |N(z) -
+x| <= eta + L |z - x|² / (2 mu) <= 2 eta: N contracts this ball into itself and has a single fixed
+point there. The distance t of the fixed point from x has t <= eta + L t² / (2 mu) and t <= 2 eta <
+mu / L. So t <= d, the smaller root, and H(z) >= mu - L d = mu (1 - 2 L eta / mu)^1/2 > 0 there.
 
-Since |H^-1 grad g(x)| <= |grad g(x)| / mu, the bound is never worse than the one that follows from
-the convexity of g on a ball of radius 2 |grad g(x)| / mu, and it is sharper where some directions
-are stiffer than others.
+The bound is never worse than the bound by convexity of g on a ball of radius 2 |grad g(x)| / mu,
+since |H^-1 grad g(x)| <= |grad g(x)| / mu. It is sharper where stiffnesses differ by direction.
 
 The bounds hold in exact arithmetic for the g that the floating-point inputs define. They include
 the rounding errors of x_n + h v_n, the effective springs, the gradient, the Hessian, its Cholesky
@@ -39,10 +38,10 @@ from .objective import Objective
 
 EPS = float(np.finfo(float).eps)
 # Computing a term of the gradient takes at most 27 roundings of EPS/2 each, an entry of a spring's
-# block at most 60; the norm of a block is at most three times its largest entry.
+# block at most 60. The norm of a block is at most three times its largest entry.
 GRADIENT_ROUNDING = 16
 HESSIAN_ROUNDING = 128
-# Factor that covers the rounding errors of the bounds themselves, for millions of particles.
+# Factor to cover the rounding errors of the bounds themselves, for millions of particles.
 SLACK = 1.0 + 1e-8
 # The norm of the third derivative of the length |p| is this over |p|².
 THIRD_DERIVATIVE = 2.0 / math.sqrt(3.0)
@@ -54,7 +53,7 @@ FIRST_SHIFT, ESTIMATE_TOLERANCE = 0.98, 1e-2
 
 
 class Coverage(SentenceEnum):
-    """Whether the distance to a minimiser is bounded, or why it is not."""
+    """Whether the distance to a minimiser is bounded, or why not."""
 
     COVERED = "A minimiser of g lies within the distance, and it is the only one near."
     OVERFLOWN = "No bound: g or its gradient is not finite here or where the step starts."
@@ -75,14 +74,13 @@ class Coverage(SentenceEnum):
 class Certificate:
     """Proven bounds for positions x as the result of a step.
 
-    Distances are Euclidean norms over all coordinates and so bound that of every particle.
+    Distances are Euclidean norms over all coordinates, and so bound the distance of every particle.
 
     Attributes:
         residual: |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows.
         coverage: whether there is a bound, or why not.
         distance: radius about x that contains a minimiser of g [m]; infinite without a bound.
-        unique_within: radius about x that contains no other stationary point [m]; 0 without a
-            bound.
+        unique_within: radius about x without another stationary point [m]; 0 without a bound.
         newton_step: eta, an upper bound of the length of the Newton step [m]; NaN if unknown.
         curvature: mu, a lower bound of the eigenvalues of the Hessian [kg]; 0 if none is positive.
         lipschitz: L, a Lipschitz constant of the Hessian within 2 eta of x [kg/m]; NaN if unknown.
@@ -104,14 +102,14 @@ class Certificate:
     def shares_minimiser(self, other: "Certificate", distance: float) -> bool | None:
         """Return whether two results of the same step have the same minimiser nearby.
 
-        `distance` is that between the two results [m]. None means that neither is proven, as when
-        one of the certificates has no bound.
+        `distance` is the distance between the two results [m]. None means that neither is proven,
+        as when a certificate has no bound.
         """
         instance("other", other, Certificate)
         return self.shares_minimiser_within(other, number("distance", distance, minimum=0.0))
 
     def shares_minimiser_within(self, other: "Certificate", distance: float) -> bool | None:
-        """Do what `shares_minimiser` does, of a distance that is not checked."""
+        """Do the same as `shares_minimiser` for an unchecked distance."""
         if not (self.covered and other.covered):
             return None
         reach = distance * SLACK
@@ -127,8 +125,8 @@ class Certificate:
 def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     """Return the certificate of positions, shape (particle, 3) [m], as the result of a step.
 
-    It takes two or three Cholesky factorisations of the Hessian and 20 to 60 solves. Positions of
-    another shape or not finite are a ValueError.
+    The cost is two or three Cholesky factorisations of the Hessian and 20 to 60 solves. Positions
+    of another shape or not finite are a ValueError.
     """
     system = instance("objective", objective, Objective).system
     x = coordinates("positions", positions, system.particle_count, 3)
@@ -174,9 +172,9 @@ def kantorovich_distance(eta: float, ratio: float) -> float:
 def least_curvature(H: Any, error: float) -> tuple[float, Factor | None]:
     """Return a positive lower bound of the smallest eigenvalue and the factor of H, or 0 and None.
 
-    The bound holds for every matrix within `error` of H in norm. Lanczos estimates the eigenvalue;
-    a Cholesky factorisation of H - shift I that succeeds proves it, up to the rounding error of the
-    factorisation, which is at most (n + 1) EPS times the trace (Rump 2006).
+    The bound holds for every matrix within `error` of H in norm. Lanczos estimates the eigenvalue.
+    A successful Cholesky factorisation of H - shift I proves the bound, up to the rounding error of
+    the factorisation, at most (n + 1) EPS times the trace (Rump 2006).
     """
     n = H.shape[0]
     allowance = error + (n + GRADIENT_ROUNDING) * EPS * float(H.trace())
@@ -206,11 +204,11 @@ def newton_length(
 def hessian_change(objective: Objective, x: FloatArray, radius: float) -> tuple[Coverage, float]:
     """Return L [kg/m], a Lipschitz constant of the Hessian of g within a radius of x.
 
-    Only the second part of a spring's block k I - k r/l (I - u u') depends on x. It is k r times
-    the second derivative of l and changes by at most k r THIRD_DERIVATIVE / l² times the relative
-    displacement of the ends, which is at most 2^1/2 |z - x|, or |z - x| if one end is pinned. With
-    c_i the product of these factors, -|z - x| W x I <= H(z) - H(x) <= |z - x| W x I for
-    W = sum of c_i A_i A_i', so that L is the norm of W.
+    Only the second part of a spring's block k I - k r/l (I - u u') depends on x. This part is k r
+    times the second derivative of l. It changes by at most k r THIRD_DERIVATIVE / l² times the
+    relative displacement of the ends, at most 2^1/2 |z - x|, or |z - x| if one end is pinned. With
+    c_i the product of these factors and W = sum of c_i A_i A_i', -|z - x| W x I <= H(z) - H(x) <=
+    |z - x| W x I. L is the norm of W.
 
     Returns:
         COVERED and L, or the reason why g may not be twice differentiable there and NaN.
@@ -251,8 +249,8 @@ def rounding_errors(objective: Objective, x: FloatArray) -> RoundingErrors:
     """Return upper bounds of the rounding errors of the gradient and the Hessian at x.
 
     The error of a spring is relative to its length, not to its coordinates as in the floor of a
-    residual, because differences of coordinates are rounded only once. The bounds include the
-    rounding errors of y, of the external forces and of the effective springs.
+    residual: differences of coordinates are rounded only once. The bounds include the rounding
+    errors of y, of the external forces and of the effective springs.
     """
     system, h, springs = objective.system, objective.h, objective.effective.springs
     k, length = h * h * objective.effective.stiffnesses, lengths(objective.effective, x)

@@ -1,8 +1,8 @@
-"""A cache of factors, so that each matrix is factorised once and each pattern analysed once.
+"""A cache of factors: each matrix is factorised once and each pattern analysed once.
 
-A factor stays in the cache as long as some integrator uses it. Another integrator for the same
-system and h shares it; one for another h or stiffness shares its ordering and symbolic structure,
-which depend only on the sparsity pattern. Results do not depend on the contents of the cache.
+A factor stays in the cache as long as an integrator uses it. Integrators for the same system and h
+share a factor. With another h or stiffness they share its ordering and symbolic structure, which
+depend only on the sparsity pattern. Results do not depend on the contents of the cache.
 """
 
 import hashlib
@@ -49,7 +49,7 @@ def hessian_factor(system: MassSpring) -> Factor:
 
 
 def prefactored(matrix: Any) -> Factor:
-    """Return the factor of a sparse CSC matrix from the cache, or factorise it."""
+    """Return the factor of a sparse CSC matrix from the cache, or factorise the matrix."""
     digest = hashlib.blake2b(matrix.indptr)
     digest.update(matrix.indices)
     pattern = digest.digest()

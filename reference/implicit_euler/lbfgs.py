@@ -1,9 +1,9 @@
 """L-BFGS with M + h² L, the matrix of the local/global iterations, as the initial Hessian.
 
-Liu, Bouaziz, Kavan 2017, "Quasi-Newton Methods for Real-Time Simulation of Hyperelastic Materials":
-a local/global iteration is a quasi-Newton step with M + h² L for the Hessian. The two-loop
-recursion of Nocedal 1980 corrects it by the last few steps and changes of the gradient, and a line
-search ensures descent.
+A local/global iteration is a quasi-Newton step with M + h² L for the Hessian (Liu, Bouaziz, Kavan
+2017, "Quasi-Newton Methods for Real-Time Simulation of Hyperelastic Materials"). The two-loop
+recursion of Nocedal 1980 corrects this matrix by the last few steps and changes of the gradient,
+and a line search ensures descent.
 """
 
 from collections import deque

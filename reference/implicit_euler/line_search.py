@@ -1,6 +1,6 @@
 """Backtracking line search: halve a descent step until g decreases enough (Armijo 1966).
 
-Close to the minimum the changes of g are smaller than its rounding error; there the slope decides,
+Close to the minimum the changes of g are smaller than its rounding error. There the slope decides,
 by the approximate Wolfe condition of Hager and Zhang 2005, "A New Conjugate Gradient Method with
 Guaranteed Descent".
 """

@@ -1,22 +1,22 @@
 """Newton's method on g with its exact Hessian, and Gauss-Newton.
 
 Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
-until it is positive definite, a Levenberg shift in the metric of M.
+until the sum is positive definite, a Levenberg shift in the metric of M.
 
 Such steps leave a saddle point where the gradient shows a way out, but not at a squeezed straight
-rod. An end is therefore accepted only without a negative eigenvalue: the Hessian is factorised once
-more, unless it was positive definite at both iterates before, as in ordinary steps.
+rod. An end is therefore accepted only without a negative eigenvalue. The Hessian is factorised once
+more, unless the Hessians of the last two iterates were positive definite, as in ordinary steps.
 
 Gauss-Newton linearises the springs at the start of the step. At x_n the dampers of E are at rest
-length, grad g(x_n) = -h (M v_n + h f), and with their Hessian without geometric terms the step
-h (v_n + dv) = -(M + h C + h² J' k J)^-1 grad g(x_n) is
+length: grad g(x_n) = -h (M v_n + h f). With their Hessian without geometric terms the step h (v_n +
+dv) = -(M + h C + h² J' k J)^-1 grad g(x_n) is
 
     (M + h C + h² J' k J) dv = h (f - h J' k J v_n),
 
-J here being the Jacobian of the lengths and f all forces with the dampers' -C v_n: one step of
-Baraff and Witkin 1998, "Large Steps in Cloth Simulation", without geometric stiffness, and the
-integrator that MuJoCo calls `discrete`. Springs are linearised at x_n for pins that move, too: the
-displacement of the pins adds h² J' k J (x_pins - x_n) to the gradient at the free particles.
+where J is the Jacobian of the lengths, and f all forces with the dampers' -C v_n. This is a step of
+Baraff and Witkin 1998, "Large Steps in Cloth Simulation", without geometric stiffness, and MuJoCo's
+integrator `discrete`. Springs are linearised at x_n for moving pins too: the displacement of the
+pins adds h² J' k J (x_pins - x_n) to the gradient at the free particles.
 """
 
 from collections.abc import Iterator
@@ -73,7 +73,7 @@ class Newton:
     def _factor(self, hessian: Any, shift: float) -> tuple[Factor, float]:
         """Return the factor of the Hessian plus a multiple of M, and the multiple.
 
-        Start below the multiple of the last iteration, so that it decays when no longer needed.
+        The search starts below the last multiple, which so decays when no longer needed.
         """
         shift = shift / SHIFT_DECAY if shift > FIRST_SHIFT else 0.0
         unshifted = hessian.data[self._diagonal]
@@ -86,12 +86,12 @@ class Newton:
 
 
 class GaussNewton:
-    """Gauss-Newton iterations from x_n, by default one."""
+    """Gauss-Newton iterations from x_n, by default a single iteration."""
 
     default_iterations = 1
 
     def __init__(self, system: MassSpring, h: float) -> None:
-        """Analyse the sparsity pattern that the matrices of all steps share."""
+        """Analyse the sparsity pattern, which the matrices of all steps share."""
         self._analysed = hessian_factor(system)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:

@@ -2,12 +2,12 @@
 
 The Newton system H s = -grad g(x), with the exact Hessian H = M + h² K, is solved inexactly (Dembo
 and Steihaug 1983, "Truncated-Newton Algorithms for Large-Scale Unconstrained Optimization"). The
-relative tolerance falls with the square root of the gradient, so that convergence is superlinear.
-The conjugate gradients stop at a direction of non-positive curvature.
+relative tolerance falls with the square root of the gradient: convergence is superlinear. The
+conjugate gradients stop at a direction of non-positive curvature.
 
-The preconditioner is M + h² L, the matrix of the local/global iterations, which is factorised once
-for all steps and has a third of the rows of H. The first conjugate gradient iterate is a multiple
-of a local/global step. H is never assembled, only multiplied with, spring by spring.
+The preconditioner is M + h² L, the matrix of the local/global iterations. It is factorised once for
+all steps and has a third of the rows of H. The first conjugate gradient iterate is a multiple of a
+local/global step. H is never assembled, only multiplied with, spring by spring.
 """
 
 from collections.abc import Iterator
@@ -64,7 +64,7 @@ class NewtonCG(GlobalMatrixSolver):
 
 
 def hessian_product(blocks, p, masses, springs, pinned):
-    """Return M p + sum of (A_i A_i') x B_i p for a p that is zero at the pins; zero there too."""
+    """Return M p + sum of (A_i A_i') x B_i p for p zero at the pins; zero there too."""
     product = np.empty(p.shape)
     for i in range(len(p)):
         store_vector(product, i, scale(masses[i], load_vector(p, i)))

@@ -6,11 +6,11 @@ grad g(x) = 0 for (Liu et al. 2013)
     g(x) = 1/2 (x - y)' M (x - y) + h² E(x),    E(x) = sum of k/2 (l(x) - r)² - f_ext' x,
 
 where f_ext is the sum of gravity and external forces and l_n the length of a spring at x_n. A
-damper adds c/(2h) (l(x) - l_n)² to E, so that a damped spring acts within the step as a spring of
+damper adds c/(2h) (l(x) - l_n)² to E. A damped spring hence acts within the step as a spring of
 stiffness k + c/h and rest length (k r + c l_n/h) / (k + c/h). The damper of a tension-only spring
-also acts while the spring is slack and becomes a spring of its own, of stiffness c/h and rest
-length l_n. The force of a damper in a step is therefore -(c/h) (l - l_n) u, not the
--c ((v_i - v_j)·u) u of explicit integrators; `mass_spring.damper_forces` compares the two.
+also acts while the spring is slack. It becomes a spring of its own, of stiffness c/h and rest
+length l_n. The force of a damper in a step is therefore -(c/h) (l - l_n) u, not the -c ((v_i -
+v_j)·u) u of explicit integrators. `mass_spring.damper_forces` compares the two.
 
 Pinned particles are not variables: y holds their positions at the end of the step, and their rows
 of the gradient are zero.
@@ -112,19 +112,19 @@ def _finite_result(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Objective:
-    """g of one step, in SI units.
+    """g of a step, in SI units.
 
-    Its value, its derivatives and its quadratic form are a FloatingPointError where they overflow,
-    and a ValueError at positions of another shape or not finite; an iterate says so in `finite`.
+    Where g, its derivatives or its quadratic form overflow, methods raise a FloatingPointError; an
+    iterate reports overflow in `finite`. Positions of another shape or not finite are a ValueError.
 
     Attributes:
         system: particles and springs.
         h: the step [s].
         x_n: positions at the start of the step, shape (particle, 3).
         y: x_n + h v_n, with pins at the end of their path, shape (particle, 3).
-        external: gravity and external forces [N], shape (particle, 3); do not write to it.
-        effective: the system with its dampers replaced by springs, as above; those of tension-only
-            springs follow all other springs.
+        external: gravity and external forces [N], shape (particle, 3), not to be written to.
+        effective: the system with its dampers replaced by springs, as above; the dampers of
+            tension-only springs follow all other springs.
         inertial: the iterate at y, to which residuals are relative.
     """
 
@@ -139,9 +139,9 @@ class Objective:
     ) -> None:
         """Set up the step of length h from a state; `start` is the first iterate, "y" or "x_n".
 
-        Raise a ValueError if h is not positive, the state has another number of particles, or the
-        external forces [N], shape (particle, 3), or the pins' positions at the end of the step [m],
-        shape (pinned, 3), have another shape or are not finite.
+        Raise a ValueError if h is not positive, the state has another number of particles, or an
+        array has another shape or is not finite. External forces [N] have shape (particle, 3), the
+        pins' positions at the end of the step [m] (pinned, 3).
         """
         self.system = system
         self.h = h = number("h", h, above=0)
@@ -166,7 +166,7 @@ class Objective:
 
     @functools.cached_property
     def start(self) -> Iterate:
-        """The first iterate: y, or x_n with the pins where they are in y."""
+        """The first iterate: y, or x_n with the pins where y has them."""
         if self._start == "y":
             return self.inertial
         return self.iterate_at(np.where(self.system.free[:, None], self.x_n, self.y))
@@ -176,7 +176,7 @@ class Objective:
         return self.iterate_at(self._positions(positions))
 
     def iterate_at(self, positions: FloatArray) -> Iterate:
-        """Return g and its gradient at positions that are not checked and not copied."""
+        """Return g and its gradient at positions neither checked nor copied."""
         regions = self.system.with_separate_dampers.regions
         if regions is None:
             terms = _evaluate(positions, *self._arguments)
@@ -222,7 +222,7 @@ class Objective:
         return self.hessian_at(self._positions(positions), geometric=geometric)
 
     def hessian_at(self, x: FloatArray, *, geometric: bool = True) -> Any:
-        """Return the Hessian at positions that are not checked."""
+        """Return the Hessian at unchecked positions."""
         springs = self.system.with_separate_dampers.free_blocks
         hessian = springs.matrix(
             self.h * self.h * mass_spring.blocks(x, self.effective.arrays, geometric)
@@ -233,8 +233,8 @@ class Objective:
     def pin_gradient_at(self, x: FloatArray, *, geometric: bool) -> FloatArray:
         """Return h² K times the displacement of the pins from x_n to y, shape (particle, 3) [kg m].
 
-        It is the contribution of the pins to the gradient at the free particles when the springs
-        are linearised at x, which is not checked; zero at the pins. K is as for `hessian`.
+        It is the contribution of the pins to the gradient at the free particles, zero at the pins,
+        with springs linearised at x, which is not checked. K is as for `hessian`.
         """
         displacement = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
         if not displacement.any():
@@ -248,9 +248,10 @@ class Objective:
     def quadratic_form(self, positions: ArrayLike, d: ArrayLike) -> float:
         """Return g as a quadratic form in x for constant rest vectors d, shape (spring, 3).
 
-        1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al. 2013), with
-        L and J of the effective springs. It equals g(x) for d = rest_vectors(x) and is larger for
-        any other d of the effective rest lengths, or of shorter ones in tension-only springs.
+        The form is 1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al.
+        2013), with L and J of the effective springs. It equals g(x) for d = rest_vectors(x). It is
+        larger for any other d of the effective rest lengths, or of shorter lengths in tension-only
+        springs.
         """
         x, y, hh = self._positions(positions), self.y, self.h * self.h
         d = coordinates("d", d, len(self.effective.springs), 3)
@@ -272,8 +273,8 @@ class Objective:
 def global_matrix(system: mass_spring.MassSpring, h: float) -> Any:
     """Return M + h² L of the effective springs [kg], sparse (particle, particle).
 
-    It is the Hessian of the quadratic form of g for constant d, the same for each coordinate and
-    for all steps of length h. The rows and columns of pins are those of the identity.
+    This is the Hessian of the quadratic form of g for constant d, the same for each coordinate and
+    for all steps of length h. The rows and columns of pins are the identity's.
     """
     weights = h * h * effective_stiffnesses(system, h)
     return system.free_blocks.scalar_matrix(weights, system.free_masses)

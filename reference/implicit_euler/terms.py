@@ -1,4 +1,4 @@
-"""Kernels that sum the terms of g: value, gradient, effective dampers and rounding errors.
+"""Kernels for the terms of g: value, gradient, effective dampers and rounding errors.
 
 All arguments are in SI units; `objective` defines g. Groups of arrays are plain tuples: `particles`
 of y, external forces and masses, `elastic` of rest lengths, stiffnesses and tension_only.
@@ -12,7 +12,7 @@ from numpy import uint64 as at
 from ..mass_spring import spring_frame, spring_stretch
 from ..quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 
-# Bound on the rounding error of the gradient, relative to the norm of the terms that it sums.
+# Bound on the rounding error of the gradient, relative to the norm of its terms.
 EPS = float(np.finfo(float).eps)
 SUM_ROUNDING = 64 * EPS
 # Covers the rounding error of the upper bound of the floor itself.
@@ -77,7 +77,7 @@ def join_regions(x, h, constant, elastic, pinned, regions, gradient, sums):
 
 
 def add_ordered_springs(x, hh, elastic, regions, begin, end, gradient):
-    """Add the gradient of springs begin to end - 1 of the ordered ones; return their part of g."""
+    """Add the gradient of springs begin to end - 1 of the order; return their part of g."""
     value, (rest_lengths, stiffnesses, tension_only) = 0.0, elastic
     for t in range(begin, end):
         i, j = at(regions.springs[at(t), 0]), at(regions.springs[at(t), 1])
@@ -156,7 +156,7 @@ def rounding_bounds(x, h, particles, springs, elastic, pinned):
 def rounding_coefficients(y, external, h, masses, spring_sums, free):
     """Return a, b such that a + b r bounds the rounding error of |grad g| when all |x_i| <= r.
 
-    It is the bound of `rounding_bounds` with r for every |x_i|, by the triangle inequality.
+    The bound is `rounding_bounds` with r for every |x_i|, by the triangle inequality.
     """
     a, b = 0.0, 0.0
     for i in range(len(y)):
