@@ -15,8 +15,8 @@ from ..backend.compiled import Kernel
 class BlockSum:
     """Sums of (A_i A_i') x B_i over the springs, for any symmetric 3 x 3 blocks B_i.
 
-    All sums have the same pattern, whose analysis serves for all: every pair of particles that a
-    spring joins, and the whole diagonal, even where entries are zero.
+    All sums share a pattern, which is analysed once: every pair of particles joined by a spring,
+    and the whole diagonal, even where entries are zero.
     """
 
     def __init__(self, A: Any) -> None:
@@ -53,7 +53,7 @@ class BlockSum:
 
 
 def _adjacency(ends: IndexArray, count: int) -> Any:
-    """Return all pairs that a spring joins and the diagonal as entries, sparse CSC."""
+    """Return all pairs of particles joined by springs and the diagonal as entries, sparse CSC."""
     i, j = ends[(ends >= 0).all(axis=1)].T
     diagonal = np.arange(count, dtype=np.int32)
     rows, columns = np.concatenate([i, j, diagonal]), np.concatenate([j, i, diagonal])
@@ -73,7 +73,7 @@ def _pattern(symmetric: Any) -> Any:
 
 
 def _filled(pattern: Any, data: FloatArray) -> Any:
-    """Return a matrix that shares a pattern, ten times faster than the constructor."""
+    """Return a matrix on a shared pattern, ten times faster than the constructor."""
     matrix = copy.copy(pattern)
     matrix.data = data
     return matrix

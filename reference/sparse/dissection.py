@@ -1,14 +1,14 @@
 """Nested dissection: an order of elimination that leaves little fill, from the graph only.
 
-A separator is eliminated after both halves that it parts, and so on inside of the halves (George
-1973, "Nested Dissection of a Regular Finite Element Mesh"). Here separators are level sets of a
-few coordinates, which breadth-first searches find: with a and b far apart, dist(v, a) - dist(v, b)
-grows evenly from a to b, and its level sets are straight, while level sets of a distance bend.
-Whatever the threshold t of a coordinate f, the vertices with f >= t that have a neighbour with
-f < t are a separator, and one sweep over the edges counts them for every t.
+A separator is eliminated after the two halves on its sides, and so on inside of the halves (George
+1973, "Nested Dissection of a Regular Finite Element Mesh"). Here separators are level sets of a few
+coordinates, from breadth-first searches. With a and b far apart, dist(v, a) - dist(v, b) grows
+evenly from a to b. Its level sets are straight, while level sets of a distance bend. For any
+threshold t of a coordinate f, the vertices with f >= t and a neighbour with f < t are a separator.
+A single sweep over the edges counts the vertices for every t.
 
-Pieces that cannot be split well are ordered from the inside out: the neighbours of a piece are
-eliminated later, so that the vertices on its rim, which have many of them, go last.
+Pieces without a good split are ordered from the inside out. The neighbours of a piece are
+eliminated later, so vertices on its rim, with many such neighbours, go last.
 """
 
 import math
@@ -40,7 +40,7 @@ class Search(NamedTuple):
 
 
 def nested_dissection(graph, order):
-    """Reorder the vertices in `order` in place, so that eliminating them leaves little fill."""
+    """Reorder the vertices in `order` in place, for little fill in their elimination."""
     n = len(order)
     inside = np.zeros(n, np.bool_)
     search = Search(
@@ -78,7 +78,7 @@ def nested_dissection(graph, order):
 
 
 def push(pieces, waiting, first, last, measured):
-    """Push a piece, if it has vertices; return the stack's height."""
+    """Push a piece, unless it is empty; return the stack's height."""
     if first == last:
         return waiting
     pieces[waiting, 0], pieces[waiting, 1], pieces[waiting, 2] = first, last, measured
@@ -152,10 +152,10 @@ def push_components(graph, search, region, piece, first, pieces, waiting):
 
 
 def measure(graph, search, region, piece):
-    """Give the vertices of a connected piece their coordinates; return the region they are in.
+    """Give the vertices of a connected piece their coordinates; return the region of the vertices.
 
     Two pairs of far vertices, a and b, c and d, give the differences of distances, their sum and
-    their difference: on a grid, the directions along its sides and its diagonals.
+    their difference. On a grid these are the directions along its sides and its diagonals.
     """
     axes = search.axes
     for axis in range(AXES):
@@ -195,7 +195,7 @@ def farthest(graph, axes, piece, axis):
 def split(graph, search, piece):
     """Reorder a piece into two halves and then their separator; return the halves' sizes.
 
-    They are zero, and the piece as it was, if it has no good separator.
+    Without a good separator the sizes are zero, and the piece is left as it was.
     """
     best_axis, best, lowest_cost = 0, -1, np.inf
     for axis in range(AXES):
@@ -225,7 +225,7 @@ def sweep(graph, f, lowest, piece):
 def threshold(f, lowest, piece, first, last):
     """Return the t of the best separator and its cost, or -1 if none is good.
 
-    The cost, of the separator over the product of the halves, weighs a short separator against
+    The cost is the separator over the product of the halves: it weighs a short separator against
     equal halves (Leighton and Rao 1999, "Multicommodity Max-Flow Min-Cut Theorems and Their Use in
     Designing Approximation Algorithms").
     """

@@ -1,4 +1,4 @@
-"""Cholesky factors as callers see them: analyse, factorise, solve, factorise again."""
+"""Cholesky factors for callers: analyse, factorise, solve, factorise again."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ class NotPositiveDefiniteError(ValueError):
 
 
 class SymbolicFactor:
-    """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
+    """The analysis of a symmetric pattern, shared by the factors of all matrices of the pattern."""
 
     def __init__(self, indptr: Any, indices: Any) -> None:
         """Order the columns and find L's pattern; a ValueError if A's is not symmetric."""
@@ -43,9 +43,9 @@ class CholeskyFactor:
     def __init__(self, matrix: Any, pattern: SymbolicFactor | None = None) -> None:
         """Factorise a sparse symmetric matrix, both triangles given.
 
-        `pattern` is the analysis of an earlier matrix; it is used if the matrix has that pattern.
-        Raise a NotPositiveDefiniteError if a pivot is not positive and finite, another ValueError
-        if the matrix is not sparse or square, or its pattern not symmetric.
+        `pattern` is the analysis of an earlier matrix, used if the patterns are equal. Raise a
+        NotPositiveDefiniteError if a pivot is not positive and finite. Raise another ValueError if
+        the matrix is not sparse or square, or its pattern not symmetric.
         """
         columns = square(matrix).tocsc()
         if not columns.has_canonical_format:
@@ -117,7 +117,7 @@ class CholeskyFactor:
 
 
 def square(matrix: Any) -> Any:
-    """Return a matrix that is sparse, square and real; raise a ValueError if it is not."""
+    """Return a sparse, square, real matrix; raise a ValueError for any other matrix."""
     if not scipy.sparse.issparse(matrix):
         raise ValueError(f"matrix: expected a square sparse matrix, got {shown(matrix)}")
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.dtype.kind not in "fiu":

@@ -1,4 +1,4 @@
-"""Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
+"""Direct solves with a sparse symmetric positive definite matrix and many right-hand sides.
 
 Two solvers have the same interface: our own `CholeskyFactor`, the default, and SciPy's SuperLU.
 """
@@ -28,7 +28,7 @@ def factorize(matrix: Any, library: str = "supernodal") -> Factor:
     """Return the factor of a sparse symmetric positive definite matrix, both triangles given.
 
     `library` is "supernodal" or "scipy". Raise a NotPositiveDefiniteError if the matrix is not
-    positive definite, another ValueError if it is not sparse, real and square.
+    positive definite, another ValueError if the matrix is not sparse, real and square.
     """
     factor = LIBRARIES[choice("library", library, LIBRARIES)]
     if not np.isfinite(square(matrix).data).all():

@@ -1,10 +1,10 @@
 """Compute L of P A P' = L L' by the multifrontal method, supernode by supernode.
 
-A supernode's columns of A and the updates that its children left are added into a dense front;
-its columns are eliminated there and the remainder is the update for its parent (Duff and Reid 1983,
-"The Multifrontal Solution of Indefinite Sparse Symmetric Linear Systems"; Liu 1992, "The
-Multifrontal Method for Sparse Matrix Solution: Theory and Practice"). Children come right before
-their parents, so that the pending updates form a stack.
+A supernode's columns of A and its children's updates are added into a dense front. The columns are
+eliminated there, and the remainder is the update for the parent (Duff and Reid 1983, "The
+Multifrontal Solution of Indefinite Sparse Symmetric Linear Systems"; Liu 1992, "The Multifrontal
+Method for Sparse Matrix Solution: Theory and Practice"). Children come right before their parents:
+the pending updates form a stack.
 
 Row j of a front holds column j of the lower triangle, from the diagonal on: elimination runs along
 rows. Indices are made unsigned (`at`) for the reason given in `triangular`.

@@ -1,11 +1,11 @@
 """Symbolic analysis: the order P and the supernodes of P A P' = L L', from the pattern of A.
 
-The elimination tree makes the parent of column j the first row below the diagonal of column j of L
+The parent of column j in the elimination tree is the first row below the diagonal of column j of L
 (Liu 1990, "The Role of Elimination Trees in Sparse Factorization"). Supernodes are runs of columns
-of L with a common pattern below them, stored and used as blocks. Fundamental ones follow from
+of L with a common pattern below them, stored and used as blocks. Fundamental supernodes follow from
 parents and column counts (Ng and Peyton 1993, "Block Sparse Cholesky Algorithms on Advanced
-Uniprocessor Computers"). Small ones are merged with their parents where that adds few explicit
-zeros (Ashcraft and Grimes 1989, "The Influence of Relaxed Supernode Partitions on the Multifrontal
+Uniprocessor Computers"). Small supernodes are merged with their parents if few explicit zeros are
+added (Ashcraft and Grimes 1989, "The Influence of Relaxed Supernode Partitions on the Multifrontal
 Method").
 """
 
@@ -30,7 +30,7 @@ class Supernodes(NamedTuple):
 
 
 class UpdateTree(NamedTuple):
-    """The updates that go into each front."""
+    """The updates to add into each front."""
 
     starts: np.ndarray  # where the children of each begin in `children`; shape (supernode + 1,)
     children: np.ndarray  # of each supernode, last first, as their updates lie on the stack
@@ -41,7 +41,7 @@ class UpdateTree(NamedTuple):
 def analyse(graph, order):
     """Return the order of elimination, its inverse, the supernodes and their family.
 
-    `order` lists all vertices of the graph; it is overwritten.
+    `order` lists all vertices of the graph, and is overwritten.
     """
     nested_dissection(graph, order)
     parents, counts = elimination_tree(graph, order, inverse(order))
@@ -84,9 +84,9 @@ def relabelled(parents, relabelling):
 def elimination_tree(graph, order, place):
     """Return the parent of each column of P A P', -1 for a root, and the lengths of L's columns.
 
-    Row i of L has entries in the columns of row i of A and in their ancestors up to i, so that
-    climbing from each of them finds both (Davis 2005, "Algorithm 849: A Concise Sparse Cholesky
-    Factorization Package"). `order` lists the vertices as they are eliminated, `place` inverts it.
+    Row i of L has entries in the columns of row i of A and in their ancestors up to i. Climbing
+    from each column finds both (Davis 2005, "Algorithm 849: A Concise Sparse Cholesky Factorization
+    Package"). `order` lists the vertices in order of elimination, `place` inverts the list.
     """
     n = len(order)
     parents, visited, counts = np.full(n, -1, np.int32), np.empty(n, np.int32), np.ones(n, np.int32)
@@ -141,7 +141,7 @@ def fundamental(parents, counts):
 
 
 def amalgamate(member, parents, counts):
-    """Return the final supernode that each supernode becomes a part of."""
+    """Return the final supernode of each supernode."""
     count = member[-1] + 1 if len(member) > 0 else 0
     last = np.zeros(count, np.int64)
     width, filled = np.zeros(count, np.int64), np.zeros(count, np.int64)
@@ -219,8 +219,8 @@ def structure(graph, order, place, columns, parents, counts):
 def row_lists(graph, order, place, member, above, starts):
     """Return the rows below each supernode, list after list.
 
-    Row i of L reaches from the supernodes of its entries in A up to its own; running through the
-    rows in order leaves every list sorted.
+    Row i of L reaches from the supernodes of its entries in A up to its own supernode. Running
+    through the rows in order leaves every list sorted.
     """
     rows, filled = np.empty(starts[-1], np.int32), starts.copy()
     visited = np.full(len(above), -1, np.int32)

@@ -1,10 +1,9 @@
 """Solve L L' x = b by forward and backward substitution, three right-hand sides together.
 
-L is read once in the order in which it is stored, and once in reverse.
+L is read once in its stored order, and once in reverse.
 
-Three right-hand sides go through together, in the lanes of a vector register, so that L comes from
-memory once for all of them; and four columns at a time, so that the unknowns come from the cache
-once for all of these.
+Three right-hand sides go through together, in the lanes of a vector register: L comes from memory
+once for all three. Four columns go through at a time: unknowns come from the cache once for four.
 
 Indices are made unsigned (`at`) where speed matters: the test for a negative index takes as long as
 the arithmetic.
@@ -17,9 +16,9 @@ from numpy import uint64 as at
 
 from ..backend.simd.vectors import load_row, prefetch, scale_row, store_row, subtract_scaled
 
-# Right-hand sides solved together, and the doubles of a register that holds one unknown of each.
+# Right-hand sides solved together, and the doubles of a register with an unknown of each.
 RIGHT_HAND_SIDES, REGISTER = 3, 4
-# An L of more entries than NEAR does not stay in a near cache: prefetch it AHEAD of its use.
+# An L of more than NEAR entries does not stay in a near cache: it is prefetched AHEAD of use.
 NEAR, AHEAD = 2**20, 1024
 LINE = 8  # entries that come from memory together
 
@@ -61,7 +60,7 @@ def row_below(below, i):
 def eliminate(values, p, first, last, below, y, ahead):
     """Solve for the unknowns of a supernode and subtract their terms from the rows below.
 
-    Its columns begin at p in `values`; return where they end.
+    The columns of the supernode begin at p in `values`; return their end.
     """
     j = first
     while j + 4 <= last:
@@ -86,9 +85,9 @@ def eliminate(values, p, first, last, below, y, ahead):
 
 
 def substitute(values, p, first, last, below, y, ahead):
-    """Solve for the unknowns of a supernode when all unknowns below it are known.
+    """Solve for the unknowns of a supernode when all unknowns below are known.
 
-    Its columns end at p in `values`; return where they begin.
+    The columns of the supernode end at p in `values`; return their beginning.
     """
     j = last
     while (j - first) % 4 > 0:
@@ -119,7 +118,7 @@ def prefetch_columns(values, p, size):
 
 
 def four_columns(p, size):
-    """Return where four columns begin, the first of them, of `size` entries, at p."""
+    """Return the beginnings of four columns, the first of `size` entries at p."""
     return p, p + size, p + 2 * size - 1, p + 3 * size - 3
 
 
