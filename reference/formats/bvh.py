@@ -1,12 +1,11 @@
 """BVH, the Biovision hierarchy: motions of a skeleton, a common format of animation programs.
 
 The joints follow the order of the file, depth first. An end site becomes a joint without channels,
-named after its parent with " end" added, or " end 2" and so on where a joint has that name; an end
-that coincides with its parent is left out.
-Rotation channels compose in their order, R = R_1 R_2 R_3, about moving axes. Position channels
-replace the OFFSET, axis by axis, as animation programs write them; a program that adds the two
-reads the same from a file whose root has OFFSET zero. Lengths are in the unit of the file; angles
-are in degrees in the file and become quaternions.
+named after its parent with " end" added, or " end 2" and so on if the name is taken. An end at its
+parent's position is left out. Rotation channels compose in their order, R = R_1 R_2 R_3, about
+moving axes. Position channels replace the OFFSET, axis by axis, as animation programs write them. A
+program that adds the two reads the same from a file whose root has OFFSET zero. Lengths are in the
+unit of the file; angles are in degrees in the file and become quaternions.
 """
 
 import contextlib
@@ -28,7 +27,7 @@ from ..skeleton import Pose, Skeleton, checked_skeleton
 from .robot import MAX_JOINTS, ORIGIN
 from .source import checked_path, read_text, warn
 
-# Frames times joints, so that a motion needs at most about a gigabyte.
+# Frames times joints: a motion needs at most about a gigabyte.
 MAX_POSES = 20_000_000
 # In a line of the hierarchy.
 MAX_CHARACTERS = 100_000
@@ -40,12 +39,12 @@ ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 CYCLIC = ("XYZ", "YZX", "ZXY")
 DECIMALS = 6
 POSITIONS = "Xposition Yposition Zposition"
-# Deeper joints are not indented further, so that the text of a long chain stays linear in it.
+# Deeper joints are not indented further: the text of a long chain stays linear in its length.
 DEEPEST_INDENT = 40
 
 
 class Motion(NamedTuple):
-    """A skeleton and its poses over time; `bvh.write(path, *motion)` writes it to a file."""
+    """A skeleton and its poses over time; `bvh.write(path, *motion)` writes a motion to a file."""
 
     skeleton: Skeleton  # the offset of its root is the root's position in the first frame
     local_rotations: FloatArray  # (frame, joint, 4)
@@ -57,8 +56,8 @@ class Motion(NamedTuple):
     def pose(self) -> Pose:
         """Return the global poses of all joints, with frames as the leading axis.
 
-        Without position channels it equals `forward_kinematics(skeleton, local_rotations)`. Raise a
-        ValueError if the skeleton is none, or the rotations or offsets are not its own.
+        Without position channels the poses equal `forward_kinematics(skeleton, local_rotations)`.
+        Raise a ValueError if the skeleton is none, or the rotations or offsets are not its own.
         """
         skeleton = checked_skeleton(self.skeleton)
         count = skeleton.joint_count
@@ -73,13 +72,13 @@ def read(path: str | Path) -> Motion:
     """Return the motion in a file.
 
     A single frame beyond the count in the file, as some programs write, is dropped with a warning.
-    Raise a ValueError if it cannot be read or is not a BVH file; names the file and the line.
+    Raise a ValueError, naming file and line, if the file cannot be read or is not a BVH file.
     """
     return _motion(read_text(path), str(path))
 
 
 def parse(text: str) -> Motion:
-    """Return the motion that a text describes; see `read`."""
+    """Return the motion described by a text; see `read`."""
     return _motion(arguments.text("text", text), "BVH")
 
 
@@ -112,7 +111,7 @@ def _motion(text: str, origin: str) -> Motion:
 
 
 class _Lines:
-    """An iterator over the non-empty lines of a text that knows the current line number."""
+    """An iterator over the non-empty lines of a text with the current line number."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -211,7 +210,7 @@ class _Tree:
         self.unopened = True
 
     def close(self, joint: _Joint) -> None:
-        """Finish a joint; drop an end site that coincides with its parent."""
+        """Finish a joint; drop an end site at its parent's position."""
         if not joint.offset:
             raise ValueError(f"expected an OFFSET in {joint.name!r:.40}, got none")
         self.path.pop()
@@ -219,7 +218,7 @@ class _Tree:
             self.joints.pop()
 
     def name_ends(self) -> None:
-        """Give each end site a name that no joint has."""
+        """Give each end site a name of its own."""
         counts: dict[int, int] = {}
         for joint in self.joints:
             stem, count = joint.name, counts.get(joint.parent, 1)
@@ -276,7 +275,7 @@ def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, Floa
 
 
 def _extra_frame(lines: _Lines, values: FloatArray) -> int:
-    """Return the line number of a single extra frame, 0 if the text ends after the last one."""
+    """Return the line number of a single extra frame, 0 if the text ends after the last frame."""
     count, width = values.shape
     line = next(iter(lines), "")
     number = lines.number
@@ -326,13 +325,13 @@ def write(
     *,
     order: str = "ZXY",
 ) -> None:
-    """Write a motion to a file, replacing an existing one.
+    """Write a motion to a file, in place of an existing file.
 
     Args:
         path: of the file.
         skeleton: a Skeleton or an Articulation.
-        local_rotations: (frame, joint, 4), or (joint, 4) for one pose, as `solve_ik` and `track`
-            return them; for an Articulation its coordinates, (frame, coordinate).
+        local_rotations: (frame, joint, 4), or (joint, 4) for a single pose, as returned by
+            `solve_ik` and `track`; for an Articulation its coordinates, (frame, coordinate).
         frame_time: time between frames [s].
         offsets: each joint's position in its parent's frame, (frame, joint, 3), or the root's
             position, (frame, 3); by default the skeleton's offsets.
@@ -388,11 +387,11 @@ def format(
 def euler_angles(R: FloatArray, order: str) -> FloatArray:
     """Return angles [degrees], (frame, joint, 3), of R = R_1(a_1) R_2(a_2) R_3(a_3), (..., 4).
 
-    Bernardes and Viollet 2022: with e the sign of the axes' order, (a_3 + e a_1)/2 and
-    (a_3 - e a_1)/2 are the polar angles of two points in the plane whose coordinates are sums of
-    the quaternion's components, and the ratio of their radii gives a_2. At gimbal lock one of them
-    is the origin, whose angle is arbitrary and has no effect. Angles start between -180 and 180 and
-    are continuous from frame to frame.
+    Bernardes and Viollet 2022: let e be the sign of the axes' order. Then (a_3 + e a_1)/2 and (a_3
+    - e a_1)/2 are the polar angles of two points in the plane, whose coordinates are sums of the
+    quaternion's components. The ratio of their radii gives a_2. At gimbal lock one point is the
+    origin, whose angle is arbitrary and has no effect. Angles start between -180 and 180 and are
+    continuous from frame to frame.
     """
     first, second, third = (R[..., 1 + "XYZ".index(axis)] for axis in order)
     first = -first if order in CYCLIC else first
@@ -444,7 +443,7 @@ def _children(skeleton: Skeleton) -> list[list[int]]:
 
 
 def _end_sites(skeleton: Skeleton, R: FloatArray, shifts: np.ndarray) -> set[int]:
-    """Return the joints that can be written as end sites without loss."""
+    """Return the joints that end sites can stand for without loss."""
     ends = set()
     children = _children(skeleton)
     for siblings in children:

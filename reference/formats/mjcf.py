@@ -1,21 +1,20 @@
 """The kinematic part of an MJCF file, MuJoCo's own format.
 
 Joint 0 of the articulation is the world. Bodies follow depth first in the order of the file, and
-the coordinates equal those of MuJoCo's qpos. Every body becomes a joint with its name and pose. A
-body with several joints becomes one joint for each, named "body/joint", except that the last one
-has the name of the body; if its anchor is not the body's origin, a fixed joint with the name of the
-body follows. A body without a name is called "body#3" by its index, a joint without one "hinge1" by
-its type and its index in the body.
+the coordinates equal MuJoCo's qpos. Every body becomes a joint with its name and pose. A body with
+several joints becomes a joint for each, named "body/joint"; the last has the name of the body. If
+its anchor is not the body's origin, a fixed joint with the name of the body follows. A body without
+a name is called "body#3" by its index, a joint "hinge1" by its type and its index in the body.
 
 `home` is the configuration in the file, with each joint at its `ref`. A free joint moves in the
-world's frame. MuJoCo limits the total angle of a ball; here its tilt and its twist about z are each
-limited by that angle, which allows all that MuJoCo does, and more. Frames, nested defaults and
-includes from one folder are supported. Active equalities `connect`, `weld` and `joint` become
-tasks (`Robot.equalities`); those between tendons and flexes, and elements that do not affect
-forward kinematics, such as keyframes, are ignored. A body's mass is
-that of its `inertial`, else of its geoms, by their mass or density; NaN if one of them is a mesh or
-a shell of a density. Elements that generate bodies (replicate, attach, composite, flexcomp) are
-refused, except for a replicate without bodies, which is ignored with a warning.
+world's frame. MuJoCo limits the total angle of a ball. Here the same angle limits its tilt and its
+twist about z each, which allows all that MuJoCo does, and more. Frames, nested defaults and
+includes from one folder are supported. Active equalities `connect`, `weld` and `joint` become tasks
+(`Robot.equalities`). Equalities between tendons and flexes are ignored, and so are elements without
+effect on forward kinematics, such as keyframes. A body's mass is its `inertial`'s, or else its
+geoms', by their mass or density. The mass is NaN if a geom is a mesh or a shell of a density.
+Elements that generate bodies (replicate, attach, composite, flexcomp) are refused. A replicate
+without bodies is ignored with a warning.
 """
 
 import math
@@ -67,7 +66,7 @@ Z = (0.0, 0.0, 1.0)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 POLYNOMIAL = (0.0, 1.0, 0.0, 0.0, 0.0)  # of a coupling, where the file gives no coefficients
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-# The attributes of a default class that are read, by the tag of the elements they are for.
+# The attributes read from a default class, by the tag of their elements.
 DEFAULTS = {
     "joint": ("type", "pos", "axis", "range", "limited", "ref"),
     "geom": (
@@ -90,16 +89,16 @@ DENSITY = 1000.0  # of a geom that has none [kg/m³]
 
 
 def read(path: str | Path, *, root: str | Path | None = None) -> Robot:
-    """Return the robot or character that a file describes.
+    """Return the robot or character described by a file.
 
     Args:
         path: of the file.
-        root: the folder that must contain all included files after symbolic links are resolved;
-            that of the file if None.
+        root: the folder for all included files after symbolic links are resolved; by default the
+            file's own folder.
 
     Raises:
-        ValueError: naming file, line and element, if it cannot be read, is not an MJCF file,
-            includes one from outside the root, or has elements that generate bodies.
+        ValueError: naming file, line and element, if the file cannot be read, is not an MJCF file,
+            includes a file from outside the root, or has elements that generate bodies.
     """
     element = xml.read(path)
     _include_files(element, Path(path), root)
@@ -107,7 +106,7 @@ def read(path: str | Path, *, root: str | Path | None = None) -> Robot:
 
 
 def parse(text: str) -> Robot:
-    """Return the robot that a text describes, which can include no files; see `read`."""
+    """Return the robot described by a text, which can include no files; see `read`."""
     root = xml.parse(text, "MJCF")
     for element in root.walk():
         if element.tag == "include":
@@ -118,7 +117,7 @@ def parse(text: str) -> Robot:
 def _include_files(root: Element, path: Path, top: str | Path | None) -> None:
     """Replace all includes by the content of the files, each of which may be included once.
 
-    `top` is the folder that must contain all files; that of the main file at `path` if None.
+    `top` is the folder for all files; None stands for the folder of the main file at `path`.
     """
     main = path.resolve()
     folder = main.parent
@@ -161,7 +160,7 @@ def _included(include: Element, file: Path, main_folder: Path, top: Path) -> Pat
 
 
 def _resolved(path: Path) -> Path | None:
-    """Return a path with symbolic links resolved; None if it is not a valid path."""
+    """Return a path with symbolic links resolved; None if the path is not valid."""
     try:
         path.exists()  # raises for names that are too long and for cycles of links
         return path.resolve()
@@ -184,7 +183,7 @@ class _Transform(NamedTuple):
         return _Transform(self.apply(inner.x), multiply(self.R, inner.R))
 
 
-# The attributes of a default class by the tag of the elements they are for.
+# The attributes of a default class by the tag of their elements.
 _Class = dict[str, dict[str, str]]
 
 
@@ -237,7 +236,7 @@ class _CompilerSettings(NamedTuple):
         return IDENTITY
 
     def _from_euler(self, angles: Sequence[float]) -> Quaternion:
-        """Return the product of rotations about moving axes, or about fixed ones for capitals."""
+        """Return the product of rotations about moving axes, or about fixed axes for capitals."""
         R = IDENTITY
         for axis, angle in zip(self.sequence, angles, strict=True):
             factor = exponential(scale(angle * self.angle, AXES[axis.lower()]))
@@ -269,7 +268,7 @@ def _settings(root: Element) -> _CompilerSettings:
 
 
 def _one_of(element: Element, name: str, valid: Sequence[str], default: str) -> str:
-    """Return an attribute that is one of several words."""
+    """Return an attribute from a list of valid words."""
     value = element.word(name, default)
     if value not in valid:
         raise element.error(f"expected one of {', '.join(valid)} for {name}, got {value!r:.80}")
@@ -314,7 +313,7 @@ def _classes(root: Element) -> dict[str, _Class]:
 
 
 def _own_defaults(element: Element, tag: str) -> dict[str, str]:
-    """Return the attributes that a <default> itself gives to elements of a tag."""
+    """Return the attributes of a <default> itself for elements of a tag."""
     child = element.single(tag)
     own = child.attributes if child else {}
     return {key: own[key] for key in DEFAULTS[tag] if key in own}
@@ -349,7 +348,7 @@ class _Joint(NamedTuple):
 
 
 def _robot(root: Element, origin: str) -> Robot:
-    """Return the robot or character that a <mujoco> element describes."""
+    """Return the robot or character described by a <mujoco> element."""
     if root.tag != "mujoco":
         raise root.error("expected a <mujoco>")
     tree = _Tree(_settings(root))
@@ -391,7 +390,7 @@ def _equalities(root: Element, tree: "_Tree", robot: Robot) -> Iterator[IKTask]:
 
 
 def _index(element: Element, attribute: str, indices: Mapping[str, int]) -> int:
-    """Return the index of what an attribute names, 0, the world, if it is missing."""
+    """Return the index of the name in an attribute; without the attribute 0, the world."""
     name = element.word(attribute, "world")
     if name not in indices:
         raise element.error(f"expected a name in the file for {attribute}, got {name!r:.80}")
@@ -401,8 +400,8 @@ def _index(element: Element, attribute: str, indices: Mapping[str, int]) -> int:
 def _closure(element: Element, first: int, second: int, poses: list[_Transform]) -> FrameTask:
     """Return a connection of two points, or of two frames.
 
-    The anchor of a connection is in the first body, that of a weld in the second; the other point
-    and the relative rotation are as at home, or for a weld as its relpose says.
+    The anchor of a connection is in the first body, the anchor of a weld in the second. The other
+    point and the relative rotation are as at home, or as in the relpose of a weld.
     """
     anchor = element.numbers("anchor", ORIGIN)
     inverse = _Transform(R=conjugate(poses[first].R))
@@ -420,7 +419,7 @@ def _closure(element: Element, first: int, second: int, poses: list[_Transform])
 
 
 def _coupling(element: Element, robot: Robot) -> Coupling:
-    """Return a joint that follows a polynomial of another, or stays."""
+    """Return a joint that follows a polynomial of another joint, or stays."""
     count = len(element.attributes.get("polycoef", "").split())
     coefficients = (*element.numbers("polycoef", POLYNOMIAL[:count]), *POLYNOMIAL[count:])
     joint, leader = _index(element, "joint1", robot.joints), None
@@ -482,11 +481,11 @@ class _Tree:
         return bodies
 
     def add_sites(self, sites: list[_Part], link: int) -> None:
-        """Add the sites of a body that have a name."""
+        """Add the named sites of a body."""
         self.sites |= {site.element.attributes.get("name", ""): (link, site) for site in sites}
 
     def site(self, equality: Element, attribute: str) -> tuple[int, _Transform]:
-        """Return the link and the frame in it of a site that an equality names."""
+        """Return the link of a site named by an equality, and the site's frame in the link."""
         name = equality.word(attribute)
         if name not in self.sites:
             raise equality.error(f"expected a site in the file for {attribute}, got {name!r:.80}")
@@ -573,7 +572,7 @@ class _Tree:
     def record(
         self, element: Element, joint: _Joint, path: str, number: int, pose: _Transform
     ) -> None:
-        """Store the index and home of a joint by its name, or by its path if it has none."""
+        """Store the index and home of a joint by its name, or without a name by its path."""
         name = joint.label if "name" in element.attributes else path
         if name in self.joints:
             raise element.error(f"expected a joint's name once, got {name!r:.80} twice")

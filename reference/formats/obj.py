@@ -37,19 +37,19 @@ class Mesh(NamedTuple):
 
 
 def read_obj(path: str | os.PathLike[str]) -> Mesh:
-    """Return the mesh in an OBJ file of at most 256 MiB; errors are those of `parse_obj`."""
+    """Return the mesh in an OBJ file of at most 256 MiB; errors are as for `parse_obj`."""
     return parse_obj(read_text(path), name=str(path))
 
 
 def parse_obj(text: str, *, name: str = "text") -> Mesh:
-    """Return the mesh that an OBJ text describes, with its vertices in their order.
+    """Return the mesh described by an OBJ text, with its vertices in their order.
 
     Polygons become fans of triangles about their first corner. A weight or colour after the third
     coordinate of a vertex is ignored. A backslash at the end of a line, before any comment,
-    continues it. Positive indices may refer to later vertices; negative ones count back from the
-    last vertex so far. Raise a ValueError if a statement is not of the format, a coordinate is not
-    a finite number, a face has fewer than three corners, repeats a vertex or refers to one that
-    does not exist, or there are no faces; names the text and the line.
+    continues the line. Positive indices may refer to later vertices; negative indices count back
+    from the last vertex so far. Raise a ValueError if a statement is not of the format, a
+    coordinate is not a finite number, or there are no faces. The same goes for a face with fewer
+    than three corners, a repeated vertex or an unknown vertex. Errors name the text and the line.
     """
     arguments.text("text", text)
     arguments.text("name", name)

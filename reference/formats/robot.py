@@ -1,4 +1,4 @@
-"""The links that a reader has read, and the robot that they make."""
+"""The links from a reader, and the robot that they make."""
 
 import contextlib
 from collections.abc import Mapping
@@ -24,8 +24,7 @@ INFINITY = float("inf")
 class RobotLink(NamedTuple):
     """A joint of an articulation, as read from a file; see `Articulation` for the fields.
 
-    Its offset [m] and frame are in the frame of its parent, an index among the links, -1 of the
-    root.
+    Its offset [m] and frame are in the frame of its parent, an index of a link, -1 of the root.
     """
 
     name: str
@@ -89,7 +88,7 @@ def assemble(
 
 
 def mass_of(element: Element | None, name: str) -> float:
-    """Return the mass that an attribute gives [kg], NaN if it gives none."""
+    """Return the mass in an attribute [kg], NaN if missing."""
     mass = (float("nan"),)
     if element is not None:
         with contextlib.suppress(ValueError):
@@ -98,7 +97,7 @@ def mass_of(element: Element | None, name: str) -> float:
 
 
 def centre_of(element: Element | None, name: str) -> Vector:
-    """Return the centre of mass that an attribute gives [m], zero if it gives none."""
+    """Return the centre of mass in an attribute [m], zero if missing."""
     if element is not None:
         with contextlib.suppress(ValueError):
             return element.numbers(name, ORIGIN)

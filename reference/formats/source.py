@@ -10,7 +10,7 @@ from ..arguments import shown
 
 LARGEST = 256 * 2**20  # bytes
 UTF_8, UTF_16 = "utf-8-sig", "utf-16"
-# Of an XML file in an encoding of one byte per character; the others are declared for UTF-8.
+# Of an XML file in an encoding of a byte per character; other declarations are for UTF-8.
 DECLARATION = re.compile(
     rb"""\s*<\?xml\s[^<>]{0,200}?\sencoding\s*=\s*["']"""
     rb"""(iso-8859-(?:1[013456]?|[2-9])|latin-?1|windows-125[0-8])["']""",
@@ -30,10 +30,10 @@ def warn(problem: str) -> None:
 def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST, is_xml: bool = False) -> str:
     r"""Return the text of a file with line ends \n and without a byte order mark.
 
-    XML may be in UTF-16 or an encoding that it declares (`xml_encoding`), other text is UTF-8.
+    XML may be in UTF-16 or in its declared encoding (`xml_encoding`), other text is UTF-8.
 
     Raises:
-        ValueError: as for `read_bytes`, or if it contains a NUL byte or is in another encoding.
+        ValueError: as for `read_bytes`, or if the file contains a NUL byte or has another encoding.
     """
     content = read_bytes(path, largest=largest)
     encoding = xml_encoding(content) if is_xml else UTF_8
@@ -57,7 +57,7 @@ def xml_encoding(content: bytes) -> str:
 
 
 def checked_path(path: str | os.PathLike[str]) -> str:
-    """Return the path of a file as a string; a ValueError if it is none, empty or has a NUL."""
+    """Return the path of a file as a string; a ValueError if it is no path, empty or has a NUL."""
     text = os.fspath(path) if isinstance(path, str | os.PathLike) else None
     if not isinstance(text, str) or not text or "\0" in text:
         raise ValueError(f"path: expected a path, got {shown(path)}")
@@ -65,7 +65,7 @@ def checked_path(path: str | os.PathLike[str]) -> str:
 
 
 def read_bytes(path: str | os.PathLike[str], *, largest: int = LARGEST) -> bytes:
-    """Return the content of a file; read at most `largest` + 1 bytes of it.
+    """Return the content of a file; read at most `largest` + 1 bytes.
 
     Raise a ValueError if the file does not exist, is not regular, cannot be read, or is larger than
     `largest` bytes.

@@ -1,14 +1,13 @@
 """The kinematic part of a URDF file.
 
-Every link becomes the joint of the articulation that moves it, with the link's name.
-The root link is fixed to the world; a file with a moving base has a floating joint. Links precede
-their descendants, and siblings keep the order of the file. A planar joint becomes two slides, named
-after the joint with " x" and " y" added, and a hinge. A revolute or prismatic joint whose limit has
-neither `lower` nor `upper` is locked at zero, with a FormatWarning; a mimic joint without these
-numbers follows its leader anywhere. Links without an inertial have no mass.
-The quat_xyzw of an origin is read in files of version 1.1 or 1.2, and passed over with a warning
-in those of version 1.0, like Pinocchio.
-Shapes, transmissions and safety controllers are ignored.
+Every link becomes the joint of the articulation that moves the link, with the link's name. The root
+link is fixed to the world; a file with a moving base has a floating joint. Links precede their
+descendants, and siblings keep the order of the file. A planar joint becomes two slides, named after
+the joint with " x" and " y" added, and a hinge. A revolute or prismatic joint whose limit has
+neither `lower` nor `upper` is locked at zero, with a FormatWarning. A mimic joint without these
+numbers follows its leader anywhere. Links without an inertial have no mass. The quat_xyzw of an
+origin is read in files of version 1.1 or 1.2; in files of version 1.0 it is ignored with a warning,
+like in Pinocchio. Shapes, transmissions and safety controllers are ignored.
 """
 
 from collections.abc import Mapping
@@ -43,8 +42,8 @@ KINDS = {
     "floating": "free",
     "planar": "hinge",
 }
-# Treatments of limits with lower > upper. MuJoCo drops them; Pinocchio keeps both as they are, so
-# that no coordinate is within them.
+# Treatments of limits with lower > upper. MuJoCo drops such limits; Pinocchio keeps both, and no
+# coordinate is within them.
 CROSSED_LIMITS = ("unlimited", "ordered", "refused")
 VERSIONS = ("1.0", "1.1", "1.2")  # of URDF; quaternions are read from the second on
 LIMITED_TYPES = "revolute", "prismatic"
@@ -62,24 +61,24 @@ class _Joint(NamedTuple):
 
 
 def read(path: str | Path, *, mimic: bool = True, crossed_limits: str = "unlimited") -> Robot:
-    """Return the robot that a file describes, at home where its coordinates are zero.
+    """Return the robot described by a file, at home where its coordinates are zero.
 
     Args:
         path: of the file.
-        mimic: whether mimic joints follow their leaders; if False, they move independently.
-        crossed_limits: treatment of limits with lower > upper: "unlimited" drops them, as MuJoCo
-            does, "ordered" exchanges them, both with a FormatWarning; "refused" raises.
+        mimic: whether mimic joints follow their leaders or, if False, move independently.
+        crossed_limits: treatment of limits with lower > upper: "unlimited" drops the limits, like
+            MuJoCo, "ordered" exchanges the two, both with a FormatWarning; "refused" raises.
 
     Raises:
-        ValueError: naming file, line and element, if it cannot be read or is not a URDF file of one
-            tree of links; naming the argument, if `crossed_limits` is none of these.
+        ValueError: naming file, line and element, if the file cannot be read or is not a URDF file
+            with a single tree of links; naming the argument, if `crossed_limits` is unknown.
     """
     arguments.choice("crossed_limits", crossed_limits, CROSSED_LIMITS)
     return _robot(xml.read(path), str(path), mimic, crossed_limits)
 
 
 def parse(text: str, *, mimic: bool = True, crossed_limits: str = "unlimited") -> Robot:
-    """Return the robot that a text describes; see `read`."""
+    """Return the robot described by a text; see `read`."""
     arguments.choice("crossed_limits", crossed_limits, CROSSED_LIMITS)
     return _robot(xml.parse(text, "URDF"), "URDF", mimic, crossed_limits)
 
@@ -226,7 +225,7 @@ def _base(root: Element, joints: Mapping[str, _Joint], links: Mapping[str, list[
 
 
 def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list[RobotLink]:
-    """Return the links that a joint becomes, numbered from `number` on."""
+    """Return the links of a joint, numbered from `number` on."""
     origin = joint.element.single("origin")
     offset = origin.numbers("xyz", ORIGIN) if origin else ORIGIN
     if joint.type in ("fixed", "floating"):

@@ -1,7 +1,7 @@
 """A reader of untrusted XML files: elements and attributes with their line numbers.
 
 Files are in UTF-8, in UTF-16 with a byte order mark, or in ISO-8859-n or Windows-125n as declared.
-A document type declaration is refused, and with it entities that expand without bound or read other
+A document type declaration is refused, and with it entities that expand without bound or read
 files.
 """
 
@@ -19,7 +19,7 @@ from .source import read_text, warn
 MAX_ELEMENTS = 100_000
 # The limit of TinyXML2, the parser of MuJoCo and ROS.
 MAX_DEPTH = 500
-# In an attribute that is read: a default value is copied to every joint.
+# In an attribute to be read: a default value is copied to every joint.
 MAX_CHARACTERS = 2000
 MISPLACED_DECLARATION = re.compile(r"(\s+)<\?xml\s[^<>]{0,200}\?>")
 
@@ -27,7 +27,7 @@ Numbers = TypeVar("Numbers", bound=tuple[float, ...])
 
 
 class Element(NamedTuple):
-    """An element of a file; its methods raise a ValueError that says where it is."""
+    """An element of a file; its methods raise a ValueError with the location of the element."""
 
     tag: str  # its name
     attributes: dict[str, str]  # their values, by name
@@ -43,18 +43,18 @@ class Element(NamedTuple):
             waiting += reversed(element.children)
 
     def children_named(self, tag: str) -> list["Element"]:
-        """Return the children of that name."""
+        """Return the children of this name."""
         return [child for child in self.children if child.tag == tag]
 
     def single(self, tag: str) -> "Element | None":
-        """Return the only child of that name, None if there is none."""
+        """Return the only child of this name, None without such a child."""
         matches = self.children_named(tag)
         if len(matches) > 1:
             raise self.error(f"expected at most one <{tag}>, got {len(matches)}")
         return matches[0] if matches else None
 
     def word(self, name: str, default: str | None = None) -> str:
-        """Return an attribute, or the default where it is missing."""
+        """Return an attribute, or the default where the attribute is missing."""
         value = self._short(name) if name in self.attributes else default
         if not value:
             got = "none" if value is None else "an empty one"
@@ -79,7 +79,7 @@ class Element(NamedTuple):
         return cast(Numbers, values)
 
     def error(self, problem: str) -> ValueError:
-        """Return an error that names the location, the element and the problem."""
+        """Return an error with the location, the element and the problem."""
         name = f" name={self.attributes['name']!r:.60}" if "name" in self.attributes else ""
         return ValueError(f"{self.location}: <{self.tag:.60}{name}>: {problem}")
 
@@ -101,10 +101,11 @@ def read(path: str | Path) -> Element:
 
 
 def parse(text: str, origin: str) -> Element:
-    """Return the root element of a text; origin names it in errors.
+    """Return the root element of a text; errors name `origin`.
 
-    White space before <?xml ...?> gets a warning. Raise a ValueError if it is not well-formed, has
-    a document type, more than MAX_ELEMENTS elements, or some nested deeper than MAX_DEPTH.
+    White space before <?xml ...?> gets a warning. Raise a ValueError if the text is not
+    well-formed, or has a document type, more than MAX_ELEMENTS elements, or more levels than
+    MAX_DEPTH.
     """
     builder, text = _Builder(origin), arguments.text("text", text)
     if match := MISPLACED_DECLARATION.match(text):
@@ -121,7 +122,7 @@ def parse(text: str, origin: str) -> Element:
 
 
 class _Builder:
-    """A handler of the parser's events that builds the tree of elements."""
+    """A handler of the parser's events to build the tree of elements."""
 
     def __init__(self, origin: str) -> None:
         self.origin = origin
@@ -156,7 +157,7 @@ class _Builder:
 
 
 def _number(word: str) -> float:
-    """Return the number that a word denotes, possibly infinite, or NaN if it denotes none."""
+    """Return the number in a word, possibly infinite, or NaN if the word is no number."""
     try:
         return math.nan if "_" in word else float(word)
     except ValueError:
