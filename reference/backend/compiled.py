@@ -1,10 +1,11 @@
-"""One source, two backends: every kernel runs compiled by numba, or in the Python interpreter.
+"""A single source, two backends: every kernel runs compiled by numba, or in the Python interpreter.
 
-A kernel is written as a plain Python function on floats, arrays and tuples of them. `Kernel(plain)`
-runs it compiled; inside `with set_backend("python"):` the interpreter runs the very same source.
+A kernel is written as a plain Python function on floats, arrays and tuples of floats and arrays.
+`Kernel(plain)` runs the compiled kernel; inside `with set_backend("python"):` the interpreter runs
+the very same source.
 
-The compiled version is *rebuilt* from the plain one with every callee replaced by its own compiled
-version, so that the plain functions stay as they are and can serve as the oracle. Numba's disk
+The compiled version is *rebuilt* from the plain function with every callee replaced by its own
+compiled version. The plain functions stay as they are and can serve as the oracle. Numba's disk
 cache compares the file of a function only: it would miss changes of callees and constants in other
 files. The rebuilt function therefore has a digest of all its sources in its name.
 """
@@ -26,7 +27,7 @@ import numpy as np
 from .. import arguments
 from . import compilation
 
-# A plain function at module level: it has __code__ and __globals__, which Callable cannot say.
+# A plain function at module level with __code__ and __globals__, which Callable cannot say.
 PythonKernel = Any
 
 BACKENDS = ("numba", "python")
@@ -34,7 +35,7 @@ BACKENDS = ("numba", "python")
 RELAXATIONS = {"reassoc", "contract", "nsz"}
 # Names in kernels that make arrays.
 ALLOCATING = {"np", "copy"}
-# The size of callees that are inlined wherever they are called, in the interpreter's instructions.
+# The largest size of callees always inlined, in the interpreter's instructions.
 INLINED_SIZE = 5000
 # The interpreter's instructions that read a global.
 GLOBAL_LOADS = {"LOAD_GLOBAL", "LOAD_NAME"}
@@ -61,7 +62,7 @@ def set_backend(name: str) -> Iterator[None]:
 class Kernel:
     """A kernel that runs on the backend in force; compiled at its first call.
 
-    `relaxed` lets the compiler reorder sums and fuse products with them: the backends then agree
+    `relaxed` lets the compiler reorder sums and fuse products with sums. The backends then agree
     only to rounding, and dense loops run up to four times faster. `label` is its name for users.
     Callees of more than `inlined_size` instructions of the interpreter are inlined only once.
     """
@@ -107,12 +108,12 @@ def compile_kernel(
 ) -> PythonKernel:
     """Compile a kernel and all kernels it calls, from their plain sources; cached on disk.
 
-    Division by zero gives infinity or NaN, as in NumPy. Unless it is relaxed, floating point is
-    strict: no reordering and no fused operations, so that both backends round alike.
+    Division by zero gives infinity or NaN, as in NumPy. Unless the kernel is relaxed, floating
+    point is strict: no reordering and no fused operations, and both backends round alike.
 
     Callees are inlined: a call would pass every number of every array in its tuples, more than a
-    hundred, and take longer than most kernels. Exceptions are callees above a size that are called
-    in several places, as copies of them would take seconds to compile.
+    hundred, and take longer than most kernels. Exceptions are callees above a size in several
+    places: their copies would take seconds to compile.
 
     Where NUMBA_DISABLE_JIT turns numba's compiler off, the interpreter runs the kernel.
     """
@@ -142,7 +143,7 @@ def bind(kernel: PythonKernel, **bound: Any) -> PythonKernel:
 def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
     """Return a decorator of functions whose compiled versions are in another module.
 
-    It is for vector instructions. The module is imported when a caller is compiled.
+    The decorator is for vector instructions. The module is imported when a caller is compiled.
     """
 
     def mark(plain: PythonKernel) -> PythonKernel:
@@ -212,8 +213,8 @@ def _inlined_size(kernel: PythonKernel) -> int:
 def allocates(kernel: PythonKernel) -> bool:
     """Return whether a kernel or its callees may make arrays.
 
-    Otherwise it is compiled without counting references to its arguments, which takes half of the
-    time where a tuple holds many arrays; numba would report a wrong answer as an error.
+    If not, the kernel is compiled without counting references to its arguments, which takes half of
+    the time where a tuple holds many arrays. For a wrong answer numba would report an error.
     """
     names = {name for code in _code_objects(kernel.__code__) for name in code.co_names}
     return bool(ALLOCATING & names) or any(
@@ -239,7 +240,7 @@ def digest(kernel: PythonKernel) -> str:
 
 
 def _named_globals(kernel: PythonKernel) -> list[tuple[str, Any]]:
-    """Return the globals that a kernel mentions, with their values, in the order of their names."""
+    """Return the globals mentioned by a kernel, with their values, in the order of their names."""
     names = sorted({name for code in _code_objects(kernel.__code__) for name in code.co_names})
     return [(name, kernel.__globals__[name]) for name in names if name in kernel.__globals__]
 
@@ -251,7 +252,7 @@ def _kernels_in(value: Any) -> tuple[PythonKernel, ...]:
 
 
 def _callees(kernel: PythonKernel) -> list[tuple[str, PythonKernel]]:
-    """Return the other kernels that a kernel calls, by the names under which it does."""
+    """Return the other kernels called by a kernel, by their names in the kernel."""
     return [
         (name, callee)
         for name, value in _named_globals(kernel)

@@ -1,7 +1,7 @@
 """Numba's cache of compiled kernels on disk, without errors for invalid files.
 
 Numba's files are pickles of types, machine code and their signatures. A file that is truncated or
-changed, or names a class that has since moved, would raise an error in a user's call. Here it
+changed, or names a class that has moved, would raise an error in a user's call. Here such a file
 counts as absent: the kernel is compiled again and the file replaced.
 """
 
@@ -13,7 +13,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 
 class CheckedCacheFile(IndexDataCacheFile):
-    """An index and its data files; machine code comes with a hash of it."""
+    """An index and its data files; machine code comes with its hash."""
 
     def _load_index(self) -> dict[Any, str]:
         try:
@@ -33,7 +33,7 @@ class CheckedCacheFile(IndexDataCacheFile):
 
 
 class DiskCache(FunctionCache):
-    """The cache of one kernel; reading and writing it raise no error."""
+    """The cache of a kernel; reading and writing raise no error."""
 
     def __init__(self, kernel: Any):
         super().__init__(kernel)
@@ -58,7 +58,7 @@ class DiskCache(FunctionCache):
 
 
 def use_cache(dispatcher: Any) -> None:
-    """Keep a kernel's compiled versions on disk, if there is a folder that may be written to."""
+    """Keep a kernel's compiled versions on disk, if there is a writable folder."""
     try:
         dispatcher._cache = DiskCache(dispatcher.py_func)
     except RuntimeError:  # numba found no folder

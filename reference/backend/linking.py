@@ -1,9 +1,9 @@
-"""Compile each callee of a kernel once and link all of them into the kernel that Python calls.
+"""Compile each callee of a kernel once and link all callees into the kernel called by Python.
 
-Numba alone optimises each function together with all its callees and makes machine code of it. In a
-nest of inlined callees every level would repeat the work of the levels below, half of the time of a
-large kernel, and only the outermost result is used. The classes replace methods that numba does not
-document: with an untested series of numba, numba compiles as usual.
+Numba alone optimises each function together with all its callees and makes machine code of all. In
+a nest of inlined callees every level would repeat the work of the levels below, half of the time of
+a large kernel. Only the outermost result is used. The classes replace undocumented methods of
+numba: with an untested series of numba, numba compiles as usual.
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from numba.core import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-# The first and the last series of numba that the tests have run with.
+# The first and the last tested series of numba.
 OLDEST, NEWEST = (0, 61), (0, 68)
 # The first series whose functions are optimised by the new pass managers of LLVM.
 NEW_PASSES = (0, 62)
@@ -22,7 +22,7 @@ NEW_PASSES = (0, 62)
 class LinkedLibrary(JITCodeLibrary):
     """The code of a callee: simplified by itself, linked, optimised and made machine code outside.
 
-    It has no address that Python could call, and so no place for an environment of Python objects.
+    It has no address for Python to call, and so no place for an environment of Python objects.
     """
 
     def _optimize_functions(self, module: Any) -> None:
@@ -61,10 +61,10 @@ class LinkedLibrary(JITCodeLibrary):
 
 
 class KernelLibrary(JITCodeLibrary):
-    """The code of a kernel, with that of its callees and of theirs linked into it, each once."""
+    """The code of a kernel, linked with the code of all direct and indirect callees, each once."""
 
     def add_linking_library(self, library: Any) -> None:
-        """Add a library and the libraries that it would have linked."""
+        """Add a library and the libraries to be linked into it."""
         super().add_linking_library(library)
         if isinstance(library, LinkedLibrary):
             for linked in library._linking_libraries:

@@ -1,9 +1,9 @@
-"""Divide a large system into regions of particles, so that threads can sum its springs.
+"""Divide a large system into regions of particles, for threads to sum its springs.
 
-A region is a run of particles by number with the springs between them, so that threads can sum over
-regions independently. Springs between regions come last, in one thread: they are few where
+A region is a run of particles by number with the springs between them; threads sum over regions
+independently. Springs between regions come last, in a single thread. Such springs are few where
 neighbours have numbers near each other, as in cloths and lattices. The regions depend on the system
-only, so that results are the same bits on any number of cores.
+only: results are the same bits on any number of cores.
 """
 
 from typing import NamedTuple

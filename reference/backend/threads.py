@@ -1,6 +1,6 @@
 """Spread a batch over all cores: each slice is computed by a kernel in a thread of a pool.
 
-Compiled kernels release the interpreter's lock, so that threads suffice; they are kept for reuse.
+Compiled kernels release the interpreter's lock, so threads suffice; threads are kept for reuse.
 """
 
 import contextlib
@@ -14,7 +14,7 @@ from typing import Any
 from .. import arguments
 from .compilation import numba_settings
 
-# More slices than cores, so that a core that finishes early can take another slice.
+# More slices than cores: a core that finishes early takes another slice.
 SLICES_PER_CORE = 4
 # How often a waiting thread looks for an interrupt [s].
 POLL = 0.1
@@ -55,11 +55,11 @@ def in_slices(
 
     A batch of less than two slices of `minimum` is a single call in the caller's thread. At an
     error or an interrupt, slices not yet begun are dropped. Calls of this function within a slice
-    do not divide it again.
+    do not divide the slice again.
 
         in_slices(kernel, len(x), lambda part: (model, x[part], result[part]), minimum=100)
 
-    `count` is the length of the batch and `minimum` the smallest slice that is worth a thread.
+    `count` is the length of the batch and `minimum` the smallest slice worth a thread.
     """
     threads = (_num_threads.get() or _all_cores()) if count >= 2 * minimum else 1
     if threads == 1:
@@ -86,7 +86,7 @@ def _result(part: Future[Any]) -> Any:
 
 
 def _all_cores() -> int:
-    """Return the number of cores that the process may use, as numba counts them."""
+    """Return the number of cores for the process, counted as in numba."""
     return numba_settings().NUMBA_NUM_THREADS
 
 

@@ -1,9 +1,9 @@
 """The compiled versions of the functions in `vectors.py`, as LLVM's vectors of doubles.
 
 LLVM maps a vector of eight to a register of AVX-512, two of AVX or four of SSE. Floating point is
-as strict as for floats, except that products of rows may be fused with the differences that they go
-into, as everywhere in relaxed kernels. Functions that read or write a row of a tile also prefetch a
-share of the next tile: the processor does not foresee accesses so far apart.
+as strict as for floats, with an exception: products of rows may be fused with differences, as
+everywhere in relaxed kernels. Functions that read or write a row of a tile also prefetch a share of
+the next tile. The processor does not foresee accesses so far apart.
 """
 
 import operator
@@ -38,11 +38,11 @@ class LanesType(types.Type):
     """LANES doubles side by side; a float is converted to equal doubles."""
 
     def can_convert_from(self, typingctx, other):
-        """Say that floats convert."""
+        """Let floats convert."""
         return Conversion.safe if isinstance(other, types.Float) else None
 
     def unify(self, typingctx, other):
-        """Give a variable that is a float in some branches the type of lanes."""
+        """Give lanes as the type of a variable that is a float in some branches."""
         return self if isinstance(other, types.Float) else None
 
 
@@ -226,7 +226,7 @@ def _reader(count):
 
 
 def _writer(count):
-    """Return a function that transposes lanes and writes so many doubles into each pose."""
+    """Return a function that transposes lanes and writes a number of doubles into each pose."""
 
     def generate(context, builder, signature, arguments):
         pointers = _tile_row(context, builder, signature, arguments, count, WRITE)
@@ -256,14 +256,14 @@ def _transposed(builder, rows):
 
 
 def _fenced(builder, vector):
-    """Return a vector, and prevent LLVM from splitting the shuffles that make it."""
+    """Return a vector, and keep LLVM from splitting the shuffles behind it."""
     kind = ir.FunctionType(VECTOR, [VECTOR])
     name = f"llvm.arithmetic.fence.v{LANES}f64"
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [vector])
 
 
 def _contiguous(array, axes=3):
-    """Return the type if it is that of a C-contiguous array of doubles with so many axes."""
+    """Return the type of a C-contiguous array of doubles with so many axes; refuse other types."""
     if array != types.Array(types.float64, axes, "C"):
         raise TypeError(f"expected a C-contiguous array of doubles with {axes} axes, got {array}")
     return array
@@ -308,7 +308,7 @@ def _moved(builder, pointer, count, size):
 
 
 def _prefetch(builder, pointer, size, access):
-    """Prefetch memory that will be read or written soon; any address is allowed."""
+    """Prefetch memory for reading or writing soon; any address is allowed."""
     kind = ir.FunctionType(ir.VoidType(), [POINTER, INT, INT, INT])
     fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
     for offset in range(0, size, LINE_BYTES):

@@ -1,9 +1,9 @@
 """Functions on vector registers: arrays in the interpreter, instructions in compiled kernels.
 
 *Lanes* are the same joint of eight poses side by side. A kernel on tuples of components also runs
-on lanes: `in_lanes` replaces the functions that read and write a pose by functions on tiles; data
-that all poses share, such as a skeleton's offsets, stay as they are. No operation mixes lanes:
-every pose gets the same bits as by itself. A *tile* is as many poses of a batch as there are lanes,
+on lanes. `in_lanes` replaces the functions that read and write a pose by functions on tiles. Data
+shared by all poses, such as a skeleton's offsets, stay unchanged. No operation mixes lanes: every
+pose gets the same bits as by itself. A *tile* is as many poses of a batch as there are lanes,
 (lane, joint, component). A *scratch* array, (joint, component, lane), holds unit quaternions in the
 order of the registers.
 
@@ -90,7 +90,7 @@ def subtract_scaled(row, factor, other):
 
 @in_vector_registers
 def prefetch(values, i):
-    """Load an entry that will be read soon into the cache; the index may be out of range."""
+    """Load an entry to be read soon into the cache; the index may be out of range."""
 
 
 # Rows of a pose's positions (joint, 3) and rotations (joint, 4); of unit quaternions (joint, 4),
