@@ -1,10 +1,10 @@
 """Hinge, slide, ball, free and fixed joints with limits: coordinates q to local transforms.
 
-A joint's frame sits in its parent's at an offset and a rotation, its *frame*. Its coordinates move
-it from there: a hinge rotates about its axis and a slide moves along it, a ball rotates by a unit
-quaternion, a free joint does both, a fixed one stays. A mimic joint is a hinge or a slide
-that moves with a leader: its coordinate times a multiplier, plus a shift. The limits of a leader
-are narrowed to the coordinates that keep the limits of its followers as well.
+A joint's frame sits in its parent's at an offset and a rotation, its *frame*. The coordinates move
+the frame from there: a hinge rotates about its axis and a slide moves along its axis. A ball
+rotates by a unit quaternion, a free joint rotates and moves, and a fixed joint stays. A mimic joint
+is a hinge or a slide that moves with a leader: its coordinate is the leader's times a multiplier,
+plus a shift. The limits of a leader are narrowed so that its followers keep their limits as well.
 """
 
 import functools
@@ -51,7 +51,7 @@ from .quaternion import (
 )
 from .skeleton import Skeleton, checked_skeleton
 
-# The kinds of joints, by the numbers that the kernels read.
+# The kinds of joints, by their numbers in kernels.
 KINDS = "fixed", "hinge", "slide", "ball", "free"
 FIXED, HINGE, SLIDE, BALL, FREE = range(5)
 # The number of coordinates and of degrees of freedom of each kind.
@@ -83,12 +83,12 @@ JOINT = np.dtype(
 
 
 class Mimic(NamedTuple):
-    """A joint that moves with another: q = multiplier q_leader + shift.
+    """A joint moving with another: q = multiplier q_leader + shift.
 
     Attributes:
         leader: the joint followed, by index or name.
         multiplier: of its coordinate.
-        shift: added to that [rad or m].
+        shift: added to the product [rad or m].
     """
 
     leader: int | str
@@ -101,23 +101,22 @@ class Articulation(KeepsReadOnly):
     """A tree of joints of several kinds, with limits.
 
     Its coordinates q, shape (..., coordinate), take the place of the local rotations of a Skeleton.
-    Joint after joint, they hold an angle [rad] of a hinge, a displacement [m] of a slide, a unit
-    quaternion, w first, of a ball, and a position [m] and a quaternion of a free joint; a fixed or
-    mimic joint has none. Methods raise a ValueError for a joint that does not exist, and for q of
-    another shape, not finite, or with a quaternion further than 1e-6 from unit length.
+    Joint after joint they hold an angle [rad] of a hinge, a displacement [m] of a slide, a unit
+    quaternion, w first, of a ball. A free joint has a position [m] and a quaternion, a fixed or
+    mimic joint nothing. Methods raise a ValueError for an unknown joint, and for q of another
+    shape, not finite, or with a quaternion further than 1e-6 from unit length.
 
     Attributes:
         skeleton: the tree: parents, offsets [m], names.
-        kinds: each joint's kind, one of "fixed", "hinge", "slide", "ball", "free".
-        frames: each joint's rotation in its parent's frame where its coordinates are zero, (joint,
-            4).
+        kinds: each joint's kind: "fixed", "hinge", "slide", "ball" or "free".
+        frames: each joint's rotation in its parent's frame at zero coordinates, (joint, 4).
         axes: unit axes of hinges and slides, and twist axes of balls, (joint, 3).
-        lower: least coordinate of hinges and slides, least twist of balls, (joint,). The limits of
-            a leader are those in effect, which keep the limits of its followers as well.
+        lower: least coordinate of hinges and slides, least twist of balls, (joint,). A leader's
+            limits are narrowed by the limits of its followers.
         upper: greatest of the same.
         cones: greatest tilt of the axis of a ball [rad], (joint,).
         mimics: the joints that move with their leaders.
-        joints: the records (JOINT) that the kernels read, a record a joint; do not write to them.
+        joints: the records (JOINT) of the kernels, a record a joint, not to be written to.
         mechanisms: cache of inverse kinematics, by effectors, of a limited size.
     """
 
@@ -151,16 +150,16 @@ class Articulation(KeepsReadOnly):
             kinds: of each joint.
             axes: any length but zero.
             frames: unit quaternions.
-            lower: limits of hinges [rad], slides [m] and of the twist of balls [rad]; a mimic joint
-                keeps its limits by those of its leader.
+            lower: limits of hinges [rad], slides [m] and of the twist of balls [rad]; the limits of
+                a mimic joint narrow its leader's.
             upper: likewise.
             cones: limits of the tilt of balls [rad].
             mimics: which hinges and slides move with others.
 
         Raises:
-            ValueError: naming the argument, if it has another shape, is out of range, an axis is
-                zero, limits cross or no twist could keep them, a mimic joint or its leader is no
-                hinge or slide, or no coordinate of a leader keeps the limits of a mimic joint.
+            ValueError: naming the argument, if it has another shape, is out of range, or an axis is
+                zero. Also if limits cross or no twist could keep them, a mimic joint or its leader
+                is no hinge or slide, or a leader's coordinates cannot keep a mimic joint's limits.
         """
         count = checked_skeleton(skeleton).joint_count
         if isinstance(kinds, str):
@@ -240,8 +239,8 @@ class Articulation(KeepsReadOnly):
     def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
         """Return coordinates drawn evenly within the limits, (..., coordinate), by a generator.
 
-        Without limits a hinge is drawn from all angles, a slide or a free joint from within a
-        metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
+        Without limits a hinge is drawn from all angles, a slide or a free joint from within a metre
+        of zero, and rotations evenly among all. A limited ball has its swing and twist drawn.
         """
         arguments.instance("rng", rng, np.random.Generator)
         shape = arguments.lengths("shape", shape)
@@ -304,7 +303,7 @@ class Articulation(KeepsReadOnly):
 
     @functools.cached_property
     def _leading(self) -> IndexArray:
-        """Return the joints that have coordinates of their own."""
+        """Return the joints with coordinates of their own."""
         own = self.joints["kind"] != FIXED
         own[list(self.mimics)] = False
         return np.flatnonzero(own)
@@ -397,7 +396,7 @@ def joint_excess(joints, j, q):
 
 
 def normalise_start(joints, q):
-    """Make quaternions unit; return whether they are so to 1e-6, and all numbers up to 1e75."""
+    """Make quaternions unit; return whether all were unit to 1e-6, and all numbers up to 1e75."""
     valid = True
     for k in range(len(q)):
         valid &= abs(q[k]) <= LARGEST_COORDINATE
@@ -584,7 +583,7 @@ def _records(skeleton: Skeleton, kinds: IndexArray, mimics: Mapping[int, Mimic])
 
 
 def _narrow_leaders(joints: RecordArray, names: tuple[str, ...]) -> None:
-    """Narrow the limits of leaders to coordinates that keep the limits of all followers."""
+    """Narrow the limits of leaders so that all followers keep their limits."""
     for j in np.flatnonzero(joints["leader"] != np.arange(len(joints))):
         leader = joints[joints["leader"][j]]
         least, greatest = _bounds_by_follower(joints[j])

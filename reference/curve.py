@@ -1,7 +1,7 @@
 """Named curves for an effector to draw, and resampling to an even spacing.
 
-A named curve takes a count of samples, a positive integer, else it raises a ValueError. It lies in
-the plane y = 0 [m]; closed curves do not repeat their first point.
+A named curve takes a count of samples; a count that is no positive integer is a ValueError. All
+curves lie in the plane y = 0 [m]; closed curves do not repeat their first point.
 """
 
 from collections.abc import Callable
@@ -49,9 +49,9 @@ def star(count: int = 400) -> FloatArray:
 def plumb_bob(count: int = 1200) -> FloatArray:
     """Return unevenly spaced samples of a drawing of a plumb bob, shape (frame, 3) [m].
 
-    It consists of five strokes: line, eye, collar, body and plumb mark. Within a stroke the arc
-    length is s = u + sin(2 pi n u) / (2 pi n) for evenly spaced u, so that samples are dense in
-    some parts and sparse in others, as in hand-drawn input.
+    The drawing has five strokes: line, eye, collar, body and plumb mark. Within a stroke the arc
+    length is s = u + sin(2 pi n u) / (2 pi n) for evenly spaced u. Samples are dense in some parts
+    and sparse in others, as in hand-drawn input.
     """
     count = arguments.count("count", count, minimum=1)
     parts = np.array_split(np.arange(count), len(_BOB_STROKES))
@@ -75,20 +75,19 @@ def resample(
 ) -> FloatArray:
     """Return the curve with distances between neighbours from min_spacing to max_spacing.
 
-    Drop points that are too close to the last kept point, divide wide gaps evenly, and keep both
-    ends. Only the two ends remain if they are closer than min_spacing to each other and no point of
-    the curve is min_spacing away from both.
+    Drop points too close to the last kept point, divide wide gaps evenly, and keep both ends. If
+    the ends are closer than min_spacing to each other, and no point of the curve is min_spacing
+    away from both, only the ends remain.
 
     Args:
         curve: points, shape (point, 3) [m].
         min_spacing: the least distance of neighbours [m].
-        max_spacing: the greatest, at least twice min_spacing, so that a divided gap is not too
-            short.
+        max_spacing: the greatest distance, at least twice min_spacing to keep divided gaps long.
         closed: whether the last point is a neighbour of the first.
 
     Raises:
-        ValueError: if there are no points, they are not finite, or the spacings are not positive,
-            too near to each other, or so small that there would be more than ten million points.
+        ValueError: if there are no points, a point is not finite, or the spacings are not positive,
+            too near to each other, or so small as to give more than ten million points.
     """
     points = arguments.array("curve", curve, "point", 3)
     closed = arguments.boolean("closed", closed)
@@ -112,8 +111,8 @@ def resample(
 def select_spaced(points, min_spacing, selection):
     """Store the indices of both ends and of points min_spacing apart; return their count.
 
-    Choose points greedily, then drop the last of them until the end of the curve is far enough from
-    them. If none remains between the ends, take a point far enough from both.
+    Choose points greedily, then drop the last points too close to the end of the curve. If none
+    remains between the ends, take a point far enough from both.
     """
     last = len(points) - 1
     count = 1

@@ -1,8 +1,8 @@
 """Explicit integrators: symplectic Euler, and the classical Runge-Kutta method of order 4.
 
 Dampers pull with -c ((v_i - v_j)·u) u at the current velocities, unlike in a step of implicit
-Euler; `mass_spring.damper_forces` compares the two laws. A pin moves to its position at the end of
-the step in a straight line at constant velocity; its velocity in the state is ignored.
+Euler. `mass_spring.damper_forces` compares the two laws. A pin moves in a straight line at constant
+velocity to its position at the end of the step. Its velocity in the state is ignored.
 """
 
 import numpy as np
@@ -21,8 +21,8 @@ def symplectic_euler(
 ) -> State:
     """Return the state a time h [s] later: v' = v + h M^-1 f(x, v), then x' = x + h v'.
 
-    Arguments and errors are as for `ImplicitEuler.step`. It is stable for h below about 2 over
-    the highest angular frequency.
+    Arguments and errors are as for `ImplicitEuler.step`. The method is stable for h below about 2
+    over the highest angular frequency.
 
     Raises:
         FloatingPointError: if a coordinate or velocity exceeds 1e75, as after many unstable steps.

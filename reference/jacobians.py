@@ -1,16 +1,16 @@
 """Jacobians of a tree of joints, and steps of its coordinates along velocities.
 
-A velocity v, (..., freedom), holds joint after joint the rate of a hinge [rad/s] or a slide [m/s];
-of a ball the angular velocity in its own, moved frame; of a free joint the rate of its position
+A velocity v, (..., freedom), holds joint after joint the rate of a hinge [rad/s] or a slide [m/s].
+A ball has the angular velocity in its own, moved frame. A free joint has the rate of its position
 coordinates, then the angular velocity in its own frame. So a step rotates a quaternion from the
 right: Q exp(v). A mimic joint has no velocity of its own: it adds to its leader's column.
 
 Coordinates q have the shape (..., coordinate), of a Skeleton (..., joint, 4); leading axes
 broadcast. Functions raise a ValueError if an argument has another shape, is not finite, or holds a
-quaternion that is not unit, and if there is no such joint.
+quaternion not unit, and for an unknown joint.
 
-The kernel `motion` gives the motion subspace of a joint (Featherstone 2008) in the world's axes: a
-freedom rotates the joints below about an axis through the joint's origin, or translates them.
+The kernel `motion` gives the motion subspace of a joint (Featherstone 2008) in the world's axes. A
+freedom rotates the joints below about an axis through the joint's origin, or translates the joints.
 """
 
 import numpy as np
@@ -54,9 +54,9 @@ ZERO = (0.0, 0.0, 0.0)
 def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = None) -> FloatArray:
     """Return the derivative of a joint's motion by the velocity, (..., 6, freedom).
 
-    Three rows of linear velocity [m], three of angular velocity [rad], both of the joint's frame,
-    taken at its origin, along the axes of the world. The effector is a joint by name or index; by
-    default as for `solve_ik`.
+    Three rows of linear velocity [m], three of angular velocity [rad], of the joint's frame at its
+    origin, along the axes of the world. The effector is a joint by name or index; by default as for
+    `solve_ik`.
     """
     joint = effector_of(checked_model(articulation, "articulation"), effector)
     return jacobians(articulation, q, [joint])[..., 0, :, :]
@@ -84,9 +84,9 @@ def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
 
 
 def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
-    """Return the velocity that leads from q0 to q1 in a second, (..., freedom).
+    """Return the velocity from q0 to q1 in a second, (..., freedom).
 
-    It is the inverse of `integrate`: rotations go through the smaller angle, at most pi.
+    This inverts `integrate`: rotations go through the smaller angle, at most pi.
     """
     model, start = _coordinates("q0", articulation, q0)
     _, end = _coordinates("q1", articulation, q1)
@@ -102,7 +102,7 @@ def axis_of(joints, j, R):
 
 
 def frame_of(joints, j, rotations):
-    """Return the rotation in the world that a joint has where its coordinates are zero."""
+    """Return the rotation in the world of a joint at zero coordinates."""
     frame = load_quaternion(joints["frame"], j)
     if joints["parent"][j] < 0:
         return frame
@@ -113,7 +113,7 @@ def motion(joints, j, i, rotations, length):
     """Return the angular [rad] and linear [m] velocity by the i-th freedom of joint j.
 
     A mimic joint's freedom is its leader's; a free joint's translations come first. `rotations` are
-    those of all joints in the world, and a unit of a translation is `length` [m].
+    all joints' in the world, and a unit of a translation is `length` [m].
     """
     kind, R = joints["kind"][j], load_quaternion(rotations, j)
     if kind in (HINGE, SLIDE):
@@ -171,12 +171,12 @@ def move_joint(joints, j, v, q):
 
 
 def rotate_ball(q, at, v):
-    """Rotate the quaternion that begins at an index of q by a rotation vector in its own frame."""
+    """Rotate the quaternion at an index of q by a rotation vector in its own frame."""
     store_quaternion_to(q, at, multiply(load_quaternion_from(q, at), exponential(v)))
 
 
 def joint_difference(joints, j, q1, q0, v):
-    """Fill the velocity that takes a joint from q0 to q1."""
+    """Fill the velocity of a joint from q0 to q1."""
     kind, at, first = joints["kind"][j], joints["coordinate"][j], joints["freedom"][j]
     if kind == FIXED or joints["leader"][j] != j:
         return

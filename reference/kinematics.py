@@ -75,15 +75,15 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
 
 
 class PreparedKinematics(threading.local):
-    """Forward kinematics of a model, one pose a call, into the same arrays every time.
+    """Forward kinematics of a model, a pose a call, into the same arrays every time.
 
-    A call takes less than half the time of `forward_kinematics`, which allocates its result and
-    makes it read-only: for ten balls that is most of its time. Each thread that shares the object
+    A call takes less than half the time of `forward_kinematics`, which spends most of its time on
+    allocating its result and making it read-only (ten balls). Each thread that shares the object
     has arrays of its own.
 
     Attributes:
-        pose: the pose of the last call, read-only views of the arrays that the next one fills:
-            positions (joint, 3) [m] and rotations (joint, 4), NaN before the first call.
+        pose: the pose of the last call, NaN before the first: positions (joint, 3) [m] and
+            rotations (joint, 4), read-only views of the arrays that the next call fills.
     """
 
     def __init__(self, model: Skeleton | Articulation):
@@ -106,7 +106,7 @@ class PreparedKinematics(threading.local):
         return type(self), (self._model,)
 
     def __call__(self, local_rotations: ArrayLike) -> Pose:
-        """Return the pose of local rotations, (joint, 4); the next call overwrites it.
+        """Return the pose of local rotations, (joint, 4); the next call overwrites the pose.
 
         For an Articulation, of its coordinates, (coordinate,).
 
@@ -127,10 +127,10 @@ class PreparedKinematics(threading.local):
 def prepare(skeleton: Model) -> PreparedKinematics:
     """Return forward kinematics for many single poses of a model: `prepare(skeleton)(local)`.
 
-    It runs on the backend that is in force now.
+    The result runs on the backend now in force.
 
     Raises:
-        ValueError: if it is no Skeleton, Articulation or Robot.
+        ValueError: if the model is no Skeleton, Articulation or Robot.
     """
     return PreparedKinematics(checked_model(skeleton))
 

@@ -1,20 +1,20 @@
 """Particles joined by damped springs: the model, its state, energies, forces and their matrices.
 
-A spring from particle i to particle j has length l = |x_i - x_j| and direction
-u = (x_i - x_j) / l. It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u; the
-dampers of an implicit Euler step have another law, see `damper_forces`.
+A spring from particle i to particle j has length l = |x_i - x_j| and direction u = (x_i - x_j) / l.
+It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u. The dampers of an implicit
+Euler step have another law, see `damper_forces`.
 
-A tension-only spring, such as a rope, stores no energy and does not pull while it is slack, l <= r;
-its damper acts in all states, as in MuJoCo. Its stiffness jumps at l = r, where it is defined as
+A tension-only spring, such as a rope, is slack where l <= r: it stores no energy and does not pull.
+Its damper acts in all states, as in MuJoCo. The stiffness jumps at l = r, where it is defined as
 zero, the one-sided second derivative from the slack side, again as in MuJoCo. A tension-only spring
 with r = 0 is never slack and equals a linear spring.
 
 Where the ends of a spring coincide, its direction is undefined and u is set to (1, 0, 0), as in
-MuJoCo. The order of its particles then decides which end is pushed in which direction; a slack
-spring and one with r = 0 exert no force there.
+MuJoCo. The order of the particles then decides in which direction each end is pushed; a slack
+spring and a spring with r = 0 exert no force there.
 
-Functions raise a ValueError that names the argument if it has another shape, holds numbers that are
-not finite, or is no system or state.
+Functions raise a ValueError with the name of an argument that has another shape, holds numbers that
+are not finite, or is no system or state.
 """
 
 import functools
@@ -49,7 +49,7 @@ COINCIDENT = 1e-150
 
 
 class SystemArrays(NamedTuple):
-    """The arrays of a mass-spring system that kernels read."""
+    """The arrays of a mass-spring system for kernels."""
 
     masses: FloatArray
     springs: IndexArray
@@ -67,17 +67,17 @@ class MassSpring(KeepsReadOnly):
 
     Attributes:
         masses: [kg], shape (particle,).
-        springs: the two particles that each spring joins, shape (spring, 2).
+        springs: the two particles of each spring, shape (spring, 2).
         rest_lengths: [m], shape (spring,).
         stiffnesses: [N/m], shape (spring,).
         dampings: along the springs [N s/m], shape (spring,).
         tension_only: whether each spring goes slack below its rest length, bool, shape (spring,).
-        pinned: particles that keep their position in the state unless a step is called with
-            `pin_positions`, ascending, shape (pinned,); their velocity in a state is ignored.
+        pinned: particles that keep their position in the state unless a step has `pin_positions`,
+            ascending, shape (pinned,); their velocity in a state is ignored.
         free: whether each particle may move, bool, shape (particle,).
         gravity: acceleration [m/s²], shape (3,).
         damped: whether any spring has a damper.
-        arrays: the arguments of the kernels; do not write to them.
+        arrays: the arguments of the kernels, not to be written to.
     """
 
     masses: FloatArray
@@ -107,8 +107,8 @@ class MassSpring(KeepsReadOnly):
 
         Raises:
             ValueError: if a shape is wrong, a number is negative, not finite, beyond 1e75 or below
-                1e-75 but not 0, an index is out of range, a spring joins a particle to itself, or
-                a free particle has no mass.
+                1e-75 but not 0, or an index is out of range. Also if a spring joins a particle to
+                itself, or a free particle has no mass.
         """
         mass = sizes("masses", masses, "particle").copy()
         if len(mass) == 0:
@@ -171,7 +171,7 @@ class MassSpring(KeepsReadOnly):
 
     @functools.cached_property
     def weights(self) -> FloatArray:
-        """The weight of each particle [N], shape (particle, 3); do not write to it."""
+        """The weight of each particle [N], shape (particle, 3), not to be written to."""
         return self.masses[:, None] * self.gravity
 
     @functools.cached_property
@@ -199,7 +199,7 @@ class MassSpring(KeepsReadOnly):
 
     @functools.cached_property
     def free_masses(self) -> FloatArray:
-        """The masses, replaced by one at the pins, whose rows are eliminated; shape (particle,)."""
+        """The masses, shape (particle,), with 1 at the pins, whose rows are eliminated."""
         return frozen(np.where(self.free, self.masses, 1.0))
 
     def __repr__(self) -> str:
@@ -291,7 +291,7 @@ def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
 
 
 def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
-    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over all that are not slack."""
+    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over all springs not slack."""
     stretch = stretches(system, positions)
     return float(np.sum(0.5 * system.stiffnesses * stretch**2))
 
@@ -305,7 +305,7 @@ def kinetic_energy(system: MassSpring, state: State) -> float:
 def forces(
     system: MassSpring, state: State, external_forces: ArrayLike | None = None
 ) -> FloatArray:
-    """Return the total force on each particle [N], (particle, 3); at a pin it is the load on it."""
+    """Return the total force on each particle [N], (particle, 3); at a pin, the load on the pin."""
     x, v = checked_state(system, state)
     return constant_forces(system, external_forces) + pulls(x, v, system.arrays)
 
@@ -332,7 +332,7 @@ def damper_forces(system: MassSpring, state: State) -> FloatArray:
 
     Dampers of slack springs act as well. A step of implicit Euler uses -(c/h) (l - l_n) u instead,
     which has an energy; l_n is the length before the step. At the end of a step the two forces
-    differ by about c h/2 |w_t|² / l, where w_t is the part of v_i - v_j at a right angle to u.
+    differ by about c h/2 |w_t|² / l. Here w_t is the part of v_i - v_j at a right angle to u.
     """
     x, v = checked_state(system, state)
     return pulls(x, v, system.arrays._replace(stiffnesses=np.zeros(len(system.springs))))
@@ -341,8 +341,8 @@ def damper_forces(system: MassSpring, state: State) -> FloatArray:
 def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     """Return the exact Hessian of the spring energy [N/m], sparse (3 particle, 3 particle).
 
-    It is the sum of (A_i A_i') x (k u u' + k (1 - r/l) (I - u u')) over springs that are not slack;
-    the second, geometric term is zero for a spring with a rest length whose ends coincide.
+    It is the sum, over springs not slack, of (A_i A_i') x (k u u' + k (1 - r/l) (I - u u')). The
+    second, geometric term is zero for a spring with a rest length whose ends coincide.
     """
     stiffness = blocks(_positions(system, positions), system.arrays, True)
     return BlockSum(incidence(system)).matrix(stiffness)
@@ -351,7 +351,7 @@ def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
 def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     """Return C, sparse (3 particle, 3 particle) [N s/m]: the dampers' forces are -C v.
 
-    It is the sum of (A_i A_i') x c u u', slack springs included.
+    C is the sum of (A_i A_i') x c u u', slack springs included.
     """
     x, never_slack = _positions(system, positions), np.zeros(len(system.springs), dtype=bool)
     dampers = system.arrays._replace(stiffnesses=system.arrays.dampings, tension_only=never_slack)
@@ -460,7 +460,7 @@ def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
 
 
 def _frames(system: MassSpring, positions: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return the lengths and the directions of all springs, as `spring_frame` does of one."""
+    """Return the lengths and the directions of all springs; see `spring_frame`."""
     p = np.subtract(*_positions(system, positions)[system.springs.T])
     length = np.linalg.norm(p, axis=1)
     p[length < COINCIDENT] = 1.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""The models that public functions take: a Skeleton, an Articulation, or a Robot."""
+"""The models of public functions: a Skeleton, an Articulation, or a Robot."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 class Robot(NamedTuple):
     """A robot or a character read from a file."""
 
-    # one joint for each link or body of the file, with its name and pose
+    # a joint for each link or body of the file, with its name and pose
     articulation: Articulation
     # index of the articulation's joint by the name of the file's joint; its coordinates in q are
     # `articulation.coordinates_of(joints[name])`
@@ -44,7 +44,7 @@ def coordinates_name(model: Skeleton | Articulation) -> str:
 
 
 def tips(model: Skeleton | Articulation) -> list[int]:
-    """Return the joints that have no children."""
+    """Return the joints without children."""
     tree = model if isinstance(model, Skeleton) else model.skeleton
     parents = set(tree.parents.tolist())
     return [joint for joint in range(tree.joint_count) if joint not in parents]
@@ -53,7 +53,7 @@ def tips(model: Skeleton | Articulation) -> list[int]:
 def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> int:
     """Return the index of the effector named; None is a Skeleton's last joint, else the only tip.
 
-    A joint that does not exist, or None where there are several tips, is a ValueError.
+    An unknown joint, or None where there are several tips, is a ValueError.
     """
     if effector is not None:
         return model.index(effector, "effector")

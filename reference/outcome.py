@@ -5,7 +5,7 @@ from typing import Self
 
 
 class SentenceEnum(IntEnum):
-    """Sentences with numbers in their order; records hold the numbers: new ones come last."""
+    """Sentences numbered in their order; records hold the numbers, so new sentences come last."""
 
     _value_: int
     sentence: str
@@ -18,7 +18,7 @@ class SentenceEnum(IntEnum):
 
 
 class Outcome(SentenceEnum):
-    """How a solve ended; `sentence` says it in words."""
+    """How a solve ended; `sentence` is the outcome in words."""
 
     CONVERGED = "The residual is within the tolerance."
     UNREACHABLE = (

@@ -1,9 +1,8 @@
 """Unit quaternions and vectors as tuples of components: the algebra inside the kernels.
 
-Hamilton product, (w, x, y, z), active: `rotate(q, v)` rotates v by q, and `multiply(a, b)` is the
-rotation by b, then by a. The components may be floats or arrays of one shape; `between`,
-`exponential` and `logarithm` branch on values and take floats. See `rotation.py` for arrays of
-quaternions.
+Hamilton product, (w, x, y, z), active: `rotate(q, v)` rotates v by q, and `multiply(a, b)` rotates
+by b, then by a. The components may be floats or arrays of a common shape; `between`, `exponential`
+and `logarithm` branch on values and take floats. See `rotation.py` for arrays of quaternions.
 """
 
 import math
@@ -126,11 +125,10 @@ def normalised(q):
 
 
 def made_unit(q):
-    """Return a quaternion made unit, and whether it was so within 1e-6.
+    """Return a quaternion made unit, and whether its length was within 1e-6 of 1.
 
-    1/|q| is the series of (1 + e)^-1/2 in e = |q|^2 - 1, which for so small an e is exact to
-    rounding with three terms, and needs neither a root nor a division. Lengths within t of one
-    have e within 2 t of t^2.
+    1/|q| is the series of (1 + e)^-1/2 in e = |q|^2 - 1. For so small an e three terms are exact to
+    rounding, and need neither a root nor a division. Lengths within t of 1 have |e - t^2| <= 2 t.
     """
     w, x, y, z = q
     t, e = UNIT_TOLERANCE, (w * w + x * x) + (y * y + z * z) - 1.0
@@ -159,16 +157,16 @@ def perpendicular(a):
 
 
 def renormalised(q):
-    """Return a quaternion that only rounding has taken from unit length, made unit."""
+    """Return a quaternion made unit, which only rounding has taken from unit length."""
     unit, _ = made_unit(q)
     return unit
 
 
 def between(a, b):
-    """Return the shortest-arc rotation from the direction of a to that of b.
+    """Return the shortest-arc rotation from the direction of a to the direction of b.
 
-    It is (|a| |b| + a.b, a x b) made unit: no trigonometry, and accurate for small angles. A zero
-    vector has no direction and gives the identity.
+    The rotation is (|a| |b| + a.b, a x b) made unit: no trigonometry, and accurate for small
+    angles. A zero vector has no direction and gives the identity.
     """
     lengths = math.sqrt(dot(a, a) * dot(b, b))
     w = lengths + dot(a, b)

@@ -1,8 +1,8 @@
 """Arrays of unit quaternions, (..., 4), w first; leading axes broadcast.
 
 Hamilton product, active rotations: `rotate(q, v)` rotates v by q, `multiply(a, b)` by b first.
-Functions raise a ValueError that names an argument of another shape, with numbers that are not
-finite, or with lengths that fit into no memory.
+Functions raise a ValueError with the name of an argument that has another shape, numbers not
+finite, or lengths too large for memory.
 """
 
 import math
@@ -47,7 +47,7 @@ def normalise(quaternions: ArrayLike, name: str = "quaternions") -> tuple[FloatA
     `name` is the argument's, for the error.
 
     Raises:
-        ValueError: if they are not finite, or a length is zero.
+        ValueError: if the quaternions are not finite, or a length is zero.
     """
     q = arguments.array(name, quaternions, "...", 4)
     largest = np.abs(q).max(axis=-1, keepdims=True)
@@ -60,7 +60,7 @@ def normalise(quaternions: ArrayLike, name: str = "quaternions") -> tuple[FloatA
 
 
 def check_unit(name: str, lengths: FloatArray) -> None:
-    """Raise a ValueError that names the first length further than 1e-6 from 1."""
+    """Raise a ValueError with the first length further than 1e-6 from 1."""
     wrong = np.abs(lengths - 1.0) > UNIT_TOLERANCE
     if wrong.any():
         index = tuple(np.argwhere(wrong)[0].tolist())
@@ -122,7 +122,7 @@ def to_matrix(q: ArrayLike) -> FloatArray:
 def roll_pitch_yaw(R: FloatArray) -> tuple[float, float, float]:
     """Return the angles about the fixed axes x, y and z whose rotations in turn make R [rad].
 
-    Roll is read off after yaw is undone, so that it is exact also where pitch is a right angle.
+    Roll is read off after yaw is undone: it is exact also where pitch is a right angle.
     """
     yaw = math.atan2(R[1, 0], R[0, 0])
     sine, cosine = math.sin(yaw), math.cos(yaw)
@@ -149,7 +149,7 @@ def from_matrix(matrix: ArrayLike) -> FloatArray:
 
 
 def _quaternion_form(R: FloatArray) -> FloatArray:
-    """Return K, (..., 4, 4), with a quadratic form q^T K q that is largest at R's quaternion."""
+    """Return K, (..., 4, 4), whose quadratic form q^T K q is largest at R's quaternion."""
     K = np.empty((*R.shape[:-2], 4, 4))
     K[..., 0, 0] = np.trace(R, axis1=-2, axis2=-1)
     K[..., 0, 1] = R[..., 2, 1] - R[..., 1, 2]
@@ -161,7 +161,7 @@ def _quaternion_form(R: FloatArray) -> FloatArray:
 
 
 def _scaled(v: FloatArray) -> FloatArray:
-    """Return vectors times powers of two, so that the squares of none underflow."""
+    """Return vectors times powers of two: no square underflows."""
     _, exponents = np.frexp(np.abs(v).max(axis=-1, keepdims=True))
     return np.ldexp(v, -exponents)
 

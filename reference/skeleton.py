@@ -13,7 +13,7 @@ from .arguments import FloatArray, IndexArray, KeepsReadOnly, frozen, shown
 
 
 class SkeletonArrays(NamedTuple):
-    """The arrays of a skeleton that kernels read."""
+    """The arrays of a skeleton for kernels."""
 
     parents: IndexArray
     offsets: FloatArray
@@ -23,14 +23,14 @@ class SkeletonArrays(NamedTuple):
 class Skeleton(KeepsReadOnly):
     """A tree of ball joints without limits; parents precede children.
 
-    Methods raise a ValueError for a joint that does not exist.
+    Methods raise a ValueError for an unknown joint.
 
     Attributes:
         parents: each joint's parent, shape (joint,); -1 for the root, which is joint 0.
         offsets: each joint's position in its parent's frame [m], shape (joint, 3); the root's
             is its global position.
         names: each joint's name.
-        arrays: for kernels; do not write to them.
+        arrays: for kernels, not to be written to.
     """
 
     parents: IndexArray
@@ -73,7 +73,7 @@ class Skeleton(KeepsReadOnly):
         """Return the index of a joint given by name or index; negative indices count from the end.
 
         Raises:
-            ValueError: if the joint does not exist; it names `argument`.
+            ValueError: naming `argument`, if the joint does not exist.
         """
         count = self.joint_count
         if type(joint) is int and -count <= joint < count:

@@ -32,16 +32,16 @@ def track(
 
     Args:
         skeleton: as for `solve_ik`.
-        curve: the effector's global position in each frame [m], shape (frame, 3); or a Target whose
-            position is that, and its rotation (frame, 4), or several for several effectors.
+        curve: the effector's global position in each frame [m], shape (frame, 3). Or a Target with
+            this position and a rotation (frame, 4), or several for several effectors.
         solver: a name in IK_SOLVERS; by default CCD for one position on a Skeleton, and else
             Levenberg-Marquardt. There are no restarts from random poses, nor phases after the first
             of Levenberg-Marquardt: the motion would jump.
         start: the first pose: local rotations, shape (joint, 4), identities if None; of an
             Articulation coordinates, (coordinate,), neutral ones if None.
         effector: the joint that follows, by index or name; by default as for `solve_ik`.
-        warm: start each frame from the solution before it, which keeps neighbouring frames alike;
-            if False, each starts from `start`, and the joints may jump from frame to frame.
+        warm: start each frame from the solution before, which keeps neighbouring frames alike. If
+            False, each starts from `start`, and the joints may jump from frame to frame.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
         max_iterations: of a frame; by default as for `solve_ik`.
@@ -51,7 +51,7 @@ def track(
         IKSolution with the frames as leading axis.
 
     Raises:
-        ValueError: as `solve_ik` does, and if the curve is not of that shape or has no points.
+        ValueError: as `solve_ik` does, and if the curve has another shape or no points.
         FloatingPointError: if a coordinate of the motion exceeds 1e75.
     """
     model = checked_model(skeleton)

@@ -1,7 +1,7 @@
 """A pose from any solver, checked by forward kinematics.
 
 In single precision quaternions deviate from unit length by 1e-5 after some hundred products. They
-are normalised, and the deviation is reported beside the distances.
+are normalised; the deviation is reported beside the distances.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from ..skeleton import Pose, Skeleton
 
 @dataclass(frozen=True, eq=False)
 class PoseJudgement:
-    """Errors of a pose that is said to bring effectors to targets.
+    """Errors of a pose claimed to bring effectors to targets.
 
     Attributes:
         distance: from effector to target [m], the largest of several.
@@ -34,12 +34,12 @@ class PoseJudgement:
         position_errors: distance between each joint's position as passed and by forward kinematics
             [m], (joint,); None unless both pose and positions were passed.
         length_errors: difference between each link's length by the positions passed and in the
-            model [m], (joint,); 0 of the root and of links that slide; None without positions.
+            model [m], (joint,). 0 for the root and for sliding links; None without positions.
         positions: of all joints by forward kinematics of the normalised pose, or as passed [m],
             (joint, 3).
         names: of the joints.
         tolerance: distance that counts as reached [m].
-        tolerance_rotation: angle that does [rad].
+        tolerance_rotation: angle that counts as reached [rad].
     """
 
     distance: float
@@ -108,12 +108,12 @@ def judge_pose(
     """Return the errors of a pose: from its targets, of its limits, of positions passed with it.
 
     `pose` holds the local rotations of a Skeleton, (joint, 4), w first, or the coordinates q of an
-    Articulation, (coordinate,), with quaternions of any length but zero; None judges `positions`
-    alone, the global ones of all joints [m], (joint, 3). All other arguments are as for `solve_ik`.
+    Articulation, (coordinate,). Quaternions have any length but zero. None judges only `positions`,
+    the global positions of all joints [m], (joint, 3). All other arguments are as for `solve_ik`.
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion has no length,
-            an effector does not exist, or a pose is missing where it is needed.
+            an effector does not exist, or a pose is needed but missing.
     """
     model = checked_model(model, "model")
     targets = check_single(check_numbers(checked_targets(model, target, effector)))

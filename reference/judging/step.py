@@ -1,8 +1,8 @@
 """Evaluate positions from any solver as the result of a step of implicit Euler.
 
-The residual |grad g(x)| / |grad g(y)| says little about the distance to the minimiser where springs
-are stiff, and ignores pins, which are not variables of g. Positions are therefore compared
-with x*, the limit of Newton's method from y, by the error
+Where springs are stiff, the residual |grad g(x)| / |grad g(y)| says little about the distance to
+the minimiser. It ignores pins, which are not variables of g. Positions are therefore compared with
+x*, the limit of Newton's method from y, by the error
 
     |x - x*| / |y - x*|,
 
@@ -40,14 +40,13 @@ class StepJudgement:
         velocity_error: the largest difference of a velocity from (x - x_n) / h [m/s]; None without
             velocities.
         residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles.
-        certificate: the certificate of x with the pins moved to their positions at the end of the
-            step.
-        reference_certificate: the certificate of where Newton's method ended.
-        same_minimiser: whether the minimiser near x is proven to be the one near x* (True) or
-            another one (False); None if neither is proven.
-        minimiser: x*, shape (particle, 3) [m]; if there is none, where Newton's method ended.
+        certificate: the certificate of x with the pins at their positions at the end of the step.
+        reference_certificate: the certificate of the end of Newton's method.
+        same_minimiser: whether the minimiser near x is proven to be the minimiser near x* (True) or
+            another minimiser (False); None without a proof of either.
+        minimiser: x*, shape (particle, 3) [m]; without x*, the end of Newton's method.
         iterations: number of iterations of Newton's method.
-        outcome: the outcome of Newton's method; there is no x* unless it is `solved`.
+        outcome: the outcome of Newton's method; without `solved` there is no x*.
     """
 
     error: float
@@ -108,7 +107,7 @@ def judge_step(
     """Return the errors of positions as the result of a step, with certificates.
 
     `positions` and `velocities` are the result to be judged, both of shape (particle, 3) [m, m/s];
-    without velocities only the positions are. The other arguments and the errors are as for
+    without velocities only the positions are judged. The other arguments and the errors are as for
     `ImplicitEuler.step`.
     """
     integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MAX_ITERATIONS)

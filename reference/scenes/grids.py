@@ -1,9 +1,9 @@
 """Ropes, cloths, nets and lattices: particles on regular grids.
 
-Arguments that scenes share: the spacing of neighbours [m]; the mass of each particle [kg];
-stiffness [N/m] and damping [N s/m] of each spring; gravity downwards [m/s²]; whether the springs go
-slack (tension_only). A scene raises a ValueError if a count is too small, a length or mass not
-positive, an index out of range, or a number negative or not finite.
+Scenes share these arguments: the spacing of neighbours [m]; the mass of each particle [kg];
+stiffness [N/m] and damping [N s/m] of each spring; gravity downwards [m/s²]; tension_only, whether
+springs go slack. A scene raises a ValueError if a count is too small, a length or mass not
+positive, or an index out of range. The same goes for a number that is negative or not finite.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 from ..arguments import FloatArray, IndexArray, boolean, count, number, sequence
 from ..mass_spring import MassSpring, State, lengths
 
-# Offsets in rows and columns from a particle of the cloth to those it is joined to by springs.
+# Offsets in rows and columns from a particle of the cloth to its neighbours by springs.
 NEIGHBOURS = [(1, 0), (0, 1)]
 NEXT_BUT_ONE = [(2, 0), (0, 2)]
 DIAGONALS = [(1, 1), (1, -1)]
 
-# The edges of the six tetrahedra around one diagonal of a cube, the same in every cube, so that
+# The edges of the six tetrahedra around a diagonal of a cube. All cubes have the same, so
 # neighbouring cubes share the diagonals of their faces (Freudenthal 1942).
 TETRAHEDRA = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1)]
 
@@ -80,7 +80,7 @@ def grid_cloth(
         height: [m].
         mass: of each particle [kg].
         stiffness: of the springs between neighbours [N/m].
-        shear_stiffness: of the diagonals; 0 leaves them out, None means the stiffness.
+        shear_stiffness: of the diagonals; 0 leaves the diagonals out, None means the stiffness.
         bending_stiffness: of the springs between particles two apart; as for shear.
         damping: of each spring [N s/m].
         tension_only: whether the springs go slack.
@@ -167,9 +167,9 @@ def lattice(
 ) -> tuple[MassSpring, State]:
     """Return a block of tetrahedra with springs along their edges, clamped at its face x = 0.
 
-    There are `counts` particles along x, y and z, 1 or more each. They lie on a cubic grid that
-    starts at the origin, numbered with z fastest and x slowest; each cube consists of six
-    tetrahedra around its diagonal.
+    There are `counts` particles along x, y and z, 1 or more each. The grid is cubic and starts at
+    the origin, numbered with z fastest and x slowest; each cube consists of six tetrahedra around
+    its diagonal.
     """
     along = sequence("counts", counts, 3, "an axis")
     nx, ny, nz = (count("counts", number_of, minimum=1) for number_of in along)
@@ -196,10 +196,10 @@ def hanging_rope(
     gravity: float = 9.81,
     tension_only: bool = False,
 ) -> tuple[MassSpring, State]:
-    """Return an unstretched rope of a length [m] that hangs vertically from a pin at the origin.
+    """Return an unstretched rope of a length [m], hanging vertically from a pin at the origin.
 
-    It has 2 or more particles, number 0 pinned. In equilibrium spring i, counted from the top,
-    carries the particles below it and is stretched by (particles - 1 - i) mass gravity / stiffness.
+    The rope has 2 or more particles, number 0 pinned. In equilibrium spring i, counted from the
+    top, carries the particles below: its stretch is (particles - 1 - i) mass gravity / stiffness.
     """
     particles = count("particles", particles, minimum=2)
     positions = np.zeros((particles, 3))
@@ -243,14 +243,14 @@ def at_rest(
 
 
 def _shape(rows: int, columns: int) -> tuple[int, int]:
-    """Return the numbers of rows and columns, checked, and their product with them."""
+    """Return the checked numbers of rows and columns, and their product."""
     rows, columns = count("rows", rows, minimum=1), count("columns", columns, minimum=1)
     count("rows, columns", rows * columns, minimum=1)
     return rows, columns
 
 
 def _springs(counts: tuple[int, ...], steps: Sequence[tuple[int, ...]]) -> IndexArray:
-    """Return springs from each particle of a grid to those at each offset, (spring, 2)."""
+    """Return springs from each particle of a grid to the particles at each offset, (spring, 2)."""
     grid, springs = np.arange(np.prod(counts)).reshape(counts), []
     for step in steps:
         starts = tuple(slice(max(-s, 0), n - max(s, 0)) for s, n in zip(step, counts, strict=True))

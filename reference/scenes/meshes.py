@@ -25,15 +25,14 @@ def cloth_from_mesh(
 ) -> tuple[MassSpring, State]:
     """Return the mesh as a cloth at rest: a particle at each vertex, a spring along each edge.
 
-    A bending spring joins each pair of vertices opposite to a shared edge, unless an edge joins
-    them already. The springs along edges may go slack; the mass of each particle is given, or the
-    density of the cloth [kg/m²], and the mass of a triangle is shared equally by its corners. The
-    vertices are positions [m], (particle, 3), the triangles indices of them, (triangle, 3), in
-    either orientation. Other arguments and errors are those of `grid_cloth`, with no pins by
-    default.
+    A bending spring joins each pair of vertices opposite to a shared edge, unless an edge joins the
+    pair already. The springs along edges may go slack. Pass the mass of each particle, or the
+    density of the cloth [kg/m²]: the corners of a triangle then share its mass equally. The
+    vertices are positions [m], (particle, 3), the triangles indices of vertices, (triangle, 3), in
+    either orientation. Other arguments and errors are as for `grid_cloth`, without pins by default.
 
     Raises:
-        ValueError: unless exactly one of density and mass is a number; if a triangle repeats a
+        ValueError: unless exactly one of density and mass is a number. Also if a triangle repeats a
             vertex or another triangle, more than 16 triangles meet at an edge, or a free vertex has
             no mass because its triangles have no area.
     """
@@ -58,7 +57,7 @@ def cloth_from_mesh(
 def mesh_springs(
     triangles: IndexArray, vertex_count: int, bending: bool
 ) -> tuple[IndexArray, IndexArray]:
-    """Return the edges of the triangles and the pairs across them, each once, both (spring, 2)."""
+    """Return the edges of the triangles and the pairs across them, distinct, both (spring, 2)."""
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     keys = _keys(sides, vertex_count)
     edges = _distinct(keys)
@@ -83,7 +82,7 @@ def _facing_pairs(keys: IndexArray, facing: IndexArray) -> IndexArray:
 
 
 def _keys(ends: IndexArray, vertex_count: int) -> IndexArray:
-    """Return a number for each pair that does not depend on its order."""
+    """Return a number for each pair, independent of the order in the pair."""
     return ends.min(axis=1) * vertex_count + ends.max(axis=1)
 
 

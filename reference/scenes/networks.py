@@ -17,10 +17,10 @@ def random_network(
     """Return a random connected network in motion; no two particles or springs are alike.
 
     Masses lie between 0.2 and 2 kg, stiffnesses between 10 and 1000 N/m, dampings between a tenth
-    of `damping` and all of it [N s/m]. Positions and velocities are normally distributed about
-    zero, by 1 m and 1 m/s along each axis, and each spring is stretched or compressed by up to a
-    third: none is at its rest length. Gravity has a random direction. So many particles are pinned,
-    and a share of the springs from 0 to 1, `tension_only`, goes slack. A number out of range is a
+    of `damping` and `damping` [N s/m]. Positions and velocities are normally distributed about
+    zero, by 1 m and 1 m/s along each axis. Each spring is stretched or compressed by up to a third:
+    none is at its rest length. Gravity has a random direction. `pinned` particles are pinned, and a
+    share `tension_only` of the springs, from 0 to 1, goes slack. A number out of range is a
     ValueError.
     """
     rng = np.random.default_rng(integer("seed", seed, minimum=0))

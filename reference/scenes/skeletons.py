@@ -22,8 +22,8 @@ def lab_arm() -> tuple[Skeleton, FloatArray]:
 def ball_chain(*, links: int = 10, link_length: float = 0.1) -> tuple[Skeleton, FloatArray]:
     """Return a straight chain of equal links [m] along x from the origin, and its rest pose.
 
-    Each link starts at a ball joint, and the last ends at the effector. No links, or a length that
-    is not positive, are a ValueError.
+    Each link starts at a ball joint, and the last ends at the effector. No links, or a length not
+    positive, are a ValueError.
     """
     links = count("links", links, minimum=1)
     offsets = np.zeros((links + 1, 3))
