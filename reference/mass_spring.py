@@ -265,8 +265,8 @@ def incidence(system: MassSpring) -> Any:
 def rest_vectors(system: MassSpring, positions: ArrayLike) -> FloatArray:
     """Return d, shape (spring, 3) [m]: d_i = r_i u_i, each spring's vector at its rest length.
 
-    Of all vectors of length r_i, d_i is the nearest to the spring's own vector (Liu et al. 2013).
-    For a slack tension-only spring, d_i is the spring's own vector.
+    The nearest vector of length r_i to the spring's own vector is d_i (Liu et al. 2013). For a
+    slack tension-only spring, d_i is the spring's own vector.
     """
     length, u = _frames(system, positions)
     slack = system.tension_only & (system.rest_lengths > 0.0) & (length <= system.rest_lengths)

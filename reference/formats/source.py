@@ -10,7 +10,7 @@ from ..arguments import shown
 
 LARGEST = 256 * 2**20  # bytes
 UTF_8, UTF_16 = "utf-8-sig", "utf-16"
-# Of an XML file in an encoding of a byte per character; other declarations are for UTF-8.
+# The declaration of an encoding of a byte per character in an XML file; others count as UTF-8.
 DECLARATION = re.compile(
     rb"""\s*<\?xml\s[^<>]{0,200}?\sencoding\s*=\s*["']"""
     rb"""(iso-8859-(?:1[013456]?|[2-9])|latin-?1|windows-125[0-8])["']""",

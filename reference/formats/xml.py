@@ -1,8 +1,7 @@
 """A reader of untrusted XML files: elements and attributes with their line numbers.
 
 Files are in UTF-8, in UTF-16 with a byte order mark, or in ISO-8859-n or Windows-125n as declared.
-A document type declaration is refused, and with it entities that expand without bound or read
-files.
+A document type declaration is refused: its entities may expand without bound or read other files.
 """
 
 import math

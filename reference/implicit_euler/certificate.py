@@ -7,7 +7,7 @@ Lipschitz constant of the Hessian within 2 eta of x. Then
     L eta < mu / 2  =>  a minimiser lies within d = 2 eta / (1 + (1 - 2 L eta / mu)^1/2),
 
 and no other stationary point within 2 eta (Kantorovich 1948). Proof: let N(z) = z - H^-1 grad g(z).
-Within 2 eta of x, |N'(z)| = |H^-1 (H - H(z))| <= 2 L eta / mu < 1. By integration from x, |N(z) -
+Within 2 eta of x, |N'(z)| = |H^-1 (H - H(z))| <= 2 L eta / mu < 1. Integration from x gives |N(z) -
 x| <= eta + L |z - x|² / (2 mu) <= 2 eta: N contracts this ball into itself and has a single fixed
 point there. The distance t of the fixed point from x has t <= eta + L t² / (2 mu) and t <= 2 eta <
 mu / L. So t <= d, the smaller root, and H(z) >= mu - L d = mu (1 - 2 L eta / mu)^1/2 > 0 there.

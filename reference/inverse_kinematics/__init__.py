@@ -68,8 +68,8 @@ def solve_ik(
     the same start. Later phases first turn effectors the long way round (a rotation has two
     quaternions), and use the null space to stay near mid-range (Liegeois 1977). Each has a damping
     of its own (Chan & Lawrence 1988), down to 0.001 of the squared error. In the end the best phase
-    goes on. Mid-range draws phases together: two phases from different starts often share their
-    end.
+    goes on. Mid-range draws phases together: two phases from different starts often end in the same
+    pose.
 
     More restarts never give a worse answer: a reached target stays reached, and the merit of a
     missed target can only fall. Nor is the merit greater than after a single attempt. For solvers
@@ -85,7 +85,7 @@ def solve_ik(
     A failed solve on joints is also UNREACHABLE where limits or a hole inside the reach keep the
     effector from the target's distance. With a rotation the same goes for a point on the effector's
     last axis. An effector's first failure computes the least and greatest distance, in 5 to 100 ms.
-    `certify_ik` has further proofs, which search for each target; without a proof failure is
+    `certify_ik` has further proofs, which search for each target; a failed solve without a proof is
     STALLED.
 
     Args:

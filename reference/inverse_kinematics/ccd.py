@@ -7,8 +7,8 @@ term. A smaller gap and a longer chain hence need more sweeps. To 1e-4 of the re
 balls take 18, 88 and 452 where g is the reach. For g of a fifth of the reach they take 40, 223 and
 1,203, for a fiftieth 243, 1,340 and 7,741. Over-relaxation does not help: rotations 1.5 times as
 far take as many sweeps, 1.8 times as far three times as many. Anderson's acceleration does
-(`anderson.py`): at a fiftieth its sweeps are 13, 58 and 257. FABRIK lays such a chain straight in
-one.
+(`anderson.py`): at a fiftieth its sweeps are 13, 58 and 257. FABRIK lays the chain straight in a
+single sweep.
 """
 
 import math

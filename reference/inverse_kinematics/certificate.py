@@ -20,10 +20,9 @@ Lipschitz constant of J. With a = 1 - |I - J B| > 0,
 (Brouwer). Joint i moves by at most |B_i| r, which must stay within its limits.
 
 L follows from lever arms. The second derivative of the position by two rotations is at most the
-distance of the lower joint from the effector. By a rotation and a slide below it, the bound is 1;
-by two slides 0. The bound for twice a quaternion is 1/2. A ball counts as three rotations: in Q
-exp(v) the first and second derivatives are bounded in the same way. L is the Frobenius norm of the
-bounds.
+distance of the lower joint from the effector. For a rotation and a slide below, the bound is 1; for
+two slides 0. The bound for twice a quaternion is 1/2. A ball counts as three rotations: in Q exp(v)
+the first and second derivatives are bounded in the same way. L is the Frobenius norm of the bounds.
 
 **Impossible.** See `reach`.
 """

@@ -43,8 +43,8 @@ from .linear_algebra import ROUNDING_DAMPING, inner
 BEYOND_TRANSPOSED, BEYOND_DAMPED = 0.2, 0.02
 # The square of the fixed damping factor, over the reach squared: a tenth of the reach.
 FIXED_DAMPING = 0.01
-# Of the squared error, for positions; and for rotations as well, the factor of Chan & Lawrence
-# 1988, which needs fewer iterations there.
+# Damping over the squared error, for positions; and for rotations as well, the factor of Chan &
+# Lawrence 1988, which needs fewer iterations there.
 DAMPING_OF_POSITIONS, DAMPING_OF_POSES = 0.5, 0.1
 # The phases after the first: the damping, over the squared error, and how many iterations turn the
 # long way round. Chosen on the bench's tuning robots alone, from 1e-4 to 2 and from 0 to 15.

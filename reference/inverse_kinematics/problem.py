@@ -20,8 +20,8 @@ from .solve_chain import ON_CHAINS
 from .solve_mechanism import ON_MECHANISMS
 
 # The defaults of `solve_ik`: iterations of an attempt, and of an attempt towards a target out of
-# reach. Then restarts of the default Levenberg-Marquardt, with one effector and with several, where
-# a restart redraws the limbs that fail.
+# reach. Then restarts of the default Levenberg-Marquardt, for one effector and for several; with
+# several a restart redraws the failing limbs.
 MAX_ITERATIONS, FAR_ITERATIONS, RESTARTS, LIMB_RESTARTS = 100, 2000, 20, 100
 # The phases of each solver, the first of which is the plain method; of others 1.
 PHASE_COUNTS = {"levenberg_marquardt": 1 + len(PHASES)}

@@ -187,7 +187,7 @@ class TaskProblem:
     def is_minimum(self, state: _Evaluation, tolerance: float, share: float) -> bool:
         """Return whether motions within limits and exact tasks lower the cost at most by `share`.
 
-        Met tasks have nothing left to lower.
+        `share` is relative to the cost. Met tasks have nothing left to lower.
         """
         if (state.errors[~self.is_exact] <= tolerance).all():
             return True

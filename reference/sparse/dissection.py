@@ -225,8 +225,8 @@ def sweep(graph, f, lowest, piece):
 def threshold(f, lowest, piece, first, last):
     """Return the t of the best separator and its cost, or -1 if none is good.
 
-    The cost is the separator over the product of the halves: it weighs a short separator against
-    equal halves (Leighton and Rao 1999, "Multicommodity Max-Flow Min-Cut Theorems and Their Use in
+    The cost, the separator over the product of the halves, weighs a short separator against equal
+    halves (Leighton and Rao 1999, "Multicommodity Max-Flow Min-Cut Theorems and Their Use in
     Designing Approximation Algorithms").
     """
     below, separator = np.zeros(last - first + 2, np.int64), np.zeros(last - first + 2, np.int64)

@@ -106,8 +106,8 @@ def all_solutions(
     """Return all joint coordinates within the limits which bring an effector to a pose.
 
     Six hinges have closed forms if the last or the first three axes meet (Pieper 1968). So have
-    hinges whose second to fourth, or third to fifth, are parallel if the two at the end meet (Elias
-    & Wen 2022, by subproblems of Paden 1986 and Kahan 1983). Closed forms prove their lists
+    hinges whose second to fourth, or third to fifth, are parallel and whose two at the end meet
+    (Elias & Wen 2022, by subproblems of Paden 1986 and Kahan 1983). Closed forms prove their lists
     complete where the axes meet or are parallel to rounding. Every other arm is searched by
     Levenberg-Marquardt from random starts.
 

@@ -24,8 +24,8 @@ from .subproblems import CERTAIN
 TOLERANCE = 1e-9
 # Solutions are the same if their coordinates differ by no more, over the reach for slides.
 DUPLICATE = 1e-6
-# Up to this from the target or a limit a candidate may or may not be a solution: near a double
-# root, rounding by e moves the root by sqrt(e).
+# A candidate this near to the target or a limit may or may not be a solution: near a double root,
+# rounding by e moves the root by sqrt(e).
 DOUBTFUL = 1e-6
 # Errors below this, over the reach, are rounding of the forward kinematics.
 ROUNDING = 64 * 2.220446049250313e-16
