@@ -52,6 +52,19 @@ def extended_precision():
 
 # Tests of ten seconds and more on two cores, left to the slow sweep; others show the same in less.
 LONG = (
+    # The same laws run on the compiled backend.
+    "test_restart_laws.py::test_the_chosen_attempt_is_that_of_least_merit[python-",
+    "test_task_jacobian.py::test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly[python-",
+    "test_restarts.py::test_one_restart_from_the_very_answer_arrives[jacobian_transpose-python",
+    "test_restarts.py::test_one_restart_from_the_very_answer_arrives[fabrik-python",
+    "test_restarts.py::test_one_restart_from_the_very_answer_arrives[damped_least_squares-python",
+    "test_effectors.py::test_targets_in_another_order_give_the_same_answer[fabrik-python",
+    "test_effectors.py::test_targets_in_another_order_give_the_same_answer[jacobian_transpose-python",
+    "test_effectors.py::test_targets_in_another_order_give_the_same_answer[damped_least_squares-pyt",
+    "test_mechanisms.py::test_another_unit_of_length_changes_nothing[jacobian_transpose-python",
+    "test_mechanisms.py::test_another_unit_of_length_changes_nothing[fabrik-python",
+    "test_mechanisms.py::test_another_unit_of_length_changes_nothing[damped_least_squares-python",
+    "test_draw_gallery.py::test_a_famous_fault_shows_beside_the_right_solver[curves",
     "test_dask.py::test_two_workers_give_the_same_tables",
     "test_rerun.py::test_a_solver_of_another_project_is_measured",
     "test_entrants.py::test_problems_of_a_python_file_stand",
