@@ -102,8 +102,8 @@ def test_a_corrupt_result_file_exits_2_and_stays(capsys, empty_folder, arguments
 def a_record(solver="ccd", **more):
     """A record that a report can be made of."""
     facts = {"subject": "kinematics", "group": "x", "work": "one pose a call"}
-    return Record("timing", "kinematics/x/one pose a call", solver, {"operations": 1}, facts=facts,
-                  arrays={"seconds": np.ones((1, 5)), "moved": np.array(0)}, **more)  # fmt: skip
+    return Record("timing", "kinematics/x/one pose a call", solver, {"operations": 1},
+                  {**facts, "seconds": np.ones((1, 5)), "moved": 0.0, **more})  # fmt: skip
 
 
 def obstruct(path, kind):
@@ -173,7 +173,7 @@ def test_a_line_nested_without_end_costs_itself(capsys, empty_folder, arguments,
 
 
 def test_a_folder_of_superseded_records_says_so(capsys):
-    RecordFile("out").append([a_record(notes={"superseded": "other settings"})])
+    RecordFile("out").append([a_record(superseded="other settings")])
     code, _, err = plumbob(capsys, "report", "out")
     assert (code, err.count("\n")) == (2, 1)
     assert "no records in out: all are superseded" in err

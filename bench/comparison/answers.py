@@ -28,7 +28,7 @@ _ERRORS = frozenset({
 # In other suites the distance of a target, which is an input.
 _DISTANCES = frozenset({("cloth", "distance"), ("newton", "distance")})
 # Arrays of which larger values are better.
-_MERITS = frozenset({"solved", "held", "covered", "same"})
+_MERITS = frozenset({"solved", "holds", "covered", "same"})
 # Which targets were solved; records with this array have times by target too.
 SOLVED = "solved"
 # Statistics of a row, and the arrays whose minimum is the smallest error.
@@ -61,8 +61,8 @@ def compare_answers(key: RowKey, pair: Pair) -> RowChange:
         why = f"measured on {old} and on {new}: not compared"
         return RowChange(key, "", ChangeVerdict.UNDECIDED, why=why)
     changes = [RowChange(key, "", ChangeVerdict.SAME, why=SAME_BITS)]
-    for name in pair.old.arrays:
-        if name not in pair.new.arrays:
+    for name in pair.old.numbers():
+        if name not in pair.new.numbers():
             why = "no longer measured"
             changes.append(RowChange(key, name, ChangeVerdict.CHANGED, 1.0, why))
         elif not is_time(key[0], name) and (key[0], name) not in _MEMORY:
@@ -79,13 +79,13 @@ def compare_statistics(key: RowKey, pair: Pair) -> Iterator[RowChange]:
     """
     if pair.old.size != pair.new.size:
         return
-    if all(SOLVED in record.arrays for record in pair):
-        solved = _common_targets(pair.old.arrays[SOLVED], pair.new.arrays[SOLVED])
+    if all(SOLVED in record.measured for record in pair):
+        solved = _common_targets(pair.old.measured[SOLVED], pair.new.measured[SOLVED])
         old, new = (float(np.mean(part)) for part in solved)
         why = f"from {100 * old:.1f} % to {100 * new:.1f} %"
         yield from _statistic(key, SHARE, new - old, f"{'fell' if new < old else 'rose'} {why}")
-    for name in _SMALLEST & pair.old.arrays.keys() & pair.new.arrays.keys():
-        errors = (np.asarray(record.arrays[name], dtype=float) for record in pair)
+    for name in _SMALLEST & pair.old.numbers().keys() & pair.new.numbers().keys():
+        errors = (np.asarray(record.measured[name], dtype=float) for record in pair)
         old, new = (float(np.min(a[np.isfinite(a)], initial=np.inf)) for a in errors)
         if min(old, new) > 0:
             why = f"{'grew' if new > old else 'shrank'} from {words(old)} to {words(new)}"
@@ -103,15 +103,15 @@ def chance_by_time_limit(pair: Pair) -> float | None:
 
     McNemar's exact test (1947) on the targets solved in only one of the two runs.
     """
-    has_targets = SOLVED in pair.old.arrays and SOLVED in pair.new.arrays
+    has_targets = SOLVED in pair.old.measured and SOLVED in pair.new.measured
     if _TIME_LIMIT not in pair.old.settings or not has_targets:
         return None
-    return chance_of_pairs(*_common_targets(pair.old.arrays[SOLVED], pair.new.arrays[SOLVED]))
+    return chance_of_pairs(*_common_targets(pair.old.measured[SOLVED], pair.new.measured[SOLVED]))
 
 
 def compare_limited_answers(key: RowKey, pair: Pair, chance: float, error_rate: float) -> RowChange:
     """Return the change of the targets solved within a time limit, by its adjusted probability."""
-    old, new = _common_targets(pair.old.arrays[SOLVED], pair.new.arrays[SOLVED])
+    old, new = _common_targets(pair.old.measured[SOLVED], pair.new.measured[SOLVED])
     before, after = int(np.sum(old)), int(np.sum(new))
     why = f"solved {before:,} of {len(old):,}, now {after:,}, within a time limit"
     if chance > error_rate:
@@ -131,7 +131,7 @@ def _common_targets(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _compare_array(key: RowKey, name: str, pair: Pair) -> RowChange:
     """Return the change of an array of answers."""
-    old, new = _common_targets(pair.old.arrays[name], pair.new.arrays[name])
+    old, new = _common_targets(pair.old.numbers()[name], pair.new.numbers()[name])
     if old.shape != new.shape:
         why = f"shape {old.shape}, now {new.shape}"
         return RowChange(key, name, ChangeVerdict.CHANGED, 1.0, why)

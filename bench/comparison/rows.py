@@ -74,7 +74,9 @@ def by_row(records: Iterable[Record]) -> dict[RowKey, Record]:
     return {
         row_key(record): record
         for record in sorted(records, key=lambda record: record.when)
-        if record.suite != FINISHED and not record.superseded and (record.arrays or record.failed)
+        if record.suite != FINISHED
+        and not record.superseded
+        and (record.has_numbers or record.failed)
     }
 
 

@@ -135,7 +135,7 @@ def machine_drift(rows: Mapping[RowKey, Pair]) -> Drift:
 
 def _drift_by_controls(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
     if controls := [pair for pair in rows.values() if _is_control(pair)]:
-        medians = [[np.median(record.arrays["seconds"]) for record in pair] for pair in controls]
+        medians = [[np.median(record.measured["seconds"]) for record in pair] for pair in controls]
         differences = np.diff(np.log(medians))
         sigma, count = float(np.sqrt(np.mean(differences**2))), len(differences)
         yield Drift(sigma, count, f"{count:,} times of unchanged code")
@@ -173,13 +173,13 @@ def time_ratios(
 
 def common_times(pair: Pair) -> list[str]:
     """Return the names of the times in both runs."""
-    suite, new = pair.old.suite, pair.new.arrays
-    return [name for name in pair.old.arrays if name in new and is_time(suite, name)]
+    suite, new = pair.old.suite, pair.new.numbers()
+    return [name for name in pair.old.measured if name in new and is_time(suite, name)]
 
 
 def has_rounds(pair: Pair, name: str) -> bool:
     """Return whether both runs have enough rounds of a time."""
-    return all(record.arrays[name].size >= ROUNDS for record in pair)
+    return all(record.measured[name].size >= ROUNDS for record in pair)
 
 
 def time_change(key: RowKey, name: str, ratio: TimeRatio, chance: float) -> RowChange:
@@ -201,17 +201,17 @@ def _why_not_compared(pair: Pair, name: str) -> str:
     if pair.old.stamp.get("machine") != pair.new.stamp.get("machine"):
         return "measured on different machines"
     for record in pair:
-        times = record.arrays[name]
+        times = record.measured[name]
         if not np.all((times > 0) & np.isfinite(times)):
             return "a time is zero or missing"
     return ""
 
 
 def _time_ratio(pair: Pair, name: str, drift: Drift) -> TimeRatio:
-    old, new = (record.arrays[name].ravel() for record in pair)
+    old, new = (record.measured[name].ravel() for record in pair)
     if np.array_equal(old, new):
         return TimeRatio(1.0, 1.0, 1.0, 1.0)
-    has_targets = all(SOLVED in record.arrays for record in pair)  # a time each, in both runs
+    has_targets = all(SOLVED in record.measured for record in pair)  # a time each, in both runs
     if has_targets:
         count = min(len(old), len(new))
         old, new = old[:count], new[:count]

@@ -12,39 +12,20 @@ if TYPE_CHECKING:
 
 # Of random targets, unless the user asks for others.
 SEED = 1986
+# The result of a block: numbers and words by name, of the type that the experiment declares.
+Measured = Mapping[str, Any]
 
 
 class Group(NamedTuple):
     """Blocks to measure together, with times taken in turns."""
 
     name: str  # equal for all blocks of the group, which follow each other
-    measure: Callable[[Sequence[Any]], "Sequence[Measured]"]  # the results of jobs
+    measure: Callable[[Sequence[Any]], Sequence[Measured]]  # the results of jobs
     job: Any  # what this block asks for
 
-    def measure_alone(self) -> "Measured":
+    def measure_alone(self) -> Measured:
         """Return the result of this block by itself."""
         return self.measure([self.job])[0]
-
-
-class Measured(NamedTuple):
-    """The result of a block.
-
-    Attributes:
-        values: numbers, of the type that the experiment declares; None where there are none.
-        notes: sentences on them, by name.
-        facts: for tables to select and sort by, beside the facts of the block; see `Block`.
-    """
-
-    values: Any  # `Values` of the type that the experiment declares, or None
-    notes: Mapping[str, str] = {}
-    facts: Mapping[str, Any] = {}
-
-    @property
-    def arrays(self) -> Mapping[str, Any]:
-        """The values by their names on record."""
-        from .values import stored  # the command line lists blocks without NumPy
-
-        return {} if self.values is None else stored(self.values)
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,12 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .block import Block, Scale
 
 if TYPE_CHECKING:
-    from .values import Kind
+    from .values import Values
 
 
 class Experiment(NamedTuple):
@@ -27,9 +27,15 @@ class Experiment(NamedTuple):
     # machine with others while they are measured
     times: bool = True
 
+    def part(self, name: str) -> Any:
+        """Return its module, or the file of its folder with this part."""
+        module = importlib.import_module(self.package)
+        is_folder = hasattr(module, "__path__")
+        return importlib.import_module(f"{self.package}.{name}") if is_folder else module
+
     def blocks(self, scale: Scale) -> Iterator[Block]:
         """Yield its blocks; engines are imported only now."""
-        for block in importlib.import_module(f"{self.package}.measurement").blocks(scale):
+        for block in self.part("measurement").blocks(scale):
             yield replace(block, times=self.times)
 
 
@@ -57,17 +63,18 @@ def blocks(suite: str, scale: Scale) -> Iterator[Block]:
 
 
 @functools.cache
-def kind_of(suite: str, task: str) -> "Kind | None":
-    """Return the types of the records of a task ("" if unnamed); None of other suites.
+def kind_of(suite: str, task: str) -> "type[Values] | None":
+    """Return the type of the records of a task ("" if unnamed); None of other suites.
 
     No engine is imported.
 
     Raises:
         ValueError: if the suite has no task of this name.
     """
-    modules = [f"{e.package}.values" for e in EXPERIMENTS if e.suite == suite]
-    kinds = {name: kind for module in modules
-             for name, kind in importlib.import_module(module).KINDS.items()}  # fmt: skip
+    kinds: dict[str, type[Values]] = {}
+    for experiment in EXPERIMENTS:
+        if experiment.suite == suite:
+            kinds |= experiment.part("values").KINDS
     if kinds and task not in kinds:
         raise ValueError(f"task: expected one of {', '.join(map(repr, kinds))}, got {task[:40]!r}")
     return kinds.get(task)

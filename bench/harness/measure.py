@@ -4,8 +4,6 @@ import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
-import numpy as np
-
 from ..peers.protocol import describe
 from .block import Block, Measured
 from .machine import conditions, stamp
@@ -52,17 +50,17 @@ def measure_together(blocks: Sequence[Block]) -> list[Record]:
 
 def failure(why: str) -> Measured:
     """Return the result of a block after a failed measurement."""
-    return Measured(None, {"failed": why})
+    return {"failed": why}
 
 
 def not_installed(package: str) -> Measured:
     """Return the result of a block with a missing package."""
-    return Measured(None, {"remark": f"{package} is not installed"})
+    return {"remark": f"{package} is not installed"}
 
 
 def not_asked(why: str) -> Measured:
     """Return the result of a block that a solver cannot take."""
-    return Measured(None, {"remark": why})
+    return {"remark": why}
 
 
 def record_of(block: Block, measured: Measured, seconds: float) -> Record:
@@ -72,12 +70,10 @@ def record_of(block: Block, measured: Measured, seconds: float) -> Record:
         block.problem,
         block.solver,
         block.settings,
+        {**block.facts, **measured},
         block.size,
-        {name: np.asarray(values) for name, values in measured.arrays.items()},
-        measured.notes,
         stamp(),
         now(),
         seconds,
-        {**block.facts, **measured.facts},
         {**conditions(), **block.conditions},
     )

@@ -1,7 +1,7 @@
 """Result files: a record is a line of JSON, appended when produced; the last of a key counts.
 
-No other file of the bench opens a result file. A record is a block: suite, problem, solver and
-settings, the resulting arrays, and the machine.
+No other file of the bench opens a result file. A record is flat: suite, problem, solver, settings,
+measured values, and where and when they were measured.
 """
 
 import contextlib
@@ -11,9 +11,9 @@ import json
 import mmap
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, TypedDict
+from typing import Annotated, Any, NamedTuple, TypedDict
 
 import msgspec
 import numpy as np
@@ -22,8 +22,9 @@ from plumbob.process.paths import check_folder, check_regular
 
 from . import values
 from .experiment import kind_of
+from .old_records import OldLine, measured_of
 
-FORMAT = 3
+FORMAT = 4
 FILE_NAME = "records.jsonl"
 # Suite name of the records that mark a suite as complete.
 FINISHED = "finished"
@@ -31,8 +32,9 @@ FINISHED = "finished"
 FIRST_TARGETS = "first_targets"
 # How many invalid lines a warning lists; the others are counted.
 LISTED_LINES = 5
-# How numbers are written for which JSON has no sign.
+# How numbers are written for which JSON has no sign, and the key of a single such number.
 _WORDS = {"nan", "inf", "-inf"}
+NUMBER = "number"
 
 Key = tuple[str, str, str, str]
 
@@ -55,26 +57,23 @@ class _Stamp(TypedDict, total=False):
     source: str
 
 
-class _Line(msgspec.Struct):
+class _Line(msgspec.Struct, tag_field="format", tag=FORMAT):
     """The fields of a line."""
 
-    format: Literal[3]
     suite: str
     problem: str
     solver: str
     settings: dict[str, _Scalar]
+    measured: dict[str, Any]
     size: float
-    arrays: dict[str, Any]
-    notes: dict[str, str]
     stamp: _Stamp
     when: _Moment
     seconds: float
-    facts: dict[str, _Scalar | list[str]]
     conditions: dict[str, str | int | float | None]
 
 
-_FIELDS = _Line.__struct_fields__[1:]
-_DECODER = msgspec.json.Decoder(_Line)
+_FIELDS = _Line.__struct_fields__
+_DECODER = msgspec.json.Decoder(_Line | OldLine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,36 +85,54 @@ class Record:
     solver: str  # the name of the solver
     # numbers, words and truth values that change the answer
     settings: Mapping[str, Any] = field(default_factory=dict)
+    # numbers, words, truth values, lists of words and arrays of numbers, with an entry for each
+    # target, frame or step; "failed" says why there are no numbers
+    measured: Mapping[str, Any] = field(default_factory=dict)
     size: float = 0.0  # how much was measured, for example the number of random targets
-    # the results, arrays of numbers with an entry for each target, frame or step
-    arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
-    # words on the record; "failed" says why there are no arrays
-    notes: Mapping[str, str] = field(default_factory=dict)
     # machine, versions and digest of the sources, see `plumbob.bench.harness.machine`
     stamp: Mapping[str, Any] = field(default_factory=dict)
     when: str = ""  # the moment it was produced, ISO 8601 with time zone
     seconds: float = 0.0  # how long it took to produce
-    # for tables to select and sort by: numbers, words, truth values and lists of words
-    facts: Mapping[str, Any] = field(default_factory=dict)
     # of the measurement, without effect on its validity: the commit of the sources, affinity, load,
     # pace
     conditions: Mapping[str, Any] = field(default_factory=dict)
 
-    @property
-    def _kind(self) -> values.Kind | None:
-        return kind_of(self.suite, str(self.facts.get("task", "")))
-
     @functools.cached_property
     def values(self) -> Any:
-        """The arrays as the type declared in the experiment; None without arrays."""
-        kind = self._kind
-        return values.read(kind.values, self.arrays) if kind and self.arrays else None
+        """Settings and measured values as the type declared in the experiment, None without a type.
+
+        A record without numbers is read as the type above.
+        """
+        kind = kind_of(self.suite, self.task)
+        fields = {**self.settings, **self.measured}
+        return kind and values.read(kind if self.has_numbers else values.words_of(kind), fields)
 
     @functools.cached_property
-    def details(self) -> Any:
-        """Settings, notes and facts as the type declared in the experiment, None without a type."""
-        kind = self._kind
-        return kind and values.read(kind.details, {**self.settings, **self.notes, **self.facts})
+    def has_numbers(self) -> bool:
+        """Whether there are numbers, not only words on why there are none."""
+        if self.failed:
+            return False
+        kind = kind_of(self.suite, self.task)
+        names = values.own_names(kind) if kind else self._array_names
+        return not names.isdisjoint(self.measured)
+
+    @property
+    def _array_names(self) -> set[str]:
+        return {name for name, value in self.measured.items() if isinstance(value, np.ndarray)}
+
+    def numbers(self) -> dict[str, np.ndarray]:
+        """Return the arrays and the scalars measured, by name."""
+        kind = kind_of(self.suite, self.task)
+        names = values.own_names(kind) if kind else self._array_names
+        return {
+            name: np.asarray(value)
+            for name, value in self.measured.items()
+            if name in names and value is not None
+        }
+
+    def with_measured(self, **measured: Any) -> "Record":
+        """Return the record with further or other measured values."""
+        return replace(self, measured={**self.measured, **measured})
 
     def check(self) -> None:
         """Check the type of the record, unless superseded.
@@ -124,17 +141,37 @@ class Record:
             ValueError: naming a missing field, or a field of another type.
         """
         if not self.superseded:
-            self.values, self.details  # noqa: B018
+            self.values  # noqa: B018
+
+    @property
+    def task(self) -> str:
+        """The kind of its numbers among the kinds of its suite, "" if there is a single kind."""
+        return str(self.measured.get("task", ""))
+
+    @property
+    def remark(self) -> str:
+        """A sentence on the numbers, or on why there are none."""
+        return str(self.measured.get("remark", ""))
+
+    @property
+    def is_entrant(self) -> bool:
+        """Whether its solver was entered by a user."""
+        return self.measured.get("entrant") is True
 
     @property
     def trouble(self) -> str:
         """The most frequent exception of its solver with its count, else ""."""
-        return str(self.facts.get("trouble", ""))
+        return str(self.measured.get("trouble", ""))
 
     @property
     def title(self) -> str:
         """How the problem is written."""
-        return str(self.facts.get("title", self.problem))
+        return str(self.measured.get("title", self.problem))
+
+    # Names of former fields, until no code uses them.
+    arrays = property(numbers)
+    facts = notes = property(lambda self: self.measured)
+    details = property(lambda self: self.values)
 
     @property
     def key(self) -> Key:
@@ -144,12 +181,12 @@ class Record:
     @property
     def failed(self) -> str:
         """Why the measurement failed, "" if not."""
-        return self.notes.get("failed", "")
+        return str(self.measured.get("failed", ""))
 
     @property
     def superseded(self) -> bool:
         """Whether its block now has other settings: the record is kept, but not shown."""
-        return "superseded" in self.notes
+        return "superseded" in self.measured
 
     @property
     def commit(self) -> str:
@@ -381,11 +418,7 @@ def _decoded(text: bytes) -> tuple[bytes, Record | None, str]:
 def encode(record: Record) -> str:
     """Return the record as a line of standard JSON; NaN and infinities become words."""
     content = {"format": FORMAT} | {name: getattr(record, name) for name in _FIELDS}
-    content["arrays"] = {name: _nested_list(np.asarray(a)) for name, a in record.arrays.items()}
-    # Names of files may bring halves of surrogate pairs along.
-    content["notes"] = {
-        name: text.encode(errors="replace").decode() for name, text in record.notes.items()
-    }
+    content["measured"] = {name: _plain(value) for name, value in record.measured.items()}
     return json.dumps(content, allow_nan=False)
 
 
@@ -411,18 +444,42 @@ def untyped(line: bytes | str) -> Record:
         content = _DECODER.decode(line)
     except RecursionError:
         raise ValueError("nested too deeply") from None
-    fields = {name: getattr(content, name) for name in _FIELDS}
-    fields["arrays"] = {name: _array(name, numbers) for name, numbers in content.arrays.items()}
-    return Record(**fields)
+    measured = measured_of(content) if isinstance(content, OldLine) else content.measured
+    fields = {name: getattr(content, name) for name in _FIELDS if name != "measured"}
+    return Record(**fields, measured={name: _read(name, value) for name, value in measured.items()})
 
 
-def _nested_list(array: np.ndarray) -> Any:
+def _plain(value: Any) -> Any:
+    """Return a measured value as JSON has it; numbers that JSON has not become words."""
+    if isinstance(value, str):  # names of files may bring halves of surrogate pairs along
+        return value.encode(errors="replace").decode()
+    if value is None or _is_words(value):
+        return value
+    array = np.asarray(value)
     if array.dtype.kind not in "biuf":
-        raise ValueError(f"arrays: expected numbers, got {array.dtype} values")
+        raise ValueError(f"measured: expected numbers, got {array.dtype} values")
     if np.isfinite(array).all():
         return array.tolist()
     words = [repr(float(x)) if not np.isfinite(x) else float(x) for x in array.ravel()]
-    return np.array(words, dtype=object).reshape(array.shape).tolist()
+    nested = np.array(words, dtype=object).reshape(array.shape)
+    return nested.tolist() if array.ndim else {NUMBER: words[0]}
+
+
+def _read(name: str, value: Any) -> Any:
+    """Return a value of JSON: a scalar or words as they are, nested lists of numbers as an array.
+
+    Raises:
+        ValueError: if the value is something else.
+    """
+    if isinstance(value, dict) and value.keys() == {NUMBER} and value[NUMBER] in _WORDS:
+        return float(value[NUMBER])
+    if _is_words(value) and not (value and {*value} <= _WORDS):  # an empty list stays empty
+        return value
+    return _array(name, value) if isinstance(value, list | dict) else value
+
+
+def _is_words(value: Any) -> bool:
+    return isinstance(value, list | tuple) and all(isinstance(part, str) for part in value)
 
 
 def _array(name: str, numbers: Any) -> np.ndarray:
@@ -434,4 +491,4 @@ def _array(name: str, numbers: Any) -> np.ndarray:
         array = np.array(numbers, dtype=np.float64 if words else None)
         if array.dtype.kind in "biuf":  # and no integers of more than 64 bits
             return array
-    raise ValueError(f"arrays: expected numbers in {name[:40]!r}")
+    raise ValueError(f"measured: expected numbers or words in {name[:40]!r}")

@@ -3,7 +3,6 @@
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -103,13 +102,13 @@ def _record_finish(
 ) -> None:
     """Record the end of a suite, if all of its blocks are on record."""
     finished = Record(
-        FINISHED, suite, "", size=len(suite_keys), notes={"scale": scale}, stamp=executor.stamp(),
-        when=now(), seconds=seconds, conditions=conditions(),
+        FINISHED, suite, "", measured={"scale": scale}, size=len(suite_keys),
+        stamp=executor.stamp(), when=now(), seconds=seconds, conditions=conditions(),
     )  # fmt: skip
     records = {record.key: record for record in file.read().records}
     previous = records.get(finished.key)
     is_recorded = previous is not None and all(
-        getattr(previous, name) == getattr(finished, name) for name in ("size", "notes", "stamp")
+        getattr(previous, name) == getattr(finished, name) for name in ("size", "measured", "stamp")
     )
     if suite_keys <= records.keys() and not is_recorded:
         file.append([finished])
@@ -128,12 +127,11 @@ def _extra_records(
     current = {key[:3] for key in suite_keys}
     old = []
     for record in extra:
-        is_remark = not (record.arrays or record.failed or record.facts.get("entrant"))
+        is_remark = not (record.has_numbers or record.failed or record.measured.get("entrant"))
         if is_remark or record.key[:3] in current:
             old.append(record)
     if newly := [record for record in old if not record.superseded]:
-        notes = {"superseded": now()}
-        file.append([replace(record, notes={**record.notes, **notes}) for record in newly])
+        file.append([record.with_measured(superseded=now()) for record in newly])
     for solver, count in Counter(record.solver for record in old).items():
         why = f"{_records(count)} of {solver} under other settings kept, left out of tables"
         yield Event(NOT_RUN, suite, solver, why)
@@ -150,9 +148,10 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
     if "check" not in suites:
         return []
     checks = [record for record in RecordFile(folder).read().records if record.suite == "check"]
-    failures = [record for record in checks if not np.all(record.arrays.get("held", True))]
+    failures = [record for record in checks if not np.all(record.measured.get("holds", True))]
     return [
-        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}" for record in failures
+        f"claim {record.problem!r} missed: {record.measured.get('failure', '')}"
+        for record in failures
     ]
 
 
@@ -199,9 +198,9 @@ def why_again(block: Block, present: Mapping[Key, Record], executor: Executor) -
         return "its settings are asked for again"
     if record.size < block.size:
         return "a larger size ({}, now {})".format(*distinct_texts(record.size, block.size))
-    if record.facts.get("problem_digest") != block.facts.get("problem_digest"):
+    if record.measured.get("problem_digest") != block.facts.get("problem_digest"):
         return f"{block.problem} is another problem now"
-    before, digest = record.facts.get("digest", ""), block.facts.get("digest", "")
+    before, digest = record.measured.get("digest", ""), block.facts.get("digest", "")
     if before != digest:
         return f"other sources of {block.solver} ({before or 'none'}, now {digest or 'none'})"
     return executor.difference(block, record) or None

@@ -1,11 +1,11 @@
-"""Typed fields of records: the numbers of an experiment, and its settings, notes and facts.
+"""Typed values of records: an experiment declares one type for the records of each of its tasks.
 
-An experiment declares its types in `values.py`, in `KINDS`. Records are read into these types: a
-record with a missing field, or a field of another type, is refused.
+Settings and measured values are read into the type. A record with a missing field, or a field of
+another type, is refused.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 import msgspec
 import numpy as np
@@ -20,26 +20,16 @@ Booleans1 = np.ndarray[tuple[int], np.dtype[np.bool_]]
 _TAKES = {"f": "fiu", "i": "iu", "b": "b"}
 
 
-class Values(msgspec.Struct, frozen=True, eq=False):
-    """The numbers of a block: arrays with axes, and scalars.
+class Values(msgspec.Struct, frozen=True, eq=False, kw_only=True):
+    """The settings and measured values of a block: words, numbers, and arrays with axes.
 
+    The words of a block stand in a class of their own, each with a default; the class below adds
+    the numbers. A record without numbers, as of a solver that is not installed, has the words only.
     A None field is not on record. A name other than an identifier is given as
     `msgspec.field(name="cold wall")`.
     """
 
-
-class Details(msgspec.Struct, frozen=True):
-    """The settings, notes and facts of a block.
-
-    Notes and facts of a measurement need a default, in case of failure.
-    """
-
-
-class Kind(NamedTuple):
-    """The types of the records of a task."""
-
-    values: type[Values]
-    details: type[Details] = Details
+    remark: str = ""  # on the numbers, or why there are none
 
 
 Typed = TypeVar("Typed", bound=msgspec.Struct)
@@ -61,14 +51,30 @@ def read(kind: type[Typed], fields: Mapping[str, Any]) -> Typed:
         raise ValueError(str(error).replace("$.", "")) from None
 
 
+def own_names(kind: type[Values]) -> set[str]:
+    """Return the names on record of the fields that a type adds to the type above: its numbers."""
+    return _names(kind) - _names(words_of(kind))
+
+
+def words_of(kind: type[Values]) -> type[Values]:
+    """Return the type of the words of a block: the type above."""
+    above = kind.__base__
+    return above if above and issubclass(above, Values) else kind
+
+
+def _names(kind: type[Values]) -> set[str]:
+    return {field.encode_name for field in msgspec.structs.fields(kind)}
+
+
 def stored(values: Values) -> dict[str, Any]:
-    """Return values by their names on record, without None."""
-    fields = msgspec.structs.fields(values)
-    return {
-        field.encode_name: number
-        for field in fields
-        if (number := getattr(values, field.name)) is not None
-    }
+    """Return values by their names on record, without defaults."""
+    fields = ((f, getattr(values, f.name)) for f in msgspec.structs.fields(values))
+    return {f.encode_name: value for f, value in fields if not _is_default(f, value)}
+
+
+def _is_default(field: msgspec.structs.FieldInfo, value: Any) -> bool:
+    is_empty_list = isinstance(value, list) and not value
+    return value is field.default or is_empty_list
 
 
 def _array(kind: Any, nested: Any) -> np.ndarray:

@@ -95,7 +95,7 @@ def overview(results: Results) -> Overview:
 
 def verdict(results: Results) -> ClaimCount | None:
     """Return the result of the cross-check, None if not run."""
-    claims = [record for record in results.all("check") if record.values]
+    claims = [record for record in results.all("check") if record.has_numbers]
     if not claims:
         return None
     used = {r.title: metrics.ratio(r.values.difference, r.values.tolerance) for r in claims}

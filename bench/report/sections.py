@@ -1,7 +1,5 @@
 """The chapters of the report and their tables, which experiments offer."""
 
-import importlib
-import importlib.util
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -47,11 +45,8 @@ MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
 
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:
-    """Return the tables of an experiment, imported only now; empty without tables."""
-    name = f"{experiment.package}.tables"
-    if importlib.util.find_spec(name) is None:
-        return ()
-    layouts: tuple[Layout, ...] = importlib.import_module(name).LAYOUTS
+    """Return the tables of an experiment, imported only now."""
+    layouts: tuple[Layout, ...] = experiment.part("tables").LAYOUTS
     return layouts
 
 

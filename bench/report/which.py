@@ -35,7 +35,7 @@ def solvers_on_robot(results: Results, name: str) -> Table:
         text("choose it for", lambda score: _peers().get(score.solver, ("", ""))[1]),
         replace(text("settings", lambda score: score.solver), folded=True),
     )
-    details = rows[0].records[0].details
+    details = rows[0].records[0].values
     link = details.effectors[0].partition("_")[2] or details.effectors[0]
     title = f"{name}, {counted(details.joints, 'joint')} to {link}: {rows[0].total} targets"
     missing = tuple(filter(None, _missing(set(map(_title, rows)))))

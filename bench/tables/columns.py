@@ -24,13 +24,13 @@ def quantile_cells(title: str, quantiles: Iterable[Cell]) -> dict[str, Cell]:
 
 def spread_of(record: Record, name: str) -> Sequence[int | float]:
     """Return median, 95th percentile and maximum of an array; of counts, as whole numbers."""
-    array = record.arrays[name]
+    array = record.measured[name]
     return metrics.whole(array) if array.dtype.kind in "iu" else metrics.spread(array)
 
 
 def reported_iterations(record: Record) -> metrics.Floats:
     """Return the iterations of the solves whose solver counts them, (solve,)."""
-    counts = record.arrays["iterations"]
+    counts = record.measured["iterations"]
     return counts[~np.isnan(counts)]
 
 
@@ -43,7 +43,7 @@ def spread_of_iterations(record: Record) -> Sequence[Cell]:
     if not counts.size:
         return (None, None, None)
     whole = metrics.whole(counts)
-    return [f"{words(n)} claimed" for n in whole] if record.facts.get("entrant") else whole
+    return [f"{words(n)} claimed" for n in whole] if record.measured.get("entrant") else whole
 
 
 def words_in(value: float, unit: str) -> str:

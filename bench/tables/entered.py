@@ -15,7 +15,7 @@ EntrantRecords = Sequence[Record]
 
 
 def _why_not_asked(record: Record) -> str:
-    remark = "" if record.arrays else str(record.notes.get("remark", ""))
+    remark = "" if record.has_numbers else record.remark
     return remark if remark.startswith(NOT_ASKED) else ""
 
 
@@ -62,8 +62,8 @@ entrant_table = Layout(
         text("suite", lambda records: records[-1].suite),
         text("version", _version),
         text("commit", _commit),
-        text("sources", lambda records: str(records[-1].facts.get("digest") or "–")),
-        text("door", lambda records: str(records[-1].facts.get("door") or "–")),
+        text("sources", lambda records: str(records[-1].measured.get("digest") or "–")),
+        text("door", lambda records: str(records[-1].measured.get("door") or "–")),
         Column("records", read=len),
         text("remark", _remark),
     ),

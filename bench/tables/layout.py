@@ -102,7 +102,7 @@ class Layout:
 
 def source(subject: Any) -> Source:
     """Return the measurements behind the row of this subject."""
-    records = [record for record in records_of(subject) if record.arrays]
+    records = [record for record in records_of(subject) if record.has_numbers]
     if not records:
         return Source()
     problems, solvers = ({r.problem: 0 for r in records}, {r.solver: 0 for r in records})
@@ -144,8 +144,8 @@ def _distinct(texts: Iterable[str]) -> str:
 
 def _samples(records: Sequence[Record]) -> str:
     """Return the number of targets or rounds of a record: "n = 20 to 200"."""
-    arrays = [r.arrays[n] for r in records for n in ("solved", "seconds", "residual")
-              if n in r.arrays]  # fmt: skip
+    names = ("solved", "seconds", "residual")
+    arrays = [a for record in records for n, a in record.numbers().items() if n in names]
     counts = sorted({array.size for array in arrays if array.size > 1})
     if not counts:
         return ""

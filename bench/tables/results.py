@@ -41,7 +41,7 @@ class Results:
     @property
     def entrants(self) -> frozenset[str]:
         """The solvers entered by a user."""
-        return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
+        return frozenset(r.solver for r in self.records if r.measured.get("entrant") is True)
 
     def all(self, suite: str, failed: bool = False, **facts: Any) -> list[Record]:
         """Return a suite's records with these facts or settings; failed records only on demand."""
@@ -55,13 +55,13 @@ class Results:
 
 
 def _has(record: Record, facts: dict[str, Any]) -> bool:
-    properties = {**record.settings, **record.facts}
+    properties = {**record.settings, **record.measured}
     return all(properties.get(name) == fact for name, fact in facts.items())
 
 
 def printable(record: Record) -> Record:
     """Return a record with words that are safe to print anywhere."""
-    names = ("suite", "problem", "solver", "settings", "notes", "stamp", "facts")
+    names = ("suite", "problem", "solver", "settings", "measured", "stamp")
     return replace(record, **{name: all_visible(getattr(record, name)) for name in names})
 
 

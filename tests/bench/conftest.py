@@ -25,11 +25,12 @@ STAMP = {
 WHEN = "2000-01-02T03:04:05+00:00"
 
 
-def record(suite, problem, solver, settings=None, arrays=None, **more):
-    """A record with a stamp; lists become arrays."""
+def record(suite, problem, solver, settings=None, arrays=None, facts=None, notes=None, **more):
+    """A record with a stamp; the lists of `arrays` become arrays."""
     numbers = {name: np.asarray(values) for name, values in (arrays or {}).items()}
+    measured = {**(facts or {}), **(notes or {}), **numbers}
     fields = {"stamp": STAMP, "when": WHEN, **more}
-    return Record(suite, problem, solver, settings or {}, arrays=numbers, **fields)
+    return Record(suite, problem, solver, settings or {}, measured, **fields)
 
 
 def sample(name, **changes):
@@ -82,8 +83,8 @@ def beyond(solver, bend):
 
 def claim(name="spring forces", held=True, **notes):
     """A verdict of the cross-check."""
-    notes = {"missed": "" if held else "they differ"} | notes
-    return sample("claim", problem=name, arrays={"held": held}, notes=notes)
+    notes = {"failure": "" if held else "they differ"} | notes
+    return sample("claim", problem=name, arrays={"holds": held}, notes=notes)
 
 
 def timed(solver, seconds, subject="kinematics", group="10 balls", work="one pose a call"):
@@ -102,15 +103,16 @@ def reached(stratum, solver):
 
 def entered(made):
     """The same record of a solver that a user entered."""
-    facts = {**made.facts, "entrant": True, "door": "my_ik.py", "digest": "0123456789ab"}
+    words = {"entrant": True, "door": "my_ik.py", "digest": "0123456789ab"}
     settings = {**made.settings, "version": "1.0"}
     commit = {"solver_commit": "0123456789abcdef with changes"}
-    return replace(made, facts=facts, settings=settings, conditions=commit)
+    made = made.with_measured(**words)
+    return replace(made, settings=settings, conditions=commit)
 
 
 def two_dampers(apart=(0.04, 0.02)):
     """The distance of two laws of dampers in two steps."""
-    arrays = {"h": 0.02 / 2.0 ** np.arange(len(apart)), "apart": apart}
+    arrays = {"h": 0.02 / 2.0 ** np.arange(len(apart)), "difference": apart}
     return sample("two_dampers", settings={"halvings": len(apart) - 1}, arrays=arrays)
 
 
@@ -144,13 +146,13 @@ def solving(
     """The first `begun` of so many targets, the first `hits` of them solved, each in so long."""
     times = np.resize(seconds, np.size(seconds) if np.ndim(seconds) else begun or count)
     solved = np.arange(len(times)) < hits
-    arrays = {"solved": solved, "claimed": solved.astype(int), "seconds": times}
+    arrays = {"solved": solved, "claims": solved.astype(int), "seconds": times}
     arrays |= {"stratum": np.arange(len(times)) % 2, "position": np.where(solved, 1e-9, 0.5)}
     arrays |= dict.fromkeys(("rotation", "beyond"), np.zeros(len(times)))
     arrays |= {name: np.resize(values, len(times)) for name, values in changed.items()}
     made = raced(solver, kind, robot=robot, size=size or count, **arrays)
     more = {"entrant": True, "door": "mine.py"} if mine else {}
-    return replace(made, facts={**made.facts, **more, **dict(facts)})
+    return made.with_measured(**more, **dict(facts))
 
 
 def entrant(suite):

@@ -61,7 +61,7 @@ def sizes(make):
 
 def missed_claim(make):
     record = make.claim(held=False)
-    record.arrays.update(difference=np.array(1e-10 * CLOSE), tolerance=np.array(1e-10))
+    record.measured.update(difference=np.array(1e-10 * CLOSE), tolerance=np.array(1e-10))
     return check._row(record)["verdict"]
 
 

@@ -397,9 +397,9 @@ def test_every_manner_becomes_one_point(worker, monkeypatch, manner, remark, tro
     monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
     monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
     measured = peers_cloth.work(MOTION, fake_peer(manner), [FALL])
-    assert np.isfinite(measured.arrays["error"]).tolist() == [manner == "well"]
-    assert measured.facts["remarks"] == [remark]
-    assert measured.facts["trouble"] == (remark if trouble else "")
+    assert np.isfinite(measured["error"]).tolist() == [manner == "well"]
+    assert measured["remarks"] == [remark]
+    assert measured["trouble"] == (remark if trouble else "")
 
 
 @pytest.fixture
@@ -419,17 +419,17 @@ def test_a_solver_that_did_not_finish_is_not_tried_again(monkeypatch):
     monkeypatch.setattr(peers_cloth, "_unfinished", {})
     measured = peers_cloth.work(MOTION, fake_peer("well"), [FALL, FALL])
     assert len(jobs) == 1
-    assert np.isinf(measured.arrays["error"]).all()
-    assert all("not finished: ended" in remark for remark in measured.facts["remarks"])
+    assert np.isinf(measured["error"]).all()
+    assert all("not finished: ended" in remark for remark in measured["remarks"])
 
 
 def test_a_ladder_is_run_whole_and_says_what_single_precision_allows(here):
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
     measured = peers_cloth.work(ONE_STEP, newton, [FALL])
-    errors = measured.arrays["error"]
-    assert len(measured.facts["rungs"]) == len(errors) == len(newton.ladder)
+    errors = measured["error"]
+    assert len(measured["rungs"]) == len(errors) == len(newton.ladder)
     assert errors[-1] < 1e-12
-    assert 1e-7 < measured.arrays["rounding"][0] < TARGETS[SOLVED]
+    assert 1e-7 < measured["rounding"][0] < TARGETS[SOLVED]
 
 
 def test_explicit_solvers_take_no_implicit_step_and_all_move():
@@ -523,8 +523,8 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
 
 def test_a_solver_that_fails_has_no_limit_and_says_why(here):
     measured = peers_cloth.stability(fake_peer("unable"), (STIFFNESS,))
-    assert np.isnan(measured.arrays["limit"]).all()
-    assert "TypeError" in measured.notes["remark"]
+    assert np.isnan(measured["limit"]).all()
+    assert "TypeError" in measured["remark"]
 
 
 # Tables and figures.

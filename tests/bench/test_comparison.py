@@ -22,7 +22,7 @@ KEY = ("timing", "p", "mine", "{}")
 
 def changed(record, **arrays):
     """The record with other arrays."""
-    return replace(record, arrays={**record.arrays, **{k: np.array(v) for k, v in arrays.items()}})
+    return record.with_measured(**{k: np.array(v) for k, v in arrays.items()})
 
 
 def verdicts(old, new):
@@ -51,7 +51,7 @@ def test_the_last_digit_of_one_number_is_seen_whatever_else_changed(
     records, make, name, step, verdict
 ):
     one = make.drawn("ccd", False, 1.0)
-    values = one.arrays[name].copy()
+    values = one.measured[name].copy()
     values[1] = np.nextafter(values[1], step * np.inf)
     slow = make.timed("My solver", 1e-6, work="more")
     new = [changed(one, **{name: values}), changed(slow, seconds=[1.0, 1.1, 1.0, 1.1, 1.0])]
@@ -84,7 +84,7 @@ def test_what_is_worse_is_less_right_and_the_reverse_more(make, arrays):
 
 def test_rows_come_go_and_fail(make):
     a, b = make.drawn("a", False, 1.0), make.drawn("b", False, 1.0)
-    failed = replace(b, arrays={}, notes={"failed": "no engine"})
+    failed = replace(b, measured={"failed": "no engine"})
     assert verdicts([a], [b]) == [(ChangeVerdict.GONE, ""), (ChangeVerdict.NEW, "")]
     assert verdicts([b], [failed])[0] == (ChangeVerdict.LESS_RIGHT, "")
     assert verdicts([failed], [b])[0] == (ChangeVerdict.NEW, "")
@@ -101,8 +101,8 @@ def test_rows_come_go_and_fail(make):
 def test_a_run_cut_sooner_is_compared_over_what_both_came_to(make):
     """Whatever the versions of the solver are."""
     old = make.raced("peer", "one start")
-    cut = {k: v[:2] if v.ndim else v for k, v in old.arrays.items()}
-    new = replace(old, arrays=cut, settings={**old.settings, "version": "2"})
+    cut = {k: v[:2] if v.ndim else v for k, v in old.numbers().items()}
+    new = replace(old.with_measured(**cut), settings={**old.settings, "version": "2"})
     assert {verdict for verdict, _ in verdicts([old], [new])} == {ChangeVerdict.SAME}
     new = changed(new, solved=[True, True])
     assert verdicts([old], [new])[0] == (ChangeVerdict.MORE_RIGHT, "solved")
@@ -122,7 +122,7 @@ def test_answers_cut_by_a_clock_are_decided_by_chance(make, lost, verdict):
     old = make.record("ik", "p", "TRAC-IK", {"seconds": 0.005}, {"solved": solved}, size=200)
     solved = solved.copy()
     solved[:lost] = False
-    new = replace(old, arrays={"solved": solved})
+    new = replace(old, measured={"solved": solved})
     assert verdicts([old], [new]) == [(verdict, "solved")]
 
 
@@ -275,7 +275,7 @@ def test_numbers_of_any_kind_are_compared(make):
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_a_change_is_a_share_of_the_larger_number_and_a_gate_stops_from_there_on(make, factor):
     old = make.drawn("ccd", False, 1.0)
-    new = changed(old, largest_angle=factor * old.arrays["largest_angle"])
+    new = changed(old, largest_angle=factor * old.measured["largest_angle"])
     rows = compare([old], [new]).rows
     (row,) = (row for row in rows if row.quantity == "largest_angle")
     assert (row.verdict, row.change) == (ChangeVerdict.CHANGED, 0.5)

@@ -21,7 +21,6 @@ from plumbob.bench.harness.executors import dask, executor_at
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import block_key
 from plumbob.bench.harness.record import Record, RecordFile, decode
-from plumbob.bench.harness.values import Values
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.report.sections import tables
@@ -32,10 +31,6 @@ from plumbob.cli import main as cli
 TINY = Scale(targets=3, seconds=0.001)
 ROOT = Path(__file__).parents[2]
 INSTALLED = "the extra `cluster` is not installed"
-
-
-class Numbers(Values, frozen=True):
-    x: list
 
 
 def rows(folder):
@@ -204,7 +199,7 @@ def results(folder, suites, *executor):
     list(run.run(suites, "quick", folder, *executor))
     all_tables = tables(Results(RecordFile(folder).read().records), suites)
     texts = {table.name: markdown(table) for table in all_tables if table.rows}
-    arrays = {r.key: {n: a.tobytes() for n, a in r.arrays.items()} for r in records(folder)}
+    arrays = {r.key: {n: a.tobytes() for n, a in r.numbers().items()} for r in records(folder)}
     return texts, arrays
 
 

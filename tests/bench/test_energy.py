@@ -13,7 +13,7 @@ STEPS = 100
 @pytest.fixture(scope="module")
 def swings():
     """The energy left by every integrator over the first steps of the undamped cloth."""
-    return {name: suite.swing("undamped", name, STEPS).arrays["left"] for name in suite.INTEGRATORS}
+    return {name: suite.swing("undamped", name, STEPS)["left"] for name in suite.INTEGRATORS}
 
 
 def test_every_swing_begins_with_all_its_energy_and_moves(swings):
@@ -35,7 +35,7 @@ def test_implicit_euler_loses_most_and_runge_kutta_least(swings):
 
 
 def test_dampers_take_energy(swings):
-    damped = suite.swing("damped", "RK4", STEPS).arrays["left"]
+    damped = suite.swing("damped", "RK4", STEPS)["left"]
     assert damped[-1] < swings["RK4"][-1] - 1e-4
 
 

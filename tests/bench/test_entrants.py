@@ -72,16 +72,16 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
     assert code == 0
     (near,) = [one for one in records("My FABRIK") if one.problem == "chain/near"]
     assert near.settings["version"] == "0.1"
-    assert near.facts["entrant"] is True
-    assert near.facts["door"] == "my_ik.py"
-    assert len(near.facts["digest"]) == 12
+    assert near.measured["entrant"] is True
+    assert near.measured["door"] == "my_ik.py"
+    assert len(near.measured["digest"]) == 12
     assert near.conditions["solver_commit"] == ""
-    assert (near.arrays["residual"] <= 1e-4).all()
-    assert near.arrays["solved"].all()
+    assert (near.measured["residual"] <= 1e-4).all()
+    assert near.measured["solved"].all()
     for solver in ("My FABRIK", "ccd", "fabrik"):  # so that its time can stand beside ours
         (record,) = [one for one in records(solver) if one.problem == "chain/near"]
-        assert record.arrays["seconds"].shape == (3, 1), solver
-        assert (record.arrays["seconds"] > 0.0).all()
+        assert record.measured["seconds"].shape == (3, 1), solver
+        assert (record.measured["seconds"] > 0.0).all()
     shown = made("ik")
     for name in ("accuracy", "q1_beyond_reach", "published_ik", "entered"):
         assert "My FABRIK" in cells(shown[name]), name
@@ -110,14 +110,14 @@ def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
         next(one for one in records(name) if one.problem == "peers/motion/k1000")
         for name in ("Plumbob symplectic Euler", "My symplectic Euler")
     )
-    np.testing.assert_allclose(ours.arrays["error"], theirs.arrays["error"], rtol=1e-6)
+    np.testing.assert_allclose(ours.measured["error"], theirs.measured["error"], rtol=1e-6)
 
 
 @pytest.mark.slow
 def test_a_cloth_solver_has_the_limit_of_its_method(folder):
     asked = ("--problem", "peers/stability", *EXPLICIT)
     assert bench("cloth", "--quick", *asked, "--with", "my_cloth.py") == 0
-    limits = [one.arrays["limit"] for one in records() if one.problem == "peers/stability"]
+    limits = [one.measured["limit"] for one in records() if one.problem == "peers/stability"]
     np.testing.assert_allclose(*limits, rtol=1e-3)
 
 
@@ -134,8 +134,8 @@ def test_a_slow_solver_gets_the_first_targets_and_a_rank_on_these(
     printed = " ".join(capsys.readouterr().out.split())
     assert re.search(r"My FABRIK ranks 1 of 2, .* of 1 target, the first of each problem", printed)
     (mine,), (ours,) = records("My FABRIK"), records("ccd")
-    assert mine.arrays["seconds"].shape == (1, 1)
-    assert [len(record.arrays["residual"]) for record in (mine, ours)] == [1, 2]
+    assert mine.measured["seconds"].shape == (1, 1)
+    assert [len(record.measured["residual"]) for record in (mine, ours)] == [1, 2]
     assert "slow: its first 1 of 2 targets" in cells(made("ik")["accuracy"])
     assert bench("ik", *SMALL, "--solver", "fabrik") == 0
     assert "Over all problems most targets" in made("ik")["accuracy"].summary.sentence
@@ -208,8 +208,8 @@ def test_a_program_is_timed_by_its_own_clock_or_by_round_trips(folder, extra, re
     words = ["bench", "ik", *SMALL, "--solver", "My program", "-o", "out"]
     assert run_command([*words, "--", sys.executable, str(folder / "program.py")]) == 0
     (record,) = records("My program")
-    assert remark in record.notes["remark"]
-    assert (record.arrays["seconds"] < 1e-6).all() == bool(extra)
+    assert remark in record.measured["remark"]
+    assert (record.measured["seconds"] < 1e-6).all() == bool(extra)
 
 
 # What else is broken is refused with its sentence: see `test_hostile_entrants`.
@@ -226,11 +226,11 @@ def test_a_broken_solver_loses_its_own_rows_only_and_says_why(folder, name, caps
     bench("ik", *SMALL, "--with", "broken.py", "--solver", "broken.py", "--solver", "ccd",
           "--with", "my_ik.py", "--solver", "My FABRIK")  # fmt: skip
     (theirs,) = records("broken.py")
-    assert theirs.failed or theirs.notes["remark"]
-    assert theirs.failed or np.isinf(theirs.arrays["residual"]).all()
+    assert theirs.failed or theirs.measured["remark"]
+    assert theirs.failed or np.isinf(theirs.measured["residual"]).all()
     for other in ("ccd", "My FABRIK"):
         (record,) = records(other)
-        assert (record.arrays["residual"] <= 1e-4).all()
+        assert (record.measured["residual"] <= 1e-4).all()
     assert tables(Results(records()), ["ik"])
 
 
@@ -300,9 +300,9 @@ def test_a_robot_solver_is_run_with_one_start_and_with_restarts(folder):
           "--solver", "Mine")  # fmt: skip
     by = {one.solver: one for one in records()}
     once, again = (by[name] for name in ("Mine", "Mine, 20 restarts"))
-    assert once.arrays["solved"].sum() >= 1
-    assert again.arrays["solved"].sum() > once.arrays["solved"].sum()
-    assert not (once.arrays["claimed"].astype(bool) & ~once.arrays["solved"]).any()
+    assert once.measured["solved"].sum() >= 1
+    assert again.measured["solved"].sum() > once.measured["solved"].sum()
+    assert not (once.measured["claims"].astype(bool) & ~once.measured["solved"]).any()
 
 
 def test_a_seed_draws_other_targets_and_is_on_record(folder):
@@ -311,11 +311,11 @@ def test_a_seed_draws_other_targets_and_is_on_record(folder):
     distances = []
     for seed in ((), ("--seed", "7"), ("--seed", "1986")):
         assert bench("ik", *words, *seed) == 0
-        distances += [tuple(one.arrays["distance"]) for one in records("ccd")]
+        distances += [tuple(one.measured["distance"]) for one in records("ccd")]
     assert distances[0] == distances[2] != distances[1]
     seeds = {one.settings["seed"]: one for one in records() if one.problem == "robots/fetch"}
     assert set(seeds) == {7, 1986}
-    positions = [one.arrays["position"] for one in seeds.values()]
+    positions = [one.measured["position"] for one in seeds.values()]
     assert not np.array_equal(*positions)
     assert bench("ik", *words, "--seed", "-1") == 2
 
@@ -396,7 +396,7 @@ def test_problems_of_a_python_file_stand_in_the_same_tables(folder, capsys):
         ("chain/tentacle", "ccd"), ("chain/tentacle", "My FABRIK"),
     }  # fmt: skip
     assert [row[0] for row in made("ik")["accuracy"].rows] == ["tentacle", "tentacle"]
-    assert all((r.arrays["residual"] <= 1e-4).mean() > 0.5 for r in records())
+    assert all((r.measured["residual"] <= 1e-4).mean() > 0.5 for r in records())
     (folder / "my_problems.py").write_text(PROBLEMS.replace("0.3, 0.3", "0.2, 0.2"))
     capsys.readouterr()
     assert bench("ik", "--quick", *words, "--dry-run") == 0
@@ -507,9 +507,9 @@ def test_a_folder_of_models_is_measured_by_ours_and_by_entrants(folder):
           "--solver", "Mine", "--solver", "Plumbob LM, first phase")  # fmt: skip
     found = {(one.problem, one.solver): one for one in records()}
     for solver in ("Mine", "Plumbob LM, first phase"):
-        assert found["robots/mine", solver].arrays["solved"].size == 6
-        assert found["unreachable/mine", solver].arrays["solved"].sum() == 0
-    assert found["robots/mine", "Plumbob LM, first phase"].arrays["solved"].any()
+        assert found["robots/mine", solver].measured["solved"].size == 6
+        assert found["unreachable/mine", solver].measured["solved"].sum() == 0
+    assert found["robots/mine", "Plumbob LM, first phase"].measured["solved"].any()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import io
 import math
 import re
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -97,7 +96,7 @@ def test_a_missed_claim_is_named_in_table_and_answer(make):
 
 
 def changed(record, **arrays):
-    return replace(record, arrays={**record.arrays, **arrays})
+    return record.with_measured(**arrays)
 
 
 def test_chains_are_counted_as_straight_only_if_they_are(make):
@@ -109,7 +108,8 @@ def test_chains_are_counted_as_straight_only_if_they_are(make):
 def test_targets_without_a_solution_are_not_printed_as_infinite(make):
     def unanswered(record, *names, count=1):
         ends = [math.inf] * count
-        return changed(record, **{n: np.array([*record.arrays[n][:-count], *ends]) for n in names})
+        cut = {name: [*record.measured[name][:-count], *ends] for name in names}
+        return changed(record, **{name: np.array(numbers) for name, numbers in cut.items()})
 
     records = [
         unanswered(make.beyond(solver, 0.004), "residual", "bend", "excess", count=count)
@@ -205,7 +205,7 @@ def test_convergence_counts_iterations_and_drift(records):
 
 def test_iterations_that_do_not_suffice_are_said_so(make):
     made = make.sample("stepped", solver="newton")
-    short = replace(made, arrays=made.arrays | {"error": np.array([1.0, 0.5])})
+    short = made.with_measured(error=np.array([1.0, 0.5]))
     table = cloth.convergence(Results([short]))
     assert "Newton more than 1" in table.summary.points[0]
     assert column(table, "iterations to 1e-4") == [None]
@@ -221,8 +221,7 @@ def swept(make, solver, seconds, noise=0.01):
     """Nine sweeps of three rounds, and how noisy the machine was."""
     made = make.timed(solver, 1.0)
     rounds = np.repeat(np.asarray(seconds)[:, None], 3, axis=1)
-    return replace(made, arrays=made.arrays | {"seconds": rounds},
-                   facts={**made.facts, "noise": noise})  # fmt: skip
+    return made.with_measured(seconds=rounds, noise=noise)
 
 
 def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_so(make, rng):
@@ -239,7 +238,7 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
     )
     (point,) = table.summary.points
     assert point.endswith("first: Plumbob")
-    apart = replace(rival, facts={**rival.facts, "together": "another run"})
+    apart = rival.with_measured(together="another run")
     (point,) = timing.kinematics(Results([ours, apart])).summary.points
     assert point.endswith("not ranked")
     again = swept(make, "MuJoCo", 1e-6 * rng.permutation(drift))
@@ -257,7 +256,7 @@ def test_rows_that_are_only_shown_are_never_first_and_remarks_have_the_numbers_o
     assert remarks["MuJoCo, qpos set before"] == remarks["Plumbob, compiled"] == ""
     assert {table.rows[i][1] for i, _ in best_cells(table)} == {"Plumbob, compiled"}
     assert table.summary.points[0].endswith("first: Plumbob")
-    inexact = replace(records[0], arrays={**records[0].arrays, "error": 4.5e-11})
+    inexact = records[0].with_measured(error=4.5e-11)
     (remark,) = column(timing.kinematics(Results([inexact])), "remark")
     assert remark == "error 4.5e-11"
 

@@ -33,11 +33,11 @@ def with_solvers(records, count):
             name = ENTRANT if i == 0 else f"an unknown solver no. {i}"
             facts = {"entrant": i == 0}
             found += [
-                replace(r, solver=name, facts={**r.facts, **facts}, arrays=slower(r.arrays, i))
+                replace(r, solver=name).with_measured(**facts, **slower(r.numbers(), i))
                 for r in records
                 if r.suite == suite and r.solver in (first, OURS, "Plumbob Newton",
                     "Plumbob, compiled", "RK4", "ccd", "newton")
-                and r.facts.get("task") not in ("few iterations", "dampers")
+                and r.measured.get("task") not in ("few iterations", "dampers")
             ]  # fmt: skip
     return Results(list({r.key: r for r in found}.values()))
 

@@ -74,9 +74,9 @@ def test_no_name_of_a_record_is_taken_apart():
     "line",
     [
         'float(record.problem.rpartition("/k")[2])',
-        'record.notes["rungs"].split("; ")',
+        'record.measured["rungs"].split("; ")',
         'point.solver.partition(" ")[0]',
-        'record.notes.get("remark", "").split("; ")',
+        'record.measured.get("remark", "").split("; ")',
     ],
 )
 def test_a_name_that_is_taken_apart_is_found(line):

@@ -93,8 +93,7 @@ def test_the_most_solved_share_of_several_seeds_is_their_mean_with_its_span(make
     solved = np.arange(240) // 6 % 2 == 0
     strata = [f"kind {k}" for k in range(6)]
     records = [
-        replace(record, settings={**record.settings, "seeds": 2},
-                facts={**record.facts, "strata": strata})
+        replace(record.with_measured(strata=strata), settings={**record.settings, "seeds": 2})
         for record in (
             make.solving("a", 240, count=240, solved=solved),
             make.solving("b", 24, count=240),
@@ -212,7 +211,7 @@ def test_a_share_is_never_rounded_to_all():
 
 def in_sweeps(make, solver, rounds):
     made = make.timed(solver, 1.0)
-    return replace(made, arrays=made.arrays | {"seconds": rounds})
+    return made.with_measured(seconds=rounds)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -264,7 +263,7 @@ def median_of(table):
 def test_nobody_leads_among_those_that_were_timed_apart(make):
     rounds = np.linspace(1e-6, 1.1e-6, 27).reshape(9, 3)
     records = [in_sweeps(make, s, f * rounds) for s, f in (("Pinocchio", 1), ("MuJoCo", 9))]
-    apart = [replace(r, facts={**r.facts, "together": r.solver}) for r in records]
+    apart = [r.with_measured(together=r.solver) for r in records]
     assert "Pinocchio is the fastest" in sentence(records, KINEMATICS)
     assert sentence(apart, KINEMATICS) == NOBODY
 
@@ -287,14 +286,13 @@ def test_an_engine_races_at_its_default_tolerance(make):
     factors = {"Plumbob, compiled": 2.0, "MuJoCo": 1.0, "MuJoCo, tolerance 1e-15": 3.0}
     made = {solver: make.timed(solver, 1.0, *step) for solver in factors}
     records = [
-        replace(made[solver], arrays=made[solver].arrays | {"seconds": factor * rounds})
-        for solver, factor in factors.items()
+        made[solver].with_measured(seconds=factor * rounds) for solver, factor in factors.items()
     ]
     assert sentence(records, "Fastest in a step of a cloth") == (
         "In a step of a cloth, MuJoCo is the fastest on 1 of 1 case, 2.0 times faster than the "
         "best other engine, Plumbob (ours)."
     )
-    first = replace(records[2], arrays=records[2].arrays | {"seconds": 0.1 * rounds})
+    first = records[2].with_measured(seconds=0.1 * rounds)
     assert sentence([*records[:2], first], "Fastest in a step of a cloth") == sentence(
         records, "Fastest in a step of a cloth"
     )
@@ -323,7 +321,7 @@ def test_a_step_is_solved_first_by_an_engine(make):
         "than the best other engine, MuJoCo"
     )
     assert sentence([newton, hasty, arrives], question) == f"{factor}."
-    stiff = [replace(make.worked(r.solver, 1e4), arrays=r.arrays) for r in (newton, hasty)]
+    stiff = [make.worked(r.solver, 1e4).with_measured(**r.numbers()) for r in (newton, hasty)]
     assert sentence([newton, arrives, *stiff], question) == (
         factor.replace("1 of 1 cloth", "2 of 2 cloths") + "; no other engine solves 1 of them."
     )
@@ -337,7 +335,7 @@ def test_a_step_is_solved_first_by_an_engine(make):
 
 def test_the_verdict_names_the_claim_with_the_narrowest_margin(make):
     wide, narrow = make.claim("wide"), make.claim("narrow")
-    narrow.arrays["difference"] = np.array(9e-13)
+    narrow.measured["difference"] = np.array(9e-13)
     found = headlines.verdict(Results([wide, narrow, make.claim("broken", held=False)]))
     assert found == headlines.ClaimCount(2, 3, "narrow", pytest.approx(0.9))
     assert headlines.verdict(Results([])) is None

@@ -1,7 +1,5 @@
 """Proofs for poses: the suite, its table and its sentence."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -54,5 +52,5 @@ def test_table_and_sentence_follow_the_records(make):
     sentence = table.summary.sentence
     assert "Of 4 targets 2 are proven" in sentence
     assert "1 to have none, 1 are open; 0 proofs are refuted" in sentence
-    refuted = dataclasses.replace(record, arrays={**record.arrays, "refuted": [True, False] * 2})
+    refuted = record.with_measured(refuted=[True, False] * 2)
     assert "2 proofs are refuted" in tables.pose_proofs(Results([refuted])).summary.sentence

@@ -58,7 +58,7 @@ def crowded(make):
                 named = make.raced(
                     peer.label_of(entry), entry.kind, robot=robot, **seconds, **solved
                 )
-                yield named.__class__(**{**vars(named), "facts": {**named.facts, "title": robot}})
+                yield named.with_measured(title=robot)
     for stiffness in (1e2, 1e3, 1e4):
         for i, peer in enumerate(registry.cloth_peers()):
             seconds = (1e-4 * (1 + i), 2e-2, 15.0 + i)

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,10 +23,11 @@ def untimed(folder):
     records = RecordFile(folder).read().records
     fields = {}
     for record in records:
-        for name, array in record.arrays.items():
+        for name, array in record.numbers().items():
             if not is_time(record.suite, name):
                 fields[*record.key, name] = (array.shape, array.dtype.str, array.tobytes())
-        fields[record.key] = (record.size, dict(record.facts), dict(record.notes))
+        words = {n: v for n, v in record.measured.items() if n not in record.numbers()}
+        fields[record.key] = (record.size, words)
     scores = [score for score in overall(Results(records)) if score.start in STARTS]
     ranks = [(s.robots, s.start, s.solver, s.share, s.success) for s in scores]
     return fields, ranks
@@ -57,7 +57,7 @@ def test_a_changed_bit_of_an_answer_is_noticed_and_one_of_a_time_is_not(tmp_path
     list(run.run(["ik"], choice, tmp_path))
     before = untimed(tmp_path)
     (record,) = RecordFile(tmp_path).read().records
-    changed = record.arrays[name].copy()
+    changed = record.measured[name].copy()
     changed.flat[3] = np.nextafter(changed.flat[3], 1.0)
-    RecordFile(tmp_path).append([replace(record, arrays={**record.arrays, name: changed})])
+    RecordFile(tmp_path).append([record.with_measured(**{name: changed})])
     assert (untimed(tmp_path) != before) == is_noticed

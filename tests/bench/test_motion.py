@@ -106,9 +106,9 @@ def test_without_motions_on_record_a_page_has_neither_them_nor_their_script(tmp_
 
 def test_entrants_are_among_the_motions_that_are_shown(make):
     found = [r for r in make.moved() if "arm" in r.problem]
-    many = [replace(found[0], solver=f"s{i}", facts={**found[0].facts, "order": i})
+    many = [replace(found[0].with_measured(order=i), solver=f"s{i}")
             for i in range(9)]  # fmt: skip
-    mine = replace(found[0], solver="mine", facts={**found[0].facts, "order": 99, "entrant": True})
+    mine = replace(found[0].with_measured(order=99, entrant=True), solver="mine")
     shown = arm_motion(Results([*many, mine]))
     assert [one.label for one in shown.motions] == ["mine", *(f"s{i}" for i in range(5))]
 

@@ -27,7 +27,7 @@ def is_certified(arrays):
 
 
 def test_newton_reaches_the_tolerance_and_is_covered(stiff):
-    arrays = stiff["newton", suite.FROM_Y, 100].arrays
+    arrays = stiff["newton", suite.FROM_Y, 100]
     assert arrays["residual"] <= suite.TOLERANCE or arrays["at_floor"]
     assert is_certified(arrays)
     assert arrays["balance"] < 1e-10
@@ -38,14 +38,14 @@ def test_newton_reaches_the_tolerance_and_is_covered(stiff):
     "key", [("lbfgs", suite.FROM_Y, 2000), ("local_global", suite.NEAR_NEWTON, 500)]
 )
 def test_the_limits_of_other_solvers_are_newtons_where_both_are_covered(stiff, key):
-    arrays, newton = stiff[key].arrays, stiff["newton", suite.FROM_Y, 100].arrays
+    arrays, newton = stiff[key], stiff["newton", suite.FROM_Y, 100]
     assert is_certified(arrays)
-    assert 0 < arrays["apart"] <= arrays["distance"] + newton["distance"]
+    assert 0 < arrays["newton_distance"] <= arrays["distance"] + newton["distance"]
 
 
 def test_an_answer_far_from_the_limit_has_no_bound_but_an_error(stiff):
     measured = stiff["local_global", suite.FROM_Y, 3]
-    arrays, notes = measured.arrays, measured.notes
+    arrays = notes = measured
     assert not any(arrays[name] for name in ("covered", "same", "different"))
     assert arrays["distance"] == np.inf
     assert arrays["error"] > 0.1
@@ -55,7 +55,7 @@ def test_an_answer_far_from_the_limit_has_no_bound_but_an_error(stiff):
 
 def test_table_and_sentence_follow_the_records(make, stiff):
     records = [
-        make.certified(solver, {"start": start, "iterations": limit}, step.arrays, step.notes)
+        make.certified(solver, {"start": start, "iterations": limit}).with_measured(**step)
         for (solver, start, limit), step in stiff.items()
     ]
     table = tables.proofs(Results(records))

@@ -43,7 +43,7 @@ def of_full_length(make):
         for peer in PRESENT:
             for entry in peer.entries:
                 chance = generator.uniform(0.2, 0.9)
-                changed = {"solved": generator.random(120) < chance, "claimed": np.ones(120, int)}
+                changed = {"solved": generator.random(120) < chance, "claims": np.ones(120, int)}
                 changed |= {"seconds": generator.uniform(1, 9, 120) * 1e-5 / chance}
                 changed |= {name: generator.random(120) for name in ("position", "rotation")}
                 changed |= {"stratum": np.arange(120) % 2, "beyond": np.zeros(120)}
@@ -63,7 +63,7 @@ def of_full_length(make):
 def address(tmp_path_factory, records, make):
     """The address of a page as of a run at full length."""
     folder = tmp_path_factory.mktemp("page")
-    others = [r for r in records if not r.facts.get("entrant")]
+    others = [r for r in records if not r.measured.get("entrant")]
     kept = [r for r in others if not r.problem.startswith(("robots/", "peers/one step"))]
     scales = [make.record(FINISHED, "ik", "", notes={"scale": "quick"})]
     RecordFile(folder).append([*kept, *of_full_length(make), *scales])

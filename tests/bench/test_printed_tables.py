@@ -135,7 +135,7 @@ def test_records_are_listed_as_counted(capsys, tmp_path, monkeypatch, make, widt
     stamp = {"machine": {"processor": "abacus", "cores": 2, "memory_gib": None, "system": "x86_64"}}
     made = [make.drawn(solver, warm, 1.0) for solver in ("my_ik", "ccd") for warm in (True, False)]
     made = [replace(record, stamp=stamp, conditions={"commit": "a" * 40}) for record in made]
-    made[0] = replace(made[0], notes={"failed": "no"}, arrays={}, conditions={})
+    made[0] = replace(made[0], measured={"failed": "no"}, conditions={})
     RecordFile(tmp_path / "report").append(made)
     code, out = plumbob(capsys, "records", "list")
     about = ("Records in report", "4 records, measured on abacus, 2 cores, x86_64")
@@ -189,8 +189,8 @@ def test_compare_prints_whole_sentences_in_ten_lines(capsys, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     old = [make.drawn(f"solver {i}", False, 1.0) for i in range(12)]
     number = 3e-4 * (1 + 1e-13)
-    new = [replace(r, arrays={**r.arrays, "residual": np.full(3, number)}) for r in old]
-    old = [replace(r, arrays={**r.arrays, "residual": np.full(3, 3e-4)}) for r in old]
+    new = [r.with_measured(residual=np.full(3, number)) for r in old]
+    old = [r.with_measured(residual=np.full(3, 3e-4)) for r in old]
     RecordFile(tmp_path / "old").append(old)
     RecordFile(tmp_path / "new").append(new)
     code, out = plumbob(capsys, "compare", "old", "new")

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import math
 import os
 import resource
 from dataclasses import replace
@@ -12,10 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from plumbob.bench.experiments.energy.values import Swing
-from plumbob.bench.harness.block import Block, Measured
+from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.measure import measure, record_of
-from plumbob.bench.harness.record import FILE_NAME, Record, RecordFile, decode, encode, key
+from plumbob.bench.harness.record import FILE_NAME, Record, RecordFile, decode, encode, key, untyped
 
 ANY_FLOATS = arrays.arrays(
     np.float64, arrays.array_shapes(max_dims=3), elements=st.floats(allow_nan=True)
@@ -23,12 +23,12 @@ ANY_FLOATS = arrays.arrays(
 
 
 def block(solver="ccd", value=1.0, **settings):
-    return Record("made up", "arm/circle", solver, settings, arrays={"residual": np.array([value])})
+    return Record("made up", "arm/circle", solver, settings, {"residual": np.array([value])})
 
 
-def returned(**fields):
-    """A record that was written and read."""
-    return decode(encode(Record("s", "p", "v", **fields)))
+def returned(**measured):
+    """The measured values of a record that was written and read."""
+    return decode(encode(Record("s", "p", "v", measured=measured))).measured
 
 
 @pytest.fixture
@@ -45,21 +45,35 @@ def test_numbers_come_back_bit_for_bit_as_standard_json(array):
     def refuse(word):
         raise AssertionError(f"{word} is no JSON")
 
-    json.loads(encode(Record("s", "p", "v", arrays={"x": array})), parse_constant=refuse)
-    back = returned(arrays={"x": array}).arrays["x"]
+    json.loads(encode(Record("s", "p", "v", measured={"x": array})), parse_constant=refuse)
+    back = np.asarray(returned(x=array)["x"])
     assert back.shape == array.shape
     np.testing.assert_array_equal(back, array)
     np.testing.assert_array_equal(np.signbit(back), np.signbit(array) & ~np.isnan(array))
 
 
-def test_integers_truth_values_facts_and_notes_come_back_as_they_are():
-    back = returned(arrays={"i": np.array([1, 2]), "b": np.array([True, False])}).arrays
+def test_integers_truth_values_and_words_come_back_as_they_are():
+    back = returned(i=np.array([1, 2]), b=np.array([True, False]))
     assert [back[name].dtype.kind for name in "ib"] == ["i", "b"]
-    facts = {"title": "arm, circle", "joints": 7, "damping": 0.0, "closed": True, "strata": ["a"]}
-    assert returned(facts={**facts, "none": None}).facts == {**facts, "none": None}
-    assert returned(notes={"failed": "no file \udcff"}).failed == "no file ?"
+    words = {"title": "arm, circle", "joints": 7, "damping": 0.0, "closed": True, "strata": ["a"]}
+    words |= {"none": None, "nothing": [], "infinite": math.inf}
+    assert returned(**words) == words
+    assert returned(failed="no file \udcff")["failed"] == "no file ?"
     with pytest.raises(ValueError, match="expected numbers"):
-        encode(Record("s", "p", "v", arrays={"x": np.array(["one"])}))
+        encode(Record("s", "p", "v", measured={"x": np.array([None])}))
+
+
+def test_a_line_of_format_3_is_read_by_the_names_of_today():
+    line = {
+        "format": 3, "suite": "ik", "problem": "p", "solver": "v", "settings": {}, "size": 2,
+        "arrays": {"claimed": [1, 0], "setup": "nan"}, "notes": {"remark": "old"}, "stamp": {},
+        "when": "2000-01-02T03:04:05+00:00", "seconds": 1.0, "facts": {"tips": ["hand"]},
+        "conditions": {},
+    }  # fmt: skip
+    back = untyped(json.dumps(line))
+    assert back.measured["claims"].tolist() == [1, 0]
+    assert math.isnan(back.measured["setup"])
+    assert (back.remark, back.measured["effectors"]) == ("old", ["hand"])
 
 
 def test_the_key_ignores_the_order_of_settings_but_not_their_values():
@@ -72,7 +86,7 @@ def test_of_two_records_with_one_key_the_later_counts(file):
     file.append([block(value=1.0), block("fabrik")])
     file.append([block(value=2.0)])
     assert solvers(file) == ["ccd", "fabrik"]
-    assert file.read().records[0].arrays["residual"] == 2.0
+    assert file.read().records[0].measured["residual"] == 2.0
 
 
 @pytest.mark.parametrize("cut", [1, 2, 20, 100])
@@ -91,7 +105,7 @@ def test_a_truncated_last_line_is_left_out_and_replaced(file, cut):
 def changed(path, value):
     """A valid line with another value at a path, or without it."""
     content = json.loads(encode(block(tolerance=1e-4)))
-    content["notes"], content["when"] = {"remark": "fine"}, "2000-01-02T03:04:05+00:00"
+    content["measured"]["remark"], content["when"] = "fine", "2000-01-02T03:04:05+00:00"
     content["stamp"] = {
         "machine": {"processor": "p", "cores": 1, "memory_gib": 0.5, "system": "s"},
         "versions": {"python": "3"},
@@ -110,20 +124,20 @@ def changed(path, value):
 
 MISSING = object()
 TEXT, NUMBER, MAP = (None, 5, True, [], ["a"], {}), (None, "1", True, [], {}), (None, "a", 1, [])
-NO_NUMBERS = (None, "a", {}, [None], ["one"], [[1], [1, 2]], [[1], 2], [True, 1], [{}], [10**30])
+NO_NUMBERS = ({}, {"number": 1}, [None], ["one", 1], [[1], [1, 2]], [[1], 2], [True, 1], [{}])
 WRONG = {
-    **dict.fromkeys([("suite",), ("problem",), ("solver",), ("notes", "remark")], TEXT),
+    **dict.fromkeys([("suite",), ("problem",), ("solver",)], TEXT),
     **dict.fromkeys([("stamp", "source"), ("stamp", "machine", "processor")], TEXT),
     **dict.fromkeys([("stamp", "machine", "system"), ("stamp", "versions", "python")], TEXT),
     ("when",): (*TEXT, "yesterday"),
     **dict.fromkeys([("size",), ("seconds",)], NUMBER),
     ("stamp", "machine", "cores"): ("1", 1.5, True, []),
     ("stamp", "machine", "memory_gib"): ("1", True, []),
-    **dict.fromkeys([("settings",), ("arrays",), ("notes",), ("stamp",), ("facts",)], MAP),
+    **dict.fromkeys([("settings",), ("measured",), ("stamp",)], MAP),
     **dict.fromkeys([("stamp", "machine"), ("stamp", "versions")], MAP),
     ("settings", "tolerance"): ([], {}, [1.0]),
-    ("arrays", "residual"): NO_NUMBERS,
-    ("format",): (None, 0, 1, 2, 4, 99, "3", True, [], 1.5),
+    ("measured", "residual"): NO_NUMBERS,
+    ("format",): (None, 0, 1, 2, 5, 99, "4", True, [], 1.5),
 }
 
 
@@ -139,14 +153,14 @@ DAMAGED = {
     "broken": b"{", "a list": b"[]", "null": b"null", "a word": b'"NaN"', "nothing": b"{}",
     "binary": b"\x00\xff\xfe", "NUL": with_text(("solver",), b'"\x00"'),
     "deep": b"[" * 100_000, "deep and whole": b"[" * 100_000 + b"]" * 100_000,
-    "deep array": with_text(("arrays", "residual"), b"[" * 300 + b"]" * 300),
-    "very deep array": with_text(("arrays", "residual"), b"[" * 10**5 + b"]" * 10**5),
-    "a lone surrogate": changed(("solver",), "\ud800"), "no UTF-8": b'{"format": 3, "\xff": 1}',
+    "deep array": with_text(("measured", "residual"), b"[" * 300 + b"]" * 300),
+    "very deep array": with_text(("measured", "residual"), b"[" * 10**5 + b"]" * 10**5),
+    "a lone surrogate": changed(("solver",), "\ud800"), "no UTF-8": b'{"format": 4, "\xff": 1}',
     "NaN": changed(("size",), float("nan")), "infinity": changed(("size",), float("inf")),
     "beyond floats": with_text(("size",), b"1e999"),
     "a huge integer": with_text(("size",), b"9" * 5000),
     "a huge setting": with_text(("settings", "tolerance"), b"9" * 5000),
-    "cut off": encode(block()).encode()[:-20], "cut off early": b'{"format": 3',
+    "cut off": encode(block()).encode()[:-20], "cut off early": b'{"format": 4',
     "two in one": encode(block()).encode() * 2, "a mark of order": b"\xef\xbb\xbf{}",
 }  # fmt: skip
 
@@ -218,7 +232,7 @@ def test_records_are_brought_into_order_and_all_else_keeps_its_place(file, monke
     assert solvers(file) == ["other", "a", "b", "rest", "c"]
     assert sorted(after) == sorted(before)
     assert after[0] == b"rubbish"
-    assert file.read().records[2].arrays["residual"] == 2.0
+    assert file.read().records[2].measured["residual"] == 2.0
     file.append([block("a", value=2.0)])  # which stands where it first stood
     monkeypatch.setattr(RecordFile, "_replace", None)
     file.arrange(order)
@@ -271,23 +285,23 @@ TIMES, LEFT = np.array([0.0, 0.1]), np.array([1.0, np.nan])
 
 @pytest.fixture
 def swing():
-    return record_of(BLOCK, Measured(Swing(TIMES, LEFT)), 1.0)
+    return record_of(BLOCK, {"time": TIMES, "left": LEFT}, 1.0)
 
 
 def test_typed_values_come_back_by_their_fields(swing):
     back = decode(encode(swing))
-    assert list(back.arrays) == ["time", "left"]
+    assert list(back.numbers()) == ["time", "left"]
     np.testing.assert_array_equal(back.values.left, LEFT)
-    assert (back.details.every, back.details.damping) == (1, 0.0)
+    assert (back.values.every, back.values.damping) == (1, 0.0)
 
 
 @pytest.mark.parametrize(("part", "name", "value", "why"), [
-    ("arrays", "left", None, "missing required field `left`"),
-    ("arrays", "left", [[1.0]], "expected 1 dimensions, got 2 - at `left`"),
-    ("arrays", "left", 1.0, "expected 1 dimensions, got 0 - at `left`"),
-    ("arrays", "left", [True], "expected float64, got bool - at `left`"),
-    ("facts", "damping", None, "missing required field `damping`"),
-    ("facts", "damping", "much", "Expected `float`, got `str` - at `damping`"),
+    ("measured", "left", None, "missing required field `left`"),
+    ("measured", "left", [[1.0]], "expected 1 dimensions, got 2 - at `left`"),
+    ("measured", "left", 1.0, "expected 1 dimensions, got 0 - at `left`"),
+    ("measured", "left", [True], "expected float64, got bool - at `left`"),
+    ("measured", "damping", None, "missing required field `damping`"),
+    ("measured", "damping", "much", "Expected `float`, got `str` - at `damping`"),
     ("settings", "every", 0.5, "Expected `int`, got `float` - at `every`"),
 ])  # fmt: skip
 def test_a_line_of_the_wrong_type_is_refused_by_its_number(swing, file, part, name, value, why):
@@ -304,16 +318,16 @@ def test_a_line_of_the_wrong_type_is_refused_by_its_number(swing, file, part, na
 
 
 def test_a_measurement_of_another_type_is_a_failure():
-    wrong = replace(BLOCK, measure=lambda: Measured(Swing(TIMES, 1.0)))
+    wrong = replace(BLOCK, measure=lambda: {"time": TIMES, "left": 1.0})
     assert measure(wrong).failed == "ValueError: expected 1 dimensions, got 0 - at `left`"
-    assert not measure(replace(BLOCK, measure=lambda: Measured(Swing(TIMES, LEFT)))).failed
+    assert not measure(replace(BLOCK, measure=lambda: {"time": TIMES, "left": LEFT})).failed
 
 
 @pytest.mark.parametrize("notes", [{"failed": "no memory"}, {"remark": "not installed"}])
 def test_a_record_without_numbers_has_no_values(notes):
-    back = decode(encode(record_of(BLOCK, Measured(None, notes), 1.0)))
-    assert back.values is None
-    assert back.details.every == 1
+    back = decode(encode(record_of(BLOCK, notes, 1.0)))
+    assert not back.has_numbers
+    assert back.values.every == 1
 
 
 def test_a_record_of_its_type_takes_the_place_of_one_that_is_not(swing, file):

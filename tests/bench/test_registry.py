@@ -53,7 +53,7 @@ def test_a_new_step_solver_stands_in_the_tables(make):
     record = run.measure(replace(block, measure=small))
     assert not record.failed
     table = cloth_tables.convergence(Results([record]))
-    assert table.rows[0][1:3] == ("damped global", record.arrays["error"][1])
+    assert table.rows[0][1:3] == ("damped global", record.measured["error"][1])
     certified = newton_tables.proofs(Results([make.certified("damped_global")]))
     assert certified.rows[0][1] == "damped global"
 
@@ -88,19 +88,18 @@ def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(
 FOLDER = {
     "__init__.py": "",
     "values.py": """
-from plumbob.bench.harness.values import Kind, Values
+from plumbob.bench.harness.values import Values
 
 class Sum(Values, frozen=True):
     sum: int
 
-KINDS = {"": Kind(Sum)}
+KINDS = {"": Sum}
 """,
     "measurement.py": """
-from plumbob.bench.harness.block import Block, Measured
-from .values import Sum
+from plumbob.bench.harness.block import Block
 
 def blocks(scale):
-    yield Block("sums", "1 + 1", "Python", lambda: Measured(Sum(2)), facts={"title": "One"})
+    yield Block("sums", "1 + 1", "Python", lambda: {"sum": 2}, facts={"title": "One"})
 """,
     "tables.py": """
 from plumbob.bench.tables.layout import Layout

@@ -12,6 +12,7 @@ import pytest
 from html_page import Page
 
 from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.values import words_of
 from plumbob.bench.report import report
 from plumbob.bench.tables.results import Results, results_of
 
@@ -97,7 +98,8 @@ def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
 
 
 def test_what_is_missing_is_said(tmp_path, records):
-    failed = replace(records[0], problem="gone", notes={"failed": "OSError: no engine"}, arrays={})
+    why = {"task": records[0].task, "failed": "OSError: no engine"}
+    failed = replace(records[0], problem="gone", measured=why)
     others = [r for r in records if not (r.suite == "finished" and r.problem == "cloth")]
     older = replace(others[1], stamp={"source": "other"}, when="1999-01-01T00:00:00+00:00")
     result, page = written(tmp_path, [failed, others[0], older, *others[2:]])
@@ -182,7 +184,7 @@ def look_into_everything(folder):
 
 
 @pytest.mark.parametrize(
-    "fields", [("solver", "problem"), ("notes", "settings", "stamp", "facts")], ids="-".join
+    "fields", [("solver", "problem"), ("settings", "stamp", "measured")], ids="-".join
 )
 def test_hostile_names_are_data_in_every_file(tmp_path, records, fields):
     """In a report of good records, and of spoilt ones beside them."""
@@ -206,21 +208,29 @@ def test_a_name_stands_letter_by_letter_in_figures_and_tables(tmp_path, make):
 
 
 SPOILT = {
-    "no arrays": lambda r: replace(r, arrays={"x": np.zeros(1)}),
-    "no settings, notes and facts": lambda r: replace(
-        r, settings={}, notes={}, facts={name: r.facts[name] for name in r.facts if name == "task"}
+    "one number only": lambda r: with_numbers(r, dict([*r.numbers().items()][:1])),
+    "no settings and words": lambda r: replace(
+        r, settings={}, measured={**r.numbers(), "task": r.task}
     ),
-    "arrays of other shapes": lambda r: replace(
-        r, arrays={name: values[..., None, None, None] for name, values in r.arrays.items()}
+    "arrays of other shapes": lambda r: with_numbers(
+        r, {name: values[..., None, None, None] for name, values in r.numbers().items()}
     ),
-    "arrays of words": lambda r: replace(r, arrays=dict.fromkeys(r.arrays, np.array(True))),
+    "truth values": lambda r: with_numbers(r, dict.fromkeys(r.numbers(), np.array(True))),
 }
 
 
+def with_numbers(record, numbers):
+    """The record with other numbers than its own."""
+    words = {n: v for n, v in record.measured.items() if n not in record.numbers()}
+    return replace(record, measured={**words, **numbers})
+
+
 def _needs_more(record):
-    """Whether a record has a detail that it needs, and a value that is no truth value."""
-    is_needed = any(field.required for field in msgspec.structs.fields(record.details))
-    return is_needed and any(array.dtype != bool for array in record.arrays.values())
+    """Whether a record has a word that it needs, further numbers, and none of truth values."""
+    above = words_of(type(record.values))
+    is_needed = any(field.required for field in msgspec.structs.fields(above))
+    numbers = record.numbers().values()
+    return is_needed and len(numbers) > 1 and any(array.dtype != bool for array in numbers)
 
 
 @pytest.mark.parametrize("how", SPOILT)

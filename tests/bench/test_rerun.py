@@ -56,16 +56,16 @@ def measure(solver):
     time.sleep(600)
 """
 RUN = """
-from ..experiments import measure as arrays
+from ..experiments import measure
 def block_key(block):
     return "timing", "p", block, "{}"
 def measure(block):
-    return {"suite": "timing", "problem": "p", "solver": block, "arrays": arrays(block)}
+    return {"suite": "timing", "problem": "p", "solver": block, "measured": measure(block)}
 """
 RECORD = """
 import json
-REST = {"settings": {}, "size": 0, "notes": {}, "stamp": {}, "when": "", "seconds": 0}
-REST |= {"facts": {}, "conditions": {}}
+REST = {"settings": {}, "size": 0, "stamp": {}, "when": "", "seconds": 0}
+REST |= {"conditions": {}}
 def encode(record):
     return json.dumps({"format": 3, **record, **REST})
 """
@@ -216,7 +216,7 @@ class CountedBench:
         self.calls[-1].append((revision, key))
         (record,) = (r for r in self.records if r.key == key)
         seconds = np.full(5, 1.0 + revision)
-        return replace(record, arrays={"seconds": seconds})
+        return replace(record, measured={"seconds": seconds})
 
 
 def test_the_ratio_is_that_of_the_new_time_to_the_old_and_orders_are_drawn(make):

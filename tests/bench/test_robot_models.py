@@ -35,7 +35,7 @@ def compared(make, tmp_path):
         return [
             make.record(
                 "robot_models", f"robots/{name}", engine, {"configurations": 5},
-                measured.arrays, notes=dict(measured.notes), facts={"title": name},
+                facts={"title": name, **measured},
             )
             for engine in ROBOT_ENGINES
             for measured in [compare(engine, RobotFile(name, path))]
@@ -72,8 +72,8 @@ def test_mimic_joints_left_free_are_told(compared, tmp_path):
 
 def test_an_engine_with_a_known_cause_is_left_out_of_the_numbers(compared):
     pinocchio, mujoco = compared("arm.urdf", URDF.format(leader="shoulder"))
-    pinocchio.notes["cause"] = "something is not read"
-    pinocchio.arrays["positions"][...] = 0.25
+    pinocchio.measured["cause"] = "something is not read"
+    pinocchio.measured["positions"] = 0.25
     table = readers(Results([pinocchio, mujoco]))
     assert column(table, "positions, of the extent")[0] < 1e-14
     assert column(table, "engines") == ["MuJoCo"]
@@ -99,8 +99,8 @@ def test_what_an_engine_does_not_take_is_said_and_what_it_rounds_too(make):
     if peer is None:
         pytest.skip("none of the engines is installed")
     measured = compare_effectors(peer, CHARACTER)
-    assert measured.notes["remark"].endswith("takes one chain of hinges only")
-    assert not measured.arrays
+    assert measured["remark"].endswith("takes one chain of hinges only")
+    assert measured.keys() == {"remark"}
 
 
 def test_robots_in_engines_of_peers_stand_beside_files(make):

@@ -65,7 +65,7 @@ def test_success_is_counted_by_the_evaluation_and_times_include_failures(make):
 
 
 def test_a_solver_without_claims_has_no_false_successes_and_none_solved_leaves_no_residual(make):
-    changed = {"claimed": [-1] * 4, "solved": [False] * 4, "position": [np.nan] * 4}
+    changed = {"claims": [-1] * 4, "solved": [False] * 4, "position": [np.nan] * 4}
     (row,) = rows(robot_by_robot(Results([make.raced("a", ONE, **changed)])))
     assert row["false successes"] is row["position residual, largest [m]"] is None
     table = unreachable(Results([make.raced("a", ONE, "unreachable", **changed)]))
@@ -115,7 +115,7 @@ def test_a_solver_with_a_time_limit_is_marked_and_not_ranked(run):
 )
 def test_a_solver_with_a_time_limit_is_listed_with_the_spread_of_its_runs(run, repeats, mark):
     record = run("limited", 90, facts={"time_limited": True})
-    record.arrays["repeats"] = np.array(repeats)
+    record.measured["repeats"] = np.array(repeats)
     marks = by_solver(over_all(Results([record, run("a", 9)])), "mark")
     assert marks["limited"] == f"time-limited, {mark}"
 
@@ -146,7 +146,7 @@ def test_bold_numbers_are_those_of_the_solvers_that_lead(run):
 
 def test_answers_that_the_engines_place_differently_are_counted(run):
     disputed = run("a", 3, count=4)
-    disputed.arrays["disputed"] = np.array([1, 3])
+    disputed.measured["disputed"] = np.array([1, 3])
     assert column(over_all(Results([disputed])), "disputed answers") == [2]
 
 
@@ -182,7 +182,7 @@ def test_outcomes_are_told_apart(run):
     arrays = {
         "position": [1e-9, 1e-9, 0.5, 0.5, np.nan, 1e-9],
         "beyond": [0.0, 0.3, 0.0, 0.9, np.nan, 0.0],
-        "claimed": [1, 1, 1, 0, 0, 1],
+        "claims": [1, 1, 1, 0, 0, 1],
         "rotation": [0.0, 0.0, 0.0, 0.0, np.nan, 0.9],
     }
     (row,) = outcomes(Results([run("a", 1, begun=6, size=8, **arrays)])).rows
@@ -197,7 +197,7 @@ def test_the_outcomes_add_up_to_all_targets(make, seed):
     choices = {"position": [1e-9, 1e-3, 0.5], "rotation": [0.0, 0.5], "beyond": [0.0, 1e-7, 0.2]}
     arrays = {n: np.where(answered, rng.choice(c, begun), np.nan) for n, c in choices.items()}
     near = (arrays["position"] <= 1e-3) & (arrays["rotation"] <= 1e-3)
-    arrays |= {"solved": near & (arrays["beyond"] <= 1e-6), "claimed": rng.integers(-1, 2, begun)}
+    arrays |= {"solved": near & (arrays["beyond"] <= 1e-6), "claims": rng.integers(-1, 2, begun)}
     arrays |= {"seconds": np.ones(begun), "stratum": np.zeros(begun, dtype=int)}
     made = make.raced("a", ONE, size=int(begun + never), **arrays)
     (row,) = outcomes(Results([made])).rows
@@ -236,7 +236,7 @@ def test_times_lead_only_where_the_same_targets_tell_them_apart(run, rng):
 
 def test_out_of_reach_the_best_distance_is_that_of_any_solver_within_limits(make):
     def missed(solver, position, beyond=(0.0,) * 3, start=ONE):
-        arrays = {"solved": [False] * 3, "claimed": [0] * 3, "stratum": [0] * 3}
+        arrays = {"solved": [False] * 3, "claims": [0] * 3, "stratum": [0] * 3}
         arrays |= {"seconds": [1e-4] * 3, "rotation": [1.0] * 3, "bound": [0.1] * 3}
         arrays |= {"position": position, "beyond": beyond}
         return make.raced(solver, start, "unreachable", size=3, **arrays)
@@ -262,8 +262,8 @@ def test_false_successes_out_of_reach_are_listed(make):
     assert row["false successes"] == row["answers within limits"] == 3
     assert row["distance to target, largest [m]"] == 0.7
     assert table.summary.points == ("the arm, a: 3/4 = 75 % (30.1–95.4)",)
-    honest = make.raced("a", ONE, "unreachable", claimed=[0] * 4, **far)
-    mute = make.raced("b", ONE, "unreachable", claimed=[-1] * 4, **far)
+    honest = make.raced("a", ONE, "unreachable", claims=[0] * 4, **far)
+    mute = make.raced("b", ONE, "unreachable", claims=[-1] * 4, **far)
     sentence = unreachable(Results([honest, mute])).summary.sentence
     assert "No solver reports" in sentence
     assert "(n = 4)" in sentence
@@ -350,7 +350,7 @@ def test_drift_between_turns_is_reported(make):
     records = [make.raced(solver, ONE) for solver in "abc"]
     assert "drifted" not in robot_by_robot(Results(records)).measured
     for record, seconds in zip(records, (1e-4, 2.5e-4, 1.1e-4), strict=True):
-        record.arrays["control"] = np.array([1e-4, seconds])
+        record.measured["control"] = np.array([1e-4, seconds])
     assert "drifted by up to a factor of 2.50." in robot_by_robot(Results(records)).measured
 
 

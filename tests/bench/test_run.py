@@ -9,23 +9,19 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
 from plumbob import bench
-from plumbob.bench.experiments import Block, Measured
+from plumbob.bench.experiments import Block
 from plumbob.bench.harness import machine, run
 from plumbob.bench.harness.folder_lock import locked
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile, decode, encode
-from plumbob.bench.harness.values import Values
 from plumbob.bench.tables.results import Results
 
 ROOT = Path(bench.__file__).resolve().parents[1]
-
-
-class Numbers(Values, frozen=True):
-    x: list
 
 
 class Suite:
@@ -45,7 +41,7 @@ class Suite:
         if solver in self.trouble:
             raise self.trouble[solver]
         self.measured.append(solver)
-        return Measured(Numbers([1.0]))
+        return {"x": np.ones(1)}
 
 
 @pytest.fixture
@@ -260,16 +256,12 @@ COUNT = 40
 RUN = f"""
 import sys, time
 import numpy as np
-from plumbob.bench.experiments import Block, Measured
+from plumbob.bench.experiments import Block
 from plumbob.bench.harness import run
-from plumbob.bench.harness.values import Values
-
-class Numbers(Values, frozen=True):
-    x: list
 
 def measure(i):
     time.sleep(0.002)
-    return Measured(Numbers(np.random.default_rng(i).random(20_000)))
+    return {{"x": np.random.default_rng(i).random(20_000)}}
 
 def blocks(suite, scale):
     for i in range({COUNT}):
@@ -299,7 +291,7 @@ def whole_lines(folder):
 
 def without_times(folder):
     return [
-        (*r.key, r.size, json.dumps(r.stamp), r.notes, r.arrays["x"].tobytes())
+        (*r.key, r.size, json.dumps(r.stamp), r.remark, r.measured["x"].tobytes())
         for r in stored(folder)
     ]
 

@@ -69,14 +69,14 @@ def test_a_start_at_the_target_takes_no_iteration_and_what_is_out_of_reach_takes
 def test_beyond_reach_the_loop_on_an_engine_does_as_the_reference_does(engine):
     """Towards the far target itself it swung for all iterations: 22 of 60 straight, not 60."""
     problem, limits = chain_targets("beyond", 20), SolverLimits(1e-6, 1000)
-    ours = solve_targets(problem, "levenberg_marquardt", limits).arrays
+    ours = solve_targets(problem, "levenberg_marquardt", limits)
     job = job_of(problem, limits, chain_loops.__name__, {"engine": engine})
-    theirs = solve_one_by_one(problem, job, limits).arrays
+    theirs = solve_one_by_one(problem, job, limits)
     np.testing.assert_array_equal(theirs["iterations"], ours["iterations"])
     np.testing.assert_allclose(theirs["excess"], ours["excess"], atol=1e-7)  # a tenth of 1e-6
     settings = {"tolerance": 1e-6, "max_iterations": 1000}
     facts = {"task": CHAIN, "stratum": BEYOND}
-    record = Record("ik", "chain/beyond", f"lm/{engine}", settings, 20, theirs, facts=facts)
+    record = Record("ik", "chain/beyond", f"lm/{engine}", settings, {**facts, **theirs}, 20)
     (sentence,) = beyond_reach(Results([record])).summary.points
     assert sentence.startswith(f"LM, our loop on {engine}: 20/20 = 100 %")
 

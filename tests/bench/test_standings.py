@@ -90,9 +90,9 @@ def chained(make, solver, residuals, seconds, stratum="near", mine=False):
     """A record of the chain, its targets within 1e-4 m solved."""
     made = make.reached(stratum, solver)
     solved = np.asarray(residuals) <= 1e-4
-    arrays = {**made.arrays, "residual": residuals, "solved": solved}
+    arrays = {"residual": residuals, "solved": solved}
     arrays["seconds"] = np.full(len(residuals), seconds)
-    made = replace(made, arrays=arrays, size=float(len(residuals)))
+    made = replace(made.with_measured(**arrays), size=float(len(residuals)))
     return make.entered(made) if mine else made
 
 
@@ -167,7 +167,8 @@ def test_what_a_solver_raised_stands_below_its_ranks_with_how_often(make):
 def test_a_problem_that_could_not_be_measured_is_not_forgotten(make):
     """A record that failed stands in no table."""
     failed = make.entered(make.reached("near", "Mine"))
-    failed = replace(failed, arrays={}, notes={"failed": "It raised ValueError: no"})
+    words = {"task": failed.task, "entrant": True, "door": "my_ik.py"}
+    failed = replace(failed, measured={"failed": "It raised ValueError: no", **words})
     standing = only([failed])
     first = "chain/near: It raised ValueError: no"
     assert standing.sentence == f"Mine had trouble on 1 of 1 problem; the first is {first}."

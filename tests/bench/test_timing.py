@@ -58,14 +58,14 @@ def test_every_case_is_kept_with_rounds_of_one_operation_each(folder):
     assert {record.settings["operations"] for record in records} == {1, 10_000, 50_000}
     for record in records:
         assert not record.failed
-        assert len(record.arrays["seconds"]) == SWEEPS
-        assert SWEEPS <= record.arrays["seconds"].size <= 10 * ROUNDS
-        assert (record.arrays["seconds"] > 0).all()
+        assert len(record.measured["seconds"]) == SWEEPS
+        assert SWEEPS <= record.measured["seconds"].size <= 10 * ROUNDS
+        assert (record.measured["seconds"] > 0).all()
         assert record.size == 0.001
-        assert record.facts["noise"] > 0
+        assert record.measured["noise"] > 0
         assert record.stamp["machine"] == stamp()["machine"]
-        assert record.facts["subject"] == "kinematics"
-    assert len({record.facts["together"] for record in records}) == 1
+        assert record.measured["subject"] == "kinematics"
+    assert len({record.measured["together"] for record in records}) == 1
 
 
 def fails():
@@ -103,7 +103,7 @@ def test_a_case_that_fails_costs_none_that_it_is_compared_with():
     assert results["rounds"][2] == []
     assert results["troubles"] == ["", "", "OSError: no engine"]
     first, *_, last = measurement.blocks(Scale(1, 0.001))
-    assert first.measure().arrays["seconds"].shape[0] == SWEEPS
+    assert first.measure()["seconds"].shape[0] == SWEEPS
     with pytest.raises(RuntimeError, match="OSError: no engine"):
         last.measure()
 
@@ -113,7 +113,7 @@ def test_a_group_is_timed_once_in_a_run_and_again_in_the_next():
     runs = []
     for _ in range(2):
         a, b, _ = measurement.blocks(Scale(1, 0.001))
-        runs.append({block.measure().facts["together"] for block in (a, b, a)})
+        runs.append({block.measure()["together"] for block in (a, b, a)})
     assert [len(words) for words in runs] == [1, 1]
     assert runs[0] != runs[1]
 

@@ -13,7 +13,6 @@ from ...harness.block import Block, Measured, Scale
 from ...problems.curves import FollowedCurve, arm_beyond, arm_curves
 from ..chain.measurement import BEYOND_TOLERANCE, SolverLimits, solve_targets
 from . import BEYOND, CURVE
-from .values import FollowedMotion
 
 LIMITS = SolverLimits(tolerance=1e-4, max_iterations=100)
 BEYOND_LIMITS = SolverLimits(BEYOND_TOLERANCE, max_iterations=1000)
@@ -47,15 +46,13 @@ def followed(problem: FollowedCurve, motion: IKSolution, closed: bool) -> Measur
     """
     pose = forward_kinematics(problem.model, motion.coordinates)
     angles = _joint_angles(problem, motion)[: None if closed else -1]
-    return Measured(
-        FollowedMotion(
-            residual=np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
-            iterations=np.asarray(motion.iterations),
-            outcome=np.asarray(motion.outcome),
-            largest_angle=angles.max(axis=-1),
-            mean_angle=angles.mean(axis=-1),
-        )
-    )
+    return {
+        "residual": np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
+        "iterations": np.asarray(motion.iterations),
+        "outcome": np.asarray(motion.outcome),
+        "largest_angle": angles.max(axis=-1),
+        "mean_angle": angles.mean(axis=-1),
+    }
 
 
 def solve_frames(problem: FollowedCurve, solver: str, options: dict[str, Any]) -> IKSolution:

@@ -26,15 +26,15 @@ def _rows(results: Results) -> list[Row]:
     """Return a row for each solver on targets within reach, problem by problem."""
     records = results.all("arm", task=CURVE, warm=False)
     records += results.all("arm", task=CURVE, warm=True)
-    records += [r for r in results.all("ik", task=CHAIN) if r.details.stratum != BEYOND]
+    records += [r for r in results.all("ik", task=CHAIN) if r.values.stratum != BEYOND]
     return [_row(record) for group in by_problem(records).values() for record in group]
 
 
 def _row(record: Record) -> Row:
-    hits, seconds = within_tolerance(record), record.arrays.get("seconds")
+    hits, seconds = within_tolerance(record), record.measured.get("seconds")
     return {
         **solves_row(record),
-        "start": STARTS[record.details.warm],
+        "start": STARTS[record.values.warm],
         "hits": hits,
         "within tolerance": metrics.share(hits),
         **quantile_cells("residual", spread_of(record, "residual")),
@@ -73,7 +73,7 @@ def _ranking(hits: dict[str, dict[tuple[str, str], np.ndarray]]) -> metrics.Rank
 def residuals_chart(results: Results) -> Sketch | None:
     """Show the residual against the iteration, median and 10 to 90 % of the targets."""
     panels = (
-        Panel(group[0].title, tuple(map(_residuals, group)), group[0].details.tolerance)
+        Panel(group[0].title, tuple(map(_residuals, group)), group[0].values.tolerance)
         for group in histories(results)
     )
     return declared_chart(_CAPTIONS.figure("ik_residuals"), panels, results.entrants)

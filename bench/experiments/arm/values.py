@@ -1,11 +1,11 @@
 """The records of the lab's arm: curves to draw, and targets beyond reach."""
 
-from ...harness.values import Floats1, Integers1, Kind, Values
-from ..chain.values import ChainSolves, SolveDetails
+from ...harness.values import Floats1, Integers1
+from ..chain.values import ChainSolves, SolveWords
 from . import BEYOND, CURVE
 
 
-class FollowedMotion(Values, frozen=True):
+class FollowedMotion(SolveWords, frozen=True):
     """A motion along a curve, (frame,): an outcome is the number of an `Outcome`.
 
     The angles are the rotations of joints from each frame to the next [rad].
@@ -18,4 +18,4 @@ class FollowedMotion(Values, frozen=True):
     mean_angle: Floats1
 
 
-KINDS = {CURVE: Kind(FollowedMotion, SolveDetails), BEYOND: Kind(ChainSolves, SolveDetails)}
+KINDS = {CURVE: FollowedMotion, BEYOND: ChainSolves}

@@ -24,7 +24,6 @@ from ...problems.evaluate import Targets, angle_between, evaluator_of
 from ...problems.robot_targets import STRATA, robot_targets
 from ...problems.robots import ROBOTS, UnableError, is_installed, robot, title
 from . import BRANCHES, EXACT, LARGEST_COUNT, SAME, STARTS, TOLERANCE
-from .values import BranchValues
 
 SUITE = "ik"
 HINGES = 6
@@ -67,16 +66,11 @@ def compare(jobs: Sequence[BranchJob]) -> list[Measured]:
     announce("all solutions, every solver")
     modules, job = [job.peer.module for job in jobs], jobs[0]
     results = in_a_fresh_process(PATIENCE, lists, job.robot, modules, job.target_count, job.seed)
-    return [
-        Measured(None, {"remark": result})
-        if isinstance(result, str)
-        else Measured(BranchValues(*result))
-        for result in map(results.__getitem__, modules)
-    ]
+    return [results[module] for module in modules]
 
 
 def lists(name: str, modules: Sequence[str], count: int, seed: int) -> Mapping[str, Any]:
-    """Return by module the fields of BranchValues, or why the solver does not take the robot."""
+    """Return by module the numbers of its lists, or why the solver does not take the robot."""
     targets = robot_targets(name, count, seed)
     results: dict[str, Any] = {}
     asks: dict[str, Ask] = {}
@@ -84,7 +78,7 @@ def lists(name: str, modules: Sequence[str], count: int, seed: int) -> Mapping[s
         try:
             asks[module] = importlib.import_module(module).prepare_all(robot(name))
         except UnableError as error:
-            results[module] = str(error)
+            results[module] = {"remark": str(error)}
     requests = [targets.request(i) for i in range(len(targets.starts))]
     solves = {module: [ask(request) for request in requests] for module, ask in asks.items()}
     rows = {m: [_within(name, solve().q) for solve in solves[m]] for m in solves}
@@ -98,8 +92,13 @@ def lists(name: str, modules: Sequence[str], count: int, seed: int) -> Mapping[s
         right = [q[e <= TOLERANCE] for q, e in zip(rows[m], errors[m], strict=True)]
         absent = np.array([_is_missing(u, q).sum() for u, q in zip(unions, right, strict=True)])
         wrong = np.array([(e > TOLERANCE).sum() for e in errors[m]])
-        numbers = counts - absent, absent, wrong, seconds[m]
-        results[m] = (*(values[is_isolated] for values in numbers), int((~is_isolated).sum()))
+        results[m] = {
+            "solutions": (counts - absent)[is_isolated],
+            "missing": absent[is_isolated],
+            "wrong": wrong[is_isolated],
+            "seconds": seconds[m][is_isolated],
+            "singular": int((~is_isolated).sum()),
+        }
     return results
 
 

@@ -20,7 +20,7 @@ def _rows(results: Results) -> list[Row]:
 
 def _row(record: Record) -> Row:
     row: Row = {"record": record, "robot": record.title, "solver": record.solver}
-    row["remark"] = record.details.remark
+    row["remark"] = record.values.remark
     if values := record.values:
         row["targets"] = len(values.solutions)
         row["solutions"] = int(values.solutions.sum())

@@ -1,12 +1,17 @@
 """The records of solvers listing all solutions of a pose."""
 
-import msgspec
-
-from ...harness.values import Details, Floats1, Integers1, Kind, Values
+from ...harness.values import Floats1, Integers1, Values
 from . import BRANCHES
 
 
-class BranchValues(Values, frozen=True):
+class BranchWords(Values, frozen=True, kw_only=True):
+    """The version of the solver, and the starts of the search."""
+
+    version: str
+    starts: int
+
+
+class BranchValues(BranchWords, frozen=True):
     """The lists of a solver, an entry for each target with isolated solutions.
 
     Attributes:
@@ -19,17 +24,9 @@ class BranchValues(Values, frozen=True):
 
     solutions: Integers1
     missing: Integers1
-    wrong: Integers1 = msgspec.field(name="false")
+    wrong: Integers1
     seconds: Floats1
     singular: int
 
 
-class BranchDetails(Details, frozen=True):
-    """The version of the solver, the starts of the search, and why a robot is not taken."""
-
-    version: str
-    starts: int
-    remark: str = ""
-
-
-KINDS = {BRANCHES: Kind(BranchValues, BranchDetails)}
+KINDS = {BRANCHES: BranchValues}

@@ -6,7 +6,6 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from msgspec import structs
 
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.engines.skeleton_engine import forward_kinematics_by
@@ -26,7 +25,6 @@ from ...peers.protocol import NoAnswerError, describe
 from ...problems import chains
 from ...problems.evaluate import arbiter_of
 from . import CHAIN
-from .values import ChainSolves
 
 SUITE = "ik"
 TOLERANCE = 1e-4
@@ -92,14 +90,12 @@ class ChainJob(NamedTuple):
 def solve_together(jobs: Sequence[ChainJob]) -> list[Measured]:
     """Solve the targets of every solver; then time the first targets, the solvers in turns."""
     results = [_answer_of(job) for job in jobs]
-    values = [result.values for result in results]
-    places = [i for i, v in enumerate(values) if v and np.isfinite(v.residual).any()]
-    places = [i for i in places if FIRST_TARGETS not in results[i].facts]
+    places = [i for i, r in enumerate(results) if np.isfinite(r.get("residual", np.nan)).any()]
+    places = [i for i in places if FIRST_TARGETS not in results[i]]
     turns = times_in_turns([jobs[i].job for i in places], _timed_count(jobs[0].job), ROUNDS)
     for i, times in zip(places, turns, strict=True):
         if times is not None:
-            values = structs.replace(results[i].values, **times._asdict())
-            results[i] = results[i]._replace(values=values)
+            results[i] = {**results[i], **times._asdict()}
     return results
 
 
@@ -172,7 +168,7 @@ def solve_targets(
     arrays["outcome"] = np.asarray(solution.outcome)
     if record:
         arrays |= _quantiles(solution.history[:, : HISTORY + 1])
-    return Measured(ChainSolves(**arrays))
+    return arrays
 
 
 def solve_one_by_one(
@@ -203,8 +199,8 @@ def solve_one_by_one(
         history = _history(problem, job)
         arrays |= history
         remarks += [] if history or facts else [NOT_FOLLOWED]
-    facts |= {"trouble": raised(solves)}
-    return Measured(ChainSolves(**arrays), {"remark": "; ".join(filter(None, remarks))}, facts)
+    remark = "; ".join(filter(None, remarks))
+    return {**arrays, **facts, "trouble": raised(solves), "remark": remark}
 
 
 def _answers(requests: chains.ChainRequests, outcome: JobOutcome) -> tuple[FloatArray, FloatArray]:

@@ -39,20 +39,20 @@ def solves_row(record: Record) -> Row:
         "solver": label(record.solver),
         **quantile_cells("iterations", spread_of_iterations(record)),
         "iterations allowed": record.settings.get("max_iterations"),
-        "remark": record.notes.get("remark", ""),
+        "remark": record.measured.get("remark", ""),
     }
 
 
 def within_tolerance(record: Record) -> np.ndarray:
     """Return which residuals are within the tolerance."""
-    return np.asarray(record.values.residual <= record.details.tolerance)
+    return np.asarray(record.values.residual <= record.values.tolerance)
 
 
 # Beyond reach.
 
 
 def _beyond_rows(results: Results) -> list[Row]:
-    chains = [r for r in results.all("ik", task=CHAIN, stratum=BEYOND) if r.values]
+    chains = [r for r in results.all("ik", task=CHAIN, stratum=BEYOND) if r.has_numbers]
     return [*map(_beyond_row, results.all("arm", task=arm.BEYOND) + chains)]
 
 
@@ -145,7 +145,7 @@ def iterations_chart(results: Results) -> Sketch | None:
 
 def histories(results: Results) -> list[list[Record]]:
     """Return the records with a history of each stratum within reach."""
-    records = [r for r in results.all("ik", task=CHAIN) if r.details.stratum != BEYOND]
+    records = [r for r in results.all("ik", task=CHAIN) if r.values.stratum != BEYOND]
     records = [record for record in records if record.values.history_median is not None]
     return list(by_problem(records).values())
 

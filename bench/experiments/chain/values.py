@@ -2,13 +2,20 @@
 
 import math
 
-import msgspec
-
-from ...harness.values import Booleans1, Details, Floats1, Floats2, Integers1, Kind, Values
+from ...harness.values import Booleans1, Floats1, Floats2, Integers1, Values
 from . import CHAIN
 
 
-class ChainSolves(Values, frozen=True):
+class SolveWords(Values, frozen=True, kw_only=True):
+    """The tolerance [m], whether the solver starts warm, and the stratum or curve."""
+
+    tolerance: float = math.nan
+    warm: bool | None = None
+    stratum: str = ""
+    curve: str = ""
+
+
+class ChainSolves(SolveWords, frozen=True):
     """The solutions of a batch of targets, (target,); lengths in metres."""
 
     residual: Floats1  # infinite without a solution
@@ -25,16 +32,7 @@ class ChainSolves(Values, frozen=True):
     seconds: Floats2 | None = None  # of the first targets, (round, target)
     control: Floats1 | None = None  # of a fixed loop before each round
     # 1 or 0 as a user's solver claims, or -1 for no claim
-    claims: Integers1 | None = msgspec.field(default=None, name="claimed")
+    claims: Integers1 | None = None
 
 
-class SolveDetails(Details, frozen=True):
-    """The tolerance [m], whether the solver starts warm, and the stratum or curve."""
-
-    tolerance: float = math.nan
-    warm: bool | None = None
-    stratum: str = ""
-    curve: str = ""
-
-
-KINDS = {CHAIN: Kind(ChainSolves, SolveDetails)}
+KINDS = {CHAIN: ChainSolves}

@@ -6,7 +6,6 @@ from functools import partial
 from plumbob.crosscheck.claims import CLAIMS, run_claims
 
 from ...harness.block import Block, Measured, Scale
-from .values import ClaimValues
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -19,8 +18,18 @@ def evaluate(name: str) -> Measured:
     """Evaluate a claim; return its numbers and its sentences."""
     (verdict,) = run_claims([name])
     claim = verdict.claim
-    numbers = (verdict.cases, verdict.difference, claim.tolerance.value, verdict.displacement)
-    notes = {"ours": claim.quantity, "reason": claim.tolerance.reason, "missed": verdict.failure}
+    words = {
+        "quantity": claim.quantity,
+        "reason": claim.tolerance.reason,
+        "failure": verdict.failure,
+    }
     if claim.obstacle:
-        return Measured(None, {**notes, "obstacle": claim.obstacle})
-    return Measured(ClaimValues(*numbers, verdict.holds), notes)
+        return {**words, "obstacle": claim.obstacle}
+    return {
+        **words,
+        "cases": verdict.cases,
+        "difference": verdict.difference,
+        "tolerance": claim.tolerance.value,
+        "moved": verdict.displacement,
+        "holds": verdict.holds,
+    }

@@ -17,7 +17,7 @@ ENGINES = (PINOCCHIO, MUJOCO)
 
 
 def _row(record: Record) -> Row:
-    claim, details = record.values, record.details
+    claim, details = record.values, record.values
     row = {
         "record": record,
         "claim": record.problem,

@@ -1,30 +1,28 @@
 """The records of the cross-check's claims."""
 
-import msgspec
-
-from ...harness.values import Details, Kind, Values
+from ...harness.values import Values
 
 
-class ClaimValues(Values, frozen=True):
+class ClaimWords(Values, frozen=True, kw_only=True):
+    """The quantity computed by us, the reason for the tolerance, and why the claim failed.
+
+    An obstacle says why the claim could not be checked.
+    """
+
+    quantity: str = ""
+    reason: str = ""
+    failure: str = ""
+    obstacle: str = ""
+
+
+class ClaimValues(ClaimWords, frozen=True):
     """The largest relative difference over the cases, its tolerance, and the displacement."""
 
     cases: int
     difference: float
     tolerance: float
     moved: float
-    holds: bool = msgspec.field(name="held")
+    holds: bool
 
 
-class ClaimDetails(Details, frozen=True):
-    """The quantity computed by us, the reason for the tolerance, and why the claim failed.
-
-    An obstacle says why the claim could not be checked.
-    """
-
-    quantity: str = msgspec.field(default="", name="ours")
-    reason: str = ""
-    failure: str = msgspec.field(default="", name="missed")
-    obstacle: str = ""
-
-
-KINDS = {"": Kind(ClaimValues, ClaimDetails)}
+KINDS = {"": ClaimValues}

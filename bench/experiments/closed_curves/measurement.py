@@ -28,7 +28,6 @@ from ...problems.curves import (
 )
 from ..arm.measurement import LIMITS, followed, solve_frames
 from . import COLD, CURVE, DRIFT, NEAREST, WARM
-from .values import DriftAngles
 
 SUITE = "tracking"
 # The starts of a frame, of which the nearest solution is taken, and the seed of random starts.
@@ -102,7 +101,7 @@ def drift(problem: FollowedCurve, solver: str, mode: str) -> Measured:
     motion = MODES[mode](problem, solver)
     frames = DRIFT_FRAMES * np.arange(1, 4)
     angles = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[frames])
-    return Measured(DriftAngles(angles.max(axis=-1), np.asarray(motion.residual)))
+    return {"drift": angles.max(axis=-1), "residual": np.asarray(motion.residual)}
 
 
 # The ways in which the frames of a curve are solved.

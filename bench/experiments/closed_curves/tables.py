@@ -37,7 +37,7 @@ def _rows(results: Results) -> list[Row]:
 
 def _by_mode(results: Results, task: str) -> dict[tuple[str, str], dict[str, Record]]:
     groups = grouped(results.all("tracking", task=task), lambda r: (r.problem, r.solver))
-    return {key: {r.details.mode: r for r in records} for key, records in groups.items()}
+    return {key: {r.values.mode: r for r in records} for key, records in groups.items()}
 
 
 def _row(by_mode: Mapping[str, Record], drifts: Mapping[str, Record]) -> Row:
@@ -100,7 +100,7 @@ def jitter_chart(results: Results) -> Sketch | None:
             motions = [motion for motion in (record, warm) if motion is not None]
             angles = [in_unit(motion.values.largest_angle.max(), "°") for motion in motions]
             spans.append(series(record.solver, angles, [row] * len(angles), form=SPAN))
-    rows = tuple(str(records[0].details.curve) for records in curves.values())
+    rows = tuple(str(records[0].values.curve) for records in curves.values())
     panels = [Panel("", tuple(spans))] if spans else []
     return declared_chart(_CAPTIONS.figure("jitter"), panels, results.entrants, rows=rows)
 

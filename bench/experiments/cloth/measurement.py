@@ -17,7 +17,6 @@ from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from . import DAMPERS, FEW, ONE_STEP
-from .values import DamperDifferences, IterationErrors, TruncatedSteps
 
 STIFFNESS, FACTORS = 100.0, (1, 10, 100)
 H = 1 / 60
@@ -90,7 +89,7 @@ def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
         (objective.residual(iterate), exact.error(iterate.positions, objective.y))
         for _, iterate in zip(range(iterations + 1), iterates, strict=False)
     ]
-    return Measured(IterationErrors(*np.array(pairs).T))
+    return dict(zip(("residual", "error"), np.array(pairs).T, strict=True))
 
 
 def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
@@ -108,11 +107,21 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
         metrics.relative_error(end.positions, x.positions, y)
         for end, x, y in zip(ends, exact, inertial, strict=True)
     ]
-    distances = (
-        [metrics.rms_distance(a.positions, b.positions) for a, b in zip(states, exact, strict=True)]
-        for states in (ends, motion(start, STEPS, integrator)[1:], [start] * STEPS)
-    )
-    return Measured(TruncatedSteps(*map(np.array, (errors, *distances))))
+    motions = {
+        "distance": ends,
+        "drift": motion(start, STEPS, integrator)[1:],
+        "path": [start] * STEPS,
+    }
+    distances = {
+        name: np.array(
+            [
+                metrics.rms_distance(a.positions, b.positions)
+                for a, b in zip(states, exact, strict=True)
+            ]
+        )
+        for name, states in motions.items()
+    }
+    return {"error": np.array(errors), **distances}
 
 
 def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
@@ -124,7 +133,7 @@ def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
         rates = damper_forces(problem.system, end)
         offsets = step_damper_forces(problem.system, state, end, h) - rates
         differences.append(np.linalg.norm(offsets) / np.linalg.norm(rates))
-    return Measured(DamperDifferences(np.array(HALVED), np.array(differences)))
+    return {"h": np.array(HALVED), "difference": np.array(differences)}
 
 
 def step_damper_forces(system: MassSpring, before: State, after: State, h: float) -> FloatArray:

@@ -61,7 +61,7 @@ def _convergence_rows(results: Results) -> list[Row]:
     for (title, solver), group in grouped(records, lambda r: (r.title, r.solver)).items():
         row: Row = {"cloth": f"lab cloth, {title}", "solver": label(solver), "records": group}
         for record in group:
-            row |= tasks[record.facts["task"]](record)
+            row |= tasks[record.measured["task"]](record)
         rows.append(row)
     return [row for cloth in grouped(rows, lambda row: str(row["cloth"])).values() for row in cloth]
 
@@ -79,7 +79,7 @@ def _one_step(record: Record) -> Row:
 
 
 def _few_iterations(record: Record) -> Row:
-    steps, title = record.values, _steps_of(record.details.iterations)
+    steps, title = record.values, _steps_of(record.values.iterations)
     errors, drift = metrics.spread(steps.error), float(steps.drift[-1])
     return {
         f"{title}, median error": errors.median,
@@ -117,7 +117,7 @@ def _single_iterations(rows: Sequence[Row]) -> Iterator[str]:
     title = _steps_of(1)
     for row in rows:
         if f"{title}, drift" in row:
-            steps = [r for r in row["records"] if r.facts["task"] == FEW]
+            steps = [r for r in row["records"] if r.measured["task"] == FEW]
             drift, share = row[f"{title}, drift"], row[f"{title}, drift relative to the path"]
             yield (
                 f"{row['cloth']}, {settings(steps, 'steps')} steps of one local/global iteration "

@@ -37,7 +37,6 @@ from ..published import problem as published
 from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
 from .truth import ClothTruth, first_step, inertial_positions, truth_of
-from .values import LiuFrame, StabilityLimits, Work
 
 # Explicit steps a frame, relative to symplectic Euler's limit of stability.
 MARGINS = (1.1, 2.0, 4.0)
@@ -243,8 +242,14 @@ def work(task: str, peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
             labels.append(rung.label)
             remarks.append(outcome.note or ("diverged" if np.isinf(error) else ""))
             troubles.append(outcome.trouble)
-    facts = {"rungs": labels, "remarks": remarks, "trouble": next(filter(None, troubles), "")}
-    return Measured(Work(*map(np.array, zip(*rows, strict=True)), **_certainty(falls)), facts=facts)
+    names = ("particles", "seconds", "setup", "error")
+    return {
+        **dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True)),
+        **_certainty(falls),
+        "rungs": labels,
+        "remarks": remarks,
+        "trouble": next(filter(None, troubles), ""),
+    }
 
 
 def _error(task: str, frames: Sequence[Solved], fall: Fall) -> float:
@@ -306,8 +311,12 @@ def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
         except ArithmeticError as error:
             limits.append(np.nan)
             remarks.append(str(error))
-    columns = map(np.array, (stiffnesses, limits, frequencies))
-    return Measured(StabilityLimits(*columns), {"remark": "; ".join(remarks)})
+    return {
+        "stiffness": np.array(stiffnesses),
+        "limit": np.array(limits),
+        "frequency": np.array(frequencies),
+        "remark": "; ".join(remarks),
+    }
 
 
 def is_stable(
@@ -363,7 +372,7 @@ def liu_2013(solver: str) -> Measured:
     seconds = np.array([step.seconds for step in outcome.solved])
     exact, inertial = first_step(cloth, frame), inertial_positions(cloth, frame)
     error = exact.error(outcome.solved[-1].q, inertial)
-    return Measured(LiuFrame(seconds, error, cloth.system.particle_count))
+    return {"seconds": seconds, "error": error, "vertices": cloth.system.particle_count}
 
 
 def job(

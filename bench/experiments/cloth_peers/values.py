@@ -1,10 +1,21 @@
 """The records of falling cloths: work and precision, limits of stability."""
 
-from ...harness.values import Details, Floats1, Integers1, Kind, Values
+from ...harness.values import Floats1, Integers1, Values
 from . import LIU, MISSING, MOTION, ONE_STEP, STABILITY
 
 
-class Work(Values, frozen=True):
+class FallWords(Values, frozen=True, kw_only=True):
+    """The falling cloth, and the settings of its solver."""
+
+    stiffness: float  # of the springs [N/m]
+    cloth: str = ""  # the name of a user's cloth
+    rungs: tuple[str, ...] = ()  # the settings, (rung,)
+    remarks: tuple[str, ...] = ()  # on each setting, (rung,)
+    kind: str = ""  # how the solver's settings differ, see `registry`
+    sweep: int = 1  # the pass over all solvers in which it was measured
+
+
+class Work(FallWords, frozen=True):
     """A step or a motion at increasing cost, (rung,), and how sure its arbiter is, (size,).
 
     A sweep measures every rung once.
@@ -36,27 +47,10 @@ class LiuFrame(Values, frozen=True):
     vertices: int
 
 
-class FallDetails(Details, frozen=True):
-    """The falling cloth, and the settings of its solver."""
-
-    stiffness: float  # of the springs [N/m]
-    cloth: str = ""  # the name of a user's cloth
-    rungs: tuple[str, ...] = ()  # the settings, (rung,)
-    remarks: tuple[str, ...] = ()  # on each setting, (rung,)
-    kind: str = ""  # how the solver's settings differ, see `registry`
-    sweep: int = 1  # the pass over all solvers in which it was measured
-
-
-class ClothDetails(Details, frozen=True):
-    """The reason why an engine is missing, or a remark on its stability."""
-
-    remark: str = ""
-
-
 KINDS = {
-    ONE_STEP: Kind(Work, FallDetails),
-    MOTION: Kind(Work, FallDetails),
-    STABILITY: Kind(StabilityLimits, ClothDetails),
-    LIU: Kind(LiuFrame, ClothDetails),
-    MISSING: Kind(Values, ClothDetails),
+    ONE_STEP: Work,
+    MOTION: Work,
+    STABILITY: StabilityLimits,
+    LIU: LiuFrame,
+    MISSING: Values,
 }

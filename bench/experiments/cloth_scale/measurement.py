@@ -24,10 +24,8 @@ from plumbob.reference.sparse.linear_solver import factorize
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
-from ...harness.values import read
 from ...peers import registry
 from ...peers.stopwatch import compute_time_of
-from .values import FactorCosts
 
 H, STIFFNESS, ITERATIONS = 1 / 60, 1e4, 10
 # Particles along a side, and the shortest benchmark time [s] at which the cloth is measured.
@@ -56,8 +54,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 def in_its_own_process(size: int, library: str) -> Measured:
     """Measure a cloth in a fresh process."""
-    numbers = in_a_fresh_process(PATIENCE, compiled_and_measured, size, library)
-    return Measured(read(FactorCosts, numbers))
+    return in_a_fresh_process(PATIENCE, compiled_and_measured, size, library)
 
 
 def compiled_and_measured(size: int, library: str) -> dict[str, Any]:

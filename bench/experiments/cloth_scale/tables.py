@@ -15,10 +15,10 @@ LABELS = {library.name: library.label for library in registry.FACTORS}
 
 def _row(record: Record) -> Row:
     """Return medians and their ratios; a cell not measured is None."""
-    medians = {name: metrics.spread(array).median for name, array in record.arrays.items()}
-    medians["particles"] = float(record.details.particles)
+    medians = {name: metrics.spread(array).median for name, array in record.measured.items()}
+    medians["particles"] = float(record.values.particles)
     if "step" in medians:
-        medians["iteration"] = medians["step"] / record.details.iterations
+        medians["iteration"] = medians["step"] / record.values.iterations
 
     def relative(name: str, divisor: str) -> float | None:
         present = name in medians and divisor in medians
@@ -26,7 +26,7 @@ def _row(record: Record) -> Row:
 
     return {
         "record": record,
-        "particles": record.details.particles,
+        "particles": record.values.particles,
         "library": LABELS.get(record.solver, record.solver),
         "first factor": medians.get("factor"),
         "second factor": medians.get("refactor"),
@@ -50,7 +50,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
         return NO_SUMMARY
     row = max(steps, key=lambda row: int(row["particles"]))
     return Summary(
-        f"With {words(row['particles'])} particles {words(row['record'].details.iterations)} "
+        f"With {words(row['particles'])} particles {words(row['record'].values.iterations)} "
         f"iterations take {words(row['all iterations'])} s, as long as "
         f"{words(row['all iterations relative to a solve'])} solves; the residual after them is "
         f"{words(row['final residual'])}."

@@ -1,9 +1,16 @@
 """The records of growing cloths: times [s], (round,), memory [bytes] and sizes of factors."""
 
-from ...harness.values import Details, Floats1, Kind, Values
+from ...harness.values import Floats1, Values
 
 
-class FactorCosts(Values, frozen=True, kw_only=True):
+class FactorWords(Values, frozen=True, kw_only=True):
+    """The number of particles, and the iterations of a step."""
+
+    particles: int
+    iterations: int
+
+
+class FactorCosts(FactorWords, frozen=True, kw_only=True):
     """A cloth factored by a library; SciPy's has None where only ours is measured."""
 
     before: int  # the memory before the cloth
@@ -21,11 +28,4 @@ class FactorCosts(Values, frozen=True, kw_only=True):
     history: Floats1 | None = None  # the residual at the start and after each iteration
 
 
-class FactorDetails(Details, frozen=True):
-    """The number of particles, and the iterations of a step."""
-
-    particles: int
-    iterations: int
-
-
-KINDS = {"": Kind(FactorCosts, FactorDetails)}
+KINDS = {"": FactorCosts}

@@ -28,7 +28,7 @@ def energy_chart(results: Results) -> Sketch | None:
 def _rows(results: Results) -> list[Row]:
     rows = []
     for record in results.all("energy"):
-        left, every = record.values.left, record.details.every
+        left, every = record.values.left, record.values.every
         row = {"cloth": record.title, "integrator": label(record.solver), "record": record}
         row |= {"last": float(left[-1]), "maximum": left.max(), "minimum": left.min()}
         counts = [count for count in LISTED if count // every < left.size]
@@ -37,7 +37,7 @@ def _rows(results: Results) -> list[Row]:
 
 
 def _summary(rows: Sequence[Row]) -> Summary:
-    undamped = [row for row in rows if row["record"].details.damping == 0.0]
+    undamped = [row for row in rows if row["record"].values.damping == 0.0]
     if not undamped:
         return Summary()
     steps = settings((row["record"] for row in undamped), "steps")

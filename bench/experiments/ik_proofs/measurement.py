@@ -16,7 +16,6 @@ from ...problems.evaluate import Targets, evaluator_of
 from ...problems.robot_targets import STRATA, farthest, robot_targets
 from ...problems.robots import HELD_OUT, TUNING, group_of, is_installed, robot, seed_of, title
 from . import ANYWHERE, WITHIN_REACH
-from .values import PoseProofs
 
 SUITE, SOLVER = "ik_proofs", "Plumbob LM"
 TOLERANCE, RESTARTS = 1e-3, 20
@@ -59,18 +58,16 @@ def prove(name: str, kind: str, count: int, seed: int) -> Measured:
     _, setup = compute_time_of(partial(certify_ik, anew, anew.neutral(), far))
     bounds = np.array([certificate.least_distance for certificate in certificates])
     levers = np.array([certificate.lever for certificate in certificates])
-    return Measured(
-        PoseProofs(
-            converged=solution.outcome == Outcome.CONVERGED,
-            reached=np.array([certificate.reached for certificate in certificates]),
-            coverage=np.array([int(certificate.coverage) for certificate in certificates]),
-            distance=np.array([certificate.distance for certificate in certificates]),
-            least_distance=bounds,
-            refuted=solution.residual + levers * solution.residual_rotation < bounds,
-            seconds=np.array(seconds),
-            setup=setup,
-        )
-    )
+    return {
+        "converged": solution.outcome == Outcome.CONVERGED,
+        "reached": np.array([certificate.reached for certificate in certificates]),
+        "coverage": np.array([int(certificate.coverage) for certificate in certificates]),
+        "distance": np.array([certificate.distance for certificate in certificates]),
+        "least_distance": bounds,
+        "refuted": solution.residual + levers * solution.residual_rotation < bounds,
+        "seconds": np.array(seconds),
+        "setup": setup,
+    }
 
 
 def poses_anywhere(name: str, count: int, seed: int) -> Targets:

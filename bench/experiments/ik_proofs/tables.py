@@ -23,8 +23,8 @@ def _row(record: Record) -> Row:
     return {
         "record": record,
         "robot": record.title,
-        "robots": record.details.group,
-        "targets": record.details.targets,
+        "robots": record.values.group,
+        "targets": record.values.targets,
         "converged": float(proofs.converged.mean()),
         "reached": float(proofs.reached.mean()),
         "exact solution": float(is_covered.mean()),

@@ -1,9 +1,18 @@
 """The records of proofs for the poses of a robot."""
 
-from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
+from ...harness.values import Booleans1, Floats1, Integers1, Values
 
 
-class PoseProofs(Values, frozen=True):
+class ProofWords(Values, frozen=True, kw_only=True):
+    """The group of the robot, the kind of its targets, and the tolerances [m], [rad]."""
+
+    group: str
+    targets: str
+    tolerance: float
+    restarts: int
+
+
+class PoseProofs(ProofWords, frozen=True):
     """What is proven about the answers to targets, (target,)."""
 
     converged: Booleans1  # whether the solver says that it has reached the target
@@ -16,13 +25,4 @@ class PoseProofs(Values, frozen=True):
     setup: float  # of the shells of the robot [s]
 
 
-class ProofDetails(Details, frozen=True):
-    """The group of the robot, the kind of its targets, and the tolerances [m], [rad]."""
-
-    group: str
-    targets: str
-    tolerance: float
-    restarts: int
-
-
-KINDS = {"": Kind(PoseProofs, ProofDetails)}
+KINDS = {"": PoseProofs}

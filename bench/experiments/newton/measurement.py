@@ -19,7 +19,6 @@ from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from ..cloth.measurement import TOLERANCE, ClothSwing, integrator_of
 from . import FRAME, FRAMES, GRAVITY, STIFFNESSES
-from .values import CertifiedStep
 
 # Iterations of a quick solver; solvers allowed more than `SLOW` count as slow.
 USUAL, SLOW = 10, 1000
@@ -69,26 +68,25 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
     certificate, point = certify(objective, x), objective.evaluate(x)
     distance = float(np.linalg.norm(x - newton.x))
     same = certificate.shares_minimiser(newton.certificate, distance)
-    return Measured(
-        CertifiedStep(
-            size=size,
-            iterations=iterations,
-            residual=certificate.residual,
-            at_floor=point.at_floor,
-            balance=balance_residual(problem.system, problem.start, x, problem.h),
-            distance=certificate.distance,
-            curvature=certificate.curvature,
-            lipschitz=certificate.lipschitz,
-            newton_step=certificate.newton_step,
-            newton_distance=distance,
-            error=newton.exact.error(x, objective.y),
-            above=point.value - newton.minimum,
-            covered=certificate.covered,
-            same=same is True,
-            different=same is False,
-        ),
-        {"coverage": certificate.coverage.name, "why": certificate.coverage.sentence},
-    )
+    return {
+        "size": size,
+        "iterations": iterations,
+        "residual": certificate.residual,
+        "at_floor": point.at_floor,
+        "balance": balance_residual(problem.system, problem.start, x, problem.h),
+        "distance": certificate.distance,
+        "curvature": certificate.curvature,
+        "lipschitz": certificate.lipschitz,
+        "newton_step": certificate.newton_step,
+        "newton_distance": distance,
+        "error": newton.exact.error(x, objective.y),
+        "above": point.value - newton.minimum,
+        "covered": certificate.covered,
+        "same": same is True,
+        "different": same is False,
+        "coverage": certificate.coverage.name,
+        "why": certificate.coverage.sentence,
+    }
 
 
 class NewtonSolution(NamedTuple):

@@ -10,26 +10,25 @@ from ...tables.layout import Row
 from ...tables.results import counted, label, listed
 from ...tables.table import Summary, words
 from . import FRAME, FRAMES, GRAVITY
-from .values import CertifiedDetails, CertifiedStep
+from .values import CertifiedStep
 
 CAPTIONS = Captions(__file__, gravity=f"{GRAVITY:g}", time=f"{FRAMES * FRAME:g}")
 
 
 def _row(record: Record) -> Row:
     step: CertifiedStep = record.values
-    details: CertifiedDetails = record.details
     minimiser = "yes" if step.same else "no" if step.different else "not proven"
     return {
         "record": record,
-        "stiffness": details.stiffness,
+        "stiffness": step.stiffness,
         "solver": label(record.solver),
-        "start": details.start,
+        "start": step.start,
         "iterations": step.iterations,
         "residual": step.residual,
         "distance to a minimiser, at most": step.distance if np.isfinite(step.distance) else None,
         "same minimiser as Newton": minimiser,
         "residual in MuJoCo’s forces": step.balance,
-        "bound": "yes" if step.covered else details.coverage.lower().replace("_", " "),
+        "bound": "yes" if step.covered else step.coverage.lower().replace("_", " "),
         "distance to Newton’s solution": step.newton_distance,
         "error": step.error,
         "g above Newton’s": step.above,
@@ -40,7 +39,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
     records = [row["record"] for row in rows]
     newton = [record for record in records if record.solver == "newton"]
     rivals = [record for record in records if record.solver != "newton"]
-    solved = sum(r.values.at_floor or r.values.residual <= r.details.tolerance for r in newton)
+    solved = sum(r.values.at_floor or r.values.residual <= r.values.tolerance for r in newton)
     distances = [record.values.newton_distance for record in rivals if record.values.same]
     nearby = f", at most {words(max(distances))} m from Newton’s" if distances else ""
     first = (

@@ -1,11 +1,18 @@
 """The records of a step of a heavy cloth: the solution, and bounds on its error."""
 
-import msgspec
-
-from ...harness.values import Details, Kind, Values
+from ...harness.values import Values
 
 
-class CertifiedStep(Values, frozen=True):
+class CertifiedWords(Values, frozen=True, kw_only=True):
+    """The cloth's stiffness [N/m], the tolerance and start of the solve, and the kind of bound."""
+
+    stiffness: float
+    tolerance: float
+    start: str
+    coverage: str = ""
+
+
+class CertifiedStep(CertifiedWords, frozen=True, kw_only=True):
     """A solver's solution of the step; lengths in metres."""
 
     size: int  # particles along a side
@@ -17,7 +24,7 @@ class CertifiedStep(Values, frozen=True):
     curvature: float  # proven lower bound on the smallest eigenvalue of the Hessian
     lipschitz: float  # Lipschitz constant of the Hessian
     newton_step: float  # its length
-    newton_distance: float = msgspec.field(name="apart")  # to Newton's solution
+    newton_distance: float  # to Newton's solution
     error: float  # |x - x*| / |y - x*|
     above: float  # g above that of Newton's solution [kg m²]
     covered: bool  # whether there is a bound
@@ -25,13 +32,4 @@ class CertifiedStep(Values, frozen=True):
     different: bool  # whether it provably does not
 
 
-class CertifiedDetails(Details, frozen=True):
-    """The cloth's stiffness [N/m], the tolerance and start of the solve, and the kind of bound."""
-
-    stiffness: float
-    tolerance: float
-    start: str
-    coverage: str = ""
-
-
-KINDS = {"": Kind(CertifiedStep, CertifiedDetails)}
+KINDS = {"": CertifiedStep}

@@ -38,7 +38,7 @@ def arm_draws(results: Results) -> Sketch | None:
     if not records:
         return None
     drawings = [
-        (r.details.evened, r.values.curve, r.values.spacing, r.values.ghosts) for r in records
+        (r.values.evened, r.values.curve, r.values.spacing, r.values.ghosts) for r in records
     ]
     return Sketch(
         **CAPTIONS.figure("arm_draws"),
@@ -134,7 +134,7 @@ def cloth_motion(results: Results) -> Scene | None:
     return Scene(
         **CAPTIONS.figure("cloth"),
         motions=[_cloth(record) for record in records],
-        seconds=records[0].details.h * records[0].details.every,
+        seconds=records[0].values.h * records[0].values.every,
         view=CLOTH_VIEW,
         panes=2,
         marked=records[0].values.pinned.tolist(),
@@ -143,7 +143,7 @@ def cloth_motion(results: Results) -> Scene | None:
 
 def _cloth(record: Record) -> Moving:
     motion: MovingCloth = record.values
-    count = record.details.iterations
+    count = record.values.iterations
     iterations = "converged" if count > FEW else counted(count, "iteration")
     rms = np.sqrt(np.mean(motion.distance**2, axis=-1))
     name = f"{label(record.solver)}, {iterations}"
@@ -153,5 +153,5 @@ def _cloth(record: Record) -> Moving:
 def _first(results: Results, task: str, maximum: int) -> Sequence[Record]:
     """Return the visible records of a task: entrants first, then in their order."""
     records = results.all("pictures", task=task)
-    order = sorted(records, key=lambda r: (r.solver not in results.entrants, r.details.order))
+    order = sorted(records, key=lambda r: (r.solver not in results.entrants, r.values.order))
     return order[:maximum]

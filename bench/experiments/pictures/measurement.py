@@ -12,7 +12,6 @@ from ...harness.block import Block, Measured, Scale
 from ...problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
 from ..cloth.measurement import TOLERANCE, H, cloth_swing, converged_motion, motion
 from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
-from .values import ArmDrawing, ClothDrawing, MovingArm, MovingCloth
 
 GHOSTS, FRAMES = 9, 6
 # Motions to play: solvers of inverse kinematics; step solvers with their iteration limits.
@@ -51,7 +50,11 @@ def arm_motion(solver: str) -> Measured:
     curve = evened_custom_curve()
     frames = track(skeleton, curve, solver, rest)
     positions, errors = frames.positions[::THINNED], np.atleast_1d(frames.residual)[::THINNED]
-    return Measured(MovingArm(positions.round(PLACES), curve.round(PLACES), errors))
+    return {
+        "positions": positions.round(PLACES),
+        "curve": curve.round(PLACES),
+        "error": errors,
+    }
 
 
 def cloth_motion(solver: str, iterations: int) -> Measured:
@@ -65,7 +68,11 @@ def cloth_motion(solver: str, iterations: int) -> Measured:
     positions = np.array([state.positions for state in states])
     distance = np.linalg.norm(positions - exact, axis=-1)[::EVERY]
     digits = np.array([[float(f"{d:.2e}") for d in row] for row in distance])
-    return Measured(MovingCloth(positions[::EVERY].round(PLACES), digits, problem.system.pinned))
+    return {
+        "positions": positions[::EVERY].round(PLACES),
+        "distance": digits,
+        "pinned": problem.system.pinned,
+    }
 
 
 def drawing(solver: str, evened: bool) -> Measured:
@@ -76,17 +83,15 @@ def drawing(solver: str, evened: bool) -> Measured:
     joints = motion.local_rotations[:, :-1]
     angles = rotation.angle(joints[:-1], joints[1:])
     ghosts = np.linspace(0, len(curve) - 1, GHOSTS).round().astype(int)
-    return Measured(
-        ArmDrawing(
-            curve,
-            np.atleast_1d(motion.residual),
-            np.atleast_1d(motion.iterations),
-            angles.max(axis=-1),
-            angles.mean(axis=-1),
-            np.linalg.norm(np.diff(curve, axis=0), axis=-1),
-            motion.positions[ghosts],
-        )
-    )
+    return {
+        "curve": curve,
+        "residual": np.atleast_1d(motion.residual),
+        "iterations": np.atleast_1d(motion.iterations),
+        "largest_angle": angles.max(axis=-1),
+        "mean_angle": angles.mean(axis=-1),
+        "spacing": np.linalg.norm(np.diff(curve, axis=0), axis=-1),
+        "ghosts": motion.positions[ghosts],
+    }
 
 
 def falling_cloth() -> Measured:
@@ -95,4 +100,4 @@ def falling_cloth() -> Measured:
     states = converged_motion(problem)
     frames = np.linspace(0, len(states) - 1, FRAMES).round().astype(int)
     positions = np.array([states[i].positions for i in frames])
-    return Measured(ClothDrawing(positions, frames * problem.h, problem.system.pinned))
+    return {"positions": positions, "time": frames * problem.h, "pinned": problem.system.pinned}

@@ -18,7 +18,7 @@ def _row(record: Record) -> Row:
     drawing: ArmDrawing = record.values
     return {
         "record": record,
-        "curve": "resampled" if record.details.evened else "as drawn",
+        "curve": "resampled" if record.values.evened else "as drawn",
         "points": len(drawing.curve),
         "gap, smallest": float(drawing.spacing.min()),
         "gap, median": float(np.median(drawing.spacing)),

@@ -1,10 +1,16 @@
 """The records of the pictures and motions of the report."""
 
-from ...harness.values import Details, Floats1, Floats2, Floats3, Integers1, Kind, Values
+from ...harness.values import Floats1, Floats2, Floats3, Integers1, Values
 from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
 
 
-class ArmDrawing(Values, frozen=True):
+class ArmWords(Values, frozen=True, kw_only=True):
+    """Whether the curve was resampled."""
+
+    evened: bool
+
+
+class ArmDrawing(ArmWords, frozen=True):
     """The arm on a curve, point by point [m], [rad], with the joints in a few frames."""
 
     curve: Floats2
@@ -16,12 +22,6 @@ class ArmDrawing(Values, frozen=True):
     ghosts: Floats3
 
 
-class ArmDetails(Details, frozen=True):
-    """Whether the curve was resampled."""
-
-    evened: bool
-
-
 class ClothDrawing(Values, frozen=True):
     """A cloth in a few frames: positions [m], (frame, particle, 3), their times [s], the pins."""
 
@@ -30,7 +30,13 @@ class ClothDrawing(Values, frozen=True):
     pinned: Integers1
 
 
-class MovingArm(Values, frozen=True):
+class MovingArmWords(Values, frozen=True, kw_only=True):
+    """The position of the motion in the order."""
+
+    order: int
+
+
+class MovingArm(MovingArmWords, frozen=True):
     """The arm's joints [m], (frame, joint, 3), the curve, and the error of each frame [m]."""
 
     positions: Floats3
@@ -38,21 +44,7 @@ class MovingArm(Values, frozen=True):
     error: Floats1
 
 
-class MovingArmDetails(Details, frozen=True):
-    """The position of the motion in the order."""
-
-    order: int
-
-
-class MovingCloth(Values, frozen=True):
-    """A cloth's particles [m], (frame, particle, 3), the error of each [m], the pins."""
-
-    positions: Floats3
-    distance: Floats2
-    pinned: Integers1
-
-
-class MovingClothDetails(Details, frozen=True):
+class MovingClothWords(Values, frozen=True, kw_only=True):
     """The step [s], the interval of recorded steps, the iteration limit, the position in order."""
 
     h: float
@@ -61,9 +53,17 @@ class MovingClothDetails(Details, frozen=True):
     order: int
 
 
+class MovingCloth(MovingClothWords, frozen=True):
+    """A cloth's particles [m], (frame, particle, 3), the error of each [m], the pins."""
+
+    positions: Floats3
+    distance: Floats2
+    pinned: Integers1
+
+
 KINDS = {
-    ARM: Kind(ArmDrawing, ArmDetails),
-    CLOTH: Kind(ClothDrawing),
-    ARM_MOTION: Kind(MovingArm, MovingArmDetails),
-    CLOTH_MOTION: Kind(MovingCloth, MovingClothDetails),
+    ARM: ArmDrawing,
+    CLOTH: ClothDrawing,
+    ARM_MOTION: MovingArm,
+    CLOTH_MOTION: MovingCloth,
 }

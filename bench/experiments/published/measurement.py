@@ -21,7 +21,6 @@ from ..chain.measurement import SolverLimits, blocks_of_users
 from ..robots.measurement import SUITE, RobotJob
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
-from .values import FabrikSolves
 
 # Random targets per target of a scale, and how many are timed.
 _TARGETS = 5
@@ -94,4 +93,7 @@ def iterations(problem: TargetsForSkeleton, solver: str) -> Measured:
     solution = solve_ik(
         problem.skeleton, problem.starts, problem.targets, solver, **_LIMITS._asdict()
     )
-    return Measured(FabrikSolves(np.asarray(solution.iterations), np.asarray(solution.residual)))
+    return {
+        "iterations": np.asarray(solution.iterations),
+        "residual": np.asarray(solution.residual),
+    }

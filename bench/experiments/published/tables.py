@@ -21,10 +21,10 @@ def _rows(results: Results) -> list[Row]:
     """Return all numbers of the published tables with records."""
     strata = list(published.FABRIK.distances)
     trac_ik, toolbox = (
-        [record for record in results.all("ik", task=task) if "solved" in record.arrays]
+        [record for record in results.all("ik", task=task) if "solved" in record.measured]
         for task in (TRAC_IK, TOOLBOX)
     )
-    fabrik = sorted(results.all("ik", task=FABRIK), key=lambda r: strata.index(r.details.stratum))
+    fabrik = sorted(results.all("ik", task=FABRIK), key=lambda r: strata.index(r.values.stratum))
     rows = [*_of_trac_ik(trac_ik)]
     rows += [row for record in toolbox for row in _of_toolbox(record)]
     return rows + [row for record in fabrik for row in _of_fabrik(record)]
@@ -47,7 +47,7 @@ def _of_trac_ik(records: Sequence[Record]) -> Iterator[Row]:
     titles = {peer.label_of(entry): peer.name for peer in registry.PEERS for entry in peer.entries}
     for robot, members in grouped(published.TRAC_IK.rates, lambda rate: rate.robot).items():
         rates = {rate.solver: rate for rate in members}
-        measured = {titles.get(r.solver, r.solver): r for r in records if r.details.robot == robot}
+        measured = {titles.get(r.solver, r.solver): r for r in records if r.values.robot == robot}
         for solver in dict.fromkeys([*rates, *measured]) if measured else ():
             *_, percent, milliseconds, source = rates.get(solver) or (None, None, "")
             about = {"table": "TRAC-IK", "problem": robot, "solver": solver, "mark": ""}
@@ -67,13 +67,11 @@ def _of_trac_ik(records: Sequence[Record]) -> Iterator[Row]:
 def _of_toolbox(record: Record) -> Iterator[Row]:
     """Yield the shares of targets not solved by a single search, and its time."""
     score = Score(record.title, "", record.solver, (record,))
-    rate = record.details.infeasible
+    rate = record.values.infeasible
     source = "" if rate is None else published.TOOLBOX.source
     about = {"table": "Robotics Toolbox", "problem": record.title, "source": source}
     about |= _about(score)
-    yield _row(
-        about, "declared infeasible [%]", rate, _percent(score, score.all("claimed", 0) != 1)
-    )
+    yield _row(about, "declared infeasible [%]", rate, _percent(score, score.all("claims", 0) != 1))
     yield _row(about, "not solved within the limits [%]", None, _percent(score, ~score.solved))
     median = metrics.median_interval(score.seconds)
     yield _row(about, "time, median [µs]", None, [1e6 * seconds for seconds in median])
@@ -81,7 +79,7 @@ def _of_toolbox(record: Record) -> Iterator[Row]:
 
 def _of_fabrik(record: Record) -> Iterator[Row]:
     """Yield the mean and the largest number of iterations of a solver in a stratum."""
-    stratum, is_claimed = record.details.stratum, record.facts.get("entrant") is True
+    stratum, is_claimed = record.values.stratum, record.measured.get("entrant") is True
     number = published.FABRIK.means.get(record.solver, {}).get(stratum)
     counts = record.values.iterations[~np.isnan(record.values.iterations)]
     about = {

@@ -20,7 +20,6 @@ from ...harness.worker import Calculation
 from ...peers.registry import KINEMATICS, Peer
 from ...problems.robots import ROBOTS, is_installed, robot, title
 from . import PEERS
-from .values import EffectorDifferences, FileValues
 
 SUITE = "robot_models"
 ROBOT_CONFIGURATIONS = 100
@@ -52,21 +51,22 @@ def compare(engine: str, model: RobotFile) -> Measured:
         if isinstance(error, UnreadableError):
             reason = f"{engine} does not read it"
         sentence = f"{reason}: {error}".replace(str(model.path), model.path.name)
-        return Measured(None, {"unread": sentence})
+        return {"unread": sentence}
     articulation = comparison.robot.articulation
     joints = len(moving_joints(comparison.robot)) + len(articulation.mimics)
     sizes = (len(comparison.links), joints, articulation.freedom_count)
-    return Measured(
-        FileValues(*sizes, **differences([comparison])._asdict()),
-        {"cause": CAUSES.get((engine, model.name), ""), "free mimics": comparison.free_mimics},
-    )
+    return {
+        **dict(zip(("links", "joints", "freedoms"), sizes, strict=True)),
+        **differences([comparison])._asdict(),
+        "cause": CAUSES.get((engine, model.name), ""),
+        "free_mimics": comparison.free_mimics,
+    }
 
 
 def compare_effectors(peer: Peer, name: str) -> Measured:
     """Compare a robot in a process of the engine's own; keep why the engine refuses the robot."""
     outcome = worker_process().perform(Calculation(effector_differences, (peer.module, name)))
-    values = outcome.numbers and EffectorDifferences(**outcome.numbers)
-    return Measured(values, {"remark": outcome.note})
+    return {**(outcome.numbers or {}), "remark": outcome.note}
 
 
 def effector_differences(module: str, name: str) -> Mapping[str, float]:

@@ -9,7 +9,7 @@ from ...tables.layout import Row
 from ...tables.results import Results, by_problem, counted, grouped, listed, settings
 from ...tables.table import Summary, words
 from . import PEERS
-from .values import FileDetails
+from .values import FileWords
 
 QUANTITIES = ("positions", "rotations", "jacobians")
 
@@ -22,7 +22,7 @@ def _rows(results: Results) -> list[Row]:
 
 def _parted(records: Iterable[Record]) -> tuple[list[Record], list[Record]]:
     """Return the records of others' files, and of the bench's own robots."""
-    parts = grouped(records, lambda record: record.facts.get("task") == PEERS)
+    parts = grouped(records, lambda record: record.measured.get("task") == PEERS)
     return parts.get(False, []), parts.get(True, [])
 
 
@@ -31,7 +31,7 @@ def _of_file(records: Sequence[Record]) -> Row:
 
     An engine with free mimics has too many freedoms.
     """
-    valid = [record for record in records if record.values and not record.details.cause]
+    valid = [record for record in records if record.has_numbers and not record.values.cause]
     row: Row = {"records": records, "valid": valid, "robot": records[0].title}
     row |= {"engines": listed([record.solver for record in valid]) or "none"}
     row |= {"remark": "; ".join(filter(None, map(_remark, records)))}
@@ -50,8 +50,8 @@ def _of_file(records: Sequence[Record]) -> Row:
 
 
 def _remark(record: Record) -> str:
-    details: FileDetails = record.details
-    if not record.values:
+    details: FileWords = record.values
+    if not record.has_numbers:
         return details.unread
     if details.cause:
         difference = max(getattr(record.values, quantity) for quantity in QUANTITIES)
@@ -65,10 +65,10 @@ def _of_robot(record: Record) -> Row:
         "records": [record],
         "valid": [],
         "robot": record.title,
-        "engines": f"{record.solver} {record.details.version}",
-        "positions": record.values and record.values.positions,
-        "rotations": record.values and record.values.rotations,
-        "remark": record.details.remark or registry.SINGLE_PRECISION.get(record.solver, ""),
+        "engines": f"{record.solver} {record.values.version}",
+        "positions": record.values.positions if record.has_numbers else None,
+        "rotations": record.values.rotations if record.has_numbers else None,
+        "remark": record.values.remark or registry.SINGLE_PRECISION.get(record.solver, ""),
     }
 
 
@@ -100,8 +100,8 @@ def _summary(rows: Sequence[Row]) -> Summary:
 def _points(files: Sequence[Record], robots: Sequence[Record]) -> Iterator[str]:
     """Yield how many files each engine reads, and how closely engines of peers place robots."""
     for engine, records in grouped(files, lambda record: record.solver).items():
-        read = [record for record in records if record.values]
-        different = sum(bool(record.details.cause) for record in read)
+        read = [record for record in records if record.has_numbers]
+        different = sum(bool(record.values.cause) for record in read)
         deviation = f", {words(different)} of them differently from MuJoCo's documentation"
         count = f"{words(len(read))} of {counted(len(records), 'file')} read"
         yield f"{engine}: {count}{deviation * bool(different)}"

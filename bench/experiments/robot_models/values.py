@@ -1,12 +1,19 @@
 """The records of robots and characters in engines."""
 
-import msgspec
-
-from ...harness.values import Details, Kind, Values
+from ...harness.values import Values
 from . import PEERS
 
 
-class FileValues(Values, frozen=True):
+class FileWords(Values, frozen=True, kw_only=True):
+    """Why an engine reads a file otherwise or not at all, and the mimics left free."""
+
+    configurations: int
+    cause: str = ""
+    free_mimics: str = ""
+    unread: str = ""
+
+
+class FileValues(FileWords, frozen=True):
     """The size of a file in an engine, and its largest differences from the reference.
 
     Positions are relative to the extent of the links, rotations are between entries of matrices,
@@ -21,28 +28,18 @@ class FileValues(Values, frozen=True):
     jacobians: float
 
 
-class FileDetails(Details, frozen=True):
-    """Why an engine reads a file otherwise or not at all, and the mimics left free."""
+class EngineWords(Values, frozen=True, kw_only=True):
+    """The engine's version."""
 
     configurations: int
-    cause: str = ""
-    free_mimics: str = msgspec.field(default="", name="free mimics")
-    unread: str = ""
+    version: str
 
 
-class EffectorDifferences(Values, frozen=True):
+class EffectorDifferences(EngineWords, frozen=True):
     """The largest differences of effectors: positions [m], and entries of rotation matrices."""
 
     positions: float
     rotations: float
 
 
-class EngineDetails(Details, frozen=True):
-    """The engine's version, and why the robot is not taken."""
-
-    configurations: int
-    version: str
-    remark: str = ""
-
-
-KINDS = {"": Kind(FileValues, FileDetails), PEERS: Kind(EffectorDifferences, EngineDetails)}
+KINDS = {"": FileValues, PEERS: EffectorDifferences}

@@ -17,7 +17,6 @@ from ...problems.evaluate import evaluator_of
 from ...problems.robot_tasks import ROBOT_TASKS, TaskRequest, is_met, middle
 from ...problems.robots import HELD_OUT, UnableError, is_installed, robot, seed_of, title
 from . import ROBOT_TASK, TOLERANCE
-from .values import TaskValues
 
 SUITE = "robot_tasks"
 # Targets of a robot per target of a scale.
@@ -59,7 +58,7 @@ def meet(job: TaskJob) -> Measured:
     try:
         ask = module.prepare_task(arm, task, TOLERANCE, **settings)
     except UnableError as error:
-        return Measured(None, {"remark": str(error)})
+        return {"remark": str(error)}
     if entry.restarts:
         ask = restarted(ask, arm, entry.restarts)
     rng = np.random.default_rng([job.seed, seed_of(job.robot)])
@@ -75,4 +74,4 @@ def meet(job: TaskJob) -> Measured:
     ]
     seconds = [output.time.seconds if output.time else np.nan for output in outputs]
     distance = np.sqrt(np.mean((np.array(rows) - middle(arm)) ** 2, axis=1))
-    return Measured(TaskValues(np.array(solved), np.array(seconds), distance))
+    return {"solved": np.array(solved), "seconds": np.array(seconds), "distance": distance}

@@ -15,11 +15,11 @@ from . import ROBOT_TASK, TOLERANCE
 
 def _rows(results: Results) -> Iterator[Row]:
     records = results.all("robot_tasks", task=ROBOT_TASK)
-    groups = grouped(records, lambda r: (r.title.rpartition(", ")[2], r.details.kind, r.solver))
+    groups = grouped(records, lambda r: (r.title.rpartition(", ")[2], r.values.kind, r.solver))
     for (task, kind, solver), members in groups.items():
         row: Row = {"records": members, "task": task, "attempts": kind, "solver": solver}
-        row["remark"] = members[0].details.remark
-        values = [record.values for record in members if record.values]
+        row["remark"] = members[0].values.remark
+        values = [record.values for record in members if record.has_numbers]
         if values:
             solved = np.concatenate([v.solved for v in values])
             row["solved"] = metrics.share(solved)

@@ -1,10 +1,16 @@
 """The records of solvers for tasks of arms."""
 
-from ...harness.values import Booleans1, Details, Floats1, Kind, Values
+from ...harness.values import Booleans1, Floats1, Values
 from . import ROBOT_TASK
 
 
-class TaskValues(Values, frozen=True):
+class TaskWords(Values, frozen=True, kw_only=True):
+    """The attempts of a solver."""
+
+    kind: str
+
+
+class TaskValues(TaskWords, frozen=True):
     """The answers of a solver to the targets of a robot, (target,)."""
 
     solved: Booleans1  # whether MuJoCo confirms the answer within the limits
@@ -12,11 +18,4 @@ class TaskValues(Values, frozen=True):
     distance: Floats1  # from the middle of the limits, root mean square of all joints [rad]
 
 
-class TaskDetails(Details, frozen=True):
-    """The attempts of a solver, and why a task is not taken."""
-
-    kind: str
-    remark: str = ""
-
-
-KINDS = {ROBOT_TASK: Kind(TaskValues, TaskDetails)}
+KINDS = {ROBOT_TASK: TaskValues}

@@ -32,7 +32,6 @@ from ...problems.robot_targets import (
 )
 from ...problems.robots import HELD_OUT, PACKAGE, ROBOTS, enter, group_of, is_installed, title
 from . import REACHABLE, REPEATS, UNREACHABLE
-from .values import RobotSolves
 
 SUITE = "ik"
 TOLERANCE = Tolerance(1e-3, 1e-3)
@@ -212,20 +211,22 @@ def _measured(job: RobotJob, outcome: JobOutcome, times: Times | None) -> Measur
         arrays |= {"seconds": _rounded(times.seconds), "control": _rounded(times.control)}
     if job.entry.has_time_limit and not job.is_beyond and outcome.solved:
         arrays["repeats"] = _repeats(job, outcome)
-    facts = {
+    return {
+        **arrays,
+        "setup": outcome.setup,
+        "overhead": outcome.overhead,
+        "remark": outcome.note,
         "strata": list(STRATA),
-        "tips": list(robot.effectors),
+        "effectors": list(robot.effectors),
         "joints": len(robot.joints),
         "freedom": int(evaluator.model.nv),
-        "wanted": "pose" if robot.oriented else "position",
+        "target": "pose" if robot.oriented else "position",
         "trouble": raised(outcome.solved),
         "arbiter": engine,
         "group": group_of(job.robot),
         "time_limited": job.entry.has_time_limit,
         **first_targets(job.job, outcome),
     }
-    solves = RobotSolves(**arrays, setup=outcome.setup, overhead=outcome.overhead)
-    return Measured(solves, {"remark": outcome.note}, facts)
 
 
 def _evaluated(job: RobotJob, solved: list[Solved], engine: str) -> dict[str, np.ndarray]:

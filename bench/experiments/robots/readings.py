@@ -280,8 +280,11 @@ def on_targets_of(solver: str, field: list[Score]) -> list[Score]:
 
     def first_targets(record: Record) -> Record:
         solved, seconds = record.arrays["solved"][:count], rounds_of(record)[:, :timed_count]
-        facts = {**record.facts, FIRST_TARGETS: min(count, total(record))}
-        return replace(record, arrays={"solved": solved, "seconds": seconds}, facts=facts)
+        words = {n: v for n, v in record.measured.items() if n not in record.arrays}
+        words[FIRST_TARGETS] = min(count, total(record))
+        return replace(
+            record, measured={**words, "solved": solved, "seconds": seconds, "setup": 0.0}
+        )
 
     return _field(field[0].robots, field[0].start, list(map(first_targets, records)))
 

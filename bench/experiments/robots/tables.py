@@ -19,7 +19,7 @@ from ...tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from . import REACHABLE, readings
 from .figures import CAPTIONS, FIGURES
 from .readings import OUTCOMES, STARTS, Score, title_of
-from .values import RobotDetails
+from .values import RobotWords
 
 # The rule for unranked solvers.
 RULE = CAPTIONS.shared["rule"]
@@ -96,7 +96,7 @@ def _participant_summary(rows: Sequence[Row]) -> Summary:
 
 def _robot(record: Record) -> str:
     """Return the joints of a robot, and the target of its effectors."""
-    robot: RobotDetails = record.details
+    robot: RobotWords = record.details
     freedoms = "" if robot.freedom == robot.joints else f", {robot.freedom} freedoms"
     effectors = listed(robot.effectors)
     return f"{record.title}: {robot.joints} joints{freedoms}, {robot.target} of {effectors}"
@@ -110,7 +110,7 @@ participants = CAPTIONS.layout("participants", _participants, _participant_summa
 
 def _row(score: Score) -> Row:
     """Return the cells common to all tables of scores."""
-    seconds, claims = score.seconds, score.attempted("claimed")
+    seconds, claims = score.seconds, score.attempted("claims")
     false_successes = metrics.share((claims == 1) & ~score.attempted("solved"))
     trouble = next((record.trouble for record in score.records if record.trouble), "")
     return {

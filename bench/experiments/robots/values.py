@@ -3,11 +3,32 @@
 import msgspec
 import numpy as np
 
-from ...harness.values import Booleans1, Details, Floats1, Floats2, Integers1, Kind, Values
+from ...harness.values import Booleans1, Floats1, Floats2, Integers1, Values
 from . import REACHABLE, UNREACHABLE
 
 
-class RobotSolves(Values, frozen=True, kw_only=True):
+class RobotWords(Values, frozen=True, kw_only=True):
+    """The solver's start and version, and a description of the robot.
+
+    Targets, a pose or a position for each effector, are solved within the tolerances [m], [rad].
+    Their seeds alternate, stratum after stratum.
+    """
+
+    kind: str = ""
+    version: str = ""
+    tolerance: float = 0.0
+    tolerance_rotation: float = 0.0
+    seeds: int = 1
+    strata: list[str] = msgspec.field(default_factory=list)
+    effectors: list[str] = msgspec.field(default_factory=list)
+    joints: int = 0
+    freedom: int = 0
+    target: str = ""
+    robot: str = ""  # of a published table
+    infeasible: float | None = None  # published share of infeasible targets [%]
+
+
+class RobotSolves(RobotWords, frozen=True, kw_only=True):
     """The targets of a solver, (target,); only `setup` if no target was begun.
 
     Attributes:
@@ -28,7 +49,7 @@ class RobotSolves(Values, frozen=True, kw_only=True):
     """
 
     solved: Booleans1 | None = None
-    claims: Integers1 | None = msgspec.field(default=None, name="claimed")
+    claims: Integers1 | None = None
     seconds: Floats2 | None = None
     control: Floats1 | None = None
     position: Floats1 | None = None
@@ -49,24 +70,4 @@ class RobotSolves(Values, frozen=True, kw_only=True):
             raise ValueError("solved: expected as many entries in every array")
 
 
-class RobotDetails(Details, frozen=True):
-    """The solver's start and version, why a robot is not taken, and a description of the robot.
-
-    Targets, a pose or a position for each effector, are solved within the tolerances [m], [rad].
-    Their seeds alternate, stratum after stratum.
-    """
-
-    kind: str
-    version: str = ""
-    tolerance: float = 0.0
-    tolerance_rotation: float = 0.0
-    seeds: int = 1
-    remark: str = ""
-    strata: list[str] = msgspec.field(default_factory=list)
-    effectors: list[str] = msgspec.field(default_factory=list, name="tips")
-    joints: int = 0
-    freedom: int = 0
-    target: str = msgspec.field(default="", name="wanted")
-
-
-KINDS = dict.fromkeys((REACHABLE, UNREACHABLE), Kind(RobotSolves, RobotDetails))
+KINDS = {REACHABLE: RobotSolves, UNREACHABLE: RobotSolves}

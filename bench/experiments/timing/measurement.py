@@ -21,7 +21,6 @@ from ...harness.progress import announce
 from ...peers.protocol import describe
 from . import cloth, ik, kinematics, robots
 from .case import TimedCase
-from .values import RoundTimes
 
 # Time limit of a case [s].
 PATIENCE = 1800.0
@@ -69,8 +68,8 @@ def measure_case(run: str, case: TimedCase, seconds: float) -> Measured:
     if trouble := results["troubles"][i]:
         raise RuntimeError(trouble)
     rounds = np.array(results["rounds"][i]) / case.operations
-    error = case.error() if case.error else None
-    return Measured(RoundTimes(rounds, case.moved / case.operations, error), facts=results["facts"])
+    error = {"error": case.error()} if case.error else {}
+    return {"seconds": rounds, "moved": case.moved / case.operations, **error, **results["facts"]}
 
 
 @functools.lru_cache(maxsize=1)  # the blocks of a group follow one another

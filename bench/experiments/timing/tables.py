@@ -45,7 +45,7 @@ def median_time(record: Record) -> float:
 def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
     """Return the solvers by the medians of shared sweeps, None without any."""
     sweeps = {_label(record.solver): _scores(record) for record in records}
-    groups = {record.details.together for record in records}
+    groups = {record.values.together for record in records}
     if len(groups) > 1 or len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
         return None
     return metrics.ranking(sweeps)
@@ -125,7 +125,7 @@ def _remarks(record: Record, by_solver: dict[str, Record]) -> Iterator[str]:
     if record.solver == registry.MUJOCO and (preset := by_solver.get(PRESET)):
         share = 1.0 - median_time(preset) / median_time(record)
         yield f"qpos[:] = q takes {100 * share:.0f} %"
-    if record.details.noise > PRECISION:
+    if record.values.noise > PRECISION:
         yield "noisy"
 
 
@@ -140,14 +140,14 @@ def _columns(unit: str, rows: Sequence[Row]) -> list[Column]:
 
 def _noise(rows: Sequence[Row]) -> float:
     """Return the largest variation of a fixed loop, NaN if unknown."""
-    return max((row["record"].details.noise for row in rows), default=math.nan)
+    return max((row["record"].values.noise for row in rows), default=math.nan)
 
 
 def _summary(unit: str, rows: Sequence[Row]) -> Summary:
     """Return the times of each work, a point for each group of works, of what is ranked."""
     points = []
-    for name, group in grouped(rows, lambda row: str(row["record"].details.group)).items():
-        works = grouped(group, lambda row: str(row["record"].details.work)).items()
+    for name, group in grouped(rows, lambda row: str(row["record"].values.group)).items():
+        works = grouped(group, lambda row: str(row["record"].values.work)).items()
         sentences = [f"{work}: {_times(unit, members)}" for work, members in works]
         points.append(f"{name} – {'; '.join(sentences)}")
     rivals = [row for row in rows if is_ranked(row["record"])]

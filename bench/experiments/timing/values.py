@@ -2,18 +2,10 @@
 
 import math
 
-from ...harness.values import Details, Floats2, Kind, Values
+from ...harness.values import Floats2, Values
 
 
-class RoundTimes(Values, frozen=True):
-    """The seconds of an operation, (sweep, round), and the bytes moved as a yardstick."""
-
-    seconds: Floats2
-    moved: float
-    error: float | None = None  # that a tolerance leaves, relative to the length of the step
-
-
-class WorkDetails(Details, frozen=True):
+class WorkWords(Values, frozen=True, kw_only=True):
     """The timed work: see `case.TimedWork`."""
 
     subject: str
@@ -23,4 +15,12 @@ class WorkDetails(Details, frozen=True):
     together: str = ""  # a word that all cases timed in turns have in common
 
 
-KINDS = {"": Kind(RoundTimes, WorkDetails)}
+class RoundTimes(WorkWords, frozen=True):
+    """The seconds of an operation, (sweep, round), and the bytes moved as a yardstick."""
+
+    seconds: Floats2
+    moved: float
+    error: float | None = None  # that a tolerance leaves, relative to the length of the step
+
+
+KINDS = {"": RoundTimes}
