@@ -85,7 +85,7 @@ def compare_statistics(key: RowKey, pair: Pair) -> Iterator[RowChange]:
         why = f"from {100 * old:.1f} % to {100 * new:.1f} %"
         yield from _statistic(key, SHARE, new - old, f"{'fell' if new < old else 'rose'} {why}")
     for name in _SMALLEST & pair.old.numbers().keys() & pair.new.numbers().keys():
-        errors = (np.asarray(record.measured[name], dtype=float) for record in pair)
+        errors = (np.asarray(record.numbers()[name], dtype=float) for record in pair)
         old, new = (float(np.min(a[np.isfinite(a)], initial=np.inf)) for a in errors)
         if min(old, new) > 0:
             why = f"{'grew' if new > old else 'shrank'} from {words(old)} to {words(new)}"

@@ -179,7 +179,7 @@ def common_times(pair: Pair) -> list[str]:
 
 def has_rounds(pair: Pair, name: str) -> bool:
     """Return whether both runs have enough rounds of a time."""
-    return all(record.measured[name].size >= ROUNDS for record in pair)
+    return all(record.numbers()[name].size >= ROUNDS for record in pair)
 
 
 def time_change(key: RowKey, name: str, ratio: TimeRatio, chance: float) -> RowChange:
@@ -201,14 +201,14 @@ def _why_not_compared(pair: Pair, name: str) -> str:
     if pair.old.stamp.get("machine") != pair.new.stamp.get("machine"):
         return "measured on different machines"
     for record in pair:
-        times = record.measured[name]
+        times = record.numbers()[name]
         if not np.all((times > 0) & np.isfinite(times)):
             return "a time is zero or missing"
     return ""
 
 
 def _time_ratio(pair: Pair, name: str, drift: Drift) -> TimeRatio:
-    old, new = (record.measured[name].ravel() for record in pair)
+    old, new = (record.numbers()[name].ravel() for record in pair)
     if np.array_equal(old, new):
         return TimeRatio(1.0, 1.0, 1.0, 1.0)
     has_targets = all(SOLVED in record.measured for record in pair)  # a time each, in both runs

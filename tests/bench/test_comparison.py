@@ -84,7 +84,7 @@ def test_what_is_worse_is_less_right_and_the_reverse_more(make, arrays):
 
 def test_rows_come_go_and_fail(make):
     a, b = make.drawn("a", False, 1.0), make.drawn("b", False, 1.0)
-    failed = replace(b, measured={"failed": "no engine"})
+    failed = replace(b, measured={"task": b.task, "failed": "no engine"})
     assert verdicts([a], [b]) == [(ChangeVerdict.GONE, ""), (ChangeVerdict.NEW, "")]
     assert verdicts([b], [failed])[0] == (ChangeVerdict.LESS_RIGHT, "")
     assert verdicts([failed], [b])[0] == (ChangeVerdict.NEW, "")
@@ -122,7 +122,7 @@ def test_answers_cut_by_a_clock_are_decided_by_chance(make, lost, verdict):
     old = make.record("ik", "p", "TRAC-IK", {"seconds": 0.005}, {"solved": solved}, size=200)
     solved = solved.copy()
     solved[:lost] = False
-    new = replace(old, measured={"solved": solved})
+    new = replace(old, measured={"task": old.task, "solved": solved, "setup": 0.0})
     assert verdicts([old], [new]) == [(verdict, "solved")]
 
 

@@ -15,7 +15,7 @@ def here(tmp_path, monkeypatch, make):
     monkeypatch.chdir(tmp_path)
     early, late = "2000-01-01T00:00:00+00:00", "2000-01-02T00:00:00+00:00"
     made = [make.drawn(solver, False, 1.0) for solver in ("a", "b", "c", "d")]
-    failed = replace(made[1], measured={"failed": "no"}, when=late)
+    failed = replace(made[1], measured={"task": made[1].task, "failed": "no"}, when=late)
     RecordFile("laptop").append([replace(record, when=early) for record in made[:3]])
     machine = {**made[0].stamp["machine"], "processor": "abacus"}
     desktop = replace(made[0], when=late, stamp={**made[0].stamp, "machine": machine})

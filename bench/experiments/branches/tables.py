@@ -21,7 +21,8 @@ def _rows(results: Results) -> list[Row]:
 def _row(record: Record) -> Row:
     row: Row = {"record": record, "robot": record.title, "solver": record.solver}
     row["remark"] = record.values.remark
-    if values := record.values:
+    if record.has_numbers:
+        values = record.values
         row["targets"] = len(values.solutions)
         row["solutions"] = int(values.solutions.sum())
         row["missing"], row["false"] = int(values.missing.sum()), int(values.wrong.sum())
