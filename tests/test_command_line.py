@@ -149,8 +149,8 @@ NESTED = {
     "setting": ('"operations": 1', f'"operations": {DEEP}'),
     "machine": ('"stamp": {}', f'"stamp": {{"machine": {DEEP}}}'),
     "array": ("1.0, 1.0", f"1.0, {DEEP}"),
-    "later format": ('{"format": 3,', f'{{"format": 4, "more": {DEEP},'),
-    "unknown field": ('{"format": 3,', f'{{"format": 3, "more": {DEEP},'),
+    "later format": ('{"format": 4,', f'{{"format": 5, "more": {DEEP},'),
+    "unknown field": ('{"format": 4,', f'{{"format": 4, "more": {DEEP},'),
 }
 
 

@@ -119,7 +119,8 @@ def test_runs_of_other_sizes_are_not_compared(make):
 )
 def test_answers_cut_by_a_clock_are_decided_by_chance(make, lost, verdict):
     solved = np.ones(200, dtype=bool)
-    old = make.record("ik", "p", "TRAC-IK", {"seconds": 0.005}, {"solved": solved}, size=200)
+    facts = {"task": "reachable"}
+    old = make.record("ik", "p", "TRAC-IK", {"seconds": 0.005}, {"solved": solved}, facts, size=200)
     solved = solved.copy()
     solved[:lost] = False
     new = replace(old, measured={"task": old.task, "solved": solved, "setup": 0.0})

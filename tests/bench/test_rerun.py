@@ -56,16 +56,16 @@ def measure(solver):
     time.sleep(600)
 """
 RUN = """
-from ..experiments import measure
+from ..experiments import measure as arrays
 def block_key(block):
     return "timing", "p", block, "{}"
 def measure(block):
-    return {"suite": "timing", "problem": "p", "solver": block, "measured": measure(block)}
+    return {"suite": "timing", "problem": "p", "solver": block, "arrays": arrays(block)}
 """
 RECORD = """
 import json
-REST = {"settings": {}, "size": 0, "stamp": {}, "when": "", "seconds": 0}
-REST |= {"conditions": {}}
+REST = {"settings": {}, "size": 0, "notes": {}, "stamp": {}, "when": "", "seconds": 0}
+REST |= {"facts": {}, "conditions": {}}
 def encode(record):
     return json.dumps({"format": 3, **record, **REST})
 """
