@@ -112,18 +112,18 @@ class Record:
         """Whether there are numbers, not only words on why there are none."""
         if self.failed:
             return False
-        kind = kind_of(self.suite, self.task)
-        names = values.own_names(kind) if kind else self._array_names
-        return not names.isdisjoint(self.measured)
+        return not self._number_names.isdisjoint(self.measured)
 
     @property
-    def _array_names(self) -> set[str]:
-        return {name for name, value in self.measured.items() if isinstance(value, np.ndarray)}
+    def _number_names(self) -> set[str]:
+        """The numbers that the type declares, and all arrays, of whatever revision."""
+        kind = kind_of(self.suite, self.task)
+        arrays = {name for name, v in self.measured.items() if isinstance(v, np.ndarray)}
+        return arrays | (values.own_names(kind) if kind else set())
 
     def numbers(self) -> dict[str, np.ndarray]:
         """Return the arrays and the scalars measured, by name."""
-        kind = kind_of(self.suite, self.task)
-        names = values.own_names(kind) if kind else self._array_names
+        names = self._number_names
         return {
             name: np.asarray(value)
             for name, value in self.measured.items()
