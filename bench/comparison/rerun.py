@@ -242,7 +242,7 @@ def _random_order(rng: np.random.Generator) -> tuple[int, int]:
 def _median_times(record: Record) -> dict[str, float]:
     """Return the medians of a record's positive times [s]."""
     medians = {
-        name: float(np.median(array)) for name, array in record.measured.items()
+        name: float(np.median(array)) for name, array in record.numbers().items()
         if is_time(record.suite, name) and array.size
     }  # fmt: skip
     return {name: median for name, median in medians.items() if median > 0}
