@@ -25,10 +25,8 @@ import numpy as np
 
 from plumbob.bench.experiments.robots.measurement import TOLERANCE
 from plumbob.bench.harness.isolation import WorkerProcess
-from plumbob.bench.harness.job import seed_shared_generators
 from plumbob.bench.harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
-from plumbob.bench.peers.ik.protocol import attempt
-from plumbob.bench.peers.ik.restarts import digest_of, restarted
+from plumbob.bench.harness.timing import attempt, digest_of, restarted, seed_shared_generators
 from plumbob.bench.peers.registry import PEERS, Peer
 from plumbob.bench.problems.evaluate import Targets, arbiter_of, evaluator_of
 from plumbob.bench.problems.robot_targets import STRATA, robot_targets

@@ -6,16 +6,15 @@ import hashlib
 import os
 import platform
 import re
-import statistics
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import psutil
 
+from ..clock import pace
 from ..peers.registry import version
 from ..peers.sources import git_commit
-from ..peers.stopwatch import time_call
 
 PACKAGES = (
     *("plumbob", "numpy", "scipy", "numba", "pin", "mujoco", "example-robot-data"),
@@ -62,11 +61,6 @@ def conditions() -> dict[str, Any]:
     )
     load = round(psutil.getloadavg()[0], 2)
     return {"commit": _our_commit(), "pace": pace(), **affinity, "load": load}
-
-
-def pace() -> float:
-    """Return how long a fixed loop takes [s], the median of nine."""
-    return statistics.median(time_call(lambda: sum(range(10_000)))[1] for _ in range(9))
 
 
 @functools.cache

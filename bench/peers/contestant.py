@@ -1,7 +1,6 @@
 """The user's solver in this worker's child, opened at its first use."""
 
 from collections.abc import Mapping
-from time import perf_counter
 from typing import Any
 
 from plumbob.text.sentence import sentence
@@ -11,6 +10,7 @@ from plumbob.verify.door import ProcessLimits, open_contestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.message import NO_SECONDS
 
+from ..clock import time_call
 from .entrant import Spec
 from .protocol import NoAnswerError, OwnTime
 
@@ -41,9 +41,8 @@ class EntrantSolver:
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], OwnTime]:
         """Return its answer and its time, or raise NoAnswerError without an answer."""
-        begin = perf_counter()
-        answer = self._door.answer(Case("of the bench", task, inputs, "bench", _ABOUT))
-        round_trip = perf_counter() - begin
+        case = Case("of the bench", task, inputs, "bench", _ABOUT)
+        answer, round_trip = time_call(lambda: self._door.answer(case))
         if isinstance(answer, Failure):
             raise NoAnswerError(str(answer.sentence))
         count, limit = answer.values.get("iterations", 0), inputs.get("max_iterations", 0)

@@ -413,7 +413,7 @@ def test_a_solver_that_did_not_finish_is_not_tried_again(monkeypatch):
     class Silent:
         def perform(self, job):
             jobs.append(job)
-            return JobOutcome(0.0, [], "ended after 600 s of silence", is_silent=True)
+            return JobOutcome(trouble="ended after 600 s of silence", is_silent=True)
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_unfinished", {})

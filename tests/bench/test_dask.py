@@ -82,7 +82,7 @@ def test_every_experiment_states_whether_it_takes_times(experiment):
     folder = ROOT / Path(*experiment.package.split(".")[1:])
     files = [path for path in folder.glob("*.py") if path.name != "tables.py"]
     text = "".join(path.read_text(encoding="utf-8") for path in files)
-    words = ("stopwatch", '"seconds"', ".seconds", "times_in_turns", "RobotJob")
+    words = ("clock import", '"seconds"', ".seconds", "times_in_turns", "RobotJob")
     assert experiment.times == any(word in text for word in words)
     assert {block.times for block in experiment.blocks(TINY)} == {experiment.times}
 

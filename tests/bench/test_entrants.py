@@ -12,7 +12,7 @@ from plumbob.bench.experiments.arm.tables import residuals_chart
 from plumbob.bench.experiments.chain.tables import iterations_chart
 from plumbob.bench.experiments.cloth_peers import tables as cloth_tables
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness import job
+from plumbob.bench.harness import timing
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening
 from plumbob.bench.peers.sources import commit_of, digest_of
@@ -126,9 +126,9 @@ def test_a_slow_solver_gets_the_first_targets_and_a_rank_on_these(
 ):
     """It is measured although another solver is named."""
     worker = in_this_process()
-    monkeypatch.setattr(job, "worker_process", lambda: worker)
-    monkeypatch.setattr(job, "_LEAST_SECONDS", 0.0)
-    monkeypatch.setattr(job, "_TARGET_SECONDS", 0.0)
+    monkeypatch.setattr(timing, "worker_process", lambda: worker)
+    monkeypatch.setattr(timing, "_LEAST_SECONDS", 0.0)
+    monkeypatch.setattr(timing, "_TARGET_SECONDS", 0.0)
     asked = ("ik", *SMALL, "--with", "my_ik.py", "--solver", "ccd")
     assert bench(*asked) == 0
     printed = " ".join(capsys.readouterr().out.split())

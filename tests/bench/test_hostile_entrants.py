@@ -18,7 +18,7 @@ import pytest
 from hostile_programs import LIMITS, running
 
 from plumbob.bench.experiments.chain import measurement as chain
-from plumbob.bench.harness import job as job_module
+from plumbob.bench.harness import timing
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.progress import TROUBLE, listening
 from plumbob.bench.peers import registry
@@ -199,7 +199,7 @@ def solved(spec, targets):
 def test_a_hostile_entrant_of_the_bench_reaches_nothing_by_it(tmp_path, monkeypatch, worker, name):
     """What is wrong with an answer costs the target; its time is never what it claims."""
     row = BEHAVIOURS[name]
-    monkeypatch.setattr(job_module, "worker_process", lambda: worker)
+    monkeypatch.setattr(timing, "worker_process", lambda: worker)
     (tmp_path / "solver.py").write_text(source(row.does, PYTHON))
     measure = partial(solved, str(tmp_path / "solver.py"), TARGETS)
     if row.bench == SILENT:
@@ -234,7 +234,7 @@ for line in sys.stdin:
 
 def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch, worker):
     """Those of the first targets neither, which were claimed before it was seen."""
-    monkeypatch.setattr(job_module, "worker_process", lambda: worker)
+    monkeypatch.setattr(timing, "worker_process", lambda: worker)
     (tmp_path / "liar.py").write_text(HEAD + "    pass\n" + LIAR)
     targets = np.array([[6.0 + i % 3, 1.0, 1.0] for i in range(12)])
     announced = []

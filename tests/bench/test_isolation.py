@@ -1,21 +1,18 @@
 """Solvers in a process of their own: one that hangs, crashes, raises or lies costs one row."""
 
-import itertools
-
 import numpy as np
 import pytest
 
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots.tables import outcomes, robot_by_robot
-from plumbob.bench.harness import job as job_module
-from plumbob.bench.harness.isolation import WorkerProcess, raised
-from plumbob.bench.harness.job import Job, TimedTurns, times_in_turns
+from plumbob.bench.harness import timing
+from plumbob.bench.harness.isolation import Finished, Solved, WorkerProcess, raised
 from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.worker import Finished, Lap, Solved
+from plumbob.bench.harness.timing import Job, restarted, times_in_turns
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
-from plumbob.bench.peers.ik.restarts import restarted
+from plumbob.bench.peers.protocol import OwnTime
 from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robots import robot
@@ -140,7 +137,7 @@ def test_an_answer_depends_on_its_target_only(targets, manner, restarts):
 
 
 def test_solvers_take_turns_and_a_lost_one_costs_its_own_times(worker, targets, monkeypatch):
-    monkeypatch.setattr(job_module, "worker_process", lambda: worker)
+    monkeypatch.setattr(timing, "worker_process", lambda: worker)
     jobs = [job(targets, manner) for manner in ("perfect", "hangs", "unable", "raises")]
     perfect, *others, raises = times_in_turns(jobs, 3, 2)
     assert others == [None, None]
@@ -150,15 +147,77 @@ def test_solvers_take_turns_and_a_lost_one_costs_its_own_times(worker, targets, 
         assert (times.seconds > 0).all()
 
 
-def test_a_turn_is_announced_before_it_begins_and_the_order_of_a_round_is_drawn(targets):
-    turns = TimedTurns(tuple(job(targets, "perfect") for _ in range(4)), 2, 3)
-    laps = [message for message in turns.perform() if isinstance(message, Lap)]
-    begun = [lap.number for lap in laps if lap.control]
-    rounds = np.reshape(begun, (3, 4))
+class Recorder(WorkerProcess):
+    """A worker in this process, which keeps its turns."""
+
+    def __init__(self):
+        super().__init__()
+        self.turns = []
+
+    def stream(self, job):
+        self.turns.append(job)
+        return job.perform()
+
+
+def test_the_order_of_a_round_is_drawn_and_all_targets_are_converted_first(targets, monkeypatch):
+    recorder = Recorder()
+    monkeypatch.setattr(timing, "worker_process", lambda: recorder)
+    jobs = [job(targets, "perfect") for _ in range(4)]
+    assert None not in times_in_turns(jobs, 2, 3)
+    rounds = np.reshape([turn.number for turn in recorder.turns], (3, 4))
     assert (np.sort(rounds, axis=1) == range(4)).all()
     assert len(np.unique(rounds, axis=0)) > 1
-    following = itertools.pairwise(laps)
-    assert all(b.number == a.number and b.times for a, b in following if a.control)
+    steps = []
+
+    def ask(request):
+        steps.append("converts")
+        return lambda: steps.append("solves") or SolverOutput(request.start, True)
+
+    monkeypatch.setitem(timing._asks, 0, ask)
+    ready, *answers, _ = timing.Turn(0, jobs[0], 2, is_first=False).perform()
+    assert steps == ["converts"] * 2 + ["solves"] * 3  # the first twice, uncounted once
+    assert len(answers) == 2
+    assert ready.pace > 0.0
+
+
+def test_a_slow_turn_is_not_silent(targets, monkeypatch):
+    """The times of fast solves are sent at the end, lest the messages disturb the solves."""
+    sent = []
+    slow, fast = OwnTime(timing._SILENCE * 1.1), OwnTime(timing._SILENCE / 10)
+    for number, time in enumerate((slow, fast)):
+        ask = lambda request, time=time: (  # noqa: E731
+            lambda: sent.append("solve") or SolverOutput(request.start, True, time)
+        )
+        monkeypatch.setitem(timing._asks, number, ask)
+    orders = []
+    for number in (0, 1):
+        sent.clear()
+        turn = timing.Turn(number, job(targets, "perfect"), 2, is_first=False)
+        sent.extend(type(message).__name__ for message in turn.perform())
+        orders.append(" ".join(sent))
+    assert orders == [
+        "Ready solve solve Solved solve Solved Finished",
+        "Ready solve solve solve Solved Solved Finished",
+    ]
+
+
+def test_a_solver_whose_clock_stands_still_uses_up_its_budget(targets, monkeypatch):
+    """A user's solver is given the first targets only if it is slow, whatever it claims."""
+    monkeypatch.setattr(timing, "_LEAST_SECONDS", 0.0)
+    monkeypatch.setattr(timing, "_TARGET_SECONDS", 1.0)
+    ask = lambda request: lambda: SolverOutput(request.start, True, OwnTime(1e-9, 2.0))  # noqa: E731
+    request = job(targets, "perfect")._replace(entrant="mine")
+    assert len(list(request.answers(ask))) == 3  # the third is begun within 4 s
+
+
+def test_an_exception_of_a_conversion_costs_one_target(targets):
+    def ask(request):
+        if (request.start == targets.starts[1]).all():
+            raise ValueError("no such target")
+        return lambda: SolverOutput(request.start, True)
+
+    troubles = [answer.trouble for answer in job(targets, "perfect").answers(ask)]
+    assert troubles == ["", "ValueError: no such target", "", ""]
 
 
 def test_an_exception_costs_one_target_and_is_reported(targets):
@@ -268,7 +327,7 @@ def suite(monkeypatch, worker):
     ]
     monkeypatch.setattr(registry, "PEERS", peers)
     monkeypatch.setattr(robots, "ROBOTS", ("iiwa14",))
-    monkeypatch.setattr(job_module, "worker_process", lambda: worker)
+    monkeypatch.setattr(timing, "worker_process", lambda: worker)
     yield {(b.solver, b.problem): b for b in robots.blocks(Scale(targets=3, seconds=10.0))}
     registry._by_name.cache_clear()  # where the fakes stand in place of the peers
 
@@ -295,7 +354,7 @@ def test_every_manner_becomes_one_record(suite):
 
 def test_a_solver_that_hangs_thrice_does_not_finish(suite, monkeypatch):
     """Else a solver that hangs on every target would take hours; its share is not known."""
-    monkeypatch.setattr(job_module, "MAXIMUM_SILENCES", 1)
+    monkeypatch.setattr(timing, "MAXIMUM_SILENCES", 1)
     block = suite["hangs", "robots/iiwa14"]
     measured = block.measure()
     assert measured.values.exception.tolist() == [False, True]

@@ -8,12 +8,11 @@ import types
 import numpy as np
 import pytest
 
-from plumbob.bench.harness.job import Job
-from plumbob.bench.harness.worker import Solved
-from plumbob.bench.peers import stopwatch
-from plumbob.bench.peers.ik import overhead, protocol
+from plumbob.bench import clock
+from plumbob.bench.harness.isolation import Solved
+from plumbob.bench.harness.timing import Job, restarted
+from plumbob.bench.peers.ik import protocol
 from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
-from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.protocol import OwnTime
 from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, PORTFOLIO, RESTARTS
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
@@ -161,20 +160,19 @@ def measuring(seconds):
     def ask(request):
         def solve():
             attempts.append(request)
-            return SolverOutput(request.start, len(attempts) == 3, seconds and OwnTime(seconds))
+            return SolverOutput(request.start, len(attempts) == 3, OwnTime(seconds))
 
         return solve
 
     return ask
 
 
-@pytest.mark.parametrize(("each", "together"), [(None, None), (0.25, 0.75)])
-def test_times_that_a_solver_measures_are_added_over_its_restarts(each, together):
+def test_times_that_a_solver_measures_are_added_over_its_restarts():
     arm = robot("iiwa14")
     nowhere = np.zeros((1, 3)), np.eye(3)[None], arm.draw(np.random.default_rng(0), 1)[0]
-    answer = restarted(measuring(each), arm, 5)(PoseRequest(*nowhere))()
+    answer = restarted(measuring(0.25), arm, 5)(PoseRequest(*nowhere))()
     assert answer.claim
-    assert answer.time == (together and OwnTime(together))
+    assert answer.time == OwnTime(0.75)
 
 
 @pytest.mark.parametrize("restarts", [0, 3])
@@ -205,26 +203,57 @@ def test_every_entry_has_a_name_of_its_own_within_its_kind():
     assert {kind for kind, _ in names} == {ONE_START, PORTFOLIO, RESTARTS}
 
 
-def test_only_the_calls_of_a_solver_are_timed_and_the_rest_of_a_loop_is_overhead(monkeypatch):
-    """Every reading of the clock takes a second, of which a metered function sees one."""
+@pytest.fixture
+def ticks(monkeypatch):
+    """A clock that advances by a second at each reading of the wall clock."""
     seconds = itertools.count()
-    tick = lambda: float(next(seconds))  # noqa: E731
-    clocks = types.SimpleNamespace(perf_counter=tick, process_time=tick)
-    monkeypatch.setattr(stopwatch, "time", clocks)
-    monkeypatch.setattr(overhead, "perf_counter", tick)
-    read = protocol.Solve(lambda: next(seconds), lambda q: (q, next(seconds) < 0))
-    assert read().time == OwnTime(2.0)
+    clocks = types.SimpleNamespace(
+        perf_counter=lambda: float(next(seconds)), process_time=lambda: 0.25 * next(seconds)
+    )
+    monkeypatch.setattr(clock, "time", clocks)
+    return seconds
+
+
+def test_only_the_calls_of_a_solver_are_timed(ticks):
+    """The processor's clock, read before and after the wall clock, shows 1 s of the four."""
+    solve = protocol.Solve(lambda: next(ticks), lambda q: (q, next(ticks) < 0))
+    assert solve().time == OwnTime(1.0)
+
+
+def test_the_rest_of_a_loop_is_overhead_by_the_same_clock(ticks):
+    """Every reading takes a second of wall time, of which a metered function sees one.
+
+    The processor's clock runs slower, as beside other programs: the difference of the two was
+    less than nothing.
+    """
 
     def prepare():
-        step = overhead.library(lambda: next(seconds))
+        step = clock.library(lambda: next(ticks))
+        return protocol.Solve(lambda: (step(), next(ticks)), lambda answer: (None, None))
 
+    assert clock.overhead(prepare) == 5.0 - 2.0
+    assert clock.overhead(lambda: protocol.Solve(lambda: None, lambda q: (q, None))) == 1.0
+    assert not clock.is_metered()
+
+
+def test_the_overhead_of_a_solver_that_raises_is_not_known():
+    assert np.isnan(clock.overhead(lambda: 1 / 0))
+    assert not clock.is_metered()
+
+
+@pytest.mark.parametrize(("is_metered", "expected"), [(True, 0.5), (False, 0.0)])
+def test_the_overhead_of_a_peer_is_of_its_loop_where_it_has_one(is_metered, expected, monkeypatch):
+    """A program with a clock of its own reports the time of its library, too."""
+
+    def prepare(model, tolerance):
         def solve():
-            return step(), next(seconds)
+            clock.report_library(1.0)
+            return SolverOutput(None, None, OwnTime(1.5))
 
-        return lambda request: protocol.Solve(solve, lambda answer: (None, None))
+        return lambda request: solve
 
-    one_call, loop = types.SimpleNamespace(), types.SimpleNamespace(METERED=True)
-    assert prepare()(None)().time == OwnTime(3.0)
-    assert overhead.overhead(loop, prepare, None) == 5.0 - 2.0
-    assert overhead.overhead(one_call, prepare, None) == 1.0
-    assert not overhead.is_metered()
+    adapter = types.SimpleNamespace(prepare=prepare, METERED=is_metered)
+    monkeypatch.setitem(sys.modules, "a_peer", adapter)
+    targets = robot_targets("iiwa14", 1)
+    _, ready = Job("a_peer", robot("iiwa14"), targets, TOLERANCE, {}).set_up(adapter)
+    assert ready.overhead == pytest.approx(expected, abs=1e-4)

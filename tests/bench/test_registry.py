@@ -14,7 +14,7 @@ from plumbob.bench.experiments.cloth import tables as cloth_tables
 from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.newton import tables as newton_tables
 from plumbob.bench.experiments.robots import tables as robot_tables
-from plumbob.bench.harness import job, run
+from plumbob.bench.harness import run, timing
 from plumbob.bench.harness.experiment import Experiment
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import registry
@@ -73,7 +73,7 @@ def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(
     monkeypatch.syspath_prepend(tmp_path)
     line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (PeerEntry(ONE_START),))
     monkeypatch.setattr(registry, "PEERS", (*registry.PEERS, line))
-    monkeypatch.setattr(job, "worker_process", in_this_process)
+    monkeypatch.setattr(timing, "worker_process", in_this_process)
     name = ("robots/character", "Stays put")
     (block,) = [b for b in blocks("ik", TINY) if (b.problem, b.solver) == name]
     record = run.measure(block)

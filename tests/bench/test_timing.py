@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from plumbob.bench import clock
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.timing import case as timing_case
@@ -27,7 +28,7 @@ from plumbob.bench.experiments.timing.measurement import ROUNDS, SWEEPS, cases
 from plumbob.bench.harness import run
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.peers import registry, stopwatch
+from plumbob.bench.peers import registry
 from plumbob.bench.problems.robots import is_installed, robot
 from plumbob.crosscheck.engines import SKELETON_ENGINES, MujocoMassSpring
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
@@ -136,8 +137,8 @@ def test_work_on_one_core_is_timed_by_the_processors_clock(monkeypatch):
     """Other programs on the core cost a case nothing; work on all cores has the wall clock."""
     clocks = iter(range(10**9))
     tick = {"process_time": lambda: 1e-3 * next(clocks), "perf_counter": lambda: next(clocks)}
-    for name, clock in tick.items():
-        monkeypatch.setattr(measurement, name, clock)
+    for name, reading in tick.items():
+        monkeypatch.setattr(measurement, name, reading)
     for cores, longest in ((1, 2e-3), (None, 2.0)):
         case = TimedCase(WORK, "a", lambda: lambda: None, cores=cores)
         assert longest / 10 < max(next(measurement._rounds(case, 1e-9))) < longest
@@ -151,9 +152,9 @@ def test_work_on_one_core_is_timed_by_the_processors_clock(monkeypatch):
 def test_a_solver_is_timed_while_it_computes(monkeypatch, wall, processor, expected):
     now = dict.fromkeys(("perf_counter", "process_time"), 0.0)
     clocks = {name: lambda name=name: now[name] for name in now}
-    monkeypatch.setattr(stopwatch, "time", SimpleNamespace(**clocks))
+    monkeypatch.setattr(clock, "time", SimpleNamespace(**clocks))
     call = lambda: now.update(perf_counter=wall, process_time=processor)  # noqa: E731
-    assert stopwatch.compute_time_of(call) == (None, expected)
+    assert clock.compute_time_of(call) == (None, expected)
 
 
 def test_a_copy_moves_as_many_bytes_as_it_says(monkeypatch):

@@ -92,7 +92,7 @@ def folder(tmp_path, monkeypatch, in_this_process):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(opening, "installed", list)
     monkeypatch.setattr(registry, "PEERS", registry.PEERS[:1])
-    monkeypatch.setattr("plumbob.bench.harness.job.worker_process",
+    monkeypatch.setattr("plumbob.bench.harness.timing.worker_process",
                         in_this_process)  # fmt: skip
     for name, kind in (("arm", "revolute"), ("slider", "prismatic")):
         (tmp_path / f"{name}.urdf").write_text(ARM.format(kind=kind))

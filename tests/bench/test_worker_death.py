@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from plumbob.bench.harness import isolation
-from plumbob.bench.harness.isolation import WorkerProcess
-from plumbob.bench.harness.worker import Ready
+from plumbob.bench.harness.isolation import Ready, WorkerProcess
 from plumbob.process.child import ChildProcess
 
 ROOT = Path(isolation.__file__).resolve().parents[2]
@@ -24,7 +23,8 @@ JOBS = """
 import ctypes, gc, os, pickle, signal, struct, subprocess, sys, time
 from multiprocessing.connection import Connection
 import numpy as np
-from plumbob.bench.harness.worker import Finished, Ready, Solved
+from plumbob.bench.harness.isolation import Finished, Ready, Solved
+from plumbob.bench.peers.protocol import OwnTime
 
 def descriptor():
     (own,) = [o for o in gc.get_objects() if isinstance(o, Connection) and o.writable]
@@ -49,12 +49,12 @@ class Dying:
     def perform(self):
         self.die("preparing")
         yield Ready(0.5)
-        yield Solved(np.zeros(2), 1, 0.1, "")
+        yield Solved(np.zeros(2), 1, OwnTime(0.1))
         self.die("solving")
         if self.moment == "in a message":
             os.write(descriptor(), struct.pack("!i", 1000) + b"cut")
             self.die(self.moment)
-        yield Solved(np.ones(2), 1, 0.1, "")
+        yield Solved(np.ones(2), 1, OwnTime(0.1))
         yield Finished()
         self.die("after the last")
 

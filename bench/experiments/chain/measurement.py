@@ -15,9 +15,9 @@ from plumbob.reference.arguments import FloatArray
 from ...harness import metrics
 from ...harness.block import Block, Group, Measured, Scale
 from ...harness.isolation import JobOutcome, raised
-from ...harness.job import Job, answers, first_targets, times_in_turns
 from ...harness.measure import failure, not_asked
 from ...harness.record import FIRST_TARGETS
+from ...harness.timing import Job, answers, first_targets, times_in_turns
 from ...peers import registry
 from ...peers.entrant import CHAIN_TASK
 from ...peers.ik import chain_loops

@@ -1,6 +1,5 @@
 """A worker's job: move a cloth frame by frame, by a solver with its settings."""
 
-import importlib
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -10,11 +9,11 @@ from plumbob.reference import MassSpring, State, scenes
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import SystemArrays
 
-from ...harness.job import announced, solved_in, unfit
-from ...harness.worker import Finished, Message, Ready, Solved
+from ...clock import compute_time_of, time_call
+from ...harness.isolation import Message, Ready, Solved
+from ...harness.timing import messages_of
 from ...peers.cloth.protocol import Mover
-from ...peers.protocol import OwnTime, remark_of
-from ...peers.stopwatch import compute_time_of, time_call
+from ...peers.protocol import OwnTime
 from ...problems.falling_cloth import FRAME
 
 # Before the timing, each solver moves a small cloth once to compile everything, in a frame [s] in
@@ -44,16 +43,10 @@ class ClothJob(NamedTuple):
 
     def perform(self) -> Iterator[Message]:
         """Yield the positions and the time of each frame as soon as computed."""
-        try:
-            adapter = importlib.import_module(self.module)
-            mover, setup = self._prepared(adapter)
-            yield Ready(setup, remark_of(adapter))
-            yield from announced(self._moved(mover), self.entrant)
-            yield Finished()
-        except Exception as error:  # an exception of an engine is its result
-            yield from unfit(error, self.entrant)
+        return messages_of(self.module, self.set_up, self.answers, self.entrant)
 
-    def _prepared(self, adapter: Any) -> tuple[Mover, float]:
+    def set_up(self, adapter: Any) -> tuple[Mover, Ready]:
+        """Return the solver for the cloth, and how long its set-up took."""
         code = self.module, self.entrant, *(v for v in self.settings.values() if isinstance(v, str))
         if code not in _compiled:
             small, state = scenes.grid_cloth(_SMALL, _SMALL)
@@ -62,9 +55,12 @@ class ClothJob(NamedTuple):
             trial.advance()
             _compiled.add(code)
         system = MassSpring(**self.system._asdict())
-        return time_call(lambda: adapter.prepare(system, self.shape.frame, **self.settings))
+        frame, settings = self.shape.frame, self.settings
+        mover, setup = time_call(lambda: adapter.prepare(system, frame, **settings))
+        return mover, Ready(setup)
 
-    def _moved(self, mover: Mover) -> Iterator[Solved]:
+    def answers(self, mover: Mover) -> Iterator[Solved]:
+        """Move the cloth, again and again from its start, until it leaves the finite numbers."""
         nowhere = np.full_like(self.start.positions, np.nan)
         for _ in range(self.shape.repeats):
             mover.begin(self.start)
@@ -81,5 +77,5 @@ def advanced(mover: Mover, nowhere: FloatArray) -> Solved:
         with np.errstate(over="ignore", invalid="ignore"):
             own_time, seconds = compute_time_of(mover.advance)
     except FloatingPointError:
-        return solved_in(OwnTime(np.nan), nowhere, UNKNOWN)
-    return solved_in(own_time or OwnTime(seconds), mover.positions(), UNKNOWN)
+        return Solved(nowhere, UNKNOWN, OwnTime(np.nan))
+    return Solved(mover.positions(), UNKNOWN, own_time or OwnTime(seconds))

@@ -7,6 +7,7 @@ times depend on the machine. Solvers with different sweeps are seen.
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -16,9 +17,8 @@ from plumbob.reference import MassSpring, State
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import JobOutcome, WorkerProcess
+from ...harness.isolation import JobOutcome, Solved, WorkerProcess
 from ...harness.measure import not_installed
-from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.registry import EXPLICIT, ITERATED, LINEARISED, UNDECLARED, ClothPeer
 from ...problems.falling_cloth import (
@@ -215,11 +215,11 @@ def _performed(peer: ClothPeer, cloth: FallingCloth, rung: Rung, shape: Shape) -
     """Return the outcome of a rung; an unfinished solver is not tried again."""
     task = peer.title, len(cloth.start.positions)
     if task in _unfinished:
-        return JobOutcome(0.0, [], _unfinished[task])
+        return JobOutcome(trouble=_unfinished[task])
     outcome = worker_process().perform(job(peer, cloth, rung.settings, shape))
     if outcome.is_silent:
         _unfinished[task] = f"not finished: {outcome.trouble}"
-        return outcome._replace(trouble=_unfinished[task])
+        return replace(outcome, trouble=_unfinished[task])
     return outcome
 
 

@@ -21,11 +21,11 @@ from plumbob.reference.implicit_euler.objective import global_matrix
 from plumbob.reference.sparse import CholeskyFactor
 from plumbob.reference.sparse.linear_solver import factorize
 
+from ...clock import compute_time_of
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
 from ...peers import registry
-from ...peers.stopwatch import compute_time_of
 
 H, STIFFNESS, ITERATIONS = 1 / 60, 1e4, 10
 # Particles along a side, and the shortest benchmark time [s] at which the cloth is measured.

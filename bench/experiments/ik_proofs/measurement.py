@@ -9,8 +9,8 @@ import numpy as np
 from plumbob.reference import Outcome, Target, certify_ik, rotation, solve_ik
 from plumbob.reference.formats import urdf
 
+from ...clock import compute_time_of
 from ...harness.block import Block, Measured, Scale
-from ...peers.stopwatch import compute_time_of
 from ...problems.chains import unit
 from ...problems.evaluate import Targets, evaluator_of
 from ...problems.robot_targets import STRATA, farthest, robot_targets

@@ -15,8 +15,7 @@ from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import mjcf, urdf
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.job import worker_process
-from ...harness.worker import Calculation
+from ...harness.isolation import Calculation, worker_process
 from ...peers.registry import KINEMATICS, Peer
 from ...problems.robots import ROBOTS, is_installed, robot, title
 from . import PEERS

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...harness.block import Block, Measured, Scale
 from ...harness.progress import announce
-from ...peers.ik.protocol import attempt
-from ...peers.ik.restarts import restarted
+from ...harness.timing import attempt, restarted
 from ...peers.registry import ONE_START, PLUMBOB, PLUMBOB_LM, RESTARTS, TASK_SOLVERS, Peer
 from ...problems.evaluate import evaluator_of
 from ...problems.robot_tasks import ROBOT_TASKS, TaskRequest, is_met, middle

@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...harness.block import Block, Group, Measured, Scale
-from ...harness.isolation import JobOutcome, raised
-from ...harness.job import Job, Times, answers, first_targets, times_in_turns
+from ...harness.isolation import JobOutcome, Solved, raised
 from ...harness.measure import not_asked, not_installed
 from ...harness.progress import announce
-from ...harness.worker import Solved
+from ...harness.timing import Job, Times, answers, first_targets, times_in_turns
 from ...peers import registry
 from ...peers.entrant import ROBOT_TASK
 from ...peers.registry import Peer, PeerEntry

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ...clock import time_limit
 from ...peers.protocol import describe
 from ...peers.sources import digest_of
-from ...peers.stopwatch import Patience
 from ..block import Block, Scale
 from ..experiment import blocks
 from ..isolation import WorkerProcess
@@ -94,7 +94,7 @@ class DaskExecutor(Executor):
         """Yield futures as they complete; Dask repeats the block of a lost worker on another."""
         from distributed import wait
 
-        left, patience = set(futures), Patience(self._patience)
+        left, is_over = set(futures), time_limit(self._patience)
         while left:
             try:
                 with self._client.as_current():
@@ -102,8 +102,8 @@ class DaskExecutor(Executor):
             except TimeoutError:
                 completed = set()
             if completed or self._client.nthreads():
-                patience = Patience(self._patience)
-            elif patience.is_spent:
+                is_over = time_limit(self._patience)
+            elif is_over():
                 raise self._error(f"no worker is left for {self._patience:g} s")
             yield from completed
             left -= completed

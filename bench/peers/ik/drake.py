@@ -19,7 +19,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.solvers import IpoptSolver, NloptSolver, SnoptSolver, SolverOptions
 
-from .overhead import library
+from ...clock import library
 from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 METERED = True

@@ -14,6 +14,7 @@ import numpy as np
 
 from plumbob.process.child import ChildProcess, LostError
 
+from ...clock import is_metered, report_library
 from ...problems.evaluate import evaluator_of
 from ...problems.robot_tasks import (
     LOOK_AT,
@@ -27,7 +28,6 @@ from ...problems.robot_tasks import (
 from ...problems.robots import UnableError
 from ..protocol import OwnTime
 from ..registry import environment_python
-from .overhead import is_metered, report_library
 from .protocol import Ask, BenchRobot, SolverOutput, Tolerance
 
 METERED = True

@@ -4,7 +4,7 @@ An adapter is a module with a function `prepare(robot, tolerance, **settings)`. 
 engine up for a robot and returns a function `ask(request)`. `ask` puts a target in the engine's own
 types and returns a `Solve`. Only the solver's own calls are timed: neither conversions nor set-up
 count. For an unsuitable robot `prepare` raises `UnableError`. An adapter with a loop around its
-solver passes the solver's functions through `overhead.library`.
+solver passes the solver's functions through `clock.library`.
 
 If the engine's kinematics is compared as well, its adapter has a function `kinematics(robot)`,
 which returns a `Forward`.
@@ -12,15 +12,14 @@ which returns a `Forward`.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Any, NamedTuple
 
 from plumbob.reference.arguments import FloatArray
 
+from ...clock import compute_time_of
 from ...problems.evaluate import PoseRequest, Tolerance
 from ...problems.robots import BenchRobot, UnableError
-from ..protocol import OwnTime, describe
-from ..stopwatch import compute_time_of
+from ..protocol import OwnTime
 
 __all__ = ["BenchRobot", "FloatArray", "PoseRequest", "Tolerance", "UnableError"]
 
@@ -57,12 +56,3 @@ Ask = Callable[[PoseRequest], Callable[[], SolverOutput]]
 # From coordinates to the transforms of the effectors, (effector, 4, 4), or of the only effector,
 # (4, 4).
 Forward = Callable[[FloatArray], FloatArray]
-
-
-def attempt(solve: Callable[[], SolverOutput]) -> SolverOutput:
-    """Return the answer of a solve; an exception is a failed attempt with its error."""
-    begin = perf_counter()
-    try:
-        return solve()
-    except Exception as error:  # an exception of an engine is its result
-        return SolverOutput(None, False, OwnTime(perf_counter() - begin), describe(error))

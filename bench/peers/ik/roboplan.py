@@ -10,7 +10,7 @@ from math import hypot
 import numpy as np
 from roboplan import core, optimal_ik
 
-from .overhead import library
+from ...clock import library
 from .protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance
 
 METERED = True
