@@ -108,22 +108,17 @@ def seed_shared_generators(seed: int) -> None:
         ctypes.CDLL(None).srand(seed)
 
 
-def messages_of(
-    module: str,
-    set_up: Callable[[Any], tuple[Any, Ready]],
-    answers: Callable[[Any], Iterator[Solved]],
-    entrant: str = "",
-) -> Iterator[Message]:
-    """Yield the messages of a job: set a solver up by its adapter's module, and yield its answers.
+def messages_of(job: Any) -> Iterator[Message]:
+    """Yield the messages of a job, which sets up a solver of a module and yields its answers.
 
-    The first trouble of a user's solver, whose name is given, is announced ahead of its target.
+    The first trouble of a user's solver, the `entrant`, is announced ahead of its target.
     """
-    is_silent = bool(entrant)
+    entrant, is_silent = job.entrant, bool(job.entrant)
     try:
-        adapter = importlib.import_module(module)
-        solver, ready = set_up(adapter)
+        adapter = importlib.import_module(job.module)
+        solver, ready = job.set_up(adapter)
         yield replace(ready, remark=remark_of(adapter))
-        for answer in answers(solver):
+        for answer in job.answers(solver):
             trouble = answer.trouble or answer.time.doubt
             if is_silent and trouble:
                 yield Progress(entrant, TROUBLE, trouble)
@@ -158,7 +153,7 @@ class Job(NamedTuple):
 
     def perform(self) -> Iterator[Message]:
         """Yield the answers to all targets."""
-        return messages_of(self.module, self.set_up, self.answers, self.entrant)
+        return messages_of(self)
 
     def set_up(self, adapter: Any) -> tuple[Ask, Ready]:
         """Return the function of the adapter that takes requests, and how long that took."""
@@ -249,14 +244,16 @@ _asks: dict[int, Ask] = {}
 class Turn(NamedTuple):
     """The turn of a solver: its first targets, timed."""
 
+    module: str  # the adapter's module
     number: int  # of the solver
     job: Job
     target_count: int
     is_first: bool  # whether the solver is set up anew
+    entrant: str = ""  # whose trouble was announced with the answers
 
     def perform(self) -> Iterator[Message]:
         """Yield the pace before the turn, and the answers."""
-        return messages_of(self.job.module, self.set_up, self.answers)
+        return messages_of(self)
 
     def set_up(self, adapter: Any) -> tuple[Ask, Ready]:
         """Return the solver, as set up in its first turn."""
@@ -296,7 +293,8 @@ def times_in_turns(jobs: Sequence[Job], count: int, rounds: int) -> list[Times |
     generator = np.random.default_rng(len(jobs))
     for i in range(rounds):
         for number in generator.permutation(list(outcomes)).tolist():
-            turn = Turn(number, jobs[number], count, is_first=i == 0)
+            job = jobs[number]
+            turn = Turn(job.module, number, job, count, is_first=i == 0)
             outcomes[number].append(worker_process().perform(turn))
             if len(outcomes[number][-1].solved) < count:
                 del outcomes[number]

@@ -174,7 +174,7 @@ def test_the_order_of_a_round_is_drawn_and_all_targets_are_converted_first(targe
         return lambda: steps.append("solves") or SolverOutput(request.start, True)
 
     monkeypatch.setitem(timing._asks, 0, ask)
-    ready, *answers, _ = timing.Turn(0, jobs[0], 2, is_first=False).perform()
+    ready, *answers, _ = timing.Turn("fake_solvers", 0, jobs[0], 2, is_first=False).perform()
     assert steps == ["converts"] * 2 + ["solves"] * 3  # the first twice, uncounted once
     assert len(answers) == 2
     assert ready.pace > 0.0
@@ -192,7 +192,7 @@ def test_a_slow_turn_is_not_silent(targets, monkeypatch):
     orders = []
     for number in (0, 1):
         sent.clear()
-        turn = timing.Turn(number, job(targets, "perfect"), 2, is_first=False)
+        turn = timing.Turn("fake_solvers", number, job(targets, "perfect"), 2, is_first=False)
         sent.extend(type(message).__name__ for message in turn.perform())
         orders.append(" ".join(sent))
     assert orders == [
@@ -334,22 +334,21 @@ def suite(monkeypatch, worker):
 
 def test_every_manner_becomes_one_record(suite):
     """The target that a solver hangs on costs the time it took; a new process continues."""
-    solves, notes, _ = suite["liar", "robots/iiwa14"].measure()
-    assert solves.claims.tolist() == [1] * 6
-    assert not solves.solved.any()
-    assert notes["remark"] == ""
-    solves, notes, _ = suite["unable", "robots/iiwa14"].measure()
-    assert solves.solved is None
-    assert notes["remark"] == "takes no iiwas"
-    solves, notes, _ = suite["hangs", "robots/iiwa14"].measure()
-    assert solves.exception.tolist() == [False, True] * 3
-    assert solves.seconds is None  # it hangs on a target that is timed
-    assert np.isnan(solves.position[1])
-    assert notes["remark"] == "ended after 0.5 s of silence, on 3 of 6 targets"
+    measured = suite["liar", "robots/iiwa14"].measure()
+    assert measured["claims"].tolist() == [1] * 6
+    assert not measured["solved"].any()
+    assert not measured["remark"]
+    measured = suite["unable", "robots/iiwa14"].measure()
+    assert "solved" not in measured
+    assert measured["remark"] == "takes no iiwas"
+    measured = suite["hangs", "robots/iiwa14"].measure()
+    assert measured["exception"].tolist() == [False, True] * 3
+    assert "seconds" not in measured  # it hangs on a target that is timed
+    assert np.isnan(measured["position"][1])
+    assert measured["remark"] == "ended after 0.5 s of silence, on 3 of 6 targets"
     assert sum(solver == "gone" for solver, _ in suite) == 1
-    numbers, notes, _ = suite["gone", "robots/all"].measure()
-    assert not numbers
-    assert notes["remark"] == "a-package-that-nobody-has is not installed"
+    measured = suite["gone", "robots/all"].measure()
+    assert measured == {"remark": "a-package-that-nobody-has is not installed"}
 
 
 def test_a_solver_that_hangs_thrice_does_not_finish(suite, monkeypatch):
@@ -357,7 +356,7 @@ def test_a_solver_that_hangs_thrice_does_not_finish(suite, monkeypatch):
     monkeypatch.setattr(timing, "MAXIMUM_SILENCES", 1)
     block = suite["hangs", "robots/iiwa14"]
     measured = block.measure()
-    assert measured.values.exception.tolist() == [False, True]
+    assert measured["exception"].tolist() == [False, True]
     table = robot_by_robot(Results([record_of(block, measured, 0.0)]))
     row = dict(zip([column.title for column in table.columns], table.rows[0], strict=True))
     assert (row["solved"], row["mark"].partition(";")[0]) == (None, "not finished")

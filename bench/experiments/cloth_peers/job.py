@@ -43,7 +43,7 @@ class ClothJob(NamedTuple):
 
     def perform(self) -> Iterator[Message]:
         """Yield the positions and the time of each frame as soon as computed."""
-        return messages_of(self.module, self.set_up, self.answers, self.entrant)
+        return messages_of(self)
 
     def set_up(self, adapter: Any) -> tuple[Mover, Ready]:
         """Return the solver for the cloth, and how long its set-up took."""
