@@ -49,7 +49,7 @@ def test_what_shows_numbers_solves_nothing(file):
 
 TAKES_APART = {"startswith", "endswith", "split", "partition", "rpartition", "removeprefix",
                "removesuffix", "rsplit", "find", "index", "match", "fullmatch"}  # fmt: skip
-NAMES = {"problem", "solver", "suite", "notes"}
+NAMES = {"problem", "solver", "suite", "measured", "remark"}
 
 
 def names_taken_apart(text):
