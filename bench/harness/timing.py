@@ -19,8 +19,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import clock
-from ..peers.ik.protocol import Ask, BenchRobot, PoseRequest, Solve, SolverOutput, UnableError
-from ..peers.protocol import NoAnswerError, OwnTime, describe, remark_of, total
+from ..peers.protocol import (
+    Ask,
+    BenchRobot,
+    NoAnswerError,
+    OwnTime,
+    PoseRequest,
+    Solve,
+    SolverOutput,
+    UnableError,
+    describe,
+    remark_of,
+    total,
+)
 from .isolation import (
     Finished,
     JobOutcome,

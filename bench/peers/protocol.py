@@ -1,7 +1,31 @@
-"""The parts common to all adapters: the time measured by a solver itself, and its failures."""
+"""The interface of adapters, for robots and for cloths.
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+An adapter for robots is a module with a function `prepare(robot, tolerance, **settings)`. `prepare`
+sets the engine up for a robot and returns a function `ask(request)`. `ask` puts a target in the
+engine's own types and returns a `Solve`. Only the solver's own calls are timed: neither conversions
+nor set-up count. For an unsuitable robot `prepare` raises `UnableError`. An adapter with a loop
+around its solver passes the solver's functions through `clock.library`. If the engine's
+kinematics is compared as well, its adapter has a function `kinematics(robot)`, which returns a
+`Forward`.
+
+An adapter for cloths has a function `prepare(system, frame, **settings)`. `prepare` sets the engine
+up for particles and springs and returns a `Mover`, to move the particles a frame at a time. Only
+`advance` is timed, and set-up is timed apart. For an unsuitable system `prepare` raises a
+`ValueError`.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from plumbob.reference import State
+from plumbob.reference.arguments import FloatArray
+
+from ..clock import compute_time_of
+from ..problems.evaluate import PoseRequest, Tolerance
+from ..problems.robots import BenchRobot, UnableError
+
+__all__ = ["BenchRobot", "FloatArray", "PoseRequest", "Tolerance", "UnableError"]
 
 
 class OwnTime(NamedTuple):
@@ -34,3 +58,54 @@ def describe(error: Exception) -> str:
 def remark_of(adapter: Any) -> str:
     """Return an adapter's remark on its numbers, by its function `remark`, else ""."""
     return str(adapter.remark()) if hasattr(adapter, "remark") else ""
+
+
+class SolverOutput(NamedTuple):
+    """The answer of a solver."""
+
+    q: FloatArray | None  # the coordinates, in the robot's order; None if it returns none
+    claim: bool | None  # whether it says that they solve the target; None if it does not say
+    # as measured by the adapter or its process; None where the call is timed
+    time: OwnTime | None = None
+    error: str = ""  # the exception of the solver, else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Solve:
+    """A target to solve.
+
+    Attributes:
+        call: the calls of the solver by its user for a target, which are timed.
+        read: converts what `call` returns to coordinates, None for none, and a claim.
+    """
+
+    call: Callable[[], Any]
+    read: Callable[[Any], tuple[Any, bool | None]]
+
+    def __call__(self) -> SolverOutput:
+        """Return the answer, and the time of `call`."""
+        answer, seconds = compute_time_of(self.call)
+        return SolverOutput(*self.read(answer), OwnTime(seconds))
+
+
+Ask = Callable[[PoseRequest], Callable[[], SolverOutput]]
+# From coordinates to the transforms of the effectors, (effector, 4, 4), or of the only effector,
+# (4, 4).
+Forward = Callable[[FloatArray], FloatArray]
+
+
+class Mover(Protocol):
+    """A solver set up for a system and the length of a frame."""
+
+    def begin(self, state: State) -> None:
+        """Put the particles into a state; the solver forgets all earlier states."""
+
+    def advance(self) -> OwnTime | None:
+        """Move on by a frame; return the solver's own time, None if the call is timed.
+
+        Raises:
+            FloatingPointError: if the motion leaves the finite numbers.
+        """
+
+    def positions(self) -> FloatArray:
+        """Return the positions of the particles [m], (particle, 3), not finite after a blow-up."""

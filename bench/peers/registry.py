@@ -300,7 +300,7 @@ SINGLE_PRECISION = {peer.title: peer.precision for peer in PEERS if peer.precisi
 def robot_peers(entrants: Iterable[Entrant] = ()) -> list[Peer]:
     """Return the solvers for robots: `PEERS`, then the user's for robots."""
     restarts = PeerEntry(RESTARTS, {}, _RESTART_COUNT, f"{_RESTART_COUNT} restarts")
-    adapter = (f"{_IK_ADAPTERS}.entrant", "", "", "", (PeerEntry(ONE_START), restarts))
+    adapter = (f"{__package__}.entrant_robot", "", "", "", (PeerEntry(ONE_START), restarts))
     takers = [entrant for entrant in entrants if ROBOT_TASK in entrant.tasks]
     return [*PEERS, *(Peer(entrant.name, *adapter, entrant=entrant) for entrant in takers)]
 
@@ -308,7 +308,7 @@ def robot_peers(entrants: Iterable[Entrant] = ()) -> list[Peer]:
 def chain_peers(entrants: Iterable[Entrant]) -> list[ChainPeer]:
     """Return the methods of the user's solvers for chains of balls."""
     return [
-        ChainPeer(title, f"{_IK_ADAPTERS}.entrant_chain", "", method, entrant=entrant)
+        ChainPeer(title, f"{__package__}.entrant_chain", "", method, entrant=entrant)
         for entrant in entrants
         if CHAIN_TASK in entrant.tasks
         for method, title in entrant.titles.items()
@@ -333,7 +333,7 @@ def _reference_cloth_peer(solver: StepSolver) -> ClothPeer:
 def _entered_cloth_peer(entrant: Entrant) -> ClothPeer:
     """Return a user's solver as a peer for cloths, tried as its declared step requires."""
     kind = EXPLICIT if entrant.step in _EXPLICIT_METHODS else LINEARISED
-    adapter = (entrant.name, f"{_CLOTH_ADAPTERS}.entrant", "", entrant.name)
+    adapter = (entrant.name, f"{__package__}.entrant_cloth", "", entrant.name)
     return ClothPeer(*adapter, kind if entrant.step else UNDECLARED, entrant=entrant)
 
 

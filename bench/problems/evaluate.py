@@ -9,18 +9,18 @@ excess of joints over their limits.
 import functools
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from plumbob.crosscheck.engines import ABSENT
 from plumbob.reference.arguments import FloatArray
 
 from .robots import LIMIT_TOLERANCE, BenchRobot, robot
 
 MUJOCO, PINOCCHIO = "MuJoCo", "Pinocchio"
+HAS_PINOCCHIO = find_spec("pinocchio") is not None
 # The engines place an effector alike to this [m], [rad]: some hundred roundings of a metre.
 AGREEMENT = 1e-12
 
@@ -95,6 +95,8 @@ class Evaluation(NamedTuple):
 
 def mujoco_model(robot: BenchRobot) -> Any:
     """Return the robot in MuJoCo with all of its links."""
+    import mujoco
+
     tree = ElementTree.fromstring(robot.text)
     if robot.is_chain:
         extension = ElementTree.SubElement(tree, "mujoco")
@@ -104,7 +106,7 @@ def mujoco_model(robot: BenchRobot) -> Any:
 
 def arbiter_of(engine: str) -> str:
     """Return the engine that evaluates the answers of a solver built on an engine."""
-    return MUJOCO if engine == PINOCCHIO or PINOCCHIO in ABSENT else PINOCCHIO
+    return PINOCCHIO if HAS_PINOCCHIO and engine != PINOCCHIO else MUJOCO
 
 
 def pinocchio_model(robot: BenchRobot) -> Any:
@@ -144,7 +146,9 @@ class Evaluator:
     """The kinematics of a robot in both engines."""
 
     def __init__(self, robot: BenchRobot) -> None:
-        self.robot = robot
+        import mujoco
+
+        self.robot, self._mujoco = robot, mujoco
         self.model = mujoco_model(robot)
         self._data = mujoco.MjData(self.model)
         self._effectors = [self.model.body(effector).id for effector in robot.effectors]
@@ -183,9 +187,9 @@ class Evaluator:
         J = np.empty((len(q), len(self._effectors), 2, 3, self.model.nv))
         for i, row in enumerate(q):
             self._update_kinematics(row)
-            mujoco.mj_comPos(self.model, self._data)
+            self._mujoco.mj_comPos(self.model, self._data)
             for k, effector in enumerate(self._effectors):
-                mujoco.mj_jacBody(self.model, self._data, *J[i, k], effector)
+                self._mujoco.mj_jacBody(self.model, self._data, *J[i, k], effector)
         return J
 
     def evaluate(
@@ -198,7 +202,7 @@ class Evaluator:
         is_answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
         poses = np.where(is_answered[:, None], q, targets.starts[:count])
         by_engine = {MUJOCO: self.forward(poses)}
-        if PINOCCHIO not in ABSENT:
+        if HAS_PINOCCHIO:
             by_engine[PINOCCHIO] = self.forward_by_pinocchio(poses)
         target_poses = targets.positions[:count], targets.rotations[:count]
         distance, angle = _distances(by_engine[arbiter or arbiter_of("")], target_poses)
@@ -214,7 +218,7 @@ class Evaluator:
 
     def _update_kinematics(self, q: FloatArray) -> None:
         self._data.qpos[:] = q
-        mujoco.mj_kinematics(self.model, self._data)
+        self._mujoco.mj_kinematics(self.model, self._data)
 
 
 def _distances(

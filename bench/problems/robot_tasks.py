@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
-import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -95,6 +94,8 @@ def _relative(data: Any, body: int, base: int) -> tuple[FloatArray, FloatArray]:
 
 def _data(model: Any, q: FloatArray) -> Any:
     """Return the data of a configuration in MuJoCo."""
+    import mujoco
+
     data = mujoco.MjData(model)
     data.qpos[:] = q
     mujoco.mj_kinematics(model, data)

@@ -13,7 +13,7 @@ OURS = "plumbob.bench.peers.ik.plumbob"
 FAULTY = """
 import numpy as np
 from plumbob.bench.peers.ik import plumbob
-from plumbob.bench.peers.ik.protocol import Solve
+from plumbob.bench.peers.protocol import Solve
 
 def prepare_all(robot):
     ask = plumbob.prepare_all(robot)

@@ -323,7 +323,7 @@ def test_a_seed_draws_other_targets_and_is_on_record(folder):
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
 def test_the_link_of_the_tool_is_where_poses_are_evaluated(name):
     """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
-    from plumbob.bench.peers.ik.entrant import robot_inputs
+    from plumbob.bench.peers.entrant_robot import robot_inputs
     from plumbob.bench.problems.evaluate import evaluator_of
     from plumbob.verify.kinematics.robot_models import tool_pose
     from plumbob.verify.task import TASKS

@@ -26,7 +26,7 @@ def test_only_the_clock_and_the_harness_read_a_clock():
     clocks = {"time", "datetime", "timeit"}
     readers = {name(path) for path in SOURCES if clocks & set(imports(path))}
     # PlaCo lives in an environment of its own, where nothing of ours is: it times itself.
-    allowed = {"clock.py", "peers/ik/placo_program.py"}
+    allowed = {"clock.py", "peers/placo_program.py"}
     # When and in how long a record was made.
     allowed |= {"harness/measure.py", "harness/run.py"}
     assert {reader for reader in readers if "timing/" not in reader} == allowed

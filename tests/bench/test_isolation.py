@@ -11,8 +11,7 @@ from plumbob.bench.harness.isolation import Finished, Solved, WorkerProcess, rai
 from plumbob.bench.harness.measure import record_of
 from plumbob.bench.harness.timing import Job, restarted, times_in_turns
 from plumbob.bench.peers import registry
-from plumbob.bench.peers.ik.protocol import SolverOutput
-from plumbob.bench.peers.protocol import OwnTime
+from plumbob.bench.peers.protocol import OwnTime, SolverOutput
 from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robots import robot
@@ -27,7 +26,7 @@ COUNT = 4
 FAKES = """
 import ctypes, os, random, sys, time
 import numpy as np
-from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
+from plumbob.bench.peers.protocol import SolverOutput, UnableError
 
 def behave(manner, start):
     if manner == "prints":

@@ -11,9 +11,8 @@ import pytest
 from plumbob.bench import clock
 from plumbob.bench.harness.isolation import Solved
 from plumbob.bench.harness.timing import Job, restarted
-from plumbob.bench.peers.ik import protocol
-from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
-from plumbob.bench.peers.protocol import OwnTime
+from plumbob.bench.peers import protocol
+from plumbob.bench.peers.protocol import OwnTime, SolverOutput, UnableError
 from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, PORTFOLIO, RESTARTS
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets

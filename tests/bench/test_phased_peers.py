@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from plumbob.bench.peers.ik.differential import LONG_WAY, PhasedReach, long_way, reaching
+from plumbob.bench.peers.differential import LONG_WAY, PhasedReach, long_way, reaching
 from plumbob.bench.problems.evaluate import Tolerance, evaluator_of, pinocchio_model, to_pinocchio
 from plumbob.bench.problems.robot_targets import robot_targets
 from plumbob.bench.problems.robots import CHARACTER, UnableError, is_installed

@@ -59,7 +59,7 @@ def test_a_new_step_solver_stands_in_the_tables(make):
 
 
 ADAPTER = """
-from plumbob.bench.peers.ik.protocol import SolverOutput
+from plumbob.bench.peers.protocol import SolverOutput
 
 def prepare(robot, tolerance):
     return lambda request: lambda: SolverOutput(request.start, False)

@@ -21,7 +21,7 @@ import numpy as np
 from plumbob.bench.problems.robots import UnableError
 
 def prepare_task(robot, task, tolerance, **settings):
-    from plumbob.bench.peers.ik.protocol import Solve
+    from plumbob.bench.peers.protocol import Solve
     if len(task.parts) > 1:
         raise UnableError("takes one part")
     return lambda request: Solve(lambda: request.goal + 0.01, lambda q: (q, True))

@@ -14,8 +14,8 @@ from plumbob.bench.experiments.chain.measurement import (
 )
 from plumbob.bench.experiments.chain.tables import beyond_reach
 from plumbob.bench.harness.record import Record
-from plumbob.bench.peers.ik import chain_loops
-from plumbob.bench.peers.ik.levenberg_marquardt import (
+from plumbob.bench.peers import chain_loops
+from plumbob.bench.peers.levenberg_marquardt import (
     ReferenceKinematics,
     levenberg_marquardt,
     within_reach,

@@ -17,8 +17,8 @@ from plumbob.reference.formats import urdf
 from ...harness.block import Block, Group, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
-from ...peers.ik.axes import REVOLUTION, all_within
-from ...peers.ik.protocol import Ask
+from ...peers.axes import REVOLUTION, all_within
+from ...peers.protocol import Ask
 from ...peers.registry import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM, Peer
 from ...problems.evaluate import Targets, angle_between, evaluator_of
 from ...problems.robot_targets import STRATA, robot_targets

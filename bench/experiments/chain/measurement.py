@@ -18,9 +18,8 @@ from ...harness.isolation import JobOutcome, raised
 from ...harness.measure import failure, not_asked
 from ...harness.record import FIRST_TARGETS
 from ...harness.timing import Job, answers, first_targets, times_in_turns
-from ...peers import registry
+from ...peers import chain_loops, registry
 from ...peers.entrant import CHAIN_TASK
-from ...peers.ik import chain_loops
 from ...peers.protocol import NoAnswerError, describe
 from ...problems import chains
 from ...problems.evaluate import arbiter_of

@@ -12,8 +12,7 @@ from plumbob.reference.mass_spring import SystemArrays
 from ...clock import compute_time_of, time_call
 from ...harness.isolation import Message, Ready, Solved
 from ...harness.timing import messages_of
-from ...peers.cloth.protocol import Mover
-from ...peers.protocol import OwnTime
+from ...peers.protocol import Mover, OwnTime
 from ...problems.falling_cloth import FRAME
 
 # Before the timing, each solver moves a small cloth once to compile everything, in a frame [s] in

@@ -9,7 +9,7 @@ from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import IK_SOLVERS, prepare_ik, solve_ik
 
 from ...peers import registry
-from ...peers.ik.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
+from ...peers.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
 from ...problems.chains import chain_targets
 from ..chain.measurement import MAX_ITERATIONS, TOLERANCE
 from .case import COMPILED, PLAIN, PREPARED, TimedCase, TimedWork

@@ -11,7 +11,7 @@ from plumbob.crosscheck.engines import MujocoFlex, MujocoMassSpring
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 
-from .protocol import Mover
+from ..protocol import Mover
 
 # A model is built from these; stiffness and damping are set anew every time.
 _BUILT_FROM = ("masses", "springs", "rest_lengths", "tension_only", "pinned", "gravity")

@@ -23,7 +23,7 @@ from newton.solvers import SolverSemiImplicit, SolverVBD, SolverXPBD
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 
-from .protocol import Mover
+from ..protocol import Mover
 
 SOLVERS: dict[str, Any] = {
     "semi-implicit": SolverSemiImplicit,

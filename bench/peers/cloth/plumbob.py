@@ -7,7 +7,7 @@ from typing import Any
 from plumbob.reference import ImplicitEuler, MassSpring, State, runge_kutta, symplectic_euler
 from plumbob.reference.arguments import FloatArray
 
-from .protocol import Mover
+from ..protocol import Mover
 
 EXPLICIT = {"symplectic_euler": symplectic_euler, "runge_kutta": runge_kutta}
 

@@ -18,7 +18,7 @@ import pybullet
 from plumbob.reference import ImplicitEuler, MassSpring, State
 from plumbob.reference.arguments import FloatArray, IndexArray
 
-from .protocol import Mover
+from ..protocol import Mover
 
 # The length [s] of the step to set velocities, and its gravity in units of the fastest velocity.
 # Then the length [s] and number of the steps of implicit Euler to find its start.

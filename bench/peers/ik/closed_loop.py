@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio
 
 from ...problems.evaluate import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 
 def prepare(

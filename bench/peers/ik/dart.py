@@ -7,7 +7,7 @@ the joints' limits. DART's own restarts draw from a generator without a seed, an
 import dartpy
 import numpy as np
 
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 
 def prepare(

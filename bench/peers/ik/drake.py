@@ -20,7 +20,7 @@ from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.solvers import IpoptSolver, NloptSolver, SnoptSolver, SolverOptions
 
 from ...clock import library
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 METERED = True
 # A solver, and its names for the tolerance on constraints and the maximum of iterations.

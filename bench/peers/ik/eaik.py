@@ -13,8 +13,8 @@ import numpy as np
 from eaik.pybindings import EAIK
 
 from ...problems.robots import UnableError
-from .axes import axes_at_zero, first_within
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..axes import axes_at_zero, first_within
+from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 MAXIMUM_HINGES = 6
 

@@ -10,7 +10,7 @@ from typing import Any
 import ikpy.chain
 import numpy as np
 
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 
 def prepare(

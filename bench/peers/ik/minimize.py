@@ -11,7 +11,7 @@ import numpy as np
 from mujoco import minimize
 
 from ...problems.evaluate import mujoco_model
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 SILENT = minimize.Verbosity.SILENT
 

@@ -13,8 +13,8 @@ import mink
 
 from ...problems.evaluate import evaluator_of, mujoco_model
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
-from .differential import PhasedReach, meeting, reaching
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..differential import PhasedReach, meeting, reaching
+from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 METERED = True
 

@@ -17,8 +17,8 @@ import pink
 
 from ...problems.evaluate import evaluator_of, from_pinocchio, pinocchio_model, to_pinocchio
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
-from .differential import PhasedReach, meeting, reaching
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance, UnableError
+from ..differential import PhasedReach, meeting, reaching
+from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance, UnableError
 
 METERED = True
 

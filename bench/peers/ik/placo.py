@@ -26,12 +26,11 @@ from ...problems.robot_tasks import (
     middle,
 )
 from ...problems.robots import UnableError
-from ..protocol import OwnTime
+from ..protocol import Ask, BenchRobot, OwnTime, SolverOutput, Tolerance
 from ..registry import environment_python
-from .protocol import Ask, BenchRobot, SolverOutput, Tolerance
 
 METERED = True
-PROGRAM = Path(__file__).with_name("placo_program.py")
+PROGRAM = Path(__file__).parents[1] / "placo_program.py"
 
 
 def prepare(

@@ -31,7 +31,7 @@ from ...problems.robot_tasks import (
     first_link,
     middle,
 )
-from .protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
 
 def prepare(

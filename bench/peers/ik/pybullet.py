@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
 
 
 def prepare(

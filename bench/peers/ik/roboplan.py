@@ -11,7 +11,7 @@ import numpy as np
 from roboplan import core, optimal_ik
 
 from ...clock import library
-from .protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance
 
 METERED = True
 GROUP = "arm"

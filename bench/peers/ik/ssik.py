@@ -18,8 +18,7 @@ import numpy as np
 from ssik import cli
 
 from ...problems.robots import UnableError
-from ..protocol import describe
-from .protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance, describe
 
 # Arms whose modules take ssik more than seven minutes of processor time.
 LONG_BUILDS = ("baxter", "tiago_pro")

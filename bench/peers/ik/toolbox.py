@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...problems.robots import links
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

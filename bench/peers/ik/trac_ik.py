@@ -12,7 +12,7 @@ from functools import partial
 
 import pytracik
 
-from .protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
 
 def prepare(

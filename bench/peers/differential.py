@@ -15,8 +15,8 @@ from plumbob.reference.inverse_kinematics.restarts import (
     PROGRESS,
 )
 
-from ...clock import library
-from ...problems.robot_tasks import POSTURE, RobotTask, TaskRequest, middle
+from ..clock import library
+from ..problems.robot_tasks import POSTURE, RobotTask, TaskRequest, middle
 from .protocol import BenchRobot, FloatArray, Solve, Tolerance
 
 # Where a posture counts, iterations go on until a step is smaller than this [rad].

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...problems.robots import LIMIT_TOLERANCE, links
+from ..problems.robots import LIMIT_TOLERANCE, links
 from .protocol import BenchRobot, FloatArray
 
 REVOLUTION = 2.0 * np.pi

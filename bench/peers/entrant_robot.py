@@ -8,11 +8,18 @@ import numpy as np
 from plumbob.reference import rotation
 from plumbob.verify.kinematics import robot_models
 
-from ...problems.robots import links
-from ..contestant import opened, remark
-from ..entrant import ROBOT_TASK, Spec
-from ..protocol import NoAnswerError
-from .protocol import Ask, BenchRobot, PoseRequest, SolverOutput, Tolerance, UnableError
+from ..problems.robots import links
+from .contestant import opened, remark
+from .entrant import ROBOT_TASK, Spec
+from .protocol import (
+    Ask,
+    BenchRobot,
+    NoAnswerError,
+    PoseRequest,
+    SolverOutput,
+    Tolerance,
+    UnableError,
+)
 
 __all__ = ["prepare", "remark", "robot_inputs"]
 

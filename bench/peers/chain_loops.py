@@ -10,8 +10,8 @@ from plumbob.crosscheck.engines import SKELETON_ENGINES, forward_kinematics_by
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import Skeleton, solve_ik
 
-from ...problems.chains import ChainRequest
-from ...problems.evaluate import arbiter_of
+from ..problems.chains import ChainRequest
+from ..problems.evaluate import arbiter_of
 from .levenberg_marquardt import LoopOutput, levenberg_marquardt, within_reach
 from .protocol import FloatArray, Solve
 

@@ -9,10 +9,10 @@ from plumbob.crosscheck.engines import SKELETON_ENGINES, SkeletonEngine, forward
 from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.arguments import FloatArray
 
-from ...problems.chains import ChainRequest
-from ...problems.evaluate import arbiter_of
-from ..contestant import opened, remark
-from ..entrant import CHAIN_TASK, Spec
+from ..problems.chains import ChainRequest
+from ..problems.evaluate import arbiter_of
+from .contestant import opened, remark
+from .entrant import CHAIN_TASK, Spec
 from .protocol import SolverOutput
 
 __all__ = ["joint_positions", "prepare", "remark"]
