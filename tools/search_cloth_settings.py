@@ -15,7 +15,8 @@ import numpy as np
 
 from plumbob.bench.experiments.cloth_peers.truth import truth_of
 from plumbob.bench.harness import metrics
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import catalogue
+from plumbob.bench.peers.peer import EXPLICIT, ITERATED, LINEARISED
 from plumbob.bench.problems.falling_cloth import FRAME, explicit_substeps, falling_cloth
 from plumbob.reference import MassSpring, State
 
@@ -33,15 +34,15 @@ def grid(peer):
     if "XPBD" in peer.title:
         for substeps, iterations in itertools.product([10, *stable], XPBD_ITERATIONS):
             yield {"substeps": substeps, "iterations": iterations}
-    elif peer.kind == registry.EXPLICIT:
+    elif peer.run.kind == EXPLICIT:
         yield from ({"substeps": substeps} for substeps in stable)
     elif peer.title.startswith("MuJoCo discrete"):
         for substeps, (iterations, tolerance) in itertools.product(SUBSTEPS, CONJUGATE_GRADIENTS):
             yield {"substeps": substeps, "iterations": iterations, "tolerance": tolerance}
-    elif peer.kind == registry.LINEARISED:
+    elif peer.run.kind == LINEARISED:
         yield from ({"substeps": substeps} for substeps in SUBSTEPS)
     else:
-        iterated = ITERATIONS[:4] if peer.converges else ITERATIONS
+        iterated = ITERATIONS[:4] if peer.run.converges else ITERATIONS
         for substeps, iterations in itertools.product(SUBSTEPS, iterated):
             yield {"substeps": substeps, "iterations": iterations}
 
@@ -51,7 +52,7 @@ def result(peer, settings):
     cloth = falling_cloth(SIZE, STIFFNESS)
     truth = truth_of(cloth, FRAMES).true[-1]
     adapter = importlib.import_module(peer.module)
-    mover = adapter.prepare(cloth.system, FRAME, **{**peer.settings, **settings})
+    mover = adapter.prepare(cloth.system, FRAME, **{**peer.run.settings, **settings})
     seconds = []
     for _ in range(REPEATS):
         mover.begin(cloth.start)
@@ -69,11 +70,13 @@ def fixed_costs():
     start = State([[0.0, 0.0, 0.0], [1.01, 0.0, 0.0]], np.zeros((2, 3)))
     print("| solver | a step [µs] |")
     print("| --- | ---: |")
-    for peer in filter(lambda peer: peer.is_installed, registry.cloth_peers()):
-        settings = {"iterations": 1} if peer.kind == registry.ITERATED else {}
+    for peer in filter(lambda peer: peer.is_installed, catalogue.cloth_peers()):
+        settings = {"iterations": 1} if peer.run.kind == ITERATED else {}
         try:
             adapter = importlib.import_module(peer.module)
-            mover = adapter.prepare(system, FRAME, **{**peer.settings, **settings}, substeps=100)
+            mover = adapter.prepare(
+                system, FRAME, **{**peer.run.settings, **settings}, substeps=100
+            )
         except ValueError:
             continue  # takes square cloths only
         mover.begin(start)
@@ -85,7 +88,7 @@ def main():
     """Print the settings of each solver that no other setting beats in both time and error."""
     print("| solver | tried | within 1 % | setting | error | ms a frame |")
     print("| --- | ---: | ---: | --- | ---: | ---: |")
-    for peer in filter(lambda peer: peer.is_installed, registry.cloth_peers()):
+    for peer in filter(lambda peer: peer.is_installed, catalogue.cloth_peers()):
         results = []
         for settings in grid(peer):
             try:

@@ -27,7 +27,8 @@ from plumbob.bench.experiments.robots.measurement import TOLERANCE
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
 from plumbob.bench.harness.timing import attempt, digest_of, restarted, seed_shared_generators
-from plumbob.bench.peers.registry import PEERS, Peer
+from plumbob.bench.peers.catalogue import PEERS
+from plumbob.bench.peers.peer import Peer
 from plumbob.bench.problems.evaluate import Targets, arbiter_of, evaluator_of
 from plumbob.bench.problems.robot_targets import STRATA, robot_targets
 from plumbob.bench.problems.robots import TUNING
@@ -49,7 +50,7 @@ class SettingsSearch(NamedTuple):
     """The settings of a solver, from one start or with restarts."""
 
     solver: str
-    start: str  # `registry.ONE_START` or `registry.RESTARTS`
+    start: str  # `ONE_START` or `RESTARTS`
     default: Settings  # of its authors
     before: Settings  # of the bench before the search
     candidates: tuple[Settings, ...]  # the settings among which is chosen, the default first

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from ..peers import registry
+from ..peers import catalogue
 from .answers import SOLVED, is_time
 from .rows import ChangeVerdict, Pair, RowChange, RowKey, TimeRatio
 
@@ -154,8 +154,8 @@ def _is_control(pair: Pair) -> bool:
     versions = [record.stamp.get("versions") for record in pair]
     if pair.old.suite != "timing" or versions[0] != versions[1]:
         return False
-    engine = registry.find(pair.old.solver).engine
-    is_foreign = pair.old.solver == registry.LIMIT.name or engine not in ("", registry.PLUMBOB)
+    engine = catalogue.find(pair.old.solver).engine
+    is_foreign = pair.old.solver == catalogue.LIMIT.name or engine not in ("", catalogue.PLUMBOB)
     return is_foreign and not _why_not_compared(pair, "seconds")
 
 

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..peers import registry
-from ..peers.registry import Style
+from ..peers import catalogue
+from .style import Style
 
 Floats = NDArray[np.float64]
 
@@ -141,7 +141,7 @@ class Chart:
         firsts = [name for name in ranked if name in self.entrants]
         for side in (True, False):
             peers = [name for name in ranked if name not in self.entrants]
-            firsts += [name for name in peers if registry.is_ours(name) == side][:1]
+            firsts += [name for name in peers if catalogue.is_ours(name) == side][:1]
         labelled = list(dict.fromkeys([*firsts, *ranked]))[:MAX_LABELLED]
         return [name for name in names if name in labelled]
 
@@ -181,9 +181,9 @@ class Chart:
 def looks(names: Sequence[str]) -> Mapping[str, Style]:
     """Return the look of each of a few solvers, the same in every chart if free.
 
-    Solvers with a style of their own choose first.
+    Solvers with a colour of their own choose first.
     """
-    styled = [name for name in names if registry.find(name).style is not registry.OTHER]
+    styled = [name for name in names if catalogue.find(name).colour]
     assigned: dict[str, Style] = {}
     for name in dict.fromkeys([*styled, *names]):
         assigned[name] = next(look for look in _preferred(name) if look not in assigned.values())
@@ -193,6 +193,6 @@ def looks(names: Sequence[str]) -> Mapping[str, Style]:
 def _preferred(name: str) -> tuple[Style, ...]:
     """Return all looks, the solver's own colour first, else by a hash of its name."""
     colours = [look.colour for look in LOOKS]
-    own = registry.find(name).style.colour
+    own = catalogue.find(name).colour
     first = colours.index(own) if own in colours else zlib.crc32(name.encode()) % len(LOOKS)
     return LOOKS[first:] + LOOKS[:first]

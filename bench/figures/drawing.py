@@ -15,11 +15,10 @@ from matplotlib.lines import Line2D
 
 from plumbob.text.printable import shortened
 
-from ..peers.registry import Style
 from ..tables.results import label
 from .canvas import WIDTH, canvas
 from .chart import GREY, LINE, SPAN, Axis, Chart, Panel, Series, looks
-from .style import COLOURS, plain_label
+from .style import COLOURS, Style, plain_label
 
 # Heights [inch] of a panel, of a row of marks, of a line of the legend.
 PANEL, ROW, LEGEND = 2.3, 0.3, 0.19

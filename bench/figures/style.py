@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from plumbob.text.printable import shortened
 
@@ -12,6 +12,16 @@ COLOURS: dict[str, str] = _STYLE["colours"]
 PARAMETERS: dict[Any, Any] = {
     name: COLOURS.get(str(value), value) for name, value in _STYLE["parameters"].items()
 }
+
+
+class Style(NamedTuple):
+    """How a solver is drawn: a colour of `COLOURS`, a line and a marker of matplotlib's."""
+
+    colour: str
+    line: Any
+    marker: str
+
+
 # The most letters of a name.
 LONGEST = 60
 

@@ -13,7 +13,7 @@ from typing import Any
 import psutil
 
 from ..clock import pace
-from ..peers.registry import version
+from ..peers.packages import version
 from ..peers.sources import git_commit
 
 PACKAGES = (

@@ -11,7 +11,7 @@ from plumbob.verify.door import LIMITS, open_contestant
 from plumbob.verify.greeting import Greeting
 
 from ..problems.own import clean
-from . import registry
+from . import catalogue
 from .entrant import SUITE_TASKS, Entrant, Spec
 from .sources import commit_of, digest_of
 
@@ -139,5 +139,5 @@ def _name(address: SolverAddress, greeting: Greeting) -> str:
         word = address.spec if isinstance(address.spec, str) else address.spec[0]
         own_name = Path(word.partition(":")[0]).name
     name = clean(address.name or own_name) or door
-    taken_names = set(map(str.casefold, registry.names()))
+    taken_names = set(map(str.casefold, catalogue.names()))
     return f"{name} ({door})" if name.casefold() in taken_names else name

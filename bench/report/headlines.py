@@ -33,7 +33,8 @@ from ..experiments.robots.readings import (
 from ..experiments.timing.tables import is_ranked, median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
-from ..peers import registry
+from ..peers import catalogue
+from ..peers.peer import ONE_START, PORTFOLIO, PORTFOLIO_ITERATIONS, RESTARTS
 from ..problems.robots import CHARACTER
 from ..tables.results import Results, by_problem, counted, grouped, listed
 from ..tables.table import words
@@ -42,9 +43,9 @@ from .standings import Headline, best_rival, factor, full_name, percent, speed, 
 # The most robots or cases that a sentence names.
 MAX_NAMED = 3
 _FROM = {
-    registry.ONE_START: "from one start",
-    registry.PORTFOLIO: f"with a portfolio of {words(registry.PORTFOLIO_ITERATIONS)} iterations",
-    registry.RESTARTS: "with restarts",
+    ONE_START: "from one start",
+    PORTFOLIO: f"with a portfolio of {words(PORTFOLIO_ITERATIONS)} iterations",
+    RESTARTS: "with restarts",
 }
 # Times within which the shares of solved poses are compared [s].
 _BUDGETS = (1e-4, 1e-3)
@@ -152,7 +153,7 @@ def absent(results: Results) -> list[str]:
     peers = _recorded_names()
     solvers = [peer for peer, names in peers.items() if names & requested and not names & present]
     packages = {record.solver for record in results.all("cloth", task=MISSING)}
-    engines = [peer.engine for peer in registry.cloth_peers() if peer.package in packages]
+    engines = [peer.engine for peer in catalogue.cloth_peers() if peer.package in packages]
     return [*solvers, *(f"{engine}{_IN_CLOTH}" for engine in dict.fromkeys(engines))]
 
 
@@ -163,8 +164,8 @@ def not_asked(results: Results) -> list[str]:
         peer for peer, names in _recorded_names().items() if requested and not names & requested
     ]
     measured = [point for task in _CLOTH_GOALS for point in points(results, task)]
-    present = {registry.find(point.solver).engine for point in measured}
-    engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers())
+    present = {catalogue.find(point.solver).engine for point in measured}
+    engines = dict.fromkeys(peer.engine for peer in catalogue.cloth_peers())
     cloth = [f"{engine}{_IN_CLOTH}" for engine in engines if present and engine not in present]
     missing = absent(results)
     return [*solvers, *(name for name in cloth if name not in missing)]
@@ -172,7 +173,7 @@ def not_asked(results: Results) -> list[str]:
 
 def _recorded_names() -> dict[str, set[str]]:
     """Return the names of each peer's entries in records, by its title."""
-    return {peer.name: set(map(peer.label_of, peer.entries)) for peer in registry.PEERS}
+    return {peer.name: set(map(peer.label_of, peer.runs)) for peer in catalogue.PEERS}
 
 
 def _robot_groups(results: Results) -> Iterator[tuple[str, str, dict[str, list[Score]]]]:
@@ -233,7 +234,7 @@ def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:
     if not rival:
         return f"{full_name(first)} solves the most poses: {solved}"
     equals = [solver for solver in rows[first].success.first if rows[solver].share.hits]
-    ties = len(set(map(registry.title_of, equals)))
+    ties = len(set(map(catalogue.title_of, equals)))
     chance = f", and {ties} solvers tie within chance" * (ties > 2)
     chance += ", a tie within chance" * (ties == 2)
     if rows[rival].share.hits == share.hits:
@@ -315,7 +316,7 @@ def _robots(group: str, count: int) -> str:
 
 def _first(order: Sequence[str]) -> str:
     """Return the first solver that is no loop of ours on another engine, "" without any."""
-    return next((solver for solver in order if not registry.is_loop(solver)), "")
+    return next((solver for solver in order if not catalogue.is_loop(solver)), "")
 
 
 class Race(NamedTuple):
@@ -359,8 +360,8 @@ def _times_of_engines(records: Sequence[Record]) -> dict[str, float]:
 
 
 def _engine(solver: str) -> str:
-    calls = {registry.COMPILED.name, registry.PREPARED.name}
-    return registry.PLUMBOB if solver in calls else solver
+    calls = {catalogue.COMPILED.name, catalogue.PREPARED.name}
+    return catalogue.PLUMBOB if solver in calls else solver
 
 
 def _race_headline(race: Race) -> Headline | None:
@@ -433,13 +434,13 @@ def _robot_wins(group: str, start: str, fields: dict[str, list[Score]]) -> Itera
     for robot, field in fields.items():
         rows = {row.solver: row for row in field}
         cases = _robots(group, len(fields))
-        own = next(filter(registry.is_ours, field[0].success.order), "")
+        own = next(filter(catalogue.is_ours, field[0].success.order), "")
         first = _first(field[0].success.first)
         if own and first and own not in field[0].success.first:
             size = 100 * float(np.mean(rows[first].solved) - np.mean(rows[own].solved))
             result = f"solves more poses than {full_name(own)} {_FROM[start]}"
             yield Win("kinematics", first, result, robot, size, cases, "robots_by_robot")
-        own = next(filter(registry.is_ours, field[0].time.order), "")
+        own = next(filter(catalogue.is_ours, field[0].time.order), "")
         if own and (first := _faster(rows, own)):
             size = ratio_of_times(rows[own], rows[first]).value
             result = f"is faster, where both solve, than {full_name(own)} {_FROM[start]}"
@@ -464,8 +465,8 @@ def _race_wins(race: Race) -> Iterator[Win]:
     """Yield the cases in which another engine is faster."""
     for case, times in race.times.items():
         first = min(times, key=times.__getitem__, default="")
-        if registry.PLUMBOB in times and first != registry.PLUMBOB and case not in race.ties:
-            ratio = times[registry.PLUMBOB] / times[first]
-            result = f"is faster than {full_name(registry.PLUMBOB)} in {race.task}"
+        if catalogue.PLUMBOB in times and first != catalogue.PLUMBOB and case not in race.ties:
+            ratio = times[catalogue.PLUMBOB] / times[first]
+            result = f"is faster than {full_name(catalogue.PLUMBOB)} in {race.task}"
             cases = counted(len(race.times), race.noun)
             yield Win(race.chapter, first, result, case, ratio, cases, race.table)

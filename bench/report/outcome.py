@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from plumbob.text.printable import visible
 
-from ..peers.registry import peers_command
+from ..peers.packages import peers_command
 from ..tables.aligned import filled
 from ..tables.entered import remarks_of_entrants
 from ..tables.results import Results, counted, grouped

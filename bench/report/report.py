@@ -11,7 +11,7 @@ from ..experiments import SUITES
 from ..experiments.robots.figures import robot_maps
 from ..figures.sketch import Drawing, drawn
 from ..harness.record import FINISHED, Record
-from ..peers.registry import peers_command
+from ..peers.packages import peers_command
 from ..tables.latex import latex
 from ..tables.layout import Figure
 from ..tables.results import Results, listed, results_of

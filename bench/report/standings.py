@@ -10,7 +10,7 @@ from ..experiments.cloth_peers.readings import Point, points
 from ..experiments.robots import readings
 from ..harness import metrics
 from ..harness.record import FIRST_TARGETS
-from ..peers import registry
+from ..peers import catalogue
 from ..tables.columns import words_in
 from ..tables.results import Results, counted, grouped, label, listed
 from ..tables.table import words
@@ -104,7 +104,7 @@ def percent(share: metrics.Share) -> str:
 def full_name(solver: str) -> str:
     """Return how a solver is written in a sentence: "pink (20 restarts)", "Plumbob LM (ours)"."""
     name, *details = label(solver).split(", ")
-    details += ["ours"] * registry.is_ours(solver)
+    details += ["ours"] * catalogue.is_ours(solver)
     return f"{name} ({', '.join(details)})" if details else name
 
 
@@ -113,15 +113,15 @@ def best_rival(solver: str, order: Sequence[str]) -> str:
 
     A loop of ours on another engine's kinematics is no solver of other authors.
     """
-    authors = registry.engine_of(solver)
-    rivals = (s for s in order if registry.engine_of(s) != authors and not registry.is_loop(s))
+    authors = catalogue.engine_of(solver)
+    rivals = (s for s in order if catalogue.engine_of(s) != authors and not catalogue.is_loop(s))
     return next(rivals, "")
 
 
 def _fastest(order: Sequence[str]) -> list[str]:
     """Return the first solver, and the first of Plumbob's solvers if different."""
-    rivals = [solver for solver in order if not registry.is_loop(solver)]
-    return list(dict.fromkeys((*rivals[:1], *list(filter(registry.is_ours, rivals))[:1])))
+    rivals = [solver for solver in order if not catalogue.is_loop(solver)]
+    return list(dict.fromkeys((*rivals[:1], *list(filter(catalogue.is_ours, rivals))[:1])))
 
 
 def factor(ratio: float) -> str:

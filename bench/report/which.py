@@ -6,7 +6,7 @@ from dataclasses import replace
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.readings import Score, by_robot
 from ..harness import metrics
-from ..peers import registry
+from ..peers import catalogue, packages
 from ..tables.columns import text, words_in
 from ..tables.results import Results, counted, grouped, listed
 from ..tables.table import Column, Summary, Table, cells
@@ -46,7 +46,7 @@ def solvers_on_robot(results: Results, name: str) -> Table:
 def advice(entries: Sequence[Score]) -> str:
     """Return which solver to choose: the fastest of the solvers tied with the best."""
     first = [e for e in entries if e.solver in e.success.first and e.share.hits]
-    first = [entry for entry in first if not registry.is_loop(entry.solver)]
+    first = [entry for entry in first if not catalogue.is_loop(entry.solver)]
     if not first:
         return "No solver reaches a target: does --link name the link that you mean?"
     best = min(first, key=_median)
@@ -67,22 +67,22 @@ def _peers() -> dict[str, tuple[str, str]]:
     """Return title and use of registered solvers, by the names of their settings in records."""
     return {
         peer.label_of(entry): (peer.title, peer.use)
-        for peer in registry.PEERS for entry in peer.entries
+        for peer in catalogue.PEERS for entry in peer.runs
     }  # fmt: skip
 
 
 def _title(score: Score) -> str:
     """Return a solver's name without its settings."""
-    title = _peers().get(score.solver, (registry.title_of(score.solver),))[0]
-    return f"{title} (ours)" if registry.is_ours(score.solver) else title
+    title = _peers().get(score.solver, (catalogue.title_of(score.solver),))[0]
+    return f"{title} (ours)" if catalogue.is_ours(score.solver) else title
 
 
 def _missing(present: set[str]) -> Sequence[str]:
     """Return sentences on installed solvers without a result, and on solvers not installed."""
-    installed = [peer.title for peer in registry.PEERS if peer.is_installed]
+    installed = [peer.title for peer in catalogue.PEERS if peer.is_installed]
     refused = [title for title in installed if not {title, f"{title} (ours)"} & present]
-    absent = [peer.title for peer in registry.PEERS if not peer.is_installed]
+    absent = [peer.title for peer in catalogue.PEERS if not peer.is_installed]
     return (
         f"Without a result here: {listed(refused)}." * bool(refused),
-        f"Not installed: {listed(absent)}; `{registry.peers_command()}` adds them." * bool(absent),
+        f"Not installed: {listed(absent)}; `{packages.peers_command()}` adds them." * bool(absent),
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..harness.record import Record
-from ..peers import registry
+from ..peers import catalogue
 from .results import Results, settings
 from .table import (
     NO_SUMMARY,
@@ -22,11 +22,11 @@ from .table import (
 # Returns the sketch of a figure, None if its records are missing.
 Figure = Callable[[Results], Any]
 NOT_MEASURED = "Nothing of this is on record yet."
-# The package of an engine, by its name in the registry.
+# The package of an engine, by its name in the catalogue.
 _PACKAGES = {
-    registry.PINOCCHIO: "pin",
-    registry.MUJOCO: "mujoco",
-    registry.NEWTON: "newton",
+    catalogue.PINOCCHIO: "pin",
+    catalogue.MUJOCO: "mujoco",
+    catalogue.NEWTON: "newton",
     "SciPy": "scipy",
 }
 # The cells of a row by the titles of their columns, and the records or scores behind them.
@@ -164,7 +164,7 @@ def _plumbob_and_python(versions: Mapping[str, Any]) -> str:
 
 def _engine_version(record: Record) -> str:
     """Return the package and version of a record's solver, "" if ours or unknown."""
-    engine = registry.find(record.solver).engine
+    engine = catalogue.find(record.solver).engine
     package = _PACKAGES.get(engine, engine) or record.solver
     version = record.settings.get("version") or record.stamp.get("versions", {}).get(package)
     return f"{package} {version}" if version and package.lower() != "plumbob" else ""

@@ -11,7 +11,7 @@ from plumbob.text.printable import all_visible
 
 from ..harness.metrics import Ranking
 from ..harness.record import Record, on_record
-from ..peers import registry
+from ..peers import catalogue
 from .table import words
 
 # The relative precision of a displayed time, given the drift of its machine.
@@ -80,7 +80,7 @@ def results_of(folder: Path) -> tuple[Results, str]:
 
 def label(solver: str) -> str:
     """Return a solver's name in tables and figures."""
-    return registry.find(solver).label
+    return catalogue.find(solver).label
 
 
 def grouped(subjects: Iterable[Subject], key: Callable[[Subject], Key]) -> dict[Key, list[Subject]]:

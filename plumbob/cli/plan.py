@@ -16,7 +16,7 @@ from plumbob.bench.harness.block import Block, Choice
 from plumbob.bench.harness.executors import THIS_PROCESS
 from plumbob.bench.harness.measure import block_key, not_asked, not_installed
 from plumbob.bench.harness.record import Key, Record, RecordFile
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import catalogue, packages
 from plumbob.bench.tables.results import counted, grouped
 
 from .terminal import width
@@ -24,7 +24,7 @@ from .terminal import width
 NOT_INSTALLED = "not installed"
 # Names of problems or solvers in the list of all suites, and their lines.
 _MAX_NAMES, _MAX_LINES = 6, 2
-_PACKAGES = {registry.PLUMBOB: "plumbob", registry.PINOCCHIO: "pin", registry.MUJOCO: "mujoco"}
+_PACKAGES = {catalogue.PLUMBOB: "plumbob", catalogue.PINOCCHIO: "pin", catalogue.MUJOCO: "mujoco"}
 OWN_RECORD, OTHER_RECORDS, BUDGET = "its own record", "records of others", "budgets"
 UNKNOWN = "unknown"
 
@@ -74,7 +74,7 @@ def _solvers(selection: Iterable[Block]) -> list[tuple[str, str, str]]:
     return [
         (
             name,
-            _unless_repeated(name, registry.find(name).label),
+            _unless_repeated(name, catalogue.find(name).label),
             NOT_INSTALLED if name in missing else _version(by_solver[name]),
         )
         for name in names
@@ -99,8 +99,8 @@ def _version(block: Block) -> str:
     version = block.settings.get("version")
     if block.facts.get("entrant") is True:
         return ", ".join(str(part) for part in (version, "entered", block.facts["door"]) if part)
-    package = _PACKAGES.get(registry.find(block.solver).engine, "")
-    return str(version or (registry.version(package) if package else ""))
+    package = _PACKAGES.get(catalogue.find(block.solver).engine, "")
+    return str(version or (packages.version(package) if package else ""))
 
 
 def _aligned(rows: Iterable[Sequence[str]]) -> Iterator[str]:

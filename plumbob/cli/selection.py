@@ -10,7 +10,7 @@ from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
 from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
 from plumbob.bench.harness.block import Block, Choice, Scale
-from plumbob.bench.peers import opening, registry
+from plumbob.bench.peers import catalogue, opening
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.problems import files
 from plumbob.bench.problems.own import OwnProblem
@@ -103,7 +103,7 @@ def _scale(
 def _solver_names(block: Block) -> tuple[str, list[str]]:
     """Return a solver's name in records, and its names: also in tables, and before the comma."""
     solver = block.solver
-    return solver, [solver, registry.find(solver).label, solver.partition(", ")[0]]
+    return solver, [solver, catalogue.find(solver).label, solver.partition(", ")[0]]
 
 
 def _problem_names(block: Block) -> tuple[str, list[str]]:

@@ -25,8 +25,8 @@ from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs
 from plumbob.bench.experiments.cloth_peers.truth import first_step, true_motion, truth_of
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import JobOutcome, WorkerProcess
-from plumbob.bench.peers import registry
-from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
+from plumbob.bench.peers import catalogue
+from plumbob.bench.peers.peer import EXPLICIT, LINEARISED, Peer, Run
 from plumbob.bench.problems.falling_cloth import (
     FRAME,
     MASS,
@@ -55,7 +55,7 @@ def slow_if_long_to_compile(peer):
     return pytest.param(peer, marks=marks, id=peer.title)
 
 
-@pytest.fixture(params=map(slow_if_long_to_compile, registry.cloth_peers()))
+@pytest.fixture(params=map(slow_if_long_to_compile, catalogue.cloth_peers()))
 def peer(request):
     """Every solver that is installed."""
     if not request.param.version:
@@ -72,7 +72,7 @@ def cloth():
 def moved(peer, cloth, frames=1, frame=FRAME, **settings):
     """Where a solver takes the cloth."""
     adapter = importlib.import_module(peer.module)
-    mover = adapter.prepare(cloth.system, frame, **{**peer.settings, **settings})
+    mover = adapter.prepare(cloth.system, frame, **{**peer.run.settings, **settings})
     mover.begin(cloth.start)
     for _ in range(frames):
         mover.advance()
@@ -139,7 +139,7 @@ def test_the_truth_is_where_symplectic_euler_goes_at_order_one(cloth):
 
 def test_the_truth_is_that_of_another_engines_runge_kutta(cloth):
     """MuJoCo shares no code with the truth; its steps are those of the finest motion."""
-    (peer,) = [peer for peer in registry.cloth_peers() if peer.title == "MuJoCo RK4"]
+    (peer,) = [peer for peer in catalogue.cloth_peers() if peer.title == "MuJoCo RK4"]
     substeps = 4 * explicit_substeps(cloth.beat, truth._COARSE)
     ends, true = moved(peer, cloth, 2, substeps=substeps), truth_of(cloth, 2).true
     np.testing.assert_allclose(ends, true[-1], atol=1e-12)
@@ -185,8 +185,8 @@ def test_a_motion_has_diverged_if_one_particle_is_ever_too_far():
 
 def test_a_solver_begins_anew_from_where_it_is_put(peer, cloth):
     adapter = importlib.import_module(peer.module)
-    settings = {"substeps": 8} if peer.kind == EXPLICIT else {}
-    mover = adapter.prepare(cloth.system, FRAME, **{**peer.settings, **settings})
+    settings = {"substeps": 8} if peer.run.kind == EXPLICIT else {}
+    mover = adapter.prepare(cloth.system, FRAME, **{**peer.run.settings, **settings})
     ends = []
     for _ in range(2):
         mover.begin(cloth.start)
@@ -201,7 +201,7 @@ def test_a_solver_begins_anew_from_where_it_is_put(peer, cloth):
 
 
 def test_a_frame_of_many_steps_is_many_frames_of_one(peer, cloth):
-    iterations = {} if peer.kind != "iterations" else {"iterations": 10}
+    iterations = {} if peer.run.kind != "iterations" else {"iterations": 10}
     many = moved(peer, cloth, substeps=4, frame=FRAME / 4, **iterations)
     few = moved(peer, cloth, frames=4, frame=FRAME / 16, **iterations)
     np.testing.assert_allclose(many, few, atol=PRECISION[peer.engine])
@@ -221,7 +221,7 @@ def test_all_who_say_so_are_symplectic_euler(peer, cloth):
 
 def test_one_linear_solve_is_the_gauss_newton_step(peer, cloth):
     """MuJoCo's conjugate gradients end at 1e-8, unless set to go on."""
-    if peer.kind != LINEARISED:
+    if peer.run.kind != LINEARISED:
         pytest.skip("solves no linear system, or several")
     result = ImplicitEuler(cloth.system, h=FRAME, solver="gauss_newton").step(cloth.start)
     tolerance = 1e-6 if peer.title == "MuJoCo discrete" else 1e-10
@@ -233,7 +233,7 @@ def test_a_model_kept_by_mujoco_takes_on_the_stiffness_asked_for(stiffness):
     cloth = falling_cloth(SIZE, stiffness)
     level = falling_cloth(SIZE, STIFFNESS).system
     assert not np.array_equal(cloth.system.stiffnesses, level.stiffnesses)
-    for peer in (p for p in registry.cloth_peers() if p.title in MUJOCO_EULERS):
+    for peer in (p for p in catalogue.cloth_peers() if p.title in MUJOCO_EULERS):
         moved(peer, falling_cloth(SIZE, STIFFNESS), substeps=8)
         state = symplectic(cloth.system, cloth.start, 8, FRAME / 8)
         ends = moved(peer, cloth, substeps=8)
@@ -242,7 +242,7 @@ def test_a_model_kept_by_mujoco_takes_on_the_stiffness_asked_for(stiffness):
 
 def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
     """XPBD, which adds what all springs want, need not: it is tried on one spring."""
-    if peer.kind != "iterations" and "XPBD" not in peer.title:
+    if peer.run.kind != "iterations" and "XPBD" not in peer.title:
         pytest.skip("does not iterate")
     many = 200 if "Newton engine" in peer.title else 1000
     if "XPBD" in peer.title:
@@ -308,9 +308,9 @@ def test_bullet_goes_where_symplectic_euler_goes_whatever_was_before(bullet):
 
 
 def test_every_entry_has_a_name_and_every_rung_a_label_of_its_own():
-    titles = [peer.title for peer in registry.cloth_peers()]
+    titles = [peer.title for peer in catalogue.cloth_peers()]
     assert len(set(titles)) == len(titles)
-    for peer in registry.cloth_peers():
+    for peer in catalogue.cloth_peers():
         assert peer.title.startswith(peer.engine)
         for rungs in (step_rungs(peer, 1000.0), motion_rungs(peer, 1000.0)):
             labels = [rung.label for rung in rungs]
@@ -369,13 +369,13 @@ def worker(fakes):
 
 
 def fake_peer(manner, package="numpy"):
-    settings = {"manner": manner}
-    return ClothPeer(manner, "fake_cloth_solvers", package, "Fake", LINEARISED, settings)
+    runs = (Run(LINEARISED, {"manner": manner}),)
+    return Peer(manner, "fake_cloth_solvers", package, "", "", "", runs, engine="Fake")
 
 
 def as_it_is(peer, frequency):
     """The one rung of a solver that knows no substeps."""
-    return [Rung("as it is", peer.settings)]
+    return [Rung("as it is", peer.run.settings)]
 
 
 FALL = peers_cloth.Fall(peers_cloth.Level(SIZE, 5), partial(falling_cloth, SIZE, STIFFNESS))
@@ -424,10 +424,10 @@ def test_a_solver_that_did_not_finish_is_not_tried_again(monkeypatch):
 
 
 def test_a_ladder_is_run_whole_and_says_what_single_precision_allows(here):
-    newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
+    newton = next(peer for peer in catalogue.cloth_peers() if peer.title == "Plumbob Newton")
     measured = peers_cloth.work(ONE_STEP, newton, [FALL])
     errors = measured["error"]
-    assert len(measured["rungs"]) == len(errors) == len(newton.ladder)
+    assert len(measured["rungs"]) == len(errors) == len(newton.run.ladder)
     assert errors[-1] < 1e-12
     assert 1e-7 < measured["rounding"][0] < TARGETS[SOLVED]
 
@@ -457,8 +457,8 @@ def errors_of_all(monkeypatch):
             return {
                 (task, peer.title): peers_cloth.work(task, peer, [FALL]).arrays["error"].tobytes()
                 for task in (ONE_STEP, MOTION)
-                for peer in registry.cloth_peers()
-                if peer.is_installed and (task == MOTION or peer.kind != EXPLICIT)
+                for peer in catalogue.cloth_peers()
+                if peer.is_installed and (task == MOTION or peer.run.kind != EXPLICIT)
             }
 
     return measured
@@ -478,7 +478,7 @@ def test_a_busy_machine_changes_no_error(errors_of_all):
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
     gone = [fake_peer(name, "a-package-that-nobody-has") for name in ("one", "two")]
-    monkeypatch.setattr(registry, "cloth_peers", lambda entrants: gone)
+    monkeypatch.setattr(catalogue, "cloth_peers", lambda entrants: gone)
     missing = [b for b in peers_cloth.blocks(Scale(1, 0.1)) if b.problem == "peers/all"]
     (block,) = missing
     arrays, notes, _ = block.measure()
@@ -512,7 +512,7 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
     """A growth of a hundredfold shows a little beyond it: (h omega)² - 4 is 7e-5, or for
     Runge-Kutta, of which |R(ih omega)| climbs with a slope of 2.5, h omega is 0.005 too large.
     """
-    peer = next(peer for peer in registry.cloth_peers() if peer.title == title)
+    peer = next(peer for peer in catalogue.cloth_peers() if peer.title == title)
     spring = one_spring()
     monkeypatch.setattr(peers_cloth, "hanging_cloth", lambda size, k: (spring.system, REST))
     arrays = peers_cloth.stability(peer, (spring.stiffness,)).arrays

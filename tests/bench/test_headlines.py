@@ -10,7 +10,7 @@ from plumbob.bench.experiments.robots.readings import STARTS, overall
 from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import FINISHED
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import catalogue
 from plumbob.bench.report import headlines
 from plumbob.bench.report.standings import percent
 from plumbob.bench.tables.layout import source
@@ -270,7 +270,7 @@ def test_nobody_leads_among_those_that_were_timed_apart(make):
 
 def test_without_rivals_there_is_no_headline(make):
     """Plain Python, the memory bound and loops of ours on engines are no rivals of Plumbob."""
-    names = (registry.PLAIN.name, registry.LIMIT_NAME, "Plumbob, compiled")
+    names = (catalogue.PLAIN.name, catalogue.LIMIT_NAME, "Plumbob, compiled")
     engines = ("Pinocchio", "MuJoCo", "Plumbob, compiled")
     for records in (
         [make.timed(name, 1e-7) for name in names],
@@ -353,9 +353,9 @@ def test_peers_without_a_measurement_are_absent_or_were_not_asked(make, run):
     found = headlines.not_asked(results)
     assert not {"pink", "Plumbob LM", "mink"} & set(found)
     assert "TRAC-IK" in found
-    engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers())
+    engines = dict.fromkeys(peer.engine for peer in catalogue.cloth_peers())
     assert [name for name in found if name.endswith("(cloth)")] == [
-        f"{engine} (cloth)" for engine in engines if engine not in (registry.PLUMBOB, "MuJoCo")
+        f"{engine} (cloth)" for engine in engines if engine not in (catalogue.PLUMBOB, "MuJoCo")
     ]
     assert headlines.absent(Results([])) == headlines.not_asked(Results([])) == []
 

@@ -10,9 +10,9 @@ from plumbob.bench.harness import timing
 from plumbob.bench.harness.isolation import Finished, Solved, WorkerProcess, raised
 from plumbob.bench.harness.measure import record_of
 from plumbob.bench.harness.timing import Job, restarted, times_in_turns
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import catalogue
+from plumbob.bench.peers.peer import ONE_START, Peer, Run
 from plumbob.bench.peers.protocol import OwnTime, SolverOutput
-from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robots import robot
 from plumbob.bench.tables.results import Results
@@ -315,7 +315,7 @@ def suite(monkeypatch, worker):
     """The blocks of fakes for peers, on the iiwa only, by solver and problem."""
 
     def peer(title, package="numpy", **settings):
-        return Peer(title, "fake_solvers", package, "MIT", "", (PeerEntry(ONE_START, settings),))
+        return Peer(title, "fake_solvers", package, "MIT", "", "", (Run(ONE_START, settings),))
 
     peers = [
         peer("liar", manner="liar"),
@@ -324,11 +324,11 @@ def suite(monkeypatch, worker):
         peer("gone", package="a-package-that-nobody-has"),
         peer("unable", manner="unable"),
     ]
-    monkeypatch.setattr(registry, "PEERS", peers)
+    monkeypatch.setattr(catalogue, "PEERS", peers)
     monkeypatch.setattr(robots, "ROBOTS", ("iiwa14",))
     monkeypatch.setattr(timing, "worker_process", lambda: worker)
     yield {(b.solver, b.problem): b for b in robots.blocks(Scale(targets=3, seconds=10.0))}
-    registry._by_name.cache_clear()  # where the fakes stand in place of the peers
+    catalogue._by_name.cache_clear()  # where the fakes stand in place of the peers
 
 
 def test_every_manner_becomes_one_record(suite):

@@ -8,7 +8,7 @@ from browser import CHROMIUM, Browser
 
 from plumbob.bench.figures.drawing import power, ticks
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import catalogue
 from plumbob.bench.report import report
 
 WIDTHS = (1440, 390)
@@ -51,8 +51,8 @@ FAULTS = """(() => {
 def crowded(make):
     """Records of every solver: times over five decades, and factors of four digits."""
     for robot in ROBOTS:
-        for i, peer in enumerate(registry.PEERS):
-            for entry in peer.entries:
+        for i, peer in enumerate(catalogue.PEERS):
+            for entry in peer.runs:
                 seconds = {"seconds": 1e-6 * 3.7 ** min(i, 7) * np.arange(1.0, 5.0)}
                 solved = {"solved": [True, True, i % 2 == 0, True]}
                 named = make.raced(
@@ -60,7 +60,7 @@ def crowded(make):
                 )
                 yield named.with_measured(title=robot)
     for stiffness in (1e2, 1e3, 1e4):
-        for i, peer in enumerate(registry.cloth_peers()):
+        for i, peer in enumerate(catalogue.cloth_peers()):
             seconds = (1e-4 * (1 + i), 2e-2, 15.0 + i)
             error = (0.5, 1e-4, 10.0 ** -(i % 14))
             yield make.worked(peer.title, stiffness, (20, 40, 100), seconds, error)

@@ -14,7 +14,8 @@ from plumbob.bench.experiments.arm.tables import accuracy, residuals_chart
 from plumbob.bench.experiments.chain.tables import beyond_reach, iterations_chart
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.peers import opening, registry
+from plumbob.bench.peers import opening
+from plumbob.bench.peers.peer import Peer
 from plumbob.bench.report.headlines import absent
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.entered import remarks_of_entrants
@@ -139,7 +140,7 @@ def test_the_list_of_a_suite_names_each_problem_once_and_lines_up(folder):
 
 
 def test_a_peer_that_is_missing_is_listed_as_such(folder, monkeypatch):
-    monkeypatch.setattr(registry.Peer, "version", "")
+    monkeypatch.setattr(Peer, "version", "")
     (line,) = [line for line in listed("ik") if line.startswith("  mink  ")]
     assert line.endswith("  not installed")
 
@@ -152,7 +153,7 @@ def test_a_part_of_the_robots_names_absent_peers_and_no_other_part_does(
     folder, monkeypatch, asked, is_named
 ):
     version = property(lambda peer: "" if peer.title == "mink" else "1")
-    monkeypatch.setattr(registry.Peer, "version", version)
+    monkeypatch.setattr(Peer, "version", version)
     choice = selection.choose(["ik"], "quick", selection.MeasurementRequest(**asked))
     solvers = {block.solver for block in filter(choice.takes, blocks("ik", choice.scale))}
     assert ("mink" in solvers) == is_named

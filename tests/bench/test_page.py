@@ -13,7 +13,8 @@ from browser import CHROMIUM, Browser
 
 from plumbob.bench.harness.record import FINISHED, RecordFile
 from plumbob.bench.motion import motion
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import catalogue
+from plumbob.bench.peers.peer import ONE_START
 from plumbob.bench.report import report
 from plumbob.bench.report.page import page as pages
 from plumbob.bench.report.sections import SECTIONS
@@ -22,9 +23,9 @@ DESK, PHONE = (1440, 900), (390, 844)
 ROBOTS = ("Panda", "UR5", "xArm7", "PR2", "Atlas")
 # The table that is tried: it is folded, and has a row for each of these solvers on each robot.
 MAIN = "robots_by_robot"
-PRESENT = registry.PEERS[:8]  # the others are absent
-ENTRIES = [entry for peer in PRESENT for entry in peer.entries]
-ONE_START = sum(entry.kind == registry.ONE_START for entry in ENTRIES)
+PRESENT = catalogue.PEERS[:8]  # the others are absent
+ENTRIES = [entry for peer in PRESENT for entry in peer.runs]
+ONE_START = sum(entry.kind == ONE_START for entry in ENTRIES)
 ROWS = len(ROBOTS) * ONE_START
 # Where npm installs axe-core, in this folder or for all.
 FOLDERS = (Path(__file__).parents[2], Path("/usr/lib"), Path("/usr/local/lib"))
@@ -41,7 +42,7 @@ def of_full_length(make):
     generator = np.random.default_rng(0)
     for robot in ROBOTS:
         for peer in PRESENT:
-            for entry in peer.entries:
+            for entry in peer.runs:
                 chance = generator.uniform(0.2, 0.9)
                 changed = {"solved": generator.random(120) < chance, "claims": np.ones(120, int)}
                 changed |= {"seconds": generator.uniform(1, 9, 120) * 1e-5 / chance}
@@ -49,11 +50,11 @@ def of_full_length(make):
                 changed |= {"stratum": np.arange(120) % 2, "beyond": np.zeros(120)}
                 made = make.raced(peer.label_of(entry), entry.kind, robot=robot, **changed)
                 yield made.__class__(**{**vars(made), "size": 120.0})
-    for peer in registry.PEERS[len(PRESENT) :]:
-        entry = peer.entries[-1]  # with restarts: in another table than the one that is tried
+    for peer in catalogue.PEERS[len(PRESENT) :]:
+        entry = peer.runs[-1]  # with restarts: in another table than the one that is tried
         yield make.lacking(peer.label_of(entry), entry.kind, f"{peer.package} is not installed")
     for stiffness in (1e2, 1e3, 1e4):
-        for i, peer in enumerate(registry.cloth_peers()):
+        for i, peer in enumerate(catalogue.cloth_peers()):
             sizes, error = (20, 40, 80), (0.5, 1e-4, 10.0**-i)
             seconds = (1e-3, 2e-3, (1 + i) * 1e-3)
             yield make.worked(peer.title, stiffness, sizes, seconds, error)
@@ -181,7 +182,7 @@ def test_a_switch_shows_one_start_or_restarts_on_the_whole_page(table):
         assert texts(table, f"figure.{other}") == []
         names = {entry.kind: [] for entry in ENTRIES}
         for peer in PRESENT:
-            for entry in peer.entries:
+            for entry in peer.runs:
                 names[entry.kind].append(peer.label_of(entry))
         assert sorted(set(column(table, 3))) == sorted(names[value])
     click(table, "[value=time]")

@@ -12,8 +12,10 @@ from plumbob.bench import clock
 from plumbob.bench.harness.isolation import Solved
 from plumbob.bench.harness.timing import Job, restarted
 from plumbob.bench.peers import protocol
+from plumbob.bench.peers.catalogue import PEERS, PLUMBOB_LM
+from plumbob.bench.peers.ik import placo
+from plumbob.bench.peers.peer import ONE_START, PORTFOLIO, RESTARTS
 from plumbob.bench.peers.protocol import OwnTime, SolverOutput, UnableError
-from plumbob.bench.peers.registry import ONE_START, PEERS, PLACO, PLUMBOB_LM, PORTFOLIO, RESTARTS
 from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
 from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, is_installed, robot
@@ -63,21 +65,21 @@ def test_from_a_start_beside_the_solution_a_peer_finds_it(peer, arm, rng):
     starts = q + rng.uniform(-0.1, 0.1, q.shape)
     targets = Targets(*evaluator.forward(q), starts, np.zeros(FEW, int))
     # with 5 ms, TRAC-IK misses one on a busy machine; IPOPT ends at the edge of the tolerance
-    entry = peer.entries[{"trac_ik": -1, "drake": 1}.get(module(peer), 0)]
+    entry = peer.runs[{"trac_ik": -1, "drake": 1}.get(module(peer), 0)]
     solved, evaluation = answers(peer, entry, arm, targets)
     assert evaluation.solved.all()
     assert all(answer.claim in (1, -1) and not answer.trouble for answer in solved)
 
 
 def test_no_peer_claims_an_unreachable_target(peer, arm):
-    solved, evaluation = answers(peer, peer.entries[0], arm, unreachable_targets(arm, 2))
+    solved, evaluation = answers(peer, peer.runs[0], arm, unreachable_targets(arm, 2))
     assert not evaluation.solved.any()
     assert not any(answer.claim == 1 for answer in solved)
 
 
 def test_with_restarts_hardly_a_target_within_reach_is_missed(peer, arm):
     """Twenty attempts and more: of six targets each of these solvers misses one at the most."""
-    for entry in (entry for entry in peer.entries if entry.kind == RESTARTS):
+    for entry in (entry for entry in peer.runs if entry.kind == RESTARTS):
         solved, evaluation = answers(peer, entry, arm, uniform_targets(arm, FEW, False))
         assert evaluation.solved.sum() >= FEW - 1
         claims = np.array([answer.claim == 1 for answer in solved])
@@ -91,19 +93,19 @@ def test_the_character_is_for_those_that_take_trees(peer):
             prepare(robot(CHARACTER), TOLERANCE)
         return
     targets = uniform_targets(CHARACTER, 2, False)
-    _, evaluation = answers(peer, peer.entry(RESTARTS), CHARACTER, targets)
+    _, evaluation = answers(peer, peer.first(RESTARTS), CHARACTER, targets)
     assert evaluation.solved.all()
     assert not evaluation.rotation.any()
 
 
 def test_ours_finds_every_target_of_every_stratum():
-    entry, targets = PLUMBOB_LM.entry(RESTARTS), robot_targets("iiwa14", 5)
+    entry, targets = PLUMBOB_LM.first(RESTARTS), robot_targets("iiwa14", 5)
     solved, evaluation = answers(PLUMBOB_LM, entry, "iiwa14", targets)
     assert evaluation.solved.all()
     assert all(answer.claim == 1 for answer in solved)
 
 
-def test_the_registry_has_the_licences_of_the_packages(peer):
+def test_peers_have_the_licences_of_the_packages(peer):
     metadata = peer.distribution.metadata
     expression = metadata.get("License-Expression", "")
     texts = [expression, metadata.get("License", ""), *(metadata.get_all("Classifier") or [])]
@@ -119,7 +121,7 @@ def test_the_answer_to_a_target_is_the_same_again_and_in_another_order(peer, arm
         pytest.skip("its answers depend on the clock")
     targets = uniform_targets(arm, FEW, False)
     orders = [targets, targets, Targets(*(part[::-1] for part in targets))]
-    for entry in peer.entries:
+    for entry in peer.runs:
         first, second, backwards = (
             [(answer.claim, answer.q.tobytes()) for answer in answers(peer, entry, arm, order)[0]]
             for order in orders
@@ -131,11 +133,11 @@ def test_the_answer_to_a_target_is_the_same_again_and_in_another_order(peer, arm
 UNLIMITED = {"closed_loop", "pybullet"}
 
 
-def test_limits_are_kept_unless_the_registry_says_otherwise(peer, arm):
+def test_limits_are_kept_unless_the_peer_says_otherwise(peer, arm):
     if module(peer) in UNLIMITED:
         assert "limits" in peer.can.partition(";")[2] + peer.can.partition(",")[2]
-        pytest.skip("its line in the registry says that it does not keep limits")
-    for entry in peer.entries:
+        pytest.skip("its file says that it does not keep limits")
+    for entry in peer.runs:
         _, evaluation = answers(peer, entry, arm, uniform_targets(arm, FEW, False))
         beyond = evaluation.beyond[np.isfinite(evaluation.beyond)]
         assert (beyond <= LIMIT_TOLERANCE).all(), peer.label_of(entry)
@@ -149,7 +151,7 @@ def test_a_peer_in_an_environment_of_its_own_is_found_there(tmp_path, monkeypatc
         facts = place / f"placo-{version}.dist-info" / "METADATA"
         facts.parent.mkdir(parents=True)
         facts.write_text(f"Metadata-Version: 2.1\nName: placo\nVersion: {version}\n")
-    assert PLACO.version == version
+    assert placo.PEER.version == version
 
 
 def measuring(seconds):
@@ -190,14 +192,14 @@ def test_our_prepared_call_is_ranked_and_answers_as_the_plain_call_does(restarts
         assert answer.claim == expected.claim
         assert isinstance(solve.call.func, PreparedIK)
     for kind in (ONE_START, RESTARTS):
-        assert PLUMBOB_LM.entry(kind).settings.get("prepared", True)
+        assert PLUMBOB_LM.first(kind).settings.get("prepared", True)
         plain_calls = [e for e in PLUMBOB_LM.entries if e.kind == kind and not
                        e.settings.get("prepared", True)]  # fmt: skip
         assert [entry.note.endswith("plain call") for entry in plain_calls] == [True]
 
 
 def test_every_entry_has_a_name_of_its_own_within_its_kind():
-    names = [(entry.kind, peer.label_of(entry)) for peer in PEERS for entry in peer.entries]
+    names = [(entry.kind, peer.label_of(entry)) for peer in PEERS for entry in peer.runs]
     assert len(set(names)) == len(names)
     assert {kind for kind, _ in names} == {ONE_START, PORTFOLIO, RESTARTS}
 

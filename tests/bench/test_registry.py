@@ -1,6 +1,8 @@
 """What is new takes one file and one line: a step solver, a peer, a table, an experiment."""
 
+import importlib.metadata
 import json
+import subprocess
 import sys
 from dataclasses import replace
 from functools import partial
@@ -14,11 +16,18 @@ from plumbob.bench.experiments.cloth import tables as cloth_tables
 from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.newton import tables as newton_tables
 from plumbob.bench.experiments.robots import tables as robot_tables
+from plumbob.bench.figures.style import COLOURS
 from plumbob.bench.harness import run, timing
 from plumbob.bench.harness.experiment import Experiment
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.peers import registry
-from plumbob.bench.peers.registry import ONE_START, Peer, PeerEntry
+from plumbob.bench.peers import catalogue, ik, packages
+from plumbob.bench.peers.peer import (
+    ONE_START,
+    PORTFOLIO,
+    PORTFOLIO_ITERATIONS,
+    RESTART_ITERATIONS,
+    RESTARTS,
+)
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
 from plumbob.reference import STEP_SOLVERS
@@ -41,8 +50,8 @@ def damped(monkeypatch):
 def test_a_new_step_solver_takes_part_in_every_suite_of_steps():
     for suite, problem in (("cloth", "cloth/x1/one step"), ("newton", "swing/k1000")):
         assert "damped_global" in [b.solver for b in blocks(suite, TINY) if b.problem == problem]
-    assert "Plumbob damped global" in [peer.title for peer in registry.cloth_peers()]
-    assert registry.find("Plumbob damped global").engine == registry.PLUMBOB
+    assert "Plumbob damped global" in [peer.title for peer in catalogue.cloth_peers()]
+    assert catalogue.find("Plumbob damped global").engine == catalogue.PLUMBOB
 
 
 @pytest.mark.usefixtures("damped")
@@ -58,26 +67,28 @@ def test_a_new_step_solver_stands_in_the_tables(make):
     assert certified.rows[0][1] == "damped global"
 
 
-ADAPTER = """
+PEER = """
+from plumbob.bench.peers.peer import ONE_START, Peer, Run
 from plumbob.bench.peers.protocol import SolverOutput
+
+PEER = Peer("Stays put", __name__, "numpy", "MIT", "none", "anything", (Run(ONE_START),))
 
 def prepare(robot, tolerance):
     return lambda request: lambda: SolverOutput(request.start, False)
 """
 
 
-def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(
-    tmp_path, monkeypatch, in_this_process
-):
-    (tmp_path / "stays_put.py").write_text(ADAPTER)
-    monkeypatch.syspath_prepend(tmp_path)
-    line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (PeerEntry(ONE_START),))
-    monkeypatch.setattr(registry, "PEERS", (*registry.PEERS, line))
+def test_a_new_peer_is_a_file_and_stands_in_the_tables(tmp_path, monkeypatch, in_this_process):
+    (tmp_path / "stays_put.py").write_text(PEER)
+    monkeypatch.setattr(ik, "__path__", [*ik.__path__, str(tmp_path)])
+    peers = catalogue._peers(ik.__path__, ik.__name__)
+    assert [peer.title for peer in peers if peer not in catalogue.PEERS] == ["Stays put"]
+    monkeypatch.setattr(catalogue, "PEERS", peers)
     monkeypatch.setattr(timing, "worker_process", in_this_process)
     name = ("robots/character", "Stays put")
     (block,) = [b for b in blocks("ik", TINY) if (b.problem, b.solver) == name]
     record = run.measure(block)
-    monkeypatch.delitem(sys.modules, "stays_put")
+    monkeypatch.delitem(sys.modules, f"{ik.__name__}.stays_put")
     assert not record.failed
     results = Results([record])
     (row,) = robot_tables.robot_by_robot(results).rows
@@ -142,17 +153,12 @@ def test_a_new_experiment_is_a_folder_and_a_line(tmp_path, monkeypatch):
         plumbob.bench.experiments.EXPERIMENTS.remove(line)
 
 
-def test_an_unknown_style_is_one_clear_error():
-    with pytest.raises(ValueError, match="style of 'ours': expected one of first, second"):
-        registry.style_of({"name": "ours", "style": "loud"})
-
-
 def test_portfolios_and_restarts_keep_to_their_iterations():
     """Of ours the attempts are made twice at the most; who has no iterations has a time limit."""
-    limits = {registry.PORTFOLIO: registry.PORTFOLIO_ITERATIONS}
-    limits[registry.RESTARTS] = registry.RESTART_ITERATIONS
-    for peer in registry.PEERS:
-        for entry in peer.entries:
+    limits = {PORTFOLIO: PORTFOLIO_ITERATIONS}
+    limits[RESTARTS] = RESTART_ITERATIONS
+    for peer in catalogue.PEERS:
+        for entry in peer.runs:
             settings, attempts = entry.settings, entry.restarts + 1
             if "iterations" not in settings:
                 continue
@@ -162,12 +168,13 @@ def test_portfolios_and_restarts_keep_to_their_iterations():
             assert total <= limits.get(entry.kind, total), (peer.title, entry)
 
 
-def test_every_solver_has_one_entry_and_every_style_is_its_own():
-    names = [solver.name for solver in registry._solvers()]
+def test_every_solver_has_one_entry_and_every_colour_is_its_own():
+    names = [solver.name for solver in catalogue._solvers()]
     assert len(names) == len(set(names))
-    for known in (registry.ik_solvers(), registry.step_solvers()):
-        styles = [s.style for s in known.values() if s.style != registry.OTHER]
-        assert len(styles) == len(set(styles)) >= 5
+    for known in (catalogue.ik_solvers(), catalogue.step_solvers()):
+        colours = [solver.colour for solver in known.values() if solver.colour]
+        assert len(colours) == len(set(colours)) >= 5
+    assert {solver.colour for solver in catalogue._solvers()} <= {"", *COLOURS}
 
 
 class Installed:
@@ -201,8 +208,28 @@ def test_the_command_that_adds_peers_fits_how_plumbob_was_installed(monkeypatch,
     installed = [Installed(None), Installed(origin)]  # the first as in the folder of a clone
     monkeypatch.setattr("importlib.metadata.distributions", lambda **_: installed)
     monkeypatch.setattr(sys, "prefix", "/a/clone/.venv")
-    registry.peers_command.cache_clear()
+    packages.peers_command.cache_clear()
     try:
-        assert registry.peers_command() == command
+        assert packages.peers_command() == command
     finally:
-        registry.peers_command.cache_clear()
+        packages.peers_command.cache_clear()
+
+
+LOADS = """
+import sys
+from plumbob.bench.peers import catalogue, ik, packages
+
+assert len(catalogue.PEERS) > 10
+print(*(name for name in sys.argv[1:] if name in sys.modules))
+"""
+
+
+def test_the_peers_are_known_without_an_engine():
+    """Tables and lists of blocks are made where no engine is installed."""
+    packages = [peer.package for peer in (*catalogue.PEERS, *catalogue.CLOTH_PEERS)]
+    found = importlib.metadata.packages_distributions()
+    modules = [name for name, owners in found.items() if set(owners) & {*packages} - {"plumbob"}]
+    modules += ["mujoco", "pinocchio", "numba", "matplotlib"]
+    command = [sys.executable, "-c", LOADS, *modules]
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert output.split() == []

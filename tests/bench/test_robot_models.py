@@ -9,7 +9,8 @@ from plumbob.bench.experiments.robot_models.measurement import (
     effector_differences,
 )
 from plumbob.bench.experiments.robot_models.tables import readers
-from plumbob.bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
+from plumbob.bench.peers.catalogue import KINEMATICS, SINGLE_PRECISION
+from plumbob.bench.peers.ik import drake
 from plumbob.bench.problems.robots import CHARACTER, ROBOTS, is_installed
 from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import ROBOT_ENGINES
@@ -87,7 +88,7 @@ def test_the_engine_of_a_peer_puts_effectors_where_we_do(peer, name):
     """Ten rotations in a row round to 1e-15; single precision rounds a metre to 6e-8 each."""
     if not peer.version or not is_installed(name):
         pytest.skip(f"{peer.package} or the robot is not installed")
-    if name == CHARACTER and peer is not DRAKE:
+    if name == CHARACTER and peer is not drake.PEER:
         pytest.skip("takes chains only")
     apart = effector_differences(peer.module, name)
     most = 1e-6 if peer.title in SINGLE_PRECISION else 1e-14
@@ -95,7 +96,7 @@ def test_the_engine_of_a_peer_puts_effectors_where_we_do(peer, name):
 
 
 def test_what_an_engine_does_not_take_is_said_and_what_it_rounds_too(make):
-    peer = next((peer for peer in KINEMATICS if peer.version and peer is not DRAKE), None)
+    peer = next((peer for peer in KINEMATICS if peer.version and peer is not drake.PEER), None)
     if peer is None:
         pytest.skip("none of the engines is installed")
     measured = compare_effectors(peer, CHARACTER)

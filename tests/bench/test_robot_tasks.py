@@ -9,7 +9,8 @@ from table_cells import column
 from plumbob.bench.experiments.robot_tasks import TOLERANCE
 from plumbob.bench.experiments.robot_tasks.measurement import TaskJob, meet
 from plumbob.bench.experiments.robot_tasks.tables import robot_tasks
-from plumbob.bench.peers.registry import ONE_START, PLUMBOB_LM, RESTARTS, TASK_SOLVERS
+from plumbob.bench.peers.catalogue import PLUMBOB_LM, TASK_SOLVERS
+from plumbob.bench.peers.peer import ONE_START, RESTARTS
 from plumbob.bench.problems.evaluate import evaluator_of
 from plumbob.bench.problems.robot_tasks import POSTURE, ROBOT_TASKS, TaskRequest, is_met
 from plumbob.bench.tables.results import Results

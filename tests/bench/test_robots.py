@@ -10,7 +10,7 @@ import pytest
 
 from plumbob.bench.experiments import SCALES
 from plumbob.bench.experiments.robots import UNREACHABLE, measurement
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import catalogue
 from plumbob.bench.problems.evaluate import (
     AGREEMENT,
     MUJOCO,
@@ -232,12 +232,12 @@ def test_a_wrong_arbiter_is_noticed_and_judges_only_its_own_solvers(asked, monke
 
 def test_no_solver_is_evaluated_by_the_engine_that_it_is_built_on():
     on_pinocchio = r"^(?:import|from) (?:pink|pinocchio|roboplan|\.closed_loop|\.placo)"
-    for peer in registry.PEERS:
+    for peer in catalogue.PEERS:
         source = Path(importlib.util.find_spec(peer.module).origin).read_text("utf-8")
         is_on_pinocchio = bool(re.search(on_pinocchio, source, re.MULTILINE))
         assert arbiter_of(peer.built_on) == MUJOCO or not is_on_pinocchio, peer.title
         assert arbiter_of(peer.built_on) != peer.built_on
-    assert arbiter_of(registry.PLUMBOB) == PINOCCHIO
+    assert arbiter_of(catalogue.PLUMBOB) == PINOCCHIO
 
 
 def test_every_robot_is_in_one_list():
@@ -322,6 +322,6 @@ def test_the_solvers_of_a_robot_are_in_random_order(monkeypatch):
 
     orders = order()
     assert len({tuple(solvers) for solvers in orders.values()}) > 1
-    monkeypatch.setattr(registry, "PEERS", registry.PEERS[1:])
+    monkeypatch.setattr(catalogue, "PEERS", catalogue.PEERS[1:])
     for name, solvers in order().items():
         assert [solver for solver in orders[name] if solver in solvers] == solvers

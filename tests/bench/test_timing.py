@@ -28,7 +28,7 @@ from plumbob.bench.experiments.timing.measurement import ROUNDS, SWEEPS, cases
 from plumbob.bench.harness import run
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import catalogue
 from plumbob.bench.problems.robots import is_installed, robot
 from plumbob.crosscheck.engines import SKELETON_ENGINES, MujocoMassSpring
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
@@ -240,8 +240,8 @@ def test_mujoco_is_timed_at_its_default_tolerance_and_shown_at_a_tight_one_with_
         else:
             assert tolerance == 1e-15
     assert 1e-13 > errors[TIGHT] < errors["MuJoCo"] < 1e-7
-    assert registry.find("MuJoCo").ranked
-    assert not registry.find(TIGHT).ranked
+    assert catalogue.find("MuJoCo").ranked
+    assert not catalogue.find(TIGHT).ranked
 
 
 @pytest.mark.usefixtures("compared")

@@ -44,7 +44,7 @@ def test_every_setting_was_tried_and_the_finalists_on_all_targets(search):
 
 def test_the_bench_uses_the_settings_that_the_search_chose(search):
     chosen = dict(tuning.best_trial(search, tuning.trials_of(search, TRIALS, COUNT)).settings)
-    entry = search.peer.entry(search.start)
+    entry = search.peer.first(search.start)
     assert entry.restarts == chosen.pop("bench_restarts", 0)
     assert entry.settings == chosen
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.peers import opening, registry
+from plumbob.bench.peers import catalogue, opening
+from plumbob.bench.peers.peer import RESTARTS
 from plumbob.bench.report.which import solvers_on_robot
 from plumbob.bench.tables.results import Results
 from plumbob.cli.main import run_command
@@ -34,8 +35,8 @@ def table_of(*records):
 
 
 def test_a_solver_has_a_row_with_its_best_settings_and_the_best_is_first(make):
-    pink = next(peer for peer in registry.PEERS if peer.title == "pink")
-    again = pink.label_of(pink.entry(registry.RESTARTS))
+    pink = next(peer for peer in catalogue.PEERS if peer.title == "pink")
+    again = pink.label_of(pink.first(RESTARTS))
     times = np.r_[np.full(190, 1e-5), np.full(10, 1e-3)]
     table = table_of(
         make.solving("mink", 60, seconds=1e-3),
@@ -56,7 +57,7 @@ def test_a_solver_has_a_row_with_its_best_settings_and_the_best_is_first(make):
 
 
 def test_every_solver_is_good_for_something_that_fits_a_line_of_80_letters():
-    uses = [peer.use for peer in registry.PEERS]
+    uses = [peer.use for peer in catalogue.PEERS]
     assert all(0 < len(use) <= 29 for use in uses)
     assert len(set(uses)) == len(uses)
 
@@ -91,7 +92,7 @@ def folder(tmp_path, monkeypatch, in_this_process):
     """A folder with an arm and one whose last joint slides, where only Plumbob is installed."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(opening, "installed", list)
-    monkeypatch.setattr(registry, "PEERS", registry.PEERS[:1])
+    monkeypatch.setattr(catalogue, "PEERS", catalogue.PEERS[:1])
     monkeypatch.setattr("plumbob.bench.harness.timing.worker_process",
                         in_this_process)  # fmt: skip
     for name, kind in (("arm", "revolute"), ("slider", "prismatic")):

@@ -18,8 +18,9 @@ from ...harness.block import Block, Group, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
 from ...peers.axes import REVOLUTION, all_within
+from ...peers.catalogue import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM
+from ...peers.peer import Peer
 from ...peers.protocol import Ask
-from ...peers.registry import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM, Peer
 from ...problems.evaluate import Targets, angle_between, evaluator_of
 from ...problems.robot_targets import STRATA, robot_targets
 from ...problems.robots import ROBOTS, UnableError, is_installed, robot, title

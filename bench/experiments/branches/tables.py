@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...harness.record import Record
-from ...peers.registry import PLUMBOB
+from ...peers.catalogue import PLUMBOB
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Row

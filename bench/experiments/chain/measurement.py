@@ -18,7 +18,7 @@ from ...harness.isolation import JobOutcome, raised
 from ...harness.measure import failure, not_asked
 from ...harness.record import FIRST_TARGETS
 from ...harness.timing import Job, answers, first_targets, times_in_turns
-from ...peers import chain_loops, registry
+from ...peers import catalogue, chain_loops
 from ...peers.entrant import CHAIN_TASK
 from ...peers.protocol import NoAnswerError, describe
 from ...problems import chains
@@ -115,7 +115,7 @@ def _blocks_on(
     """Yield targets for every solver of ours, the loop on each engine, and users' solvers."""
     facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
     adapters: dict[str, dict[str, str]] = {solver: {"solver": solver} for solver in IK_SOLVERS}
-    loops = [loop for loop in registry.LOOPS if loop.engine in SKELETON_ENGINES]
+    loops = [loop for loop in catalogue.LOOPS if loop.engine in SKELETON_ENGINES]
     adapters |= {loop.name: {"engine": loop.engine} for loop in loops}
     for name, settings in adapters.items():
         job = job_of(problem, limits, chain_loops.__name__, settings)
@@ -132,8 +132,8 @@ def blocks_of_users(
     problem: chains.TargetsForSkeleton, limits: SolverLimits, scale: Scale, followed: bool = False
 ) -> Iterator[Block]:
     """Yield targets for each method of users' solvers."""
-    for peer in registry.chain_peers(scale.entrants):
-        settings = {"method": peer.method, **peer.spec}
+    for peer in catalogue.chain_peers(scale.entrants):
+        settings = {**peer.run.settings, **peer.spec}
         job = job_of(problem, limits, peer.module, settings, peer.entrant_name)
         answers = partial(solve_one_by_one, problem, job, limits, followed=followed)
         yield ChainJob(answers, job).block(problem, peer.title, limits).of(peer.entrant)

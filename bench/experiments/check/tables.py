@@ -6,7 +6,7 @@ from plumbob.reference.arguments import distinct_texts
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers.registry import MUJOCO, PINOCCHIO
+from ...peers.catalogue import MUJOCO, PINOCCHIO
 from ...tables.captions import Captions
 from ...tables.layout import Row
 from ...tables.results import counted, listed

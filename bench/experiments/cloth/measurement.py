@@ -15,7 +15,7 @@ from plumbob.reference.mass_spring import damper_forces, lengths, spring_forces
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ...peers import registry
+from ...peers import catalogue
 from . import DAMPERS, FEW, ONE_STEP
 
 STIFFNESS, FACTORS = 100.0, (1, 10, 100)
@@ -57,7 +57,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
     swing = {"h": H, "first": FALLING, "steps": STEPS}
     for factor in FACTORS:
         problem, block = cloth_swing(factor), partial(_block, factor)
-        for solver in registry.followed_step_solvers():
+        for solver in catalogue.followed_step_solvers():
             measure = partial(one_step, problem, solver.name, solver.followed)
             settings = {"h": H, "step": MIDDLE, "iterations": solver.followed}
             yield block(ONE_STEP, solver.name, measure, **settings)

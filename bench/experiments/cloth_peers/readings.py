@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...harness.record import Record
-from ...peers import registry
+from ...peers import catalogue
 from ...tables.results import Results, grouped
 from ...tables.table import words
 
@@ -40,7 +40,7 @@ class Point(NamedTuple):
     @property
     def engine(self) -> str:
         """The engine of its solver."""
-        return registry.find(self.solver).engine
+        return catalogue.find(self.solver).engine
 
     @property
     def seconds(self) -> float:

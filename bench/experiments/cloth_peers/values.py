@@ -11,7 +11,7 @@ class FallWords(Values, frozen=True, kw_only=True):
     cloth: str = ""  # the name of a user's cloth
     rungs: tuple[str, ...] = ()  # the settings, (rung,)
     remarks: tuple[str, ...] = ()  # on each setting, (rung,)
-    kind: str = ""  # how the solver's settings differ, see `registry`
+    kind: str = ""  # how the solver's settings differ, see `Run`
     sweep: int = 1  # the pass over all solvers in which it was measured
 
 

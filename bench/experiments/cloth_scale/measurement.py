@@ -25,14 +25,14 @@ from ...clock import compute_time_of
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
-from ...peers import registry
+from ...peers import catalogue
 
 H, STIFFNESS, ITERATIONS = 1 / 60, 1e4, 10
 # Particles along a side, and the shortest benchmark time [s] at which the cloth is measured.
 SIZES = {32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
 # SuperLU takes 19 s for 100,000 particles, and its time grows faster than their number.
 MAX_SIZE_SCIPY = 316
-SUPERNODAL = registry.SUPERNODAL.name
+SUPERNODAL = catalogue.SUPERNODAL.name
 # Rounds, each of which times all parts once: so many particles in total, within limits.
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 # The plain read goes over this much memory again and again: more than most caches hold [bytes].
@@ -46,7 +46,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for size, seconds in SIZES.items():
         settings: dict[str, Any] = {"particles": size * size, "h": H, "stiffness": STIFFNESS}
         settings["iterations"] = ITERATIONS
-        libraries = registry.FACTORS if size <= MAX_SIZE_SCIPY else (registry.SUPERNODAL,)
+        libraries = catalogue.FACTORS if size <= MAX_SIZE_SCIPY else (catalogue.SUPERNODAL,)
         for library in libraries if scale.seconds >= seconds else ():
             measure_it = partial(in_its_own_process, size, library.name)
             yield Block("cloth_scale", f"cloth/{size}x{size}", library.name, measure_it, settings)

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers import registry
+from ...peers import catalogue
 from ...tables.captions import Captions
 from ...tables.layout import Row
 from ...tables.table import NO_SUMMARY, Summary, words
 
 CAPTIONS = Captions(__file__)
-LABELS = {library.name: library.label for library in registry.FACTORS}
+LABELS = {library.name: library.label for library in catalogue.FACTORS}
 
 
 def _row(record: Record) -> Row:

@@ -16,7 +16,7 @@ from plumbob.reference.implicit_euler.certificate import Certificate, certify
 from plumbob.reference.implicit_euler.objective import Objective
 
 from ...harness.block import Block, Measured, Scale
-from ...peers import registry
+from ...peers import catalogue
 from ..cloth.measurement import TOLERANCE, ClothSwing, integrator_of
 from . import FRAME, FRAMES, GRAVITY, STIFFNESSES
 
@@ -44,7 +44,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """Yield, for each stiffness, every solver to its limit and ten local/global iterations."""
     size = FULL if scale.targets >= _FULL_TARGETS else QUICK
     for stiffness in STIFFNESSES:
-        for name, solver in registry.step_solvers().items():
+        for name, solver in catalogue.step_solvers().items():
             limit = solver.certified
             yield _block(size, stiffness, name, FROM_Y, limit)
             if stiffness >= STIFF and limit >= SLOW:

@@ -16,7 +16,8 @@ from plumbob.reference.formats import mjcf, urdf
 
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Calculation, worker_process
-from ...peers.registry import KINEMATICS, Peer
+from ...peers.catalogue import KINEMATICS
+from ...peers.peer import Peer
 from ...problems.robots import ROBOTS, is_installed, robot, title
 from . import PEERS
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from ...harness.record import Record
-from ...peers import registry
+from ...peers import catalogue
 from ...tables.captions import Captions
 from ...tables.layout import Row
 from ...tables.results import Results, by_problem, counted, grouped, listed, settings
@@ -68,7 +68,7 @@ def _of_robot(record: Record) -> Row:
         "engines": f"{record.solver} {record.values.version}",
         "positions": record.values.positions if record.has_numbers else None,
         "rotations": record.values.rotations if record.has_numbers else None,
-        "remark": record.values.remark or registry.SINGLE_PRECISION.get(record.solver, ""),
+        "remark": record.values.remark or catalogue.SINGLE_PRECISION.get(record.solver, ""),
     }
 
 

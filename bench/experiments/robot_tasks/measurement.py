@@ -11,7 +11,8 @@ import numpy as np
 from ...harness.block import Block, Measured, Scale
 from ...harness.progress import announce
 from ...harness.timing import attempt, restarted
-from ...peers.registry import ONE_START, PLUMBOB, PLUMBOB_LM, RESTARTS, TASK_SOLVERS, Peer
+from ...peers.catalogue import PLUMBOB, PLUMBOB_LM, TASK_SOLVERS
+from ...peers.peer import ONE_START, RESTARTS, Peer
 from ...problems.evaluate import evaluator_of
 from ...problems.robot_tasks import ROBOT_TASKS, TaskRequest, is_met, middle
 from ...problems.robots import HELD_OUT, UnableError, is_installed, robot, seed_of, title
@@ -50,7 +51,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 def meet(job: TaskJob) -> Measured:
     """Ask a solver for all targets; MuJoCo evaluates the answers."""
     announce(f"{job.task}, {job.robot}, {job.peer.title}")
-    arm, task, entry = robot(job.robot), ROBOT_TASKS[job.task], job.peer.entry(job.kind)
+    arm, task, entry = robot(job.robot), ROBOT_TASKS[job.task], job.peer.first(job.kind)
     module, settings = importlib.import_module(job.peer.module), entry.settings
     if job.peer is PLUMBOB_LM:
         settings = {"restarts": settings["restarts"]}

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...harness import metrics
-from ...peers.registry import PLUMBOB_LM, RESTARTS
+from ...peers.catalogue import PLUMBOB_LM
+from ...peers.peer import RESTARTS
 from ...tables.captions import Captions
 from ...tables.layout import Row
 from ...tables.results import Results, grouped, listed
@@ -40,7 +41,7 @@ def _summary(rows: Sequence[Row]) -> Summary:
 _CAPTIONS = Captions(
     __file__,
     tolerance=words(TOLERANCE),
-    restarts=words(PLUMBOB_LM.entry(RESTARTS).settings["restarts"]),
+    restarts=words(PLUMBOB_LM.first(RESTARTS).settings["restarts"]),
 )
 
 robot_tasks = _CAPTIONS.layout(

@@ -13,7 +13,13 @@ from ...figures.sketch import Sketch
 from ...figures.style import COLOURS, plain_label
 from ...harness import metrics
 from ...harness.metrics import Floats
-from ...peers import registry
+from ...peers.peer import (
+    ONE_START,
+    PORTFOLIO_ITERATIONS,
+    RESTART_ITERATIONS,
+    RESTARTS,
+    SHORT_ATTEMPTS,
+)
 from ...problems.evaluate import AGREEMENT
 from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.captions import Captions
@@ -36,10 +42,10 @@ CAPTIONS = Captions(
     limit_tolerance=words(LIMIT_TOLERANCE),
     agreement=words(AGREEMENT),
     repeats=str(REPEATS),
-    portfolio=words(registry.PORTFOLIO_ITERATIONS),
-    restarts=words(registry.RESTART_ITERATIONS),
-    attempts=words(registry.SHORT_ATTEMPTS[0]),
-    short=words(registry.SHORT_ATTEMPTS[1]),
+    portfolio=words(PORTFOLIO_ITERATIONS),
+    restarts=words(RESTART_ITERATIONS),
+    attempts=words(SHORT_ATTEMPTS[0]),
+    short=words(SHORT_ATTEMPTS[1]),
 )
 # The quantities of a map; so many times the shortest time is drawn as the palest.
 SOLVED, TIME, SLOWEST = "poses solved", "time", 1000.0
@@ -237,6 +243,6 @@ FIGURES: tuple[Figure, ...] = (
     *(
         partial(draw, start)
         for draw in (budgets, performance_profiles)
-        for start in (registry.ONE_START, registry.RESTARTS)
+        for start in (ONE_START, RESTARTS)
     ),
 )

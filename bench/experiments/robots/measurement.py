@@ -18,9 +18,9 @@ from ...harness.isolation import JobOutcome, Solved, raised
 from ...harness.measure import not_asked, not_installed
 from ...harness.progress import announce
 from ...harness.timing import Job, Times, answers, first_targets, times_in_turns
-from ...peers import registry
+from ...peers import catalogue
 from ...peers.entrant import ROBOT_TASK
-from ...peers.registry import Peer, PeerEntry
+from ...peers.peer import Peer, Run
 from ...problems.evaluate import AGREEMENT, Targets, Tolerance, arbiter_of, evaluator_of
 from ...problems.robot_targets import (
     SEED,
@@ -53,7 +53,7 @@ class RobotJob(NamedTuple):
 
     robot: str
     peer: Peer
-    entry: PeerEntry
+    entry: Run
     tolerance: Tolerance
     targets: Callable[[], Targets]
     size: int  # how many targets there are
@@ -103,7 +103,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
         if name not in installed:
             absent, facts = partial(not_installed, PACKAGE), _facts(REACHABLE, title(name))
             yield Block(SUITE, f"robots/{name}", "all solvers", absent, _ANY, 0, facts)
-    peers = registry.robot_peers(scale.entrants)
+    peers = catalogue.robot_peers(scale.entrants)
     robots = [*installed, *own]
     groups = ("robots", "unreachable")
     owners = {f"{group}/{name}": problem for name, problem in own.items() for group in groups}
@@ -122,7 +122,7 @@ def _facts(task: str, title: str) -> dict[str, Any]:
 def _blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
     """Yield a solver on installed robots, with each of its settings."""
     count = max(1, round(_TARGETS * scale.targets))
-    for entry in peer.entries:
+    for entry in peer.runs:
         if not peer.is_installed:
             no_targets = partial(robot_targets, "", 0)
             job = RobotJob("", peer, entry, TOLERANCE, no_targets, 0, 0, scale.seed)

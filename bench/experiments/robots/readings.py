@@ -14,8 +14,8 @@ import numpy as np
 from ...harness import metrics
 from ...harness.metrics import Floats, Ranking, Share
 from ...harness.record import FIRST_TARGETS, Record
-from ...peers import registry
-from ...peers.registry import ONE_START, PORTFOLIO, RESTARTS
+from ...peers import catalogue
+from ...peers.peer import ONE_START, PORTFOLIO, RESTARTS
 from ...problems.robot_targets import seed_indices
 from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.results import Results, grouped, listed
@@ -262,7 +262,7 @@ def fields_of(results: Results, start: str, task: str = REACHABLE) -> dict[str, 
 
 def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score]]:
     """Return the solvers with solves on record: registered solvers first, in order."""
-    registered = [peer.label_of(entry) for peer in registry.PEERS for entry in peer.entries]
+    registered = [peer.label_of(entry) for peer in catalogue.PEERS for entry in peer.runs]
     places = {solver: place for place, solver in enumerate(registered)}
     robots = grouped((r for r in records if "solved" in r.arrays), lambda record: record.title)
     for members in robots.values():

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers import registry
-from ...peers.registry import Peer, PeerEntry
+from ...peers import catalogue
+from ...peers.peer import Peer, Run
 from ...tables.columns import words_in
 from ...tables.entered import entrant_table
 from ...tables.layout import Layout, Row
@@ -35,8 +35,8 @@ def _participants(results: Results) -> list[Row]:
     robots = {record.title: record for record in records if "solved" in record.arrays}
     users = {r.solver: _as_peer(r) for r in records if r.facts.get("entrant") is True}
     rows = []
-    for peer in (*registry.PEERS, *users.values()):
-        names = set(map(peer.label_of, peer.entries))
+    for peer in (*catalogue.PEERS, *users.values()):
+        names = set(map(peer.label_of, peer.runs))
         if own := [record for record in records if record.solver in names]:
             rows.append(_participant(peer, own, robots))
     return rows
@@ -45,7 +45,7 @@ def _participants(results: Results) -> list[Row]:
 def _as_peer(record: Record) -> Peer:
     """Return a user's solver in the form of the bench's solvers."""
     door = str(record.facts.get("door", ""))
-    return Peer(record.solver, "", door, "", "", (PeerEntry(record.details.kind),))
+    return Peer(record.solver, "", door, "", "", "", (Run(record.details.kind),))
 
 
 def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Record]) -> Row:
@@ -66,15 +66,16 @@ def _participant(peer: Peer, records: Sequence[Record], robots: Mapping[str, Rec
         "package": peer.package,
         "version": version or "not installed",
         "license": peer.license,
+        "algorithm": peer.algorithm,
         "robots": title_of(robot_names[0], robot_names[1]),
         "solves": peer.can,
-        "entries": listed(list(map(_entry, peer.entries))),
+        "entries": listed(list(map(_entry, peer.runs))),
         "harness overhead, median": _cell(float(np.median(overheads)) if overheads else math.nan),
         "remark": "; ".join(f"{listed(names)}: {reason}" for reason, names in reasons.items()),
     }
 
 
-def _entry(entry: PeerEntry) -> str:
+def _entry(entry: Run) -> str:
     """Return the start of an entry, its note, and who makes its restarts."""
     maker = "made by the bench" if entry.restarts else ""
     notes = "; ".join(filter(None, (entry.note, maker)))
@@ -83,7 +84,7 @@ def _entry(entry: PeerEntry) -> str:
 
 def _participant_summary(rows: Sequence[Row]) -> Summary:
     titles = {row["solver"] for row in rows}
-    missing = [peer.name for peer in registry.PEERS if peer.name not in titles]
+    missing = [peer.name for peer in catalogue.PEERS if peer.name not in titles]
     not_asked = f"; not selected: {', '.join(missing)}" if missing else ""
     count = sum(row["version"] != "not installed" for row in rows)
     robots = rows[0]["robot_records"].values()

@@ -11,11 +11,11 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.backend.compiled import Kernel
 from plumbob.reference.backend.threads import in_slices
 
-from ...peers import registry
+from ...peers import catalogue
 
-COMPILED, PREPARED = registry.COMPILED.name, registry.PREPARED.name
-PLAIN, LIMIT = registry.PLAIN.name, registry.LIMIT.name
-PRESET, TIGHT = registry.PRESET.name, registry.TIGHT.name
+COMPILED, PREPARED = catalogue.COMPILED.name, catalogue.PREPARED.name
+PLAIN, LIMIT = catalogue.PLAIN.name, catalogue.LIMIT.name
+PRESET, TIGHT = catalogue.PRESET.name, catalogue.TIGHT.name
 
 
 class TimedWork(NamedTuple):

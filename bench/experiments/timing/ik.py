@@ -8,7 +8,7 @@ from plumbob.crosscheck.engines import SKELETON_ENGINES, SkeletonEngine
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import IK_SOLVERS, prepare_ik, solve_ik
 
-from ...peers import registry
+from ...peers import catalogue
 from ...peers.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
 from ...problems.chains import chain_targets
 from ..chain.measurement import MAX_ITERATIONS, TOLERANCE
@@ -21,10 +21,10 @@ LIMITS: dict[str, Any] = {"tolerance": TOLERANCE, "max_iterations": MAX_ITERATIO
 # The same method as a Python loop on three kinematics.
 LOOP = "levenberg_marquardt"
 KINEMATICS: dict[str, Callable[[Any], SkeletonEngine]] = {
-    registry.OUR_KINEMATICS.name: ReferenceKinematics,
+    catalogue.OUR_KINEMATICS.name: ReferenceKinematics,
     **{
         loop.name: SKELETON_ENGINES[loop.engine]
-        for loop in registry.LOOPS
+        for loop in catalogue.LOOPS
         if loop.engine in SKELETON_ENGINES
     },
 }
@@ -52,7 +52,7 @@ def cases() -> Iterator[TimedCase]:
 
 
 def _work(stratum: str, solver: str) -> TimedWork:
-    return TimedWork(f"ik/{stratum}/{solver}", "ik", stratum, registry.find(solver).label)
+    return TimedWork(f"ik/{stratum}/{solver}", "ik", stratum, catalogue.find(solver).label)
 
 
 def single_solves(stratum: str, solver: str, count: int) -> Callable[[], Any]:

@@ -12,7 +12,7 @@ from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers import registry
+from ...peers import catalogue
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Layout, Row
@@ -34,7 +34,7 @@ CAPTIONS = Captions(__file__)
 
 def is_ranked(record: Record) -> bool:
     """Return whether an implementation is compared with others."""
-    return registry.find(record.solver).ranked
+    return catalogue.find(record.solver).ranked
 
 
 def median_time(record: Record) -> float:
@@ -122,7 +122,7 @@ def _remarks(record: Record, by_solver: dict[str, Record]) -> Iterator[str]:
     """Yield the error left by a tolerance, the share of setting qpos, and noise."""
     if record.values.error is not None:
         yield f"error {words(record.values.error)}"
-    if record.solver == registry.MUJOCO and (preset := by_solver.get(PRESET)):
+    if record.solver == catalogue.MUJOCO and (preset := by_solver.get(PRESET)):
         share = 1.0 - median_time(preset) / median_time(record)
         yield f"qpos[:] = q takes {100 * share:.0f} %"
     if record.values.noise > PRECISION:

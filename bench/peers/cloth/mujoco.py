@@ -4,18 +4,37 @@
 tolerance of 1e-8; both are settings here. All springs of a flex are alike.
 """
 
-import mujoco
+from typing import Any
+
 import numpy as np
 
-from plumbob.crosscheck.engines import MujocoFlex, MujocoMassSpring
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 
+from ..peer import EXPLICIT, LINEARISED, Peer, Run
 from ..protocol import Mover
+
+PEER = Peer(
+    "MuJoCo",
+    __name__,
+    "mujoco",
+    "Apache-2.0",
+    "semi-implicit Euler, Runge-Kutta, or one linear solve",
+    "particles and springs with dampers",
+    (
+        Run(EXPLICIT, title="MuJoCo Euler"),
+        Run(EXPLICIT, {"integrator": "implicitfast"}, title="MuJoCo implicitfast"),
+        Run(EXPLICIT, {"integrator": "RK4"}, title="MuJoCo RK4"),
+        Run(EXPLICIT, {"flex": True}, title="MuJoCo flex, Euler"),
+        # The default of 100 iterations leaves the linear system of a large cloth unsolved.
+        Run(LINEARISED, {"integrator": "discrete", "iterations": 1000}, title="MuJoCo discrete"),
+    ),
+    engine="MuJoCo",
+)
 
 # A model is built from these; stiffness and damping are set anew every time.
 _BUILT_FROM = ("masses", "springs", "rest_lengths", "tension_only", "pinned", "gravity")
-_engines: dict[tuple[bool, int], tuple[MassSpring, MujocoMassSpring]] = {}
+_engines: dict[tuple[bool, int], tuple[MassSpring, Any]] = {}
 
 
 def prepare(
@@ -28,6 +47,8 @@ def prepare(
     flex: bool = False,
 ) -> Mover:
     """Return MuJoCo, stepping so many times a frame."""
+    import mujoco
+
     engine = _engine(system, flex)
     model, option = engine.model, engine.model.opt
     if flex:
@@ -44,7 +65,7 @@ def prepare(
     return _Steps(engine, substeps)
 
 
-def _engine(system: MassSpring, flex: bool) -> MujocoMassSpring:
+def _engine(system: MassSpring, flex: bool) -> Any:
     """Return the engine of an equal system but for stiffness and damping, or a new engine.
 
     An engine is cached for each number of particles: its construction takes cubic time.
@@ -56,6 +77,8 @@ def _engine(system: MassSpring, flex: bool) -> MujocoMassSpring:
             np.array_equal(getattr(cached, part), getattr(system, part)) for part in _BUILT_FROM
         ):
             return engine
+    from plumbob.crosscheck.engines import MujocoFlex, MujocoMassSpring
+
     engine = MujocoFlex(system) if flex else MujocoMassSpring(system)
     _engines[key] = system, engine
     return engine
@@ -64,7 +87,7 @@ def _engine(system: MassSpring, flex: bool) -> MujocoMassSpring:
 class _Steps:
     """Steps of a MuJoCo model, so many a frame."""
 
-    def __init__(self, engine: MujocoMassSpring, substeps: int) -> None:
+    def __init__(self, engine: Any, substeps: int) -> None:
         self._engine, self._substeps = engine, substeps
 
     def begin(self, state: State) -> None:

@@ -15,37 +15,67 @@ particles' places, and is overwritten. `docs/peers/newton.md` gives the reasons 
 
 from typing import Any
 
-import newton
 import numpy as np
-import warp as wp
-from newton.solvers import SolverSemiImplicit, SolverVBD, SolverXPBD
 
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 
+from ..peer import EXPLICIT, ITERATED, Peer, Run
 from ..protocol import Mover
 
-SOLVERS: dict[str, Any] = {
-    "semi-implicit": SolverSemiImplicit,
-    "VBD": SolverVBD,
-    "XPBD": SolverXPBD,
-}
+PEER = Peer(
+    "Newton engine",
+    __name__,
+    "newton",
+    "Apache-2.0",
+    "vertex block descent, position-based dynamics, semi-implicit Euler",
+    "particles and springs, in single precision",
+    # All numbers were chosen on a tuning cloth (docs/peers/newton.md), but for steps of ten
+    # iterations, ten a frame, which are those of its example of a hanging cloth.
+    (
+        Run(EXPLICIT, {"solver": "semi-implicit"}, title="Newton engine, semi-implicit"),
+        Run(
+            ITERATED,
+            {"solver": "VBD"},
+            title="Newton engine, VBD",
+            ladder=(1, 3, 10, 30, 100, 300, 1000),
+            motion=((10, 10), (20, 5), (40, 2), (40, 5)),
+        ),
+        # Corrections are added, not averaged: only short steps of one iteration stay stable.
+        Run(
+            EXPLICIT,
+            {"solver": "XPBD", "iterations": 1},
+            title="Newton engine, XPBD",
+            motion=((10, 10),),
+        ),
+    ),
+    engine="Newton engine",
+)
+
+SOLVERS = {"semi-implicit": "SolverSemiImplicit", "VBD": "SolverVBD", "XPBD": "SolverXPBD"}
 
 
 def prepare(
     system: MassSpring, frame: float, solver: str = "VBD", substeps: int = 1, **limits: int
 ) -> Mover:
     """Return a solver, stepping so many times a frame, with `iterations` a step if iterative."""
+    import newton.solvers
+    import warp as wp
+
     wp.config.log_level = wp.LOG_ERROR
     with wp.ScopedDevice("cpu"):
         particles = model(system)
-        return _Frames(particles, SOLVERS[solver](particles, **limits), frame / substeps, substeps)
+        kind = getattr(newton.solvers, SOLVERS[solver])
+        return _Frames(particles, kind(particles, **limits), frame / substeps, substeps)
 
 
 class _Frames:
     """Frames of so many steps of a solver of Newton's, captured as a graph."""
 
     def __init__(self, particles: Any, solver: Any, h: float, substeps: int) -> None:
+        import warp as wp
+
+        self._launch = wp.capture_launch
         self._state = now = particles.state()
         following, control = particles.state(), particles.control()
         with wp.ScopedCapture() as capture:
@@ -63,7 +93,7 @@ class _Frames:
         self._state.particle_qd.assign(state.velocities.astype(np.float32))
 
     def advance(self) -> None:
-        wp.capture_launch(self._graph)
+        self._launch(self._graph)
 
     def positions(self) -> FloatArray:
         return np.array(self._state.particle_q.numpy(), dtype=float)
@@ -75,6 +105,9 @@ def model(system: MassSpring) -> Any:
     `ModelBuilder.color` sees triangles and bending edges only: all particles of a model of springs
     would have the same colour.
     """
+    import newton
+    import warp as wp
+
     builder = newton.ModelBuilder(gravity=wp.vec3(*system.gravity))
     nowhere = wp.vec3(0.0, 0.0, 0.0)
     for mass, free in zip(system.masses, system.free, strict=True):

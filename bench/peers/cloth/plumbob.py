@@ -7,9 +7,25 @@ from typing import Any
 from plumbob.reference import ImplicitEuler, MassSpring, State, runge_kutta, symplectic_euler
 from plumbob.reference.arguments import FloatArray
 
+from ..peer import EXPLICIT, Peer, Run
 from ..protocol import Mover
 
-EXPLICIT = {"symplectic_euler": symplectic_euler, "runge_kutta": runge_kutta}
+PEER = Peer(
+    "Plumbob",
+    __name__,
+    "plumbob",
+    "MIT",
+    "implicit Euler by each of its solvers, explicit integrators",
+    "particles and springs with dampers",
+    # The runs of `STEP_SOLVERS` stand in `catalogue`, for other experiments have them too.
+    (
+        Run(EXPLICIT, {"solver": "symplectic_euler"}, title="Plumbob symplectic Euler"),
+        Run(EXPLICIT, {"solver": "runge_kutta"}, title="Plumbob Runge-Kutta"),
+    ),
+    engine="Plumbob",
+)
+
+INTEGRATORS = {"symplectic_euler": symplectic_euler, "runge_kutta": runge_kutta}
 
 
 def prepare(
@@ -25,8 +41,8 @@ def prepare(
     Without a tolerance, the latter makes so many iterations in every step.
     """
     h = frame / substeps
-    if solver in EXPLICIT:
-        return _Steps(partial(EXPLICIT[solver], system, h=h), substeps)
+    if solver in INTEGRATORS:
+        return _Steps(partial(INTEGRATORS[solver], system, h=h), substeps)
     limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": iterations}
     integrator = ImplicitEuler(system, h=h, solver=solver, **limits)
     return _Steps(lambda state: integrator.step(state).state, substeps)

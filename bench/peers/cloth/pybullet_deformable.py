@@ -13,12 +13,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pybullet
 
 from plumbob.reference import ImplicitEuler, MassSpring, State
 from plumbob.reference.arguments import FloatArray, IndexArray
 
+from ..peer import EXPLICIT, Peer, Run
 from ..protocol import Mover
+
+PEER = Peer(
+    "PyBullet deformable",
+    __name__,
+    "pybullet",
+    "Zlib",
+    "semi-implicit Euler",
+    "square cloths of equal undamped springs",
+    (Run(EXPLICIT, title="PyBullet deformable, Euler"),),
+    engine="PyBullet",
+)
 
 # The length [s] of the step to set velocities, and its gravity in units of the fastest velocity.
 # Then the length [s] and number of the steps of implicit Euler to find its start.
@@ -82,6 +93,9 @@ class _Body:
     def __init__(
         self, text: str, flat: FloatArray, pins: tuple[int, ...], mass: float, stiffness: float
     ) -> None:
+        import pybullet
+
+        self._engine: Any = pybullet
         self._client: Any = pybullet.connect(pybullet.DIRECT)
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=self._client)
         springs = {"useMassSpring": 1, "springElasticStiffness": stiffness}
@@ -98,22 +112,22 @@ class _Body:
         self.step()
 
     def __del__(self) -> None:
-        pybullet.disconnect(self._client)
+        self._engine.disconnect(self._client)
 
     def positions(self) -> FloatArray:
-        flags = {"flags": pybullet.MESH_DATA_SIMULATION_MESH, "physicsClientId": self._client}
-        return np.array(pybullet.getMeshData(self._number, -1, **flags)[1])
+        flags = {"flags": self._engine.MESH_DATA_SIMULATION_MESH, "physicsClientId": self._client}
+        return np.array(self._engine.getMeshData(self._number, -1, **flags)[1])
 
     def write(self, positions: FloatArray) -> None:
         """Put the particles elsewhere with the same velocities."""
-        pybullet.resetMeshData(self._number, positions.tolist(), physicsClientId=self._client)
+        self._engine.resetMeshData(self._number, positions.tolist(), physicsClientId=self._client)
 
     def set(self, gravity: FloatArray, h: float) -> None:
-        pybullet.setGravity(*gravity.tolist(), physicsClientId=self._client)
-        pybullet.setTimeStep(h, physicsClientId=self._client)
+        self._engine.setGravity(*gravity.tolist(), physicsClientId=self._client)
+        self._engine.setTimeStep(h, physicsClientId=self._client)
 
     def step(self) -> None:
-        pybullet.stepSimulation(self._client)
+        self._engine.stepSimulation(self._client)
 
 
 @functools.lru_cache(maxsize=1)

@@ -4,10 +4,30 @@ The error is bounded by a cube within the ball of tolerance, and so is a rotatio
 the joints' limits. DART's own restarts draw from a generator without a seed, and are left out.
 """
 
-import dartpy
+from typing import Any
+
 import numpy as np
 
+from ..peer import ONE_START, Peer, Run, restarted, short_attempts
 from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+
+# The search chose these on the tuning robots (docs/peers/index.md).
+_SETTINGS = {"clamp": 0.5, "length": 1.0, "weight": 1.0}
+PEER = Peer(
+    "DART",
+    __name__,
+    "dartpy",
+    "BSD-2-Clause",
+    "gradient descent with damped least-squares steps",
+    "poses and limits of one chain of hinges",
+    (
+        Run(ONE_START, {"iterations": 500, "clamp": 1.0, "length": 1.0, "weight": 1.0}),
+        short_attempts(_SETTINGS),
+        restarted(50, _SETTINGS),
+    ),
+    use="robots simulated in DART",
+    kinematics=True,
+)
 
 
 def prepare(
@@ -23,6 +43,8 @@ def prepare(
     A step is clamped to `clamp` for each joint [rad] and the error to `length`; `weight` is the
     weight of angles.
     """
+    import dartpy
+
     skeleton = dart_skeleton(robot)
     ik = skeleton.getBodyNode(robot.effectors[0]).getIK(True)
     target_frame = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "target")
@@ -61,13 +83,15 @@ def kinematics(robot: BenchRobot) -> Forward:
     return pose
 
 
-def dart_skeleton(robot: BenchRobot) -> dartpy.dynamics.Skeleton:
+def dart_skeleton(robot: BenchRobot) -> Any:
     """Return a chain in DART, its root fixed in the world.
 
     Raises:
         UnableError: if the robot is no chain.
         ValueError: if DART does not read it, or orders the joints otherwise.
     """
+    import dartpy
+
     robot.require_chain()
     loader, options = dartpy.utils.DartLoader(), dartpy.utils.DartLoaderOptions()
     options.mDefaultRootJointType = dartpy.utils.DartLoaderRootJointType.FIXED

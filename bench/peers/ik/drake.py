@@ -11,23 +11,37 @@ import logging
 from typing import Any
 
 import numpy as np
-from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-from pydrake.multibody.inverse_kinematics import InverseKinematics
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame
-from pydrake.solvers import IpoptSolver, NloptSolver, SnoptSolver, SolverOptions
 
 from ...clock import library
+from ..peer import ONE_START, Peer, Run, restarted, short_attempts
 from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+
+_SETTINGS = {"feasibility": 1e-8, "inside": 0.5, "centring": 0.0}
+_SNOPT = {"solver": "SNOPT", **_SETTINGS}
+PEER = Peer(
+    "Drake",
+    __name__,
+    "drake",
+    "BSD-3-Clause",
+    "nonlinear programs by IPOPT (interior point) or SNOPT (SQP)",
+    "poses, positions and limits of several effectors, balls, these by three angles",
+    (
+        # The search chose IPOPT (docs/peers/drake.md); SNOPT is Drake's default.
+        Run(ONE_START, {"solver": "IPOPT", "iterations": 200, **_SETTINGS}, "IPOPT"),
+        Run(ONE_START, {"iterations": 200, **_SNOPT}, "SNOPT"),
+        short_attempts(_SNOPT, "SNOPT, {}"),
+        restarted(50, _SNOPT, "SNOPT, {}"),
+    ),
+    use="constraints beside the pose",
+    kinematics=True,
+)
 
 METERED = True
 # A solver, and its names for the tolerance on constraints and the maximum of iterations.
-SOLVERS: dict[str, tuple[Any, str, str]] = {
-    "SNOPT": (SnoptSolver, "Major feasibility tolerance", "Major iterations limit"),
-    "IPOPT": (IpoptSolver, "constr_viol_tol", "max_iter"),
-    "NLopt": (NloptSolver, "constraint_tol", "max_eval"),
+SOLVERS = {
+    "SNOPT": ("SnoptSolver", "Major feasibility tolerance", "Major iterations limit"),
+    "IPOPT": ("IpoptSolver", "constr_viol_tol", "max_iter"),
+    "NLopt": ("NloptSolver", "constraint_tol", "max_eval"),
 }
 
 
@@ -46,12 +60,15 @@ def prepare(
     bench's tolerance. `centring` is the weight of the squared distance from the middle of the
     limits, which is then the objective.
     """
+    from pydrake import solvers
+    from pydrake.math import RigidTransform, RotationMatrix
+
     logging.getLogger("drake").setLevel(logging.ERROR)  # IPOPT gives advice at each failure
     plant, frames = drake_plant(robot)
     part = Tolerance(inside * tolerance.position, inside * tolerance.rotation)
     ik, coordinates = _program(robot, plant, frames, part, centring), _Coordinates(robot, plant)
     kind, feasibility_name, iterations_name = SOLVERS[solver]
-    engine, options = kind(), SolverOptions()
+    engine, options = getattr(solvers, kind)(), solvers.SolverOptions()
     options.SetOption(engine.solver_id(), feasibility_name, feasibility)
     options.SetOption(engine.solver_id(), iterations_name, iterations)
     context, program, run = ik.get_mutable_context(), ik.prog(), library(engine.Solve)
@@ -89,6 +106,11 @@ def kinematics(robot: BenchRobot) -> Forward:
 
 def drake_plant(robot: BenchRobot) -> tuple[Any, list[Any]]:
     """Return the robot in Drake, its root fixed in the world, and a frame for each target."""
+    from pydrake.math import RigidTransform
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.multibody.tree import FixedOffsetFrame
+
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModelsFromString(robot.text, "urdf" if robot.is_chain else "xml")
     world = plant.world_frame()
@@ -106,6 +128,9 @@ def _program(
     robot: BenchRobot, plant: Any, targets: list[Any], tolerance: Tolerance, centring: float
 ) -> Any:
     """Return the program, with positions bounded in a cube within the ball of tolerance."""
+    from pydrake.math import RotationMatrix
+    from pydrake.multibody.inverse_kinematics import InverseKinematics
+
     ik, identity = InverseKinematics(plant, True), RotationMatrix()
     side = np.full(3, tolerance.position / np.sqrt(3.0))
     for effector, target in zip(map(plant.GetFrameByName, robot.effectors), targets, strict=True):
@@ -133,6 +158,9 @@ class _Coordinates:
             index += 4 if index in robot.balls else 1
 
     def to_drake(self, q: FloatArray) -> FloatArray:
+        from pydrake.common.eigen_geometry import Quaternion
+        from pydrake.math import RollPitchYaw
+
         converted = np.zeros(self._drake_size)
         for index, offset in self._hinges:
             converted[offset] = q[index]
@@ -142,6 +170,8 @@ class _Coordinates:
         return converted
 
     def from_drake(self, converted: FloatArray) -> FloatArray:
+        from pydrake.math import RollPitchYaw
+
         q = np.zeros(self._size)
         for index, offset in self._hinges:
             q[index] = converted[offset]

@@ -10,11 +10,23 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from eaik.pybindings import EAIK
 
 from ...problems.robots import UnableError
 from ..axes import axes_at_zero, first_within
+from ..peer import RESTARTS, Peer, Run
 from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+
+PEER = Peer(
+    "EAIK",
+    __name__,
+    "eaik",
+    "BSD-3-Clause",
+    "closed forms by subproblem decomposition",
+    "poses of six hinges or fewer, analytically; timed without the choice of a solution",
+    (Run(RESTARTS, note="all solutions, no start"),),
+    use="all solutions of six hinges",
+    lists_all=True,
+)
 
 MAXIMUM_HINGES = 6
 
@@ -46,6 +58,8 @@ def _asking(robot: BenchRobot, choose: Callable[[FloatArray], Any]) -> Ask:
 
 
 def _engine_of(robot: BenchRobot) -> Any:
+    from eaik.pybindings import EAIK
+
     robot.require_chain()
     axes, offsets, rotation = axes_at_zero(robot)
     if len(axes) > MAXIMUM_HINGES:

@@ -7,10 +7,22 @@ import warnings
 from functools import partial
 from typing import Any
 
-import ikpy.chain
 import numpy as np
 
+from ..peer import ONE_START, Peer, Run
 from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+
+PEER = Peer(
+    "ikpy",
+    __name__,
+    "ikpy",
+    "Apache-2.0",
+    "SciPy's least squares within bounds",
+    "poses and limits of one chain of hinges; makes no claims",
+    # Its own optimizer with SciPy's tolerances: the search found nothing better.
+    (Run(ONE_START, {"optimizer": "least_squares", "precision": 0.0, "method": ""}),),
+    use="plain Python, no engine",
+)
 
 
 def prepare(
@@ -25,6 +37,8 @@ def prepare(
     `precision` is the precision of its optimizer, if any, `method` a method of the optimizer in
     SciPy.
     """
+    import ikpy.chain
+
     robot.require_chain()
     with robot.file() as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")

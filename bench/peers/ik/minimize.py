@@ -6,14 +6,29 @@ of both. Its unknowns are coordinates, not rotations, so only hinges are possibl
 
 from typing import Any
 
-import mujoco
 import numpy as np
-from mujoco import minimize
 
 from ...problems.evaluate import mujoco_model
+from ..peer import ONE_START, Peer, Run, restarted, short_attempts
 from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
-SILENT = minimize.Verbosity.SILENT
+PEER = Peer(
+    "mujoco.minimize",
+    __name__,
+    "mujoco",
+    "Apache-2.0",
+    "damped Gauss-Newton within bounds",
+    "poses and limits of one chain of hinges",
+    (
+        # The authors' defaults: the search found nothing better from one start.
+        Run(ONE_START, {"iterations": 100, "minimum": 1e-6, "factor": 10.0**0.1, "scale": ""}),
+        # A damping that falls faster needs fewer iterations.
+        short_attempts({"minimum": 1e-6, "factor": 2.0}),
+        restarted(30, {"minimum": 1e-6, "factor": 2.0}),
+    ),
+    built_on="MuJoCo",
+    use="own residuals on MuJoCo",
+)
 
 
 def prepare(
@@ -29,9 +44,11 @@ def prepare(
     `minimum` is the least damping, `factor` the change of damping, `scale` the rule for
     coordinates.
     """
+    from mujoco import minimize
+
     robot.require_chain()
     bounds = [robot.lower[:, None], robot.upper[:, None]]
-    options: dict[str, Any] = {"max_iter": iterations, "verbose": SILENT}
+    options: dict[str, Any] = {"max_iter": iterations, "verbose": minimize.Verbosity.SILENT}
     options |= {"mu_min": minimum, "mu_factor": factor, "x_scale": scale or None}
     reach = _Reach(robot)
 
@@ -55,20 +72,22 @@ class _Reach:
     """The displacement and rotation vector of the effector from its current target."""
 
     def __init__(self, robot: BenchRobot) -> None:
-        self._model = mujoco_model(robot)
+        import mujoco
+
+        self._mujoco, self._model = mujoco, mujoco_model(robot)
         self._data = mujoco.MjData(self._model)
         self._effector = self._model.body(robot.effectors[0]).id
         self._position, self._rotation = np.zeros(3), np.zeros(4)
 
     def aim(self, position: FloatArray, rotation: FloatArray) -> None:
         self._position = position
-        mujoco.mju_mat2Quat(self._rotation, rotation.ravel())
+        self._mujoco.mju_mat2Quat(self._rotation, rotation.ravel())
 
     def residual(self, q: FloatArray) -> FloatArray:
         """Return displacement [m] and rotation vector [rad], (6,)."""
         self._update_kinematics(q)
         rotation_vector = np.empty(3)
-        mujoco.mju_subQuat(rotation_vector, self._rotation, self._data.xquat[self._effector])
+        self._mujoco.mju_subQuat(rotation_vector, self._rotation, self._data.xquat[self._effector])
         return np.concatenate([self._data.xpos[self._effector] - self._position, rotation_vector])
 
     def residuals(self, columns: FloatArray) -> FloatArray:
@@ -78,15 +97,15 @@ class _Reach:
     def jacobian(self, q: FloatArray, _: FloatArray) -> FloatArray:
         """Return the residual's derivative, (6, coordinate)."""
         self._update_kinematics(q.ravel())
-        mujoco.mj_comPos(self._model, self._data)
+        self._mujoco.mj_comPos(self._model, self._data)
         linear, angular = np.empty((2, 3, self._model.nv))
-        mujoco.mj_jacBody(self._model, self._data, linear, angular, self._effector)
+        self._mujoco.mj_jacBody(self._model, self._data, linear, angular, self._effector)
         slope = np.empty((3, 3))
-        mujoco.mjd_subQuat(self._rotation, self._data.xquat[self._effector], None, slope)
+        self._mujoco.mjd_subQuat(self._rotation, self._data.xquat[self._effector], None, slope)
         # The derivative is by rotation vectors in the effector's frame, J is in the world's.
         R = self._data.xmat[self._effector].reshape(3, 3)
         return np.vstack([linear, slope @ R.T @ angular])
 
     def _update_kinematics(self, q: FloatArray) -> None:
         self._data.qpos[:] = q
-        mujoco.mj_kinematics(self._model, self._data)
+        self._mujoco.mj_kinematics(self._model, self._data)

@@ -9,12 +9,33 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import mink
-
 from ...problems.evaluate import evaluator_of, mujoco_model
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
 from ..differential import PhasedReach, meeting, reaching
+from ..peer import ONE_START, PORTFOLIO, Peer, Run, restarted, short_attempts
 from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+
+# The search chose these on the tuning robots (docs/peers/mink.md).
+_SETTINGS = {"damping": 1e-12, "lm_damping": 0.001, "gain": 1.0, "limit_gain": 0.95}
+_CAUTIOUS = {**_SETTINGS, "limit_gain": 0.5}
+PEER = Peer(
+    "mink",
+    __name__,
+    "mink",
+    "Apache-2.0",
+    "differential inverse kinematics by quadratic programs",
+    "poses, positions and limits of several effectors, balls",
+    (
+        Run(ONE_START, {"iterations": 200, **_CAUTIOUS}),
+        # Our phases, which need no random poses.
+        Run(PORTFOLIO, {"iterations": 100, **_CAUTIOUS, "phases": 8}, "eight phases"),
+        short_attempts(_SETTINGS),
+        restarted(25, _SETTINGS),
+    ),
+    built_on="MuJoCo",
+    use="task loops on MuJoCo",
+    takes_tasks=True,
+)
 
 METERED = True
 
@@ -30,6 +51,8 @@ def prepare(
     phases: int = 1,
 ) -> Ask:
     """Return the solver, set up for a robot."""
+    import mink
+
     configuration = mink.Configuration(mujoco_model(robot))
     limits, cost = [mink.ConfigurationLimit(configuration.model, limit_gain)], float(robot.oriented)
     tasks = [
@@ -40,13 +63,9 @@ def prepare(
     options: dict[str, Any] = {"damping": damping, "limits": limits}
     reach: Callable[..., bool] = reaching(mink.solve_ik, configuration, tasks, *goal, **options)
     if phases > 1:
-        all_tasks, phased_goal = (
-            (*tasks, mink.PostureTask(configuration.model, 0.0)),
-            (*goal, phases),
-        )
-        reach = PhasedReach(
-            mink.solve_ik, configuration, all_tasks, _rotated, phased_goal, **options
-        )
+        parts = (*tasks, mink.PostureTask(configuration.model, 0.0))
+        phased = (parts, _rotated, (*goal, phases))
+        reach = PhasedReach(mink.solve_ik, configuration, *phased, **options)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [
@@ -60,7 +79,8 @@ def prepare(
 
 
 def _rotated(target: Any, R: FloatArray) -> Any:
-    return target @ mink.SE3.from_rotation(mink.SO3.from_matrix(R))
+    rotation = type(target.rotation()).from_matrix(R)
+    return target @ type(target).from_rotation(rotation)
 
 
 def prepare_task(
@@ -73,6 +93,8 @@ def prepare_task(
     **gains: float,
 ) -> Callable[[TaskRequest], Solve]:
     """Return the solver of a task, set up for an arm."""
+    import mink
+
     configuration = mink.Configuration(mujoco_model(robot))
     limits = [mink.ConfigurationLimit(configuration.model, limit_gain)]
     parts = [_task(robot, part, configuration.model, gains) for part in task.parts]
@@ -82,6 +104,8 @@ def prepare_task(
 
 
 def _task(robot: BenchRobot, part: TaskPart, model: Any, gains: dict[str, float]) -> Any:
+    import mink
+
     frame = (robot.effectors[0], "body")
     match part.kind:
         case "look_at":

@@ -13,12 +13,33 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import pink
 
 from ...problems.evaluate import evaluator_of, from_pinocchio, pinocchio_model, to_pinocchio
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
 from ..differential import PhasedReach, meeting, reaching
+from ..peer import ONE_START, PORTFOLIO, Peer, Run, restarted, short_attempts
 from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance, UnableError
+
+# The search chose these on the tuning robots (docs/peers/pink.md).
+_SETTINGS = {"damping": 1e-6, "lm_damping": 0.0, "gain": 1.0, "limit_gain": 0.5}
+PEER = Peer(
+    "pink",
+    __name__,
+    "pin-pink",
+    "Apache-2.0",
+    "differential inverse kinematics by quadratic programs",
+    "poses, positions and limits of several effectors, balls",
+    (
+        Run(ONE_START, {"iterations": 200, **_SETTINGS}),
+        # Our phases, which need no random poses.
+        Run(PORTFOLIO, {"iterations": 100, **_SETTINGS, "phases": 8}, "eight phases"),
+        short_attempts(_SETTINGS),
+        restarted(25, _SETTINGS),
+    ),
+    built_on="Pinocchio",
+    use="task loops on Pinocchio",
+    takes_tasks=True,
+)
 
 METERED = True
 
@@ -34,6 +55,8 @@ def prepare(
     phases: int = 1,
 ) -> Ask:
     """Return the solver, set up for a robot."""
+    import pink
+
     configuration, cost = _configuration(robot), float(robot.oriented)
     limits = [pink.limits.ConfigurationLimit(configuration.model, limit_gain)]
     tasks = [pink.FrameTask(effector, 1.0, cost, lm_damping, gain) for effector in robot.effectors]
@@ -41,11 +64,9 @@ def prepare(
     options: dict[str, Any] = {"damping": damping, "limits": limits, "safety_break": False}
     reach: Callable[..., bool] = reaching(pink.solve_ik, configuration, tasks, *goal, **options)
     if phases > 1:
-        posture = pink.PostureTask(np.zeros(configuration.model.nv))
-        all_tasks, phased_goal = (*tasks, posture), (*goal, phases)
-        reach = PhasedReach(
-            pink.solve_ik, configuration, all_tasks, _rotated, phased_goal, **options
-        )
+        parts = (*tasks, pink.PostureTask(np.zeros(configuration.model.nv)))
+        phased = (parts, _rotated, (*goal, phases))
+        reach = PhasedReach(pink.solve_ik, configuration, *phased, **options)
 
     def ask(request: PoseRequest) -> Solve:
         targets = [pink.configuration.pin.SE3(R, x) for x, R in request.poses]
@@ -56,7 +77,7 @@ def prepare(
 
 
 def _rotated(target: Any, R: FloatArray) -> Any:
-    return target * pink.configuration.pin.SE3(R, np.zeros(3))
+    return target * type(target)(R, np.zeros(3))
 
 
 def prepare_task(
@@ -73,6 +94,8 @@ def prepare_task(
     Raises:
         UnableError: if pink has no such task.
     """
+    import pink
+
     configuration = _configuration(robot)
     limits = [pink.limits.ConfigurationLimit(configuration.model, limit_gain)]
     parts = [_task(robot, part, gains) for part in task.parts]
@@ -82,6 +105,8 @@ def prepare_task(
 
 
 def _configuration(robot: BenchRobot) -> Any:
+    import pink
+
     logging.getLogger().setLevel(logging.ERROR)  # it warns of each step beyond a limit
     model = pinocchio_model(robot)
     start = pink.configuration.pin.neutral(model)
@@ -89,6 +114,8 @@ def _configuration(robot: BenchRobot) -> Any:
 
 
 def _task(robot: BenchRobot, part: TaskPart, gains: dict[str, float]) -> Any:
+    import pink
+
     match part.kind:
         case "look_at":
             raise UnableError("has no task to look at a point")

@@ -26,8 +26,29 @@ from ...problems.robot_tasks import (
     middle,
 )
 from ...problems.robots import UnableError
+from ..packages import environment_python
+from ..peer import ONE_START, Peer, Run, restarted, short_attempts
 from ..protocol import Ask, BenchRobot, OwnTime, SolverOutput, Tolerance
-from ..registry import environment_python
+
+# The search chose these on the tuning robots (docs/peers/index.md).
+_SETTINGS = {"regularization": 1e-4, "weight": 0.3}
+PEER = Peer(
+    "PlaCo",
+    __name__,
+    "placo",
+    "MIT",
+    "differential inverse kinematics by quadratic programs",
+    "poses and limits of one chain of hinges",
+    (
+        Run(ONE_START, {"iterations": 200, "regularization": 1e-3, "weight": 0.3}),
+        short_attempts(_SETTINGS),
+        restarted(25, _SETTINGS),
+    ),
+    environment="placo",
+    built_on="Pinocchio",
+    use="whole-body tasks",
+    takes_tasks=True,
+)
 
 METERED = True
 PROGRAM = Path(__file__).parents[1] / "placo_program.py"

@@ -31,7 +31,31 @@ from ...problems.robot_tasks import (
     first_link,
     middle,
 )
+from ..peer import ONE_START, PORTFOLIO, RESTARTS, Peer, Run
 from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+
+# `restarts` are at the most: the search found that more of them gain nothing (docs/peers/index.md).
+_LM = {"solver": "levenberg_marquardt", "iterations": 100}
+_FIRST_PHASE = {**_LM, "restarts": 0, "phases": 1}
+PEER = Peer(
+    "Plumbob LM",
+    __name__,
+    "plumbob",
+    "MIT",
+    "Levenberg-Marquardt within limits, in phases",
+    "poses, positions and limits of several effectors, balls",
+    (
+        Run(ONE_START, _FIRST_PHASE, "first phase"),
+        Run(PORTFOLIO, {**_LM, "restarts": 0, "phases": 8}, "eight phases"),
+        Run(RESTARTS, {**_LM, "restarts": 14}, "14 restarts"),
+        # The cost of a call without preparation.
+        Run(ONE_START, {**_FIRST_PHASE, "prepared": False}, "first phase, plain call"),
+        Run(RESTARTS, {**_LM, "restarts": 14, "prepared": False}, "14 restarts, plain call"),
+    ),
+    use="many solves from Python",
+    lists_all=True,
+    takes_tasks=True,
+)
 
 
 def prepare(

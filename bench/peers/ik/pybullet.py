@@ -13,9 +13,32 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import pybullet
 
+from ..peer import ONE_START, Peer, Run, restarted, short_attempts
 from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+
+# The search chose these on the tuning robots (docs/peers/index.md).
+_SETTINGS = {"damping": 1e-3, "inside": 0.1}
+PEER = Peer(
+    "PyBullet",
+    __name__,
+    "pybullet",
+    "Zlib",
+    "damped least squares",
+    "poses of one chain of hinges; limits only as a pull in the null space, with which it hardly "
+    "arrives and oversteps them all the same; makes no claims",
+    (
+        Run(ONE_START, {"iterations": 200, "damping": 1e-4, "inside": 0.1}, "limits left out"),
+        # As its manual has limits.
+        Run(ONE_START, {"limits": True}, "limits in the null space"),
+        # Without a claim of its own, another attempt has no reason.
+        short_attempts({"check": True, **_SETTINGS}, "{}, its answer checked by us"),
+        restarted(20, {"check": True, **_SETTINGS}, "{}, its answer checked by us"),
+    ),
+    use="robots in PyBullet",
+    kinematics=True,
+    precision="reads the file, and gives poses, in single precision",
+)
 
 
 def prepare(
@@ -48,7 +71,7 @@ def prepare(
         start = request.start.tolist()
         poses = {"currentPositions": start} | ({"restPoses": start} if limits else {})
         target = body.number, body.effector, *pose
-        solve = partial(pybullet.calculateInverseKinematics, *target, **poses, **options)
+        solve = partial(body.engine.calculateInverseKinematics, *target, **poses, **options)
 
         def read(q: tuple[float, ...]) -> tuple[tuple[float, ...], bool | None]:
             return q, body.is_at(q, request, tolerance) if check else None
@@ -67,6 +90,7 @@ class BulletBody:
     """A robot in PyBullet.
 
     Attributes:
+        engine: PyBullet.
         client: of the physics server.
         number: of the body there.
         effector: the index of its link.
@@ -74,8 +98,10 @@ class BulletBody:
 
     def __init__(self, robot: BenchRobot) -> None:
         """Load the robot; fixed joints have links of their own."""
+        import pybullet
+
         robot.require_chain()
-        self.client = _client()
+        self.engine, self.client = pybullet, _client()
         with robot.file() as file:
             self.number = pybullet.loadURDF(file, useFixedBase=True, physicsClientId=self.client)
         joints = range(pybullet.getNumJoints(self.number, physicsClientId=self.client))
@@ -86,12 +112,12 @@ class BulletBody:
     def forward(self, q: Sequence[float] | FloatArray) -> FloatArray:
         """Return the effector's transform, (4, 4)."""
         for joint, angle in zip(self._joints, q, strict=True):
-            pybullet.resetJointState(self.number, joint, angle, physicsClientId=self.client)
-        state = pybullet.getLinkState(
+            self.engine.resetJointState(self.number, joint, angle, physicsClientId=self.client)
+        state = self.engine.getLinkState(
             self.number, self.effector, computeForwardKinematics=True, physicsClientId=self.client
         )
         T = np.eye(4)
-        T[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(state[5]), (3, 3))
+        T[:3, :3] = np.reshape(self.engine.getMatrixFromQuaternion(state[5]), (3, 3))
         T[:3, 3] = state[4]
         return T
 
@@ -105,4 +131,6 @@ class BulletBody:
 
 @functools.cache
 def _client() -> int:
+    import pybullet
+
     return int(pybullet.connect(pybullet.DIRECT))

@@ -6,12 +6,33 @@ solutions keep limits to 1e-6 only, so joints are clamped, as its users would.
 """
 
 from math import hypot
+from typing import Any
 
 import numpy as np
-from roboplan import core, optimal_ik
 
 from ...clock import library
+from ..peer import ONE_START, Peer, Run, restarted, short_attempts
 from ..protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance
+
+# The search chose these on the tuning robots (docs/peers/index.md).
+_LIMITS = {"gain": 1.0, "limit_gain": 0.5}
+_SETTINGS = {"damping": 1e-12, "lm_damping": 0.0, **_LIMITS}
+PEER = Peer(
+    "roboplan OInK",
+    __name__,
+    "roboplan-oink",
+    "MIT",
+    "differential inverse kinematics by quadratic programs",
+    "poses and limits of one chain of hinges",
+    (
+        Run(ONE_START, {"iterations": 200, "damping": 1e-6, "lm_damping": 0.001, **_LIMITS}),
+        short_attempts(_SETTINGS),
+        restarted(25, _SETTINGS),
+    ),
+    built_on="Pinocchio",
+    use="task loops in C++",
+    kinematics=True,
+)
 
 METERED = True
 GROUP = "arm"
@@ -27,6 +48,8 @@ def prepare(
     limit_gain: float = 1.0,
 ) -> Ask:
     """Return the solver, set up for a robot."""
+    from roboplan import core, optimal_ik
+
     scene = scene_of(robot)
     oink, frames = optimal_ik.Oink(scene, GROUP), (robot.effectors[0], robot.root)
     pose = core.CartesianConfiguration(robot.root, robot.effectors[0], np.eye(4))
@@ -71,13 +94,15 @@ def kinematics(robot: BenchRobot) -> Forward:
     return lambda q: scene.forwardKinematics(q, *frames)
 
 
-def scene_of(robot: BenchRobot) -> core.Scene:
+def scene_of(robot: BenchRobot) -> Any:
     """Return a scene with the chain, its joints in a group.
 
     Raises:
         UnableError: if the robot is no chain.
         ValueError: if its joints are ordered otherwise.
     """
+    from roboplan import core
+
     robot.require_chain()
     scene = core.Scene(robot.name, core.loadUrdfSceneDescriptionFromXml(robot.text))
     robot.check_order("roboplan", scene.getJointNames())

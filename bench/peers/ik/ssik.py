@@ -15,10 +15,23 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from ssik import cli
 
 from ...problems.robots import UnableError
+from ..peer import RESTARTS, Peer, Run
 from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance, describe
+
+PEER = Peer(
+    "ssik",
+    __name__,
+    "ssik",
+    "BSD-3-Clause",
+    "closed forms, with a search over a seventh hinge",
+    "poses and limits of six or seven hinges, analytically; in a module that it builds for an arm",
+    (Run(RESTARTS, note="nearest solution"),),
+    use="exact, six or seven hinges",
+    kinematics=True,
+    lists_all=True,
+)
 
 # Arms whose modules take ssik more than seven minutes of processor time.
 LONG_BUILDS = ("baxter", "tiago_pro")
@@ -72,6 +85,8 @@ def built_solver(robot: BenchRobot) -> ModuleType:
 
 @cache  # a build takes up to minutes, and a second one in a process may fail
 def _built(text: str, root: str, effector: str) -> ModuleType:
+    from ssik import cli
+
     with tempfile.TemporaryDirectory() as folder:
         path, urdf = Path(folder, "arm_ik.py"), Path(folder, "robot.urdf")
         urdf.write_text(text, encoding="utf-8")

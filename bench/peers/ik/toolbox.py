@@ -11,12 +11,25 @@ from typing import Any
 import numpy as np
 
 from ...problems.robots import links
+from ..peer import ONE_START, PORTFOLIO, RESTARTS, Peer, Run
 from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")
-    from roboticstoolbox.ets.ET import ET
-    from roboticstoolbox.ets.ETS import ETS
+# The search found no better damping on the tuning robots (docs/peers/robotics_toolbox.md).
+_DAMPING = {"damping": "chan", "factor": 0.1}
+PEER = Peer(
+    "Robotics Toolbox ik_LM",
+    __name__,
+    "roboticstoolbox-python",
+    "MIT",
+    "Levenberg-Marquardt with random searches",
+    "poses and limits of one chain of hinges",
+    (
+        Run(ONE_START, {"searches": 1, "iterations": 30, "damping": "chan", "factor": 1.0}),
+        Run(PORTFOLIO, {"searches": 8, "iterations": 12, **_DAMPING}, "8 searches of 12"),
+        Run(RESTARTS, {"searches": 100, "iterations": 30, **_DAMPING}, "100 searches"),
+    ),
+    use="one arm in Python",
+)
 
 
 def prepare(
@@ -49,8 +62,13 @@ def prepare(
     return ask
 
 
-def chain_of_transforms(robot: BenchRobot) -> ETS:
+def chain_of_transforms(robot: BenchRobot) -> Any:
     """Return the robot as elementary transforms: each hinge in a frame with its axis for z."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from roboticstoolbox.ets.ET import ET
+        from roboticstoolbox.ets.ETS import ETS
+
     steps, pending, joint = [], np.eye(4), 0
     for transform, axis in links(robot):
         pending = pending @ transform

@@ -10,15 +10,31 @@ import math
 from collections.abc import Sequence
 from functools import partial
 
-import pytracik
-
+from ..peer import RESTARTS, Peer, Run
 from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+
+PEER = Peer(
+    "TRAC-IK",
+    __name__,
+    "pytracik",
+    "MIT",
+    "Newton's method and SQP in two threads, restarted",
+    "poses and limits of one chain of hinges",
+    (
+        # The paper's time, and ten times as long for the targets that it misses.
+        Run(RESTARTS, {"seconds": 0.005, "kind": "Speed"}, "5 ms"),
+        Run(RESTARTS, {"seconds": 0.05, "kind": "Speed"}, "50 ms"),
+    ),
+    use="a fixed time, C++ or ROS",
+)
 
 
 def prepare(
     robot: BenchRobot, tolerance: Tolerance, seconds: float = 0.005, kind: str = "Speed"
 ) -> Ask:
     """Return the solver, set up for a robot, with so much time for each target [s]."""
+    import pytracik
+
     robot.require_chain()
     eps, solve_type = min(tolerance) / math.sqrt(3.0), getattr(pytracik.SolveType, kind)
     chain = (robot.root, robot.effectors[0], robot.text)

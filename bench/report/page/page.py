@@ -18,7 +18,7 @@ from ...figures import svg
 from ...figures.sketch import Drawing
 from ...harness.record import Record
 from ...motion import motion
-from ...peers.registry import peers_command
+from ...peers.packages import peers_command
 from ...tables.columns import words_in
 from ...tables.layout import Figure, Layout
 from ...tables.table import Table

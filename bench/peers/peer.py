@@ -1,0 +1,144 @@
+"""A peer: a solver of a package behind an adapter, and the settings with which it runs."""
+
+import importlib.metadata
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from .entrant import Entrant
+from .packages import distribution_of
+
+# A single attempt, a portfolio of several, and restarts from random poses until the solver succeeds
+# answer different questions.
+ONE_START, PORTFOLIO, RESTARTS = "one start", "portfolio", "restarts"
+# The iterations of all attempts together, and the attempts and iterations of most portfolios.
+PORTFOLIO_ITERATIONS, RESTART_ITERATIONS, SHORT_ATTEMPTS = 100, 3000, (8, 12)
+# How the settings of a solver for cloths differ from try to try: by iterations, not at all, or by
+# explicit steps relative to the limit of stability. A user's solver without a declared step is
+# tried with steps of all lengths.
+ITERATED, LINEARISED, EXPLICIT = "iterations", "one linear solve", "explicit"
+UNDECLARED = "undeclared"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A peer with settings, as in the tables."""
+
+    kind: str  # `ONE_START`, `PORTFOLIO` or `RESTARTS`; of cloths `ITERATED` and so on
+    settings: Mapping[str, Any] = field(default_factory=dict)  # of the adapter
+    note: str = ""  # tells it from another run of the same solver and kind
+    restarts: int = 0  # further attempts from random poses, for solvers without restarts
+    # Of cloths: the name in records, the iterations of one step, steps of a frame of a motion and
+    # iterations of each, and whether the solver solves a step to the end.
+    title: str = ""
+    ladder: tuple[int, ...] = ()
+    motion: tuple[tuple[int, int], ...] = ()
+    converges: bool = False
+
+    @property
+    def has_time_limit(self) -> bool:
+        """Whether each target has a time limit [s]: answers then depend on the load."""
+        return "seconds" in self.settings
+
+
+def short_attempts(settings: Mapping[str, Any], note: str = "{}") -> Run:
+    """Return the portfolio of eight attempts, the first from the start, which the bench makes."""
+    count, iterations = SHORT_ATTEMPTS
+    attempts = note.format(f"{count} attempts of {iterations}")
+    return Run(PORTFOLIO, {"iterations": iterations, **settings}, attempts, count - 1)
+
+
+def restarted(iterations: int, settings: Mapping[str, Any], note: str = "{}") -> Run:
+    """Return attempts of so many iterations each from random poses, which the bench makes."""
+    count = RESTART_ITERATIONS // iterations - 1
+    settings = {"iterations": iterations, **settings}
+    return Run(RESTARTS, settings, note.format(f"{count} restarts"), count)
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A solver behind an adapter, a module with a function `prepare`."""
+
+    title: str  # how it is written
+    module: str  # its adapter
+    package: str  # the package that must be installed
+    license: str  # of the package
+    algorithm: str
+    can: str  # what it solves
+    runs: tuple[Run, ...]
+    # its name as written, if not its title
+    label: str = field(default="", kw_only=True)
+    # its engine, if not its package
+    engine: str = field(default="", kw_only=True)
+    # its colour in figures, by its name in `bench.figures.style`; "" for any
+    colour: str = field(default="", kw_only=True)
+    # the engine whose kinematics it works with, which never evaluates its answers
+    built_on: str = field(default="", kw_only=True)
+    # the reason to choose this peer, which ends the sentence "choose it for"
+    use: str = field(default="", kw_only=True)
+    # the precision of its kinematics, if not double
+    precision: str = field(default="", kw_only=True)
+    # whether its forward kinematics is compared with ours, by the adapter's `kinematics`
+    kinematics: bool = field(default=False, kw_only=True)
+    # whether its adapter lists all solutions of a pose, by `prepare_all`
+    lists_all: bool = field(default=False, kw_only=True)
+    # whether its adapter takes tasks beyond poses, by `prepare_task`
+    takes_tasks: bool = field(default=False, kw_only=True)
+    # whether it is a Python loop of ours on the package's kinematics
+    is_loop: bool = field(default=False, kw_only=True)
+    # an environment of its own with its own Python; "" for a solver in ours
+    environment: str = field(default="", kw_only=True)
+    # the user's solver, if any, which is always there
+    entrant: Entrant | None = field(default=None, kw_only=True)
+
+    @property
+    def name(self) -> str:
+        """How the solver is written."""
+        return self.label or self.title
+
+    def label_of(self, run: Run) -> str:
+        """Return how a run is written."""
+        return f"{self.name}, {run.note}" if run.note else self.name
+
+    def first(self, kind: str) -> Run:
+        """Return the first run of a kind."""
+        return next(run for run in self.runs if run.kind == kind)
+
+    @property
+    def run(self) -> Run:
+        """The only run of a solver for cloths or chains."""
+        (run,) = self.runs
+        return run
+
+    @property
+    def rows(self) -> Iterator["Peer"]:
+        """A peer for each run, named by the run."""
+        for run in self.runs:
+            yield replace(self, title=run.title, runs=(run,))
+
+    @property
+    def distribution(self) -> importlib.metadata.Distribution | None:
+        """The package where installed, None if not installed."""
+        return distribution_of(self.package, self.environment)
+
+    @property
+    def version(self) -> str:
+        """The installed version, "" if there is none; a user's solver states its own."""
+        if self.entrant:
+            return self.entrant.version
+        return self.distribution.version if self.distribution else ""
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether the peer can be used."""
+        return bool(self.entrant or self.version)
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """Settings of the adapter to open a user's solver."""
+        return {"spec": self.entrant.spec} if self.entrant else {}
+
+    @property
+    def entrant_name(self) -> str:
+        """The name of the user's solver, "" of others."""
+        return self.entrant.name if self.entrant else ""
