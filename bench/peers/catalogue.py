@@ -121,9 +121,12 @@ def _peers(folder: Iterable[str], package: str) -> tuple[Peer, ...]:
 PEERS = _peers(ik.__path__, ik.__name__)
 CLOTH_PEERS = _peers(cloth.__path__, cloth.__name__)
 PLUMBOB_LM = PEERS[0]
-KINEMATICS = tuple(peer for peer in PEERS if peer.kinematics)
-BRANCH_SOLVERS = tuple(peer for peer in PEERS if peer.lists_all)
-TASK_SOLVERS = tuple(peer for peer in PEERS if peer.takes_tasks)
+# Peers by the functions of their adapters: the forward kinematics is compared with ours, all
+# solutions of a pose are listed, tasks beyond poses are solved.
+KINEMATICS, BRANCH_SOLVERS, TASK_SOLVERS = (
+    tuple(peer for peer in PEERS if hasattr(importlib.import_module(peer.module), function))
+    for function in ("kinematics", "prepare_all", "prepare_task")
+)
 SINGLE_PRECISION = {peer.title: peer.precision for peer in PEERS if peer.precision}
 # Attempts beside the first where the bench starts a user's solver again.
 _RESTART_COUNT = 20

@@ -78,12 +78,6 @@ class Peer:
     use: str = field(default="", kw_only=True)
     # the precision of its kinematics, if not double
     precision: str = field(default="", kw_only=True)
-    # whether its forward kinematics is compared with ours, by the adapter's `kinematics`
-    kinematics: bool = field(default=False, kw_only=True)
-    # whether its adapter lists all solutions of a pose, by `prepare_all`
-    lists_all: bool = field(default=False, kw_only=True)
-    # whether its adapter takes tasks beyond poses, by `prepare_task`
-    takes_tasks: bool = field(default=False, kw_only=True)
     # whether it is a Python loop of ours on the package's kinematics
     is_loop: bool = field(default=False, kw_only=True)
     # an environment of its own with its own Python; "" for a solver in ours

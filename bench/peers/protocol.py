@@ -6,7 +6,8 @@ engine's own types and returns a `Solve`. Only the solver's own calls are timed:
 nor set-up count. For an unsuitable robot `prepare` raises `UnableError`. An adapter with a loop
 around its solver passes the solver's functions through `clock.library`. If the engine's
 kinematics is compared as well, its adapter has a function `kinematics(robot)`, which returns a
-`Forward`.
+`Forward`. A function `prepare_all(robot)` lists all solutions of a pose, and `prepare_task` takes
+tasks beyond poses.
 
 An adapter for cloths has a function `prepare(system, frame, **settings)`. `prepare` sets the engine
 up for particles and springs and returns a `Mover`, to move the particles a frame at a time. Only

@@ -26,7 +26,6 @@ PEER = Peer(
         restarted(50, _SETTINGS),
     ),
     use="robots simulated in DART",
-    kinematics=True,
 )
 
 

@@ -33,7 +33,6 @@ PEER = Peer(
         restarted(50, _SNOPT, "SNOPT, {}"),
     ),
     use="constraints beside the pose",
-    kinematics=True,
 )
 
 METERED = True

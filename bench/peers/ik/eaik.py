@@ -25,7 +25,6 @@ PEER = Peer(
     "poses of six hinges or fewer, analytically; timed without the choice of a solution",
     (Run(RESTARTS, note="all solutions, no start"),),
     use="all solutions of six hinges",
-    lists_all=True,
 )
 
 MAXIMUM_HINGES = 6

@@ -34,7 +34,6 @@ PEER = Peer(
     ),
     built_on="MuJoCo",
     use="task loops on MuJoCo",
-    takes_tasks=True,
 )
 
 METERED = True

@@ -38,7 +38,6 @@ PEER = Peer(
     ),
     built_on="Pinocchio",
     use="task loops on Pinocchio",
-    takes_tasks=True,
 )
 
 METERED = True

@@ -47,7 +47,6 @@ PEER = Peer(
     environment="placo",
     built_on="Pinocchio",
     use="whole-body tasks",
-    takes_tasks=True,
 )
 
 METERED = True

@@ -53,8 +53,6 @@ PEER = Peer(
         Run(RESTARTS, {**_LM, "restarts": 14, "prepared": False}, "14 restarts, plain call"),
     ),
     use="many solves from Python",
-    lists_all=True,
-    takes_tasks=True,
 )
 
 

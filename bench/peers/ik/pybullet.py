@@ -36,7 +36,6 @@ PEER = Peer(
         restarted(20, {"check": True, **_SETTINGS}, "{}, its answer checked by us"),
     ),
     use="robots in PyBullet",
-    kinematics=True,
     precision="reads the file, and gives poses, in single precision",
 )
 

@@ -31,7 +31,6 @@ PEER = Peer(
     ),
     built_on="Pinocchio",
     use="task loops in C++",
-    kinematics=True,
 )
 
 METERED = True

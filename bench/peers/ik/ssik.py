@@ -29,8 +29,6 @@ PEER = Peer(
     "poses and limits of six or seven hinges, analytically; in a module that it builds for an arm",
     (Run(RESTARTS, note="nearest solution"),),
     use="exact, six or seven hinges",
-    kinematics=True,
-    lists_all=True,
 )
 
 # Arms whose modules take ssik more than seven minutes of processor time.
