@@ -193,7 +193,7 @@ def test_our_prepared_call_is_ranked_and_answers_as_the_plain_call_does(restarts
         assert isinstance(solve.call.func, PreparedIK)
     for kind in (ONE_START, RESTARTS):
         assert PLUMBOB_LM.first(kind).settings.get("prepared", True)
-        plain_calls = [e for e in PLUMBOB_LM.entries if e.kind == kind and not
+        plain_calls = [e for e in PLUMBOB_LM.runs if e.kind == kind and not
                        e.settings.get("prepared", True)]  # fmt: skip
         assert [entry.note.endswith("plain call") for entry in plain_calls] == [True]
 
