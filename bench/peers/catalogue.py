@@ -27,7 +27,7 @@ class Solver:
 
     name: str  # in records
     label: str  # how it is written
-    engine: str = PLUMBOB  # its engine; "" if that is not known
+    engine: str = PLUMBOB  # its engine; "" if that is not listed
     colour: str = ""  # by its name in `bench.figures.style`; "" for any
     loop: bool = False  # whether it is a Python loop of ours on another engine's kinematics
     ranked: bool = True  # whether its times are compared with those of others
@@ -103,7 +103,7 @@ PRESET, TIGHT = (
 )
 LIMIT_NAME = "limit: copying as many bytes"
 LIMIT = Solver(LIMIT_NAME, "plain copy of as many bytes", "", "ink", ranked=False)
-_TIMED = (
+_BENCHMARKED = (
     *(COMPILED, PREPARED, PLAIN, OUR_KINEMATICS, _BY_PINOCCHIO, _BY_MUJOCO),
     *(PRESET, TIGHT, LIMIT),
 )
@@ -114,8 +114,9 @@ def _peers(folder: Iterable[str], package: str) -> tuple[Peer, ...]:
     names = (f"{package}.{module.name}" for module in pkgutil.iter_modules(folder))
     modules = map(importlib.import_module, names)
     peers: list[Peer] = [module.PEER for module in modules if hasattr(module, "PEER")]
-    ours = PLUMBOB.casefold()
-    return tuple(sorted(peers, key=lambda peer: (peer.package != ours, peer.name.casefold())))
+    own_package = PLUMBOB.casefold()
+    peers.sort(key=lambda peer: (peer.package != own_package, peer.name.casefold()))
+    return tuple(peers)
 
 
 PEERS = _peers(ik.__path__, ik.__name__)
@@ -153,10 +154,10 @@ def chain_peers(entrants: Iterable[Entrant]) -> list[Peer]:
 
 def cloth_peers(entrants: Iterable[Entrant] = ()) -> tuple[Peer, ...]:
     """Return a peer for each run on cloths: of the reference's solvers, engines, the user's."""
-    ours, *engines = CLOTH_PEERS
+    reference, *engines = CLOTH_PEERS
     steps = (solver.run for solver in step_solvers().values())
-    ours = replace(ours, runs=(*steps, *ours.runs))
-    rows = (row for peer in (ours, *engines) for row in peer.rows)
+    reference = replace(reference, runs=(*steps, *reference.runs))
+    rows = (row for peer in (reference, *engines) for row in peer.rows)
     return (*rows, *(_cloth_user(entrant) for entrant in entrants if entrant.offers("cloth")))
 
 
@@ -173,15 +174,15 @@ def _user(entrant: Entrant, problem: str, runs: tuple[Run, ...], title: str = ""
 
 def ik_solvers() -> dict[str, Solver]:
     """Return the reference's solvers of inverse kinematics, by name, in its order."""
-    known = {solver.name: solver for solver in _IK}
-    return {name: known.get(name) or Solver(name, name.replace("_", " ")) for name in IK_SOLVERS}
+    listed = {solver.name: solver for solver in _IK}
+    return {name: listed.get(name) or Solver(name, name.replace("_", " ")) for name in IK_SOLVERS}
 
 
 def step_solvers() -> dict[str, StepSolver]:
     """Return the reference's solvers of steps, by name, in its order."""
-    known = {solver.name: solver for solver in _STEPS}
+    listed = {solver.name: solver for solver in _STEPS}
     return {
-        name: known.get(name) or StepSolver(name, name.replace("_", " ")) for name in STEP_SOLVERS
+        name: listed.get(name) or StepSolver(name, name.replace("_", " ")) for name in STEP_SOLVERS
     }
 
 
@@ -229,7 +230,7 @@ def _by_name(*reference_names: tuple[str, ...]) -> Mapping[str, Solver]:
 
 
 def _solvers() -> Iterator[Solver]:
-    yield from (*ik_solvers().values(), *step_solvers().values(), *LOOPS, *_TIMED, *FACTORS)
+    yield from (*ik_solvers().values(), *step_solvers().values(), *LOOPS, *_BENCHMARKED, *FACTORS)
     for peer in (*cloth_peers(), *PEERS):
         labels = dict.fromkeys([*map(peer.label_of, peer.runs), peer.name])
         engine = peer.engine or peer.package

@@ -9,7 +9,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-_OURS = "plumbob"
+_PACKAGE = "plumbob"
 
 
 def environment_python(name: str) -> Path:
@@ -39,8 +39,8 @@ def version(package: str) -> str:
 @functools.cache
 def peers_command() -> str:
     """Return the command to install the peers into the environment of this Plumbob."""
-    distributions = importlib.metadata.distributions(name=_OURS)
-    texts = filter(None, (each.read_text("direct_url.json") for each in distributions))
+    distributions = importlib.metadata.distributions(name=_PACKAGE)
+    texts = filter(None, (d.read_text("direct_url.json") for d in distributions))
     origin = json.loads(next(texts, "{}"))
     url, revision = origin.get("url", ""), origin.get("vcs_info", {})
     folder = url2pathname(urlsplit(url).path) if "dir_info" in origin else ""
@@ -51,4 +51,4 @@ def peers_command() -> str:
         return f"pip install {'-e ' * is_editable}{shlex.quote(f'{folder}[peers]')}"
     prefix = f"{revision['vcs']}+" if revision else ""
     place = f" @ {prefix}{url}" if url else ""
-    return f"pip install '{_OURS}[peers]{place}'"
+    return f"pip install '{_PACKAGE}[peers]{place}'"

@@ -26,7 +26,7 @@ PEER = Peer(
         Run(EXPLICIT, {"integrator": "implicitfast"}, title="MuJoCo implicitfast"),
         Run(EXPLICIT, {"integrator": "RK4"}, title="MuJoCo RK4"),
         Run(EXPLICIT, {"flex": True}, title="MuJoCo flex, Euler"),
-        # The default of 100 iterations leaves the linear system of a large cloth unsolved.
+        # MuJoCo's own 100 iterations are too few for stiff cloths (docs/peers/newton.md).
         Run(LINEARISED, {"integrator": "discrete", "iterations": 1000}, title="MuJoCo discrete"),
     ),
     engine="MuJoCo",

@@ -26,7 +26,7 @@ PEER = Peer(
     "nonlinear programs by IPOPT (interior point) or SNOPT (SQP)",
     "poses, positions and limits of several effectors, balls, these by three angles",
     (
-        # The search chose IPOPT (docs/peers/drake.md); SNOPT is Drake's default.
+        # The search chose IPOPT (docs/peers/drake.md); SNOPT is what Drake chooses itself.
         Run(ONE_START, {"solver": "IPOPT", "iterations": 200, **_SETTINGS}, "IPOPT"),
         Run(ONE_START, {"iterations": 200, **_SNOPT}, "SNOPT"),
         short_attempts(_SNOPT, "SNOPT, {}"),

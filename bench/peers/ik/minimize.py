@@ -22,7 +22,7 @@ PEER = Peer(
     (
         # The authors' defaults: the search found nothing better from one start.
         Run(ONE_START, {"iterations": 100, "minimum": 1e-6, "factor": 10.0**0.1, "scale": ""}),
-        # A damping that falls faster needs fewer iterations.
+        # The search chose a damping that changes faster, for attempts are short.
         short_attempts({"minimum": 1e-6, "factor": 2.0}),
         restarted(30, {"minimum": 1e-6, "factor": 2.0}),
     ),

@@ -34,7 +34,7 @@ from ...problems.robot_tasks import (
 from ..peer import ONE_START, PORTFOLIO, RESTARTS, Peer, Run
 from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
 
-# `restarts` are at the most: the search found that more of them gain nothing (docs/peers/index.md).
+# The search found that more iterations and restarts gain nothing (docs/peers/index.md).
 _LM = {"solver": "levenberg_marquardt", "iterations": 100}
 _FIRST_PHASE = {**_LM, "restarts": 0, "phases": 1}
 PEER = Peer(

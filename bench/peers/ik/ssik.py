@@ -25,7 +25,7 @@ PEER = Peer(
     __name__,
     "ssik",
     "BSD-3-Clause",
-    "closed forms, with a search over a seventh hinge",
+    "closed forms, in a module built for an arm",
     "poses and limits of six or seven hinges, analytically; in a module that it builds for an arm",
     (Run(RESTARTS, note="nearest solution"),),
     use="exact, six or seven hinges",

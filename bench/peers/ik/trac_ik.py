@@ -21,7 +21,7 @@ PEER = Peer(
     "Newton's method and SQP in two threads, restarted",
     "poses and limits of one chain of hinges",
     (
-        # The paper's time, and ten times as long for the targets that it misses.
+        # The time in its authors' comparison, and ten times as long.
         Run(RESTARTS, {"seconds": 0.005, "kind": "Speed"}, "5 ms"),
         Run(RESTARTS, {"seconds": 0.05, "kind": "Speed"}, "50 ms"),
     ),
