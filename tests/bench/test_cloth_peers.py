@@ -455,7 +455,7 @@ def errors_of_all(monkeypatch):
         monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
         with contextlib.closing(worker):
             return {
-                (task, peer.title): peers_cloth.work(task, peer, [FALL]).arrays["error"].tobytes()
+                (task, peer.title): peers_cloth.work(task, peer, [FALL])["error"].tobytes()
                 for task in (ONE_STEP, MOTION)
                 for peer in catalogue.cloth_peers()
                 if peer.is_installed and (task == MOTION or peer.run.kind != EXPLICIT)
@@ -481,9 +481,7 @@ def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
     monkeypatch.setattr(catalogue, "cloth_peers", lambda entrants: gone)
     missing = [b for b in peers_cloth.blocks(Scale(1, 0.1)) if b.problem == "peers/all"]
     (block,) = missing
-    arrays, notes, _ = block.measure()
-    assert not arrays
-    assert notes["remark"] == "a-package-that-nobody-has is not installed"
+    assert block.measure()["remark"] == "a-package-that-nobody-has is not installed"
 
 
 # Limits of stability.
@@ -515,7 +513,7 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
     peer = next(peer for peer in catalogue.cloth_peers() if peer.title == title)
     spring = one_spring()
     monkeypatch.setattr(peers_cloth, "hanging_cloth", lambda size, k: (spring.system, REST))
-    arrays = peers_cloth.stability(peer, (spring.stiffness,)).arrays
+    arrays = peers_cloth.stability(peer, (spring.stiffness,))
     assert arrays["frequency"] == pytest.approx([np.sqrt(7.0 / 2.0)])
     reached = np.array(arrays["limit"]) * np.array(arrays["frequency"])
     assert reached == pytest.approx([LIMITS[title]], rel=2e-3 if "Kutta" in title else 5e-4)
