@@ -254,12 +254,13 @@ def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
 
 @pytest.fixture
 def bullet():
-    name = "plumbob.bench.peers.cloth.pybullet_deformable"
-    return pytest.importorskip(name, exc_type=ImportError)
+    pytest.importorskip("pybullet", exc_type=ImportError)
+    return importlib.import_module("plumbob.bench.peers.cloth.pybullet_deformable")
 
 
 def test_newton_colours_no_two_particles_of_a_spring_alike(cloth):
-    adapter = pytest.importorskip("plumbob.bench.peers.cloth.newton", exc_type=ImportError)
+    pytest.importorskip("newton", exc_type=ImportError)
+    adapter = importlib.import_module("plumbob.bench.peers.cloth.newton")
     groups = adapter.model(cloth.system).particle_color_groups
     colour = np.full(cloth.system.particle_count, -1)
     for number, group in enumerate(groups):
