@@ -11,6 +11,8 @@ from collections.abc import Iterator
 import matplotlib as mpl
 from markupsafe import escape
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from ..tables.results import label
@@ -41,7 +43,9 @@ def canvas(
 def svg_of(figure: Figure, title: str, mark: str = "") -> str:
     """Return a figure as reproducible SVG, with a mark at its end."""
     file = io.StringIO()
-    figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None, "Title": title})
+    FigureCanvasSVG(figure).print_svg(
+        file, metadata={"Date": None, "Creator": None, "Title": title}
+    )
     text = file.getvalue()
     for i, name in enumerate(getattr(figure, "series_names", ())):
         group = f'<g class="series"><title>{escape(label(name))}</title>'
@@ -54,5 +58,5 @@ def pdf_of(figure: Figure, title: str, mark: str = "") -> bytes:
     file = io.BytesIO()
     about = {"CreationDate": None, "Creator": None, "Producer": None, "Keywords": mark or None}
     figure.set_layout_engine("none")
-    figure.savefig(file, format="pdf", metadata={**about, "Title": title})
+    FigureCanvasPdf(figure).print_pdf(file, metadata={**about, "Title": title})
     return file.getvalue()
