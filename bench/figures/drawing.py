@@ -18,10 +18,10 @@ from plumbob.text.printable import shortened
 from ..tables.results import label
 from .canvas import WIDTH, canvas
 from .chart import GREY, LINE, SPAN, Axis, Chart, Panel, Series, looks
-from .style import COLOURS, Style, plain_label
+from .style import COLOURS, LONGEST, Style, plain_label
 
 # Heights [inch] of a panel, of a row of marks, of a line of the legend.
-PANEL, ROW, LEGEND = 2.3, 0.3, 0.19
+PANEL, ROW, LEGEND = 2.6, 0.3, 0.19
 # Distance of the names of curves, in heights of a panel.
 _NAME = 0.11
 # Letters per inch of bold and of plain type; letters of the name of a row.
@@ -45,10 +45,9 @@ def draw_chart(chart: Chart) -> Figure:
     figure, axes = canvas(height, columns, rows, sharex=not chart.rows, sharey=True)
     for i, (ax, panel) in enumerate(zip(axes, chart.panels, strict=False)):
         drawer.draw(ax, panel)
-        ax.set_title(_two_lines(panel.title, WIDTH / columns * _BOLD))
-        if i + columns >= len(chart.panels):
-            ax.set_xlabel(_two_lines(chart.x.label, WIDTH / columns * _PLAIN))
-            ax.tick_params(labelbottom=True)
+        ax.set_title(_wrapped(panel.title, WIDTH / columns * _BOLD))
+        ax.set_xlabel(_wrapped(chart.x.label, WIDTH / columns * _PLAIN))
+        ax.tick_params(labelbottom=True)
         if i % columns == 0 and (title := panel.label or chart.y.label):
             ax.set_ylabel(plain_label(title))
     for ax in axes[: len(chart.panels)]:
@@ -64,12 +63,10 @@ def draw_chart(chart: Chart) -> Figure:
     return figure
 
 
-def _two_lines(text: str, width: float) -> str:
-    """Return a text on at most two lines of so many letters, its end cut off if necessary."""
-    letters = max(12, int(width))
-    lines = textwrap.wrap(text, letters)
-    second = [shortened(" ".join(lines[1:]), letters)] if lines[1:] else []
-    return "\n".join(map(plain_label, [*lines[:1], *second]))
+def _wrapped(text: str, width: float) -> str:
+    """Return a text in lines of so many letters."""
+    lines = textwrap.wrap(shortened(text, 2 * LONGEST), max(12, int(width)))
+    return "\n".join(map(plain_label, lines))
 
 
 def _style(look: Style, marks: bool) -> dict[str, Any]:
@@ -157,7 +154,7 @@ class _ChartDrawer:
         """Set up the axes of a panel, when all panels with the same axes have their curves."""
         _set_axis(ax, "x", self._chart.x, self._letters)
         if self._chart.rows:
-            names = [_two_lines(name, _ROW_NAME) for name in self._chart.rows]
+            names = [_wrapped(name, _ROW_NAME) for name in self._chart.rows]
             ax.set_yticks(range(len(names)), names)
             ax.set_ylim(len(names) - 0.5, -0.5)
         else:
