@@ -57,7 +57,6 @@ def latex(table: Table) -> str:
     label = re.sub(r"[^\w:.-]", "-", table.name, flags=re.ASCII)
     lines = [
         _PREAMBLE,
-        f"% {' '.join(table.shows.split())}",
         r"\begin{table}",
         r"\centering",
         _NUMBERS,
@@ -103,7 +102,7 @@ def _note(table: Table) -> str:
     """Return the note below a table: set-up, samples, machine and versions."""
     best = "Best in bold, ties too." * bool(best_cells(table))
     provenance = table.provenance and f"{table.provenance}."
-    return " ".join(filter(None, (table.measured, best, provenance)))
+    return " ".join(filter(None, (table.shows, table.measured, best, provenance)))
 
 
 def escaped(text: str) -> str:

@@ -3,6 +3,8 @@
 import csv
 import io
 import re
+import unicodedata
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +13,22 @@ from markupsafe import Markup, escape
 from plumbob.text import html
 
 from ..harness.metrics import Share
-from .table import Cell, Table, best_cells, words
+from .table import Cell, Column, Table, best_cells, words
 
 # A number with a power of ten, within a text.
 POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?!\w)")
 # An apostrophe, or the start of a formula in a spreadsheet; not a number, nor a sign alone.
 _FORMULA = re.compile(r"'|[=@＝＠]|[-+－＋](?![\d.]*$|[\d.]+e[-+]?\d+$)", re.IGNORECASE)
+# Letters of units and of titles, in ASCII.
+_SIGNS = {
+    "µ": "u",
+    "μ": "u",
+    "%": "percent",
+    "°": "deg",
+    "/": "per ",
+    "ω": "omega",
+    "±": "plus_minus",
+}
 # Marks anywhere, and the start of a list, a rule or a heading; no number is among these.
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=](?=[-+=\s]|$)|(?<=^\d)[.)](?=\s|$))")
 
@@ -33,9 +45,9 @@ def markdown(table: Table) -> str:
         f"# {_markdown(table.title)}",
         _markdown(table.summary.sentence),
         "\n".join(f"- {_markdown(point)}" for point in table.summary.points),
+        "\n".join(f"| {' | '.join(line)} |" for line in lines),
         _markdown(table.shows),
         _markdown(table.measured),
-        "\n".join(f"| {' | '.join(line)} |" for line in lines),
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
 
@@ -45,31 +57,45 @@ def _markdown(text: str) -> str:
 
 
 def comma_separated(table: Table) -> str:
-    """Return a table as CSV with all digits; a share becomes hits, total and interval.
+    """Return a table as CSV for programs: names in snake_case with units, and all digits.
 
-    A text that a spreadsheet would compute begins with an apostrophe.
+    A share becomes hits, total and interval. A column of numbers holds numbers only: texts such as
+    "12 claimed" stand in a column of remarks. A text that a spreadsheet would compute begins with
+    an apostrophe.
     """
-    columns = range(len(table.columns))
-    shares = [any(isinstance(row[j], Share) for row in table.rows) for j in columns]
+    rows: list[list[Any]] = [[] for _ in range(len(table.rows) + 1)]
+    for j, column in enumerate(table.columns):
+        cells = [row[j] for row in table.rows]
+        for name, parts in _csv_columns(column, cells):
+            for row, part in zip(rows, [name, *parts], strict=True):
+                row.append(part)
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    head: list[str] = []
-    for column, is_share in zip(table.columns, shares, strict=True):
-        parts = [f"{column.title}, {part}" for part in ("hits", "total", "95 % low", "95 % high")]
-        head += parts if is_share else [column.heading]
-    writer.writerow(_csv_text(words(heading)) for heading in head)
-    for row in table.rows:
-        cells = zip(row, shares, strict=True)
-        writer.writerow(part for cell, is_share in cells for part in _csv_parts(cell, is_share))
+    csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 
-def _csv_parts(cell: Cell, is_share: bool) -> list[Any]:
-    if is_share:
-        return list(cell) if isinstance(cell, Share) else [""] * len(Share._fields)
-    if cell is None:
-        return [""]
-    return [_csv_text(words(cell)) if isinstance(cell, bool | str) else repr(cell)]
+def _csv_columns(column: Column, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Any]]]:
+    """Yield the names and the cells of the columns in CSV that stand for a column."""
+    texts = [_csv_text(words(c)) if isinstance(c, str | bool) else "" for c in cells]
+    if any(isinstance(cell, Share) for cell in cells):
+        for part in Share._fields:
+            yield machine_name(f"{column.title} {part}"), [getattr(c, part, "") for c in cells]
+        return
+    if not column.words:
+        is_number = [isinstance(c, int | float) and not isinstance(c, bool) for c in cells]
+        numbers = [repr(c) if plain else "" for c, plain in zip(cells, is_number, strict=True)]
+        yield machine_name(column.title, column.unit), numbers
+    if column.words or any(texts):
+        yield machine_name(column.title, "" if column.words else "remark"), texts
+
+
+def machine_name(title: str, unit: str = "") -> str:
+    """Return a title and a unit in snake_case: "time, median" in "µs" is "time_median_us"."""
+    text = f"{title.replace('%', '')} {unit}".lower()
+    for sign, name in _SIGNS.items():
+        text = text.replace(sign, f" {name}")
+    plain = unicodedata.normalize("NFKD", text)
+    return re.sub(r"\W+", "_", plain.replace("’", ""), flags=re.ASCII).strip("_") or "column"
 
 
 def _csv_text(text: str) -> str:

@@ -105,7 +105,7 @@ def test_csv_keeps_all_digits_and_any_text():
         table((HOSTILE, third, share(np.array([True]))), ("-", None, None), columns=columns)
     )
     rows = list(csv.reader(io.StringIO(text)))
-    assert rows[0][:3] == ["name", "value [m]", "hits, hits"]
+    assert rows[0][:3] == ["name", "value_m", "hits_hits"]
     assert rows[1][0] == " ".join(HOSTILE.split())
     assert float(rows[1][1]) == third
     assert rows[1][2:4] == ["1", "1"]
@@ -120,15 +120,33 @@ FORMULAS += ["＝1", "'", "'=1", "''a", "--", "=5", '=HYPERLINK("http://x","y")'
 def test_a_text_in_csv_is_no_formula_and_less_one_apostrophe_the_text(name):
     columns = (Column("name", words=True), Column(name, words=True))
     text = writers.comma_separated(table((name, name), columns=columns))
-    for row in csv.reader(io.StringIO(text)):
-        assert row[1][0] == "'"
-        assert row[1].removeprefix("'") in (name, " ".join(name.split()))
+    heads, row = csv.reader(io.StringIO(text))
+    assert row[1][0] == "'"
+    assert row[1].removeprefix("'") in (name, " ".join(name.split()))
+    assert re.fullmatch("[a-z0-9_]+", heads[1])
 
 
 @pytest.mark.parametrize("cell", [-1, -1.5, -1e-300, -math.inf, "-5", "-1.2e-5", "+.5", "-", "–"])
 def test_a_number_in_csv_and_the_mark_of_none_stand_as_they_are(cell):
-    text = writers.comma_separated(table((cell, cell)))
-    assert list(csv.reader(io.StringIO(text)))[1] == [str(cell), str(cell)]
+    kinds = (Column("a", words=True), Column("b", words=isinstance(cell, str)))
+    text = writers.comma_separated(table(("-", cell), columns=kinds))
+    assert list(csv.reader(io.StringIO(text)))[1] == ["-", str(cell)]
+
+
+@pytest.mark.parametrize(
+    ("title", "unit", "name"),
+    [("time, median", "µs", "time_median_us"), ("distance to Newton’s solution", "m",
+     "distance_to_newtons_solution_m"), ("solved", "%", "solved_percent"), ("2 / ω", "ms",
+     "2_per_omega_ms"), ("solve", "ns/solve", "solve_ns_per_solve"), ("g", "kg m²", "g_kg_m2")],
+)  # fmt: skip
+def test_a_name_in_csv_is_an_identifier_with_its_unit(title, unit, name):
+    assert writers.machine_name(title, unit) == name
+
+
+def test_a_column_of_numbers_in_csv_keeps_its_texts_apart():
+    columns = (Column("solver", words=True), Column("iterations"))
+    text = writers.comma_separated(table(("a", 1234), ("b", "12 claimed"), columns=columns))
+    assert text == "solver,iterations,iterations_remark\na,1234,\nb,,12 claimed\n"
 
 
 def test_an_answer_stands_in_markdown_with_its_points():

@@ -111,7 +111,7 @@ def test_the_command_tries_60_targets_prints_a_line_a_solver_and_advises(folder,
     files = ["arm.urdf", "my_ik.py", "my_robot.py", "slider.urdf"]
     assert sorted(path.name for path in folder.iterdir()) == files
     assert run_command(["which", "arm.urdf", "--format", "csv"]) == 0
-    assert capsys.readouterr().out.startswith("solver,solved [%],median [µs],")
+    assert capsys.readouterr().out.startswith("solver,solved_percent,median_us,")
 
 
 def test_the_users_solver_has_one_row_among_the_others(folder, capsys):
