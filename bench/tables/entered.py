@@ -73,5 +73,4 @@ entrant_table = Layout(
     "process; a program by the seconds in its answers, or else by the round trip of a request, "
     "as its remark says.",
     summary=_summary,
-    optional=True,
 )

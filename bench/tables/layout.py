@@ -52,7 +52,6 @@ class Layout:
     compared: int = 1  # rows with so many equal first cells are compared; 0: all are
     # whether a subject may be best in its group
     ranked: Callable[[Any], bool] = lambda subject: True
-    optional: bool = False  # whether an empty table is no omission
     # by titles of columns, whether a subject is best, where a test of its own decides
     leads: Callable[[Any], Mapping[str, bool]] = lambda subject: {}
 

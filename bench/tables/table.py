@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -123,6 +124,11 @@ class Table:
     provenance: str = ""  # number of samples, machine and versions
     # row and column of the best cells, if not by the columns
     best: frozenset[tuple[int, int]] | None = None
+
+    @property
+    def note(self) -> str:
+        """The first sentence on the contents, printed below the table on the page."""
+        return re.split(r"(?<=[.?!]) (?=[A-Z])", self.shows, maxsplit=1)[0]
 
     def __post_init__(self) -> None:
         """Check that headings are distinct, and rows and sources complete."""

@@ -226,21 +226,29 @@
     views.forEach(view => view.show());
   };
   for (const input of starts) input.onchange = () => turn(input.value);
+  // A box with more to its right fades there, and says so.
+  const hint = () => document.querySelectorAll(".scroll").forEach(box =>
+    box.classList.toggle("onward", box.scrollWidth - box.clientWidth - box.scrollLeft > 2));
   const follow = () => {
     const [, id, kept] = /^#([^?]*)\??(.*)$/s.exec(location.hash) ?? [];
     const found = document.getElementById(id), box = found?.closest(".data");
-    if (!box) return;
-    for (let fold = box; (fold = fold.parentElement.closest("details"));) fold.open = true;
+    for (let fold = found; (fold = fold?.parentElement.closest("details"));) fold.open = true;
+    if (!box) return found?.scrollIntoView();
     const row = found === box ? null : found.closest("tr");
     if (row?.dataset.start) turn(row.dataset.start);
     viewOf(box).restore(new URLSearchParams(kept), row);
     found.scrollIntoView({ block: row ? "center" : "start", behavior: "instant" });
   };
-  document.querySelectorAll(".folds details").forEach(fold =>
-    fold.addEventListener("toggle", () => fold.open && prepare(fold)));
+  for (const name of ["scroll", "change", "toggle"])
+    document.addEventListener(name, ({ target }) => {
+      if (target.open && target.closest(".folds")) prepare(target);
+      hint();
+    }, true);
   document.querySelectorAll("article").forEach(prepare);
+  addEventListener("resize", hint);
   document.addEventListener("click", event =>
     document.querySelectorAll(".menu[open]").forEach(menu => menu.contains(event.target) || (menu.open = false)));
   addEventListener("hashchange", follow);
   follow();
+  hint();
 })();

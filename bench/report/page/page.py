@@ -3,7 +3,6 @@
 import base64
 import hashlib
 import re
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -23,7 +22,7 @@ from ...tables.columns import words_in
 from ...tables.layout import Figure, Layout
 from ...tables.table import Table
 from ..headlines import Overview
-from ..sections import SECTIONS, Section, offered
+from ..sections import SECTIONS, Section
 from ..standings import Headline
 from .claim_strip import DECADES, ClaimDot, claim_dots
 from .page_tables import PageTable, page_table, rich
@@ -56,8 +55,11 @@ class Chapter(NamedTuple):
     dots: list[ClaimDot]  # claims against their tolerances
     main: PageTable | None  # the unfolded table; None if it has none
     folds: list[PageTable]  # the other tables
-    unmeasured: list[str]  # questions of tables without records
-    command: str  # that measures them
+
+    @property
+    def tables(self) -> list[PageTable]:
+        """All tables, the unfolded table first."""
+        return [*filter(None, [self.main]), *self.folds]
 
 
 def render(contents: Contents, newest: Record, missing: Sequence[str]) -> str:
@@ -79,7 +81,7 @@ def render(contents: Contents, newest: Record, missing: Sequence[str]) -> str:
         peers_command=peers_command(),
         maps=contents.maps,
         scenes=contents.scenes,
-        chapters=[_chapter(section, contents) for section in SECTIONS],
+        chapters=[c for section in SECTIONS if (c := _chapter(section, contents)).tables],
         missing=missing,
         max=MAX_SENTENCES,
         max_rows=MAX_ROWS,
@@ -120,8 +122,6 @@ def _chapter(section: Section, contents: Contents) -> Chapter:
     drawings = {layout: [contents.drawings[f] for f in layout.figures if f in contents.drawings]
                 for layout in layouts}  # fmt: skip
     tables = {layout.name: _page_table(layout, section, contents, drawings) for layout in layouts}
-    empty = [layout for layout in section.layouts if layout not in layouts and not layout.optional]
-    suites = [e.suite for e in section.experiments if {*offered(e)} & {*empty}]
     return Chapter(
         section,
         [headline for headline in contents.answers.headlines if headline.chapter == section.name],
@@ -129,8 +129,6 @@ def _chapter(section: Section, contents: Contents) -> Chapter:
         claim_dots(tables["check"]) if "check" in tables else [],
         tables.pop(section.main, None),
         list(tables.values()),
-        [layout.question for layout in empty],
-        shlex.join(["plumbob", "bench", *dict.fromkeys(suites)]),
     )
 
 
