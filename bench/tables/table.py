@@ -128,7 +128,7 @@ class Table:
     @property
     def note(self) -> str:
         """The first sentence on the contents, printed below the table on the page."""
-        return re.split(r"(?<=[.?!]) (?=[A-Z])", self.shows, maxsplit=1)[0]
+        return re.split(r"(?<=[.?!]) (?=[A-Z“])", self.shows, maxsplit=1)[0]
 
     def __post_init__(self) -> None:
         """Check that headings are distinct, and rows and sources complete."""

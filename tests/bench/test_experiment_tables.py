@@ -33,6 +33,7 @@ def test_without_records_every_table_is_empty_but_for_its_captions():
     assert [(table.rows, table.summary.sentence) for table in made] == [((), "")] * len(made)
     assert len({table.name for table in made}) == len(made)
     assert all(table.shows and table.measured for table in made)
+    assert all(0 < len(table.note) <= 130 for table in made)  # a line on the page
     for table in made:
         assert not re.search(r"[a-z] [–.,;]|every th|  ", table.measured), table.measured
 
