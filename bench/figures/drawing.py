@@ -4,7 +4,7 @@ Solvers differ in line and marker as well as in colour.
 """
 
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -42,18 +42,17 @@ def draw_chart(chart: Chart) -> Figure:
     legend_columns = max(1, int(WIDTH / (max(map(len, names), default=0) / _PLAIN + 0.6)))
     panel_height = ROW * len(chart.rows) + 0.7 if chart.rows else PANEL
     height = panel_height * rows + 0.25 + LEGEND * -(-len(names) // legend_columns)
-    figure, axes = canvas(height, columns, rows, sharex=not chart.rows, sharey=True)
+    figure, axes = canvas(height, columns, rows)
     for i, (ax, panel) in enumerate(zip(axes, chart.panels, strict=False)):
         drawer.draw(ax, panel)
-        ax.set_title(_wrapped(panel.title, WIDTH / columns * _BOLD))
+        ax.set_title(_wrapped(panel.title, WIDTH / columns * _BOLD), y=1.0)
         ax.set_xlabel(_wrapped(chart.x.label, WIDTH / columns * _PLAIN))
-        ax.tick_params(labelbottom=True)
+        ax.tick_params(labelleft=i % columns == 0)
         if i % columns == 0 and (title := panel.label or chart.y.label):
             ax.set_ylabel(plain_label(title))
-    for ax in axes[: len(chart.panels)]:
-        drawer.scale(ax)
     for ax in axes[len(chart.panels) :]:
         ax.remove()
+    drawer.scale(axes[: len(chart.panels)])
     if not chart.rows:
         for i in range(columns - 1, len(chart.panels), columns):
             drawer.name_curves(axes[i], chart.panels[i], all_solvers=i < columns)
@@ -137,6 +136,7 @@ class _ChartDrawer:
             lowest -= _NAME
             colour, end = COLOURS[self._looks[name].colour], curves.get(name, (1.0, place))
             arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "alpha": 0.6}
+            arrow |= {"patchA": None, "relpos": (0.0, 0.5), "shrinkB": 0}  # without clipping
             is_drawn = name in curves
             ax.annotate(
                 plain_label(label(name)),
@@ -150,15 +150,21 @@ class _ChartDrawer:
                 annotation_clip=False,
             )
 
-    def scale(self, ax: Axes) -> None:
-        """Set up the axes of a panel, when all panels with the same axes have their curves."""
-        _set_axis(ax, "x", self._chart.x, self._letters)
+    def scale(self, axes: Sequence[Axes]) -> None:
+        """Set up the axes of the panels, with common limits; drawn curves are shared faster."""
+        for ax in axes[1:]:
+            ax.sharey(axes[0])
         if self._chart.rows:
             names = [_wrapped(name, _ROW_NAME) for name in self._chart.rows]
-            ax.set_yticks(range(len(names)), names)
-            ax.set_ylim(len(names) - 0.5, -0.5)
-        else:
-            _set_axis(ax, "y", self._chart.y, _LINES)
+            axes[0].set_yticks(range(len(names)), names)
+            axes[0].set_ylim(len(names) - 0.5, -0.5)
+            for ax in axes:
+                _set_axis(ax, "x", self._chart.x, self._letters)
+            return
+        for ax in axes[1:]:
+            ax.sharex(axes[0])
+        _set_axis(axes[0], "x", self._chart.x, self._letters)
+        _set_axis(axes[0], "y", self._chart.y, _LINES)
 
     def _draw_line(self, ax: Axes, curve: Series, style: dict[str, Any]) -> list[Line2D]:
         if curve.solver in self._looks:
