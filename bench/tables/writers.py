@@ -77,16 +77,26 @@ def comma_separated(table: Table) -> str:
 def _csv_columns(column: Column, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Any]]]:
     """Yield the names and the cells of the columns in CSV that stand for a column."""
     texts = [_csv_text(words(c)) if isinstance(c, str | bool) else "" for c in cells]
-    if any(isinstance(cell, Share) for cell in cells):
-        for part in Share._fields:
-            yield machine_name(f"{column.title} {part}"), [getattr(c, part, "") for c in cells]
-        return
-    if not column.words:
-        is_number = [isinstance(c, int | float) and not isinstance(c, bool) for c in cells]
-        numbers = [repr(c) if plain else "" for c, plain in zip(cells, is_number, strict=True)]
-        yield machine_name(column.title, column.unit), numbers
-    if column.words or any(texts):
-        yield machine_name(column.title, "" if column.words else "remark"), texts
+    is_share = any(isinstance(cell, Share) for cell in cells)
+    names = csv_names(column, is_share)
+    if is_share:
+        parts = (cell if isinstance(cell, Share) else [""] * len(names) for cell in cells)
+        yield from zip(names, map(list, zip(*parts, strict=True)), strict=True)
+    elif column.words:
+        yield names[0], texts
+    else:
+        numbers = ["" if cell is None or text else repr(cell)
+                   for cell, text in zip(cells, texts, strict=True)]  # fmt: skip
+        yield names[0], numbers
+        if any(texts):
+            yield machine_name(f"{column.title} remark"), texts
+
+
+def csv_names(column: Column, is_share: bool) -> list[str]:
+    """Return the names of a column in CSV: a share has four."""
+    if is_share:
+        return [machine_name(f"{column.title} {part}") for part in Share._fields]
+    return [machine_name(column.title, column.unit)]
 
 
 def machine_name(title: str, unit: str = "") -> str:

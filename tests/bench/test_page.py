@@ -141,8 +141,10 @@ MOST_WORDS = 2400
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
 def test_the_first_screen_answers_and_shows_a_map_and_a_player(browser, size):
+    """On a phone the sentences come first, and the map below them is as high as its rows."""
     browser.resize(*size)
-    for part in ("h1", "#verdict", ".map", ".motion canvas", ".motion-time"):
+    pictures = (".map", ".motion canvas", ".motion-time") if size == DESK else ()
+    for part in ("h1", "#verdict", ".findings .answer", *pictures):
         end = browser.run(f"document.querySelector('{part}').getBoundingClientRect().bottom")
         assert 0 < end <= size[1], part
     message = browser.run("document.querySelector('#answers').innerText")
@@ -220,6 +222,31 @@ def test_a_box_that_scrolls_has_a_bar_and_shaded_edges(browser):
         .map(look => [look.scrollbarWidth, look.backgroundImage.split("gradient").length - 1])""")
     assert len(looks) > 20
     assert {tuple(look) for look in looks} == {("thin", 4)}
+
+
+def test_on_a_phone_every_name_is_complete_and_a_wide_map_says_that_it_scrolls(browser):
+    browser.resize(*PHONE)
+    cut = browser.run("""[...document.querySelectorAll(".map th")].filter(head =>
+        head.scrollWidth > head.clientWidth + 1 || head.scrollHeight > head.clientHeight + 1)
+        .map(head => head.textContent)""")
+    assert cut == []
+    box, rows = "document.querySelector('.scroll.maps')", "getBoundingClientRect().bottom"
+    assert browser.run(f"[...{box}.querySelectorAll('tr')].at(-1).{rows} <= {box}.{rows}")
+    browser.run("document.querySelector('.map').style.minWidth = '60rem'")
+    for left, hint in ((1, '"Scroll sideways → "'), (9999, "none")):
+        browser.run(f"{box}.scrollLeft = {left}")
+        after = f"getComputedStyle({box}.querySelector('caption'), '::after').content"
+        assert browser.run(f"new Promise(done => setTimeout(() => done({after}), 300))") == hint
+
+
+def test_the_line_below_a_table_leads_to_how_it_was_measured(browser):
+    link = browser.run("""(() => { const link = document.querySelector("article .note a");
+        link.click();
+        return new Promise(done => setTimeout(() => done(link.hash), 300)); })()""")
+    assert link == "#measured:robots_overall"
+    (text,) = texts(browser, f'[id="{link[1:]}"]')
+    assert "Settings of solvers are chosen on the robots for tuning" in text
+    assert "Answers are evaluated" in text
 
 
 def test_a_table_is_scrolled_by_keys(table):
@@ -361,7 +388,7 @@ def test_what_is_shown_is_copied_in_three_forms(table):
     assert r"\toprule" in latex
     assert re.search(r"\nthe UR5 & pink & .*\\%.* \\\\\n", latex)
     rows = csv.splitlines()
-    assert rows[0].startswith('robots,solver,"solved')
+    assert rows[0].startswith("robots,solver,solved_hits,solved_total,solved_low,solved_high,")
     assert rows[1].startswith("the UR5,pink,")
     assert len(rows) == 2
 

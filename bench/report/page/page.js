@@ -204,12 +204,10 @@
     }
     // All digits are kept; a share becomes its four parts.
     CSV() {
-      const isShare = this.heads.map((_, j) => this.rows.some(row => row.cells[j].dataset.v?.includes("/")));
       return this.written((cell, j) => {
-        const said = plain(cell).replace(/^–$/, ""), { v } = cell.dataset;
-        if (!isShare[j]) return v ?? said;
-        if (this.heads.includes(cell)) return ["hits", "total", "95 % low", "95 % high"].map(part => `${said}, ${part}`);
-        return v?.split("/") ?? ["", "", "", ""];
+        const names = this.heads[j].dataset.name.split(","), { name, v } = cell.dataset;
+        if (name) return names;
+        return v?.split("/") ?? names.map(() => plain(cell).replace(/^–$/, ""));
       }).map(cells => cells.map(text => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text) + "\n").join("");
     }
     async copy(text, what) {
@@ -227,8 +225,11 @@
   };
   for (const input of starts) input.onchange = () => turn(input.value);
   // A box with more to its right fades there, and says so.
-  const hint = () => document.querySelectorAll(".scroll").forEach(box =>
-    box.classList.toggle("onward", box.scrollWidth - box.clientWidth - box.scrollLeft > 2));
+  document.querySelectorAll(".scroll").forEach(box => {
+    box.onscroll = () =>
+      box.classList.toggle("onward", box.scrollWidth - box.clientWidth - box.scrollLeft > 2);
+    new ResizeObserver(() => requestAnimationFrame(box.onscroll)).observe(box);
+  });
   const follow = () => {
     const [, id, kept] = /^#([^?]*)\??(.*)$/s.exec(location.hash) ?? [];
     const found = document.getElementById(id), box = found?.closest(".data");
@@ -239,16 +240,11 @@
     viewOf(box).restore(new URLSearchParams(kept), row);
     found.scrollIntoView({ block: row ? "center" : "start", behavior: "instant" });
   };
-  for (const name of ["scroll", "change", "toggle"])
-    document.addEventListener(name, ({ target }) => {
-      if (target.open && target.closest(".folds")) prepare(target);
-      hint();
-    }, true);
+  document.querySelectorAll(".folds details").forEach(fold =>
+    fold.addEventListener("toggle", () => fold.open && prepare(fold)));
   document.querySelectorAll("article").forEach(prepare);
-  addEventListener("resize", hint);
   document.addEventListener("click", event =>
     document.querySelectorAll(".menu[open]").forEach(menu => menu.contains(event.target) || (menu.open = false)));
   addEventListener("hashchange", follow);
   follow();
-  hint();
 })();

@@ -12,15 +12,8 @@ from markupsafe import Markup
 from ...figures.sketch import Drawing
 from ...harness.metrics import Share
 from ...tables.results import label
-from ...tables.table import (
-    Cell,
-    Source,
-    Table,
-    best_cells,
-    number_of,
-    words,
-)
-from ...tables.writers import POWER
+from ...tables.table import Cell, Source, Table, best_cells, number_of, words
+from ...tables.writers import POWER, csv_names
 
 # The column replaced by the page's switch between one start and restarts.
 STARTS = "starts"
@@ -32,7 +25,7 @@ class PageHead(NamedTuple):
     """A heading: its classes, the best of the column, and whether it filters rows.
 
     `lead` is the part of the title repeated in the heading of its group, and hidden. `unit` is the
-    unit of numbers, or the number of trials behind shares.
+    unit of numbers, or the number of trials behind shares. `names` are those of its columns in CSV.
     """
 
     classes: str
@@ -41,6 +34,7 @@ class PageHead(NamedTuple):
     lead: str
     rest: str
     unit: str
+    names: str
 
 
 class PageCell(NamedTuple):
@@ -102,7 +96,9 @@ def _head(table: Table, j: int, folded: bool, names_solver: bool) -> PageHead:
     sizes = dict.fromkeys(words(total) for total in (*totals[:1], *totals[-1:]))
     unit = f"n = {' to '.join(sizes)}" if sizes else column.unit and f"[{column.unit}]"
     title = column.titled.removeprefix(lead)
-    return PageHead(" ".join(filter(None, marks)), column.best, has_filter, lead, title, unit)
+    classes = " ".join(filter(None, marks))
+    names = ",".join(csv_names(column, is_share=bool(sizes)))
+    return PageHead(classes, column.best, has_filter, lead, title, unit, names)
 
 
 def _solver_column(table: Table) -> int | None:
