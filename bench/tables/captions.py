@@ -1,4 +1,4 @@
-"""Titles, captions and columns of tables and figures, from the file `tables.toml` of a folder."""
+"""Titles and captions of tables and figures, from the file NAME.toml beside a module NAME.py."""
 
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
@@ -20,8 +20,9 @@ class Captions:
     """
 
     def __init__(self, module: str, **constants: str) -> None:
-        """Read the file beside a module, given by its `__file__`."""
-        path = Path(module).with_name("tables.toml")
+        """Read the file beside a module, given by its `__file__`; without it, tables.toml."""
+        path = Path(module).with_suffix(".toml")
+        path = path if path.exists() else path.with_name("tables.toml")
         self._tables = tomllib.loads(path.read_text(encoding="utf-8"))
         self._columns = self._tables.pop("columns", {}), self._tables.pop("folded", {})
         self._figures = self._tables.pop("figures", {})
@@ -37,8 +38,9 @@ class Captions:
         measured: Callable[[Any], Mapping[str, str]] | None = None,
         **fields: Any,
     ) -> Layout:
-        """Return the layout of a table, its texts and declared columns from the file.
+        """Return the layout of a table with its texts from the file.
 
+        The columns are a field, `columns`; without it, the columns declared in the file.
         `measured` returns, from the subjects of the table, the words in braces of the sentence on
         the measurement. Other braces hold the settings of the subjects' records. The fields are the
         fields of `Layout` beside the texts.
