@@ -27,10 +27,12 @@ PRESENTATION = (
     *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),
     *("bench/tables", "verify/screen"),
 )
-# Likewise in every experiment.
+# Likewise in every experiment, beside the captions NAME.toml.
 PRESENTATION_FILES = (
     *("tables.py", "tables.toml", "participants.py", "figures.py", "readings.py", "files.py"),
 )
+# The line of an experiment's file above which it measures, and below which it only shows numbers.
+SHOWN = b"# What is shown."
 
 
 @functools.cache
@@ -94,11 +96,18 @@ def versions() -> dict[str, str]:
 
 
 def source_digest() -> str:
-    """Return twelve hex digits over every file that can change a number."""
+    """Return twelve hex digits over every text that can change a number."""
     digest = hashlib.sha256()
     for path in source_files():
-        digest.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
+        digest.update(str(path.relative_to(ROOT)).encode() + b"\0" + measuring_part(path))
     return digest.hexdigest()[:12]
+
+
+def measuring_part(path: Path) -> bytes:
+    """Return the text of a file; of an experiment's file, the text above the line `SHOWN`."""
+    text = path.read_bytes()
+    is_experiment = path.parent == ROOT / "bench" / "experiments"
+    return text.partition(b"\n" + SHOWN)[0] if is_experiment else text
 
 
 def source_files() -> list[Path]:
@@ -107,7 +116,9 @@ def source_files() -> list[Path]:
     for path in (path for name in _PACKAGES for path in (ROOT / name).rglob("*") if path.is_file()):
         parts = path.relative_to(ROOT).parts
         shows = any("/".join(parts[:n]) in PRESENTATION for n in range(2, 4))
-        shows |= parts[:2] == ("bench", "experiments") and parts[-1] in PRESENTATION_FILES
+        is_captions = len(parts) == 3 and path.suffix == ".toml"
+        if parts[:2] == ("bench", "experiments"):
+            shows |= is_captions or path.name in PRESENTATION_FILES
         if not shows and "__pycache__" not in parts:
             files.append(path)
     return sorted(files)

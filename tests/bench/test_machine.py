@@ -30,10 +30,10 @@ def every_file(root):
 
 
 def only_shows(path):
-    in_experiment = path.is_relative_to("bench/experiments")
-    return any(path.is_relative_to(name) for name in machine.PRESENTATION) or (
-        in_experiment and path.name in machine.PRESENTATION_FILES
-    )
+    if path.is_relative_to("bench/experiments"):
+        is_captions = len(path.parts) == 3 and path.suffix == ".toml"
+        return is_captions or path.name in machine.PRESENTATION_FILES
+    return any(path.is_relative_to(name) for name in machine.PRESENTATION)
 
 
 def test_an_edit_of_any_file_changes_the_digest_unless_it_only_shows_numbers(copy):
@@ -63,10 +63,54 @@ def test_a_new_file_and_a_new_name_change_the_digest_and_a_compiled_cache_does_n
     assert machine.source_digest() in digests
 
 
+def test_of_an_experiment_only_the_text_above_its_tables_is_digested(copy):
+    path = copy / "bench" / "experiments" / "swing.py"
+    digests = []
+    for measuring, shown in (("h = 1", ""), ("h = 1", "unit = 's'"), ("h = 2", "unit = 's'")):
+        path.write_text(f"{measuring}\n\n\n# What is shown.\n{shown}\n")
+        digests.append(machine.source_digest())
+    path.with_suffix(".toml").write_text("[swing]")
+    digests.append(machine.source_digest())
+    assert digests[0] == digests[1] != digests[2] == digests[3]
+
+
+EXPERIMENT_FILES = [
+    path
+    for path in sorted((ROOT / "bench" / "experiments").glob("*.py"))
+    if machine.SHOWN in path.read_bytes()
+]
+
+
+def bound_and_read(text):
+    """The names that a module binds at its head, and all names that it reads."""
+    tree, bound = ast.parse(text), set()
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            bound.add(node.name)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            bound |= {(alias.asname or alias.name).partition(".")[0] for alias in node.names}
+        else:
+            bound |= {n.id for n in ast.walk(node) if is_name(n, ast.Store)}
+    return bound, {node.id for node in ast.walk(tree) if is_name(node, ast.Load)}
+
+
+def is_name(node, context):
+    return isinstance(node, ast.Name) and isinstance(node.ctx, context)
+
+
+@pytest.mark.parametrize("path", EXPERIMENT_FILES, ids=lambda path: path.stem)
+def test_a_measurement_reads_no_name_bound_below_the_digested_text(path):
+    measuring = machine.measuring_part(path)
+    bound, read = bound_and_read(measuring)
+    bound_below, _ = bound_and_read(path.read_bytes()[len(measuring) :])
+    assert read & bound_below - bound == set()
+    assert bound & bound_below == set()
+
+
 def imported(path, root):
     """The files that a source may import, in a function or at its head, by any form of import."""
     package = path.relative_to(root).parent.parts
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(ast.parse(machine.measuring_part(path))):
         if isinstance(node, ast.Import):
             names = [alias.name.split(".") for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
