@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.energy import measurement as suite
-from plumbob.bench.experiments.energy import tables
+from plumbob.bench.experiments import energy as suite
 from plumbob.bench.tables.results import Results
 
 STEPS = 100
@@ -42,9 +41,9 @@ def test_dampers_take_energy(swings):
 def test_table_and_sentence_follow_the_records(make):
     left = np.linspace(1.0, 0.5, 11)
     damped = make.swung("discrete", "damped", left)
-    table = tables.energy(Results([make.swung("RK4", left=left), damped]))
+    table = suite.energy(Results([make.swung("RK4", left=left), damped]))
     assert [row[:2] for row in table.rows] == [("undamped", "RK4"), ("damped", "discrete")]
     assert table.rows[0][2:] == (50.0, None, None, 100.0, 50.0)
     (point,) = table.summary.points
     assert all(part in point for part in ("RK4", "50.0 %", "100 %"))
-    assert tables.energy(Results([damped])).summary.sentence == ""
+    assert suite.energy(Results([damped])).summary.sentence == ""
