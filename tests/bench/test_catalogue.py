@@ -13,7 +13,6 @@ import plumbob.bench.experiments
 from plumbob.bench.experiments import Scale, blocks
 from plumbob.bench.experiments.cloth import measurement as cloth
 from plumbob.bench.experiments.cloth import tables as cloth_tables
-from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.newton import tables as newton_tables
 from plumbob.bench.experiments.robots import tables as robot_tables
 from plumbob.bench.figures.style import COLOURS
@@ -22,6 +21,7 @@ from plumbob.bench.harness.experiment import Experiment
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import catalogue, ik, packages
 from plumbob.bench.peers.peer import ONE_START
+from plumbob.bench.problems.cloth_swing import cloth_swing
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
 from plumbob.reference import STEP_SOLVERS

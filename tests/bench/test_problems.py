@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.problems.chains import STRATA, chain_targets, unit
+from plumbob.bench.problems.cloth_swing import cloth_swing
 from plumbob.bench.problems.curves import MAX_SPACING, MIN_SPACING, arm_beyond, arm_curves
 
 

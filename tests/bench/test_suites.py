@@ -9,13 +9,13 @@ import pytest
 from plumbob.bench.experiments import SUITES, Scale, blocks
 from plumbob.bench.experiments.cloth import ONE_STEP
 from plumbob.bench.experiments.cloth import measurement as cloth
-from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.cloth.tables import convergence
 from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import measure
 from plumbob.bench.harness.record import Record, decode, encode, key
 from plumbob.bench.harness.run import now
+from plumbob.bench.problems.cloth_swing import cloth_swing
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.writers import markdown
 from plumbob.reference import ImplicitEuler

@@ -10,7 +10,6 @@ import pytest
 
 from plumbob.bench import clock
 from plumbob.bench.experiments import Scale
-from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.timing import case as timing_case
 from plumbob.bench.experiments.timing import cloth, kinematics, measurement, robots
 from plumbob.bench.experiments.timing.case import (
@@ -29,6 +28,7 @@ from plumbob.bench.harness import run
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import catalogue
+from plumbob.bench.problems.cloth_swing import cloth_swing
 from plumbob.bench.problems.robots import is_installed, robot
 from plumbob.crosscheck.engines import SKELETON_ENGINES, MujocoMassSpring
 from plumbob.crosscheck.engines.skeleton_engine import coordinates

@@ -1,52 +1,37 @@
 """Convergence of implicit Euler's solvers on the lab's cloth, and the error of few iterations."""
 
-import functools
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from plumbob.crosscheck.mass_spring.exact_step import exact_step
-from plumbob.reference import ImplicitEuler, MassSpring, State, scenes
+from plumbob.reference import ImplicitEuler, MassSpring, State
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import damper_forces, lengths, spring_forces
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers import catalogue
+from ...problems.cloth_swing import (
+    FALLING,
+    MIDDLE,
+    STEPS,
+    ClothSwing,
+    H,
+    cloth_swing,
+    converged_motion,
+    integrator_of,
+    motion,
+)
 from . import DAMPERS, FEW, ONE_STEP
 
-STIFFNESS, FACTORS = 100.0, (1, 10, 100)
-H = 1 / 60
+FACTORS = (1, 10, 100)
 DAMPING = 0.2  # of the lab's own cloth; elsewhere it swings undamped
-# The cloth falls for three seconds; the steps of the next second are measured.
-FALLING, STEPS = 180, 60
-TOLERANCE = 1e-10
-# The step whose convergence is recorded iteration by iteration.
-MIDDLE = FALLING + STEPS // 2
 FEW_ITERATIONS = (1, 10, 100)
 # Steps in which the two laws of dampers are compared [s], each half as long as the last.
 HALVED = tuple(H / 2**i for i in range(-1, 6))
-
-
-@dataclass(frozen=True)
-class ClothSwing:
-    """A falling and swinging cloth, in steps of fixed length."""
-
-    name: str  # of the problem
-    system: MassSpring
-    start: State
-    h: float  # the step [s]
-
-
-@functools.cache
-def cloth_swing(factor: float, size: int = 11, damping: float = 0.0) -> ClothSwing:
-    """Return the lab's cloth of size x size particles at rest, `factor` times as stiff."""
-    system, start = scenes.lab_cloth(stiffness=factor * STIFFNESS, size=size, damping=damping)
-    name = f"cloth/x{factor:g}" if size == 11 else f"cloth/x{factor:g}/{size}x{size}"
-    return ClothSwing(name, system, start, H)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -144,28 +129,3 @@ def step_damper_forces(system: MassSpring, before: State, after: State, h: float
         tension_only=np.zeros(len(system.springs), dtype=bool),
     )
     return spring_forces(dampers, after.positions)
-
-
-def integrator_of(
-    problem: ClothSwing,
-    solver: str = "newton",
-    tolerance: float = TOLERANCE,
-    max_iterations: int = 100,
-) -> ImplicitEuler:
-    """Return an integrator of a cloth, by default converged in every step."""
-    limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations}
-    return ImplicitEuler(problem.system, h=problem.h, solver=solver, **limits)
-
-
-@functools.cache
-def converged_motion(problem: ClothSwing) -> tuple[State, ...]:
-    """Return the states of the four seconds by converged steps, the start first."""
-    return tuple(motion(problem.start, FALLING + STEPS, integrator_of(problem)))
-
-
-def motion(start: State, steps: int, integrator: ImplicitEuler) -> list[State]:
-    """Return the states of consecutive steps, the start first."""
-    states = [start]
-    for _ in range(steps):
-        states.append(integrator.step(states[-1]).state)
-    return states

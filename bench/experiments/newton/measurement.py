@@ -17,7 +17,7 @@ from plumbob.reference.implicit_euler.objective import Objective
 
 from ...harness.block import Block, Measured, Scale
 from ...peers import catalogue
-from ..cloth.measurement import TOLERANCE, ClothSwing, integrator_of
+from ...problems.cloth_swing import TOLERANCE, ClothSwing, integrator_of
 from . import FRAME, FRAMES, GRAVITY, STIFFNESSES
 
 # Iterations of a quick solver; solvers allowed more than `SLOW` count as slow.

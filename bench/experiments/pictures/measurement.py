@@ -9,8 +9,8 @@ import numpy as np
 from plumbob.reference import IK_SOLVERS, ImplicitEuler, rotation, scenes, track
 
 from ...harness.block import Block, Measured, Scale
+from ...problems.cloth_swing import TOLERANCE, H, cloth_swing, converged_motion, motion
 from ...problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
-from ..cloth.measurement import TOLERANCE, H, cloth_swing, converged_motion, motion
 from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
 
 GHOSTS, FRAMES = 9, 6

@@ -13,7 +13,7 @@ from plumbob.reference.implicit_euler.factor_cache import global_factor
 from plumbob.reference.sparse import CholeskyFactor
 
 from ...harness import metrics
-from ..cloth.measurement import MIDDLE, ClothSwing, cloth_swing, converged_motion, motion
+from ...problems.cloth_swing import MIDDLE, ClothSwing, cloth_swing, converged_motion, motion
 from .case import COMPILED, PLAIN, TIGHT, TimedCase, TimedWork, copying
 
 FACTORS = (1, 100)
