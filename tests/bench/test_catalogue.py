@@ -10,9 +10,7 @@ from functools import partial
 import pytest
 
 import plumbob.bench.experiments
-from plumbob.bench.experiments import Scale, blocks
-from plumbob.bench.experiments.cloth import measurement as cloth
-from plumbob.bench.experiments.cloth import tables as cloth_tables
+from plumbob.bench.experiments import Scale, blocks, cloth
 from plumbob.bench.experiments.newton import tables as newton_tables
 from plumbob.bench.experiments.robots import tables as robot_tables
 from plumbob.bench.figures.style import COLOURS
@@ -55,7 +53,7 @@ def test_a_new_step_solver_stands_in_the_tables(make):
     small = partial(cloth.one_step, cloth_swing(1, size=5), "damped_global", 20)
     record = run.measure(replace(block, measure=small))
     assert not record.failed
-    table = cloth_tables.convergence(Results([record]))
+    table = cloth.convergence(Results([record]))
     assert table.rows[0][1:3] == ("damped global", record.measured["error"][1])
     certified = newton_tables.proofs(Results([make.certified("damped_global")]))
     assert certified.rows[0][1] == "damped global"

@@ -6,10 +6,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments import SUITES, Scale, blocks
-from plumbob.bench.experiments.cloth import ONE_STEP
-from plumbob.bench.experiments.cloth import measurement as cloth
-from plumbob.bench.experiments.cloth.tables import convergence
+from plumbob.bench.experiments import SUITES, Scale, blocks, cloth
+from plumbob.bench.experiments.cloth import ONE_STEP, convergence
 from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import measure

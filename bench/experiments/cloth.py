@@ -1,0 +1,372 @@
+"""Convergence of implicit Euler's solvers on the lab's cloth, and the error of few iterations."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.crosscheck.mass_spring.exact_step import exact_step
+from plumbob.reference import ImplicitEuler, MassSpring, State
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.mass_spring import damper_forces, lengths, spring_forces
+
+from ..harness import metrics
+from ..harness.block import Block, Measured, Scale
+from ..harness.record import Record
+from ..harness.values import Floats1, Values
+from ..peers import catalogue
+from ..problems.cloth_swing import (
+    FALLING,
+    MIDDLE,
+    STEPS,
+    ClothSwing,
+    H,
+    cloth_swing,
+    converged_motion,
+    integrator_of,
+    motion,
+)
+
+# The tasks of its records.
+ONE_STEP, FEW, DAMPERS = "one step", "few iterations", "dampers"
+FACTORS = (1, 10, 100)
+DAMPING = 0.2  # of the lab's own cloth; elsewhere it swings undamped
+FEW_ITERATIONS = (1, 10, 100)
+# Steps in which the two laws of dampers are compared [s], each half as long as the last.
+HALVED = tuple(H / 2**i for i in range(-1, 6))
+
+
+class StepWords(Values, frozen=True, kw_only=True):
+    """The number of iterations of a step, where fixed."""
+
+    iterations: int = 0
+
+
+class IterationErrors(StepWords, frozen=True):
+    """Residual and error of a step at the start and after each iteration, (iteration + 1,)."""
+
+    residual: Floats1
+    error: Floats1
+
+
+class TruncatedSteps(StepWords, frozen=True):
+    """Steps of a few iterations compared with converged steps, (step,): relative error, and [m]."""
+
+    error: Floats1
+    distance: Floats1
+    drift: Floats1
+    path: Floats1
+
+
+class DamperDifferences(Values, frozen=True):
+    """Relative difference between the forces of two laws of dampers in steps of h [s]."""
+
+    h: Floats1
+    difference: Floats1
+
+
+KINDS = {ONE_STEP: IterationErrors, FEW: TruncatedSteps, DAMPERS: DamperDifferences}
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield, for each stiffness: the iterations of a step, few iterations, dampers.
+
+    The cloth is the same at every scale.
+    """
+    swing = {"h": H, "first": FALLING, "steps": STEPS}
+    for factor in FACTORS:
+        problem, block = cloth_swing(factor), partial(_block, factor)
+        for solver in catalogue.followed_step_solvers():
+            measure = partial(one_step, problem, solver.name, solver.followed)
+            settings = {"h": H, "step": MIDDLE, "iterations": solver.followed}
+            yield block(ONE_STEP, solver.name, measure, **settings)
+        for count in FEW_ITERATIONS:
+            measure = partial(few_iterations, problem, count)
+            yield block(FEW, "local_global", measure, **swing, iterations=count)
+        measure = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
+        settings = {"first": MIDDLE, "damping": DAMPING}
+        settings |= {"longest": HALVED[0], "halvings": len(HALVED) - 1}
+        yield block(DAMPERS, "newton", measure, **settings)
+
+
+def _block(
+    factor: float, task: str, solver: str, measure: Callable[[], Measured], **settings: Any
+) -> Block:
+    problem = f"{cloth_swing(factor).name}/{task}"
+    facts = {"title": f"stiffness × {factor:g}", "task": task}
+    return Block("cloth", problem, solver, measure, settings, facts=facts)
+
+
+def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
+    """Iterate a step from mid-swing; keep residual and error after each iteration."""
+    state = converged_motion(problem)[MIDDLE]
+    newton = integrator_of(problem, tolerance=0.0, max_iterations=50).step(state).state.positions
+    exact = exact_step(problem.system, state, problem.h, newton)
+    objective = integrator_of(problem).objective(state)
+    iterates = ImplicitEuler(problem.system, h=problem.h, solver=solver).iterates(state)
+    pairs = [
+        (objective.residual(iterate), exact.error(iterate.positions, objective.y))
+        for _, iterate in zip(range(iterations + 1), iterates, strict=False)
+    ]
+    return dict(zip(("residual", "error"), np.array(pairs).T, strict=True))
+
+
+def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
+    """Compare steps of a few local/global iterations with converged steps.
+
+    The error and distance are measured after a single step from each state of the converged motion.
+    The drift is the distance between the converged motion and a motion of only truncated steps. The
+    path is the distance of the converged motion from its start.
+    """
+    integrator = integrator_of(problem, "local_global", 0.0, iterations)
+    start, *exact = converged = converged_motion(problem)[FALLING:]
+    ends = [integrator.step(state).state for state in converged[:-1]]
+    inertial = [integrator_of(problem).objective(state).y for state in converged[:-1]]
+    errors = [
+        metrics.relative_error(end.positions, x.positions, y)
+        for end, x, y in zip(ends, exact, inertial, strict=True)
+    ]
+    motions = {
+        "distance": ends,
+        "drift": motion(start, STEPS, integrator)[1:],
+        "path": [start] * STEPS,
+    }
+    distances = {
+        name: np.array(
+            [
+                metrics.rms_distance(a.positions, b.positions)
+                for a, b in zip(states, exact, strict=True)
+            ]
+        )
+        for name, states in motions.items()
+    }
+    return {"error": np.array(errors), **distances}
+
+
+def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
+    """Take a step of each length from mid-swing; compare the two laws at its end."""
+    state = motion(problem.start, first, integrator_of(problem))[-1]
+    differences = []
+    for h in HALVED:
+        end = ImplicitEuler(problem.system, h=h).step(state).state
+        rates = damper_forces(problem.system, end)
+        offsets = step_damper_forces(problem.system, state, end, h) - rates
+        differences.append(np.linalg.norm(offsets) / np.linalg.norm(rates))
+    return {"h": np.array(HALVED), "difference": np.array(differences)}
+
+
+def step_damper_forces(system: MassSpring, before: State, after: State, h: float) -> FloatArray:
+    """Return the forces -(c/h) (l - l_n) u of a step's dampers at its end [N], (particle, 3)."""
+    dampers = system.replaced(
+        stiffnesses=system.dampings / h,
+        rest_lengths=lengths(system, before.positions),
+        tension_only=np.zeros(len(system.springs), dtype=bool),
+    )
+    return spring_forces(dampers, after.positions)
+
+
+# What is shown.
+
+from ..figures.chart import Panel, series
+from ..figures.chart_sketch import declared_chart
+from ..figures.sketch import Sketch
+from ..tables.captions import Captions
+from ..tables.columns import text, words_in
+from ..tables.results import (
+    Results,
+    by_problem,
+    counted,
+    grouped,
+    label,
+    listed,
+    most_often,
+    settings,
+)
+from ..tables.table import Column, Summary, words
+from .cloth_peers import DECADES, SOLVED
+from .pictures.figures import falling_cloth
+
+CAPTIONS = Captions(__file__)
+
+
+class SolverRow(NamedTuple):
+    """A solver on a cloth: its iterations of a step, and its steps of few iterations by number."""
+
+    cloth: str
+    solver: str
+    step: Record | None
+    few: dict[int, Record]
+
+
+def _of_step(read: Callable[[IterationErrors], Any]) -> Callable[[SolverRow], Any]:
+    return lambda row: read(row.step.values) if row.step else None
+
+
+def _of_few(count: int, read: Callable[[TruncatedSteps], Any]) -> Callable[[SolverRow], Any]:
+    return lambda row: read(row.few[count].values) if count in row.few else None
+
+
+def _after(quantity: str, count: int, **looks: Any) -> Column:
+    """Return the column of a quantity after so many iterations."""
+
+    def read(step: IterationErrors) -> float | None:
+        numbers = getattr(step, quantity)
+        return numbers[count] if count < numbers.size else None
+
+    title, group = f"{quantity} after {words(count)}", f"{quantity} after"
+    return Column(title, group=group, read=_of_step(read), **looks)
+
+
+def _iterations_to(error: str, **looks: Any) -> Column:
+    read = _of_step(lambda step: metrics.first_below(step.error, float(error)))
+    return Column(f"iterations to {error}", best="least", group="iterations to", read=read, **looks)
+
+
+def _truncated(count: int) -> Iterator[Column]:
+    """Yield the columns of steps of so many iterations."""
+    title = f"steps of {counted(count, 'iteration')}"
+    column, of = partial(Column, group=title, folded=True), partial(_of_few, count)
+    yield column(f"{title}, median error", read=of(lambda s: metrics.spread(s.error).median))
+    yield column(f"{title}, largest error", read=of(lambda s: metrics.spread(s.error).largest))
+    yield column(f"{title}, drift", unit="m", read=of(lambda s: s.drift[-1]))
+    yield column(f"{title}, drift relative to the path", unit="%", read=of(_relative_drift))
+
+
+def _relative_drift(steps: TruncatedSteps) -> float:
+    return metrics.ratio(float(steps.drift[-1]), float(steps.path[-1]))
+
+
+CONVERGENCE = (
+    text("cloth", lambda row: row.cloth),
+    text("solver", lambda row: row.solver),
+    *(_after("error", count, best="least") for count in (1, 10, 100)),
+    *map(_iterations_to, ("1e-2", "1e-4")),
+    Column("smallest error", best="least", read=_of_step(lambda step: step.error.min())),
+    _after("error", 1000, best="least", folded=True),
+    *(_iterations_to(d, folded=True) for d in DECADES if d not in ("1e-2", "1e-4")),
+    Column("iterations tried", read=_of_step(lambda step: step.error.size - 1), folded=True),
+    *(_after("residual", count, folded=True) for count in (1, 10, 100, 1000)),
+    *(column for count in FEW_ITERATIONS for column in _truncated(count)),
+)
+
+
+def _convergence_rows(results: Results) -> list[SolverRow]:
+    """Return a row for every solver on every cloth, cloth by cloth."""
+    records = [r for task in (ONE_STEP, FEW) for r in results.all("cloth", task=task)]
+    rows = [
+        SolverRow(
+            f"lab cloth, {title}",
+            label(solver),
+            next((r for r in group if r.task == ONE_STEP), None),
+            {r.values.iterations: r for r in group if r.task == FEW},
+        )
+        for (title, solver), group in grouped(records, lambda r: (r.title, r.solver)).items()
+    ]
+    return [row for cloth in grouped(rows, lambda row: row.cloth).values() for row in cloth]
+
+
+def _convergence_summary(rows: Sequence[SolverRow]) -> Summary:
+    points = [
+        f"{cloth}: {listed([_count(row) for row in of_cloth if row.step])}"
+        for cloth, of_cloth in grouped(rows, lambda row: row.cloth).items()
+    ]
+    points += [_single_iterations(row) for row in rows if 1 in row.few]
+    cloths = grouped((row for row in rows if _solved(row)), lambda row: row.cloth)
+    firsts = [min(of_cloth, key=_solved).solver for of_cloth in cloths.values()]
+    fewest = f"by {most_often(firsts, 'cloth')}" if firsts else "by no solver"
+    sentence = f"An error of {SOLVED} is reached in the fewest iterations {fewest}."
+    return Summary(sentence, tuple(points))
+
+
+_solved = _iterations_to(SOLVED).read
+
+
+def _count(row: SolverRow) -> str:
+    count = _solved(row)
+    tried = _of_step(lambda step: step.error.size - 1)(row)
+    return f"{row.solver} {f'more than {words(tried)}' if count is None else words(count)}"
+
+
+def _single_iterations(row: SolverRow) -> str:
+    steps: TruncatedSteps = row.few[1].values
+    return (
+        f"{row.cloth}, {settings([row.few[1]], 'steps')} steps of one local/global iteration "
+        f"each: a median error of {words_in(metrics.spread(steps.error).median, '%')}; the "
+        f"cloth drifts by {words(float(steps.drift[-1]))} m, "
+        f"{words_in(_relative_drift(steps), '%')} of its path"
+    )
+
+
+def convergence_chart(results: Results) -> Sketch | None:
+    """Show residual and error over the iterations of a step, a column for each stiffness."""
+    cloths = by_problem(results.all("cloth", task=ONE_STEP)).values()
+    rows = {"residual": "residual", "error": "error |x − x*| / |y − x*|"}
+    panels = (
+        Panel(
+            f"cloth, {records[0].title}" if quantity == "residual" else "",
+            tuple(
+                series(r.solver, np.arange(1, errors.size), errors[1:])
+                for r in records
+                for errors in [getattr(r.values, quantity)]
+            ),
+            label=title,
+        )
+        for quantity, title in rows.items()
+        for records in cloths
+    )
+    chart = CAPTIONS.figure("cloth_convergence")
+    return declared_chart(chart, panels, results.entrants, columns=len(cloths))
+
+
+convergence = CAPTIONS.layout(
+    "cloth_convergence",
+    _convergence_rows,
+    _convergence_summary,
+    columns=CONVERGENCE,
+    figures=(convergence_chart, falling_cloth),
+)
+
+
+class DampedStep(NamedTuple):
+    """A step of a damped cloth: its length [s], and the difference of the two laws."""
+
+    record: Record
+    h: float
+    difference: float
+    order: float | None  # observed, from the longer step before
+
+    def __str__(self) -> str:
+        return f"{words(self.difference)} at {words_in(self.h, 'ms')}"
+
+
+DAMPED_STEPS = (
+    text("cloth", lambda step: step.record.title),
+    Column("h", unit="ms", read=lambda step: step.h),
+    Column("difference", read=lambda step: step.difference),
+    Column("observed order", read=lambda step: step.order),
+)
+
+
+def _damped_steps(results: Results) -> Iterator[DampedStep]:
+    """Yield every step of every damped cloth, the longest step first."""
+    for record in results.all("cloth", task=DAMPERS):
+        differences = record.values.difference
+        orders = [None, *np.log2(differences[:-1] / differences[1:])]
+        for h, difference, order in zip(record.values.h, differences, orders, strict=True):
+            yield DampedStep(record, float(h), float(difference), order)
+
+
+def _damper_summary(steps: Sequence[DampedStep]) -> Summary:
+    cloths = grouped(steps, lambda step: step.record.title)
+    low, high = (words(end(step.difference for step in steps)) for end in (min, max))
+    return Summary(
+        f"The forces of the two laws differ by {low} to {high} of their size, the less the "
+        "shorter the step.",
+        tuple(f"{cloth}: {of[0]}, {of[-1]}" for cloth, of in cloths.items()),
+    )
+
+
+dampers = CAPTIONS.layout("cloth_dampers", _damped_steps, _damper_summary, columns=DAMPED_STEPS)
+
+LAYOUTS = (convergence, dampers)
