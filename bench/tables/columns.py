@@ -11,9 +11,9 @@ from ..harness.record import Record
 from .table import Cell, Column, in_unit, words
 
 
-def text(title: str, read: Callable[[Any], Cell]) -> Column:
+def text(title: str, read: Callable[[Any], Cell], folded: bool = False) -> Column:
     """Return a column of words."""
-    return Column(title, words=True, read=read)
+    return Column(title, words=True, read=read, folded=folded)
 
 
 def quantile_cells(title: str, quantiles: Iterable[Cell]) -> dict[str, Cell]:

@@ -10,8 +10,7 @@ from functools import partial
 import pytest
 
 import plumbob.bench.experiments
-from plumbob.bench.experiments import Scale, blocks, cloth
-from plumbob.bench.experiments.newton import tables as newton_tables
+from plumbob.bench.experiments import Scale, blocks, cloth, newton
 from plumbob.bench.experiments.robots import tables as robot_tables
 from plumbob.bench.figures.style import COLOURS
 from plumbob.bench.harness import run, timing
@@ -55,7 +54,7 @@ def test_a_new_step_solver_stands_in_the_tables(make):
     assert not record.failed
     table = cloth.convergence(Results([record]))
     assert table.rows[0][1:3] == ("damped global", record.measured["error"][1])
-    certified = newton_tables.proofs(Results([make.certified("damped_global")]))
+    certified = newton.proofs(Results([make.certified("damped_global")]))
     assert certified.rows[0][1] == "damped global"
 
 

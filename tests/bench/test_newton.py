@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.newton import measurement as suite
-from plumbob.bench.experiments.newton import tables
+from plumbob.bench.experiments import newton as suite
 from plumbob.bench.tables.results import Results
 
 SIZE = 6
@@ -58,7 +57,7 @@ def test_table_and_sentence_follow_the_records(make, stiff):
         make.certified(solver, {"start": start, "iterations": limit}).with_measured(**step)
         for (solver, start, limit), step in stiff.items()
     ]
-    table = tables.proofs(Results(records))
+    table = suite.proofs(Results(records))
     cells = dict(zip([c.title for c in table.columns], zip(*table.rows, strict=True), strict=True))
     assert cells["same minimiser as Newton"] == ("yes", "yes", "yes", "not proven")
     assert [bound == "yes" for bound in cells["bound"]] == [True, True, True, False]
@@ -70,6 +69,6 @@ def test_table_and_sentence_follow_the_records(make, stiff):
 
 def test_another_minimiser_and_a_newton_that_fails_are_reported(make):
     arrays = {"residual": 1.0, "at_floor": False, "same": False, "different": True}
-    table = tables.proofs(Results([make.certified(arrays=arrays)]))
+    table = suite.proofs(Results([make.certified(arrays=arrays)]))
     assert "no" in table.rows[0]
     assert "in 0 of 1 cloth." in table.summary.sentence

@@ -2,24 +2,28 @@
 
 import copy
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from plumbob.crosscheck.mass_spring.exact_step import ExactStep, exact_step
-from plumbob.crosscheck.mass_spring.steps import balance_residual
 from plumbob.reference import STEP_SOLVERS, ImplicitEuler, scenes
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.implicit_euler.certificate import Certificate, certify
 from plumbob.reference.implicit_euler.objective import Objective
 
-from ...harness.block import Block, Measured, Scale
-from ...peers import catalogue
-from ...problems.cloth_swing import TOLERANCE, ClothSwing, integrator_of
-from . import FRAME, FRAMES, GRAVITY, STIFFNESSES
+from ..harness.block import Block, Measured, Scale
+from ..harness.record import Record
+from ..harness.values import Values
+from ..peers import catalogue
+from ..problems.cloth_swing import TOLERANCE, ClothSwing, integrator_of
 
+# Stiffness of the cloths [N/m], gravity [m/s²], and the converged frames before the step [s].
+STIFFNESSES = (1e3, 1e4, 1e5)
+GRAVITY = 9.81
+FRAME, FRAMES = 1 / 30, 15
 # Iterations of a quick solver; solvers allowed more than `SLOW` count as slow.
 USUAL, SLOW = 10, 1000
 # At this stiffness [N/m] and above slow solvers also start near Newton's solution, every coordinate
@@ -30,14 +34,36 @@ FROM_Y, NEAR_NEWTON = "y", "beside Newton’s answer"
 QUICK, FULL, _FULL_TARGETS = 10, 30, 2000
 
 
-@functools.cache
-def mid_swing(stiffness: float, size: int) -> ClothSwing:
-    """Return the lab's cloth under real gravity in mid-swing, after converged frames from rest."""
-    system, state = scenes.lab_cloth(size=size, stiffness=stiffness, gravity=GRAVITY)
-    integrator = ImplicitEuler(system, h=FRAME)
-    for _ in range(FRAMES):
-        state = integrator.step(state).state
-    return ClothSwing(f"swing/k{stiffness:g}", system, state, FRAME)
+class CertifiedWords(Values, frozen=True, kw_only=True):
+    """The cloth's stiffness [N/m], the tolerance and start of the solve, and the kind of bound."""
+
+    stiffness: float
+    tolerance: float
+    start: str
+    coverage: str = ""
+
+
+class CertifiedStep(CertifiedWords, frozen=True, kw_only=True):
+    """A solver's solution of the step; lengths in metres."""
+
+    size: int  # particles along a side
+    iterations: int
+    residual: float
+    at_floor: bool  # whether the residual is at the rounding floor
+    balance: float  # the residual in MuJoCo's forces
+    distance: float  # proven bound on the distance to a minimiser, infinite if there is none
+    curvature: float  # proven lower bound on the smallest eigenvalue of the Hessian
+    lipschitz: float  # Lipschitz constant of the Hessian
+    newton_step: float  # its length
+    newton_distance: float  # to Newton's solution
+    error: float  # |x - x*| / |y - x*|
+    above: float  # g above that of Newton's solution [kg m²]
+    covered: bool  # whether there is a bound
+    same: bool  # whether it provably belongs to Newton's minimiser
+    different: bool  # whether it provably does not
+
+
+KINDS = {"": CertifiedStep}
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -59,8 +85,20 @@ def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> 
     return Block("newton", f"swing/k{stiffness:g}", solver, measure, settings, size, facts)
 
 
+@functools.cache
+def mid_swing(stiffness: float, size: int) -> ClothSwing:
+    """Return the lab's cloth under real gravity in mid-swing, after converged frames from rest."""
+    system, state = scenes.lab_cloth(size=size, stiffness=stiffness, gravity=GRAVITY)
+    integrator = ImplicitEuler(system, h=FRAME)
+    for _ in range(FRAMES):
+        state = integrator.step(state).state
+    return ClothSwing(f"swing/k{stiffness:g}", system, state, FRAME)
+
+
 def certified_step(size: int, stiffness: float, solver: str, start: str, limit: int) -> Measured:
     """Solve the step; keep the certificate of the solution, and its distance to Newton's."""
+    from plumbob.crosscheck.mass_spring.steps import balance_residual
+
     problem = mid_swing(stiffness, size)
     newton, objective = newton_solution(problem), _objective(problem)
     solve = _solve_from_y if start == FROM_Y else _solve_near_newton
@@ -131,3 +169,79 @@ def _solve_near_newton(problem: ClothSwing, solver: str, limit: int) -> tuple[Fl
         if k == limit or iterate.at_floor or objective.residual(iterate) <= TOLERANCE:
             break
     return iterate.positions, k
+
+
+# What is shown.
+
+from ..tables.captions import Captions
+from ..tables.columns import text
+from ..tables.results import counted, label, listed
+from ..tables.table import Column, Summary, words
+
+CAPTIONS = Captions(__file__, gravity=f"{GRAVITY:g}", time=f"{FRAMES * FRAME:g}")
+
+
+def _minimiser(record: Record) -> str:
+    step = record.values
+    return "yes" if step.same else "no" if step.different else "not proven"
+
+
+def _bound(record: Record) -> str:
+    step = record.values
+    return "yes" if step.covered else step.coverage.lower().replace("_", " ")
+
+
+def _distance(record: Record) -> float | None:
+    distance: float = record.values.distance
+    return distance if np.isfinite(distance) else None
+
+
+COLUMNS = (
+    Column("stiffness", "N/m", read=lambda r: r.values.stiffness),
+    text("solver", lambda r: label(r.solver)),
+    text("start", lambda r: r.values.start),
+    Column("iterations", read=lambda r: r.values.iterations),
+    Column("residual", best="least", read=lambda r: r.values.residual),
+    Column("distance to a minimiser, at most", "m", best="least", read=_distance),
+    text("same minimiser as Newton", _minimiser),
+    Column("residual in MuJoCo’s forces", folded=True, read=lambda r: r.values.balance),
+    text("bound", _bound, folded=True),
+    Column(
+        "distance to Newton’s solution", "m", folded=True, read=lambda r: r.values.newton_distance
+    ),
+    Column("error", folded=True, read=lambda r: r.values.error),
+    Column("g above Newton’s", "kg m²", folded=True, read=lambda r: r.values.above),
+)
+
+
+def _summary(records: Sequence[Record]) -> Summary:
+    newton = [record for record in records if record.solver == "newton"]
+    rivals = [record for record in records if record.solver != "newton"]
+    solved = sum(r.values.at_floor or r.values.residual <= r.values.tolerance for r in newton)
+    distances = [record.values.newton_distance for record in rivals if record.values.same]
+    nearby = f", at most {words(max(distances))} m from Newton’s" if distances else ""
+    first = (
+        f"Newton reached the tolerance or the rounding floor in {words(solved)} of "
+        f"{counted(len(newton), 'cloth')}. "
+    )
+    return Summary(
+        f"{first if newton else ''}Of the other solvers’ "
+        f"{counted(len(rivals), 'solution')}, {words(len(distances))} are proven to belong to the "
+        f"same minimiser{nearby}."
+    )
+
+
+def _sizes(records: Sequence[Record]) -> dict[str, str]:
+    sizes = sorted({record.values.size for record in records})
+    return {"sizes": listed([f"{size} × {size}" for size in sizes], "or")}
+
+
+proofs = CAPTIONS.layout(
+    "cloth_proofs",
+    lambda results: results.all("newton"),
+    _summary,
+    measured=_sizes,
+    columns=COLUMNS,
+)
+
+LAYOUTS = (proofs,)
