@@ -7,8 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.cloth_scale import measurement as suite
-from plumbob.bench.experiments.cloth_scale import tables
+from plumbob.bench.experiments import cloth_scale as suite
 from plumbob.bench.harness.block import Scale
 from plumbob.bench.harness.progress import listening
 from plumbob.bench.tables.results import Results
@@ -91,7 +90,7 @@ def test_the_limit_reads_what_it_says():
 
 def test_our_parts_stand_beside_scipys(make):
     records = [measured(make, "supernodal", OURS), measured(make, "scipy", THEIRS)]
-    table = tables.scale(Results(records))
+    table = suite.scale(Results(records))
     ours, theirs = table.rows
     assert (ours[1], theirs[1]) == ("ours", "SciPy's SuperLU")
     np.testing.assert_allclose(

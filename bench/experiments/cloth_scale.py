@@ -5,7 +5,7 @@ Each cloth is measured in its own process, because only a process knows its peak
 
 import resource
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,14 @@ from plumbob.reference.implicit_euler.objective import global_matrix
 from plumbob.reference.sparse import CholeskyFactor
 from plumbob.reference.sparse.linear_solver import factorize
 
-from ...clock import compute_time_of
-from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import in_a_fresh_process
-from ...harness.progress import announce
-from ...peers import catalogue
+from ..clock import compute_time_of
+from ..harness import metrics
+from ..harness.block import Block, Measured, Scale
+from ..harness.isolation import in_a_fresh_process
+from ..harness.progress import announce
+from ..harness.record import Record
+from ..harness.values import Floats1, Values
+from ..peers import catalogue
 
 H, STIFFNESS, ITERATIONS = 1 / 60, 1e4, 10
 # Particles along a side, and the shortest benchmark time [s] at which the cloth is measured.
@@ -39,6 +42,37 @@ ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 STRETCH = 2**28
 # Time limit of a part [s], for example the factor of a million particles, with compilation.
 PATIENCE = 1800.0
+
+
+class FactorWords(Values, frozen=True, kw_only=True):
+    """The number of particles, and the iterations of a step."""
+
+    particles: int
+    iterations: int
+
+
+class FactorCosts(FactorWords, frozen=True, kw_only=True):
+    """A cloth factored by a library: times [s], (round,), and memory [bytes].
+
+    None where only our factors are measured.
+    """
+
+    before: int  # the memory before the cloth
+    assembly: float | None = None
+    factor: float
+    refactor: float | None = None  # the time of a second factor of the same pattern
+    solve: Floats1  # of three right-hand sides
+    local: Floats1 | None = None
+    step: Floats1 | None = None
+    limit: Floats1 | None = None  # plain reads of as many bytes as an iteration reads
+    entries: int | None = None  # nonzeros of the factor
+    matrix_entries: int | None = None
+    memory: int  # the peak of the process
+    residual: float | None = None  # after all iterations of a step
+    history: Floats1 | None = None  # the residual at the start and after each iteration
+
+
+KINDS = {"": FactorCosts}
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -173,3 +207,72 @@ def memory() -> int:
         return 1024 * int(status.read_text().split("VmHWM:")[1].split()[0])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak
+
+
+# What is shown.
+
+from ..tables.captions import Captions
+from ..tables.columns import text
+from ..tables.table import NO_SUMMARY, Column, Summary, words
+
+LABELS = {library.name: library.label for library in catalogue.FACTORS}
+
+
+def _median(record: Record, quantity: str) -> float | None:
+    """Return the median of a quantity, None if not measured."""
+    if quantity == "iteration":
+        step = _median(record, "step")
+        return step and step / record.values.iterations
+    numbers = getattr(record.values, quantity)
+    return None if numbers is None else metrics.spread(numbers).median
+
+
+def _of(quantity: str, divisor: str = "") -> Callable[[Record], float | None]:
+    """Return a reader of a median, or of a ratio of two medians."""
+
+    def read(record: Record) -> float | None:
+        median = _median(record, quantity)
+        other = _median(record, divisor) if divisor else 1.0
+        return None if median is None or other is None else metrics.ratio(median, other)
+
+    return read
+
+
+_per_solve = _of("step", "solve")
+
+COLUMNS = (
+    Column("particles", read=lambda record: record.values.particles),
+    text("library", lambda record: LABELS.get(record.solver, record.solver)),
+    Column("first factor", "s", best="least", read=_of("factor")),
+    Column("second factor", "s", best="least", read=_of("refactor")),
+    Column("solve", "ms", best="least", read=_of("solve")),
+    Column("peak memory", "GiB", best="least", read=_of("memory")),
+    Column("iteration per particle", "ns", read=_of("iteration", "particles")),
+    Column("iteration relative to a plain read", read=_of("iteration", "limit")),
+    Column("final residual", read=_of("residual")),
+    Column("all iterations relative to a solve", folded=True, read=_per_solve),
+    Column("local step per particle", "ns", folded=True, read=_of("local", "particles")),
+    Column("solve per particle", "ns", folded=True, read=_of("solve", "particles")),
+    Column("solve per nonzero", "ns", folded=True, read=_of("solve", "entries")),
+    Column("nonzeros of L per particle", folded=True, read=_of("entries", "particles")),
+)
+
+
+def _summary(records: Sequence[Record]) -> Summary:
+    stepped = [record for record in records if record.values.step is not None]
+    if not stepped:
+        return NO_SUMMARY
+    largest = max(stepped, key=lambda record: int(record.values.particles))
+    return Summary(
+        f"With {words(largest.values.particles)} particles {words(largest.values.iterations)} "
+        f"iterations take {words(_median(largest, 'step'))} s, as long as "
+        f"{words(_per_solve(largest))} solves; the residual after them is "
+        f"{words(largest.values.residual)}."
+    )
+
+
+scale = Captions(__file__).layout(
+    "cloth_scale", lambda results: results.all("cloth_scale"), _summary, columns=COLUMNS
+)
+
+LAYOUTS = (scale,)

@@ -1,1 +1,0 @@
-"""Cloths of a thousand particles and more: factorisations, solves, memory."""
