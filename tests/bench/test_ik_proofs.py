@@ -1,11 +1,11 @@
 """Proofs for poses: the suite, its table and its sentence."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from plumbob.bench.experiments import ik_proofs
-from plumbob.bench.experiments.ik_proofs import measurement as suite
-from plumbob.bench.experiments.ik_proofs import tables
 from plumbob.bench.tables.results import Results
 from plumbob.reference import IKCoverage
 
@@ -15,7 +15,7 @@ ARM = "iiwa14"
 
 @pytest.fixture(scope="module", params=[ik_proofs.WITHIN_REACH, ik_proofs.ANYWHERE])
 def proofs(request):
-    return request.param, suite.prove(ARM, request.param, 2, 1986).values
+    return request.param, SimpleNamespace(**ik_proofs.prove(ARM, request.param, 2, 1986))
 
 
 def test_targets_within_reach_are_not_impossible(proofs):
@@ -45,7 +45,7 @@ def test_every_coverage_is_a_proof_or_a_cause():
 
 def test_table_and_sentence_follow_the_records(make):
     record = make.sample("proven")
-    table = tables.pose_proofs(Results([record]))
+    table = ik_proofs.pose_proofs(Results([record]))
     (row,) = table.rows
     assert row[:8] == ("Franka Panda", "anywhere", 50.0, 50.0, 50.0, 25.0, 25.0, 0)
     assert row[8:11] == (2.0, 5.0, 0.5)
@@ -53,4 +53,4 @@ def test_table_and_sentence_follow_the_records(make):
     assert "Of 4 targets 2 are proven" in sentence
     assert "1 to have none, 1 are open; 0 proofs are refuted" in sentence
     refuted = record.with_measured(refuted=[True, False] * 2)
-    assert "2 proofs are refuted" in tables.pose_proofs(Results([refuted])).summary.sentence
+    assert "2 proofs are refuted" in ik_proofs.pose_proofs(Results([refuted])).summary.sentence

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from table_cells import column
 
-from plumbob.bench.experiments.robot_tasks import TOLERANCE
-from plumbob.bench.experiments.robot_tasks.measurement import TaskJob, meet
-from plumbob.bench.experiments.robot_tasks.tables import robot_tasks
+from plumbob.bench.experiments.robot_tasks import TOLERANCE, TaskJob, meet, robot_tasks
 from plumbob.bench.peers.catalogue import PLUMBOB_LM, TASK_SOLVERS
 from plumbob.bench.peers.peer import ONE_START, RESTARTS
 from plumbob.bench.problems.evaluate import evaluator_of

@@ -1,0 +1,171 @@
+"""Tasks of arms held out from tuning, beyond the pose of the effector: success and time."""
+
+import importlib
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..harness import metrics
+from ..harness.block import Block, Measured, Scale
+from ..harness.progress import announce
+from ..harness.record import Record
+from ..harness.timing import attempt, restarted
+from ..harness.values import Booleans1, Floats1, Values
+from ..peers.catalogue import PLUMBOB, PLUMBOB_LM, TASK_SOLVERS
+from ..peers.peer import ONE_START, RESTARTS, Peer
+from ..problems.evaluate import evaluator_of
+from ..problems.robot_tasks import ROBOT_TASKS, TaskRequest, is_met, middle
+from ..problems.robots import HELD_OUT, UnableError, is_installed, robot, seed_of, title
+
+SUITE = "robot_tasks"
+# The task of records.
+ROBOT_TASK = "robot task"
+TOLERANCE = 1e-3  # [m], [rad]
+# Targets of a robot per target of a scale.
+_TARGETS = 0.01
+
+
+class TaskWords(Values, frozen=True, kw_only=True):
+    """The attempts of a solver."""
+
+    kind: str
+
+
+class TaskValues(TaskWords, frozen=True):
+    """The answers of a solver to the targets of a robot, (target,)."""
+
+    solved: Booleans1  # whether MuJoCo confirms the answer within the limits
+    seconds: Floats1  # the time of a call, all attempts together [s]
+    distance: Floats1  # from the middle of the limits, root mean square of all joints [rad]
+
+
+KINDS = {ROBOT_TASK: TaskValues}
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every task of every arm held out, by every installed solver, with one start or more."""
+    count = max(1, round(_TARGETS * scale.targets))
+    for name in filter(is_installed, HELD_OUT):
+        peers = [peer for peer in TASK_SOLVERS if peer.is_installed]
+        for task, peer, kind in product(ROBOT_TASKS, peers, (ONE_START, RESTARTS)):
+            facts = {"task": ROBOT_TASK, "kind": kind}
+            facts["title"] = f"{title(name)}, {ROBOT_TASKS[task].title}"
+            settings = {"version": peer.version, "seed": scale.seed, "attempts": kind}
+            measure = partial(meet, TaskJob(name, task, peer, kind, count, scale.seed))
+            solver = PLUMBOB if peer is PLUMBOB_LM else peer.title
+            yield Block(SUITE, f"{task}/{name}", solver, measure, settings, count, facts)
+
+
+class TaskJob(NamedTuple):
+    """Targets of a robot, and a solver."""
+
+    robot: str
+    task: str
+    peer: Peer
+    kind: str  # `ONE_START` or `RESTARTS`
+    target_count: int
+    seed: int
+
+
+def meet(job: TaskJob) -> Measured:
+    """Ask a solver for all targets; MuJoCo evaluates the answers."""
+    announce(f"{job.task}, {job.robot}, {job.peer.title}")
+    arm, task, entry = robot(job.robot), ROBOT_TASKS[job.task], job.peer.first(job.kind)
+    module, settings = importlib.import_module(job.peer.module), entry.settings
+    if job.peer is PLUMBOB_LM:
+        settings = {"restarts": settings["restarts"]}
+    try:
+        ask = module.prepare_task(arm, task, TOLERANCE, **settings)
+    except UnableError as error:
+        return {"remark": str(error)}
+    if entry.restarts:
+        ask = restarted(ask, arm, entry.restarts)
+    rng = np.random.default_rng([job.seed, seed_of(job.robot)])
+    pairs = (arm.draw(rng, job.target_count) for _ in range(2))
+    requests = [TaskRequest(goal, start) for goal, start in zip(*pairs, strict=True)]
+    attempt(ask(requests[0]))  # whatever is loaded or compiled with the first call
+    outputs = [attempt(ask(request)) for request in requests]
+    evaluator, no_answer = evaluator_of(job.robot), np.full(len(arm.lower), np.inf)
+    rows = [no_answer if output.q is None else output.q for output in outputs]
+    solved = [
+        bool(np.isfinite(q).all()) and is_met(evaluator, task, request, q, TOLERANCE)
+        for q, request in zip(rows, requests, strict=True)
+    ]
+    seconds = [output.time.seconds if output.time else np.nan for output in outputs]
+    distance = np.sqrt(np.mean((np.array(rows) - middle(arm)) ** 2, axis=1))
+    return {"solved": np.array(solved), "seconds": np.array(seconds), "distance": distance}
+
+
+# What is shown.
+
+from ..tables.captions import Captions
+from ..tables.columns import text
+from ..tables.results import Results, grouped, listed
+from ..tables.table import INTERVAL, Column, Summary, listing, words
+
+
+class SolverTask(NamedTuple):
+    """A task for a solver, on all arms."""
+
+    task: str
+    attempts: str
+    solver: str
+    records: list[Record]
+
+    def joined(self, read: Callable[[TaskValues], np.ndarray]) -> np.ndarray | None:
+        """Return an array of the records with numbers, one after the other; None without any."""
+        arrays = [read(record.values) for record in self.records if record.has_numbers]
+        return np.concatenate(arrays) if arrays else None
+
+    @property
+    def solved(self) -> metrics.Share | None:
+        """The share of targets whose task is met."""
+        solved = self.joined(lambda values: values.solved)
+        return None if solved is None else metrics.share(solved)
+
+
+def _median(title: str, unit: str, read: Callable[[TaskValues], Floats1], **looks: Any) -> Column:
+    def cell(row: SolverTask) -> float | None:
+        numbers = row.joined(read)
+        return None if numbers is None or not len(numbers) else float(np.median(numbers))
+
+    return Column(f"{title}, median", unit, read=cell, **looks)
+
+
+COLUMNS = (
+    text("task", lambda row: row.task),
+    text("attempts", lambda row: row.attempts),
+    text("solver", lambda row: row.solver),
+    Column("solved", note=INTERVAL, best="greatest", read=lambda row: row.solved),
+    _median("time", "ms", lambda values: values.seconds, best="least"),
+    text("remark", lambda row: row.records[0].values.remark),
+    _median("distance", "rad", lambda values: values.distance[values.solved], folded=True),
+)
+
+
+def _rows(results: Results) -> list[SolverTask]:
+    records = results.all(SUITE, task=ROBOT_TASK)
+    groups = grouped(records, lambda r: (r.title.rpartition(", ")[2], r.values.kind, r.solver))
+    return [SolverTask(*names, members) for names, members in groups.items()]
+
+
+def _summary(rows: Sequence[SolverTask]) -> Summary:
+    points = []
+    for (task, attempts), members in grouped(rows, lambda row: row[:2]).items():
+        shares = [f"{row.solver} {words(row.solved)}" for row in members if row.solved]
+        points.append(f"{task}, {attempts}: {listed(shares)}")
+    return listing("The share of the targets whose tasks each solver meets.", points)
+
+
+_CAPTIONS = Captions(
+    __file__,
+    tolerance=words(TOLERANCE),
+    restarts=words(PLUMBOB_LM.first(RESTARTS).settings["restarts"]),
+)
+
+robot_tasks = _CAPTIONS.layout("robot_tasks", _rows, _summary, columns=COLUMNS, compared=2)
+
+LAYOUTS = (robot_tasks,)
