@@ -3,8 +3,7 @@
 import pytest
 from table_cells import column
 
-from plumbob.bench.experiments.branches.measurement import blocks, lists
-from plumbob.bench.experiments.branches.tables import branches
+from plumbob.bench.experiments.branches import blocks, branches, lists
 from plumbob.bench.harness.block import Scale
 from plumbob.bench.problems.robots import is_installed
 from plumbob.bench.tables.results import Results
@@ -35,15 +34,14 @@ def test_missing_and_false_solutions_are_counted(importable):
     importable("faulty_lists", FAULTY)
     importable("unable_lists", UNABLE)
     results = lists("ur5", [OURS, "faulty_lists", "unable_lists"], 1, 1986)
-    solutions, missing, wrong, seconds, singular = results[OURS]
-    count = len(solutions)
-    assert count + singular == 6
-    assert (solutions > 0).all()
-    assert (seconds > 0.0).all()
-    assert missing.tolist() == wrong.tolist() == [0] * count
-    solutions, missing, wrong, _, _ = results["faulty_lists"]
-    assert missing.tolist() == wrong.tolist() == [1] * count
-    assert results["unable_lists"] == "takes no arm"
+    ours, faulty = results[OURS], results["faulty_lists"]
+    count = len(ours["solutions"])
+    assert count + ours["singular"] == 6
+    assert (ours["solutions"] > 0).all()
+    assert (ours["seconds"] > 0.0).all()
+    assert ours["missing"].tolist() == ours["wrong"].tolist() == [0] * count
+    assert faulty["missing"].tolist() == faulty["wrong"].tolist() == [1] * count
+    assert results["unable_lists"] == {"remark": "takes no arm"}
 
 
 @pytest.mark.skipif(not is_installed("ur5"), reason="example-robot-data is not installed")

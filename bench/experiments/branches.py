@@ -1,11 +1,11 @@
-"""Lists of all solutions: every solver on the same targets, and a search from random starts.
+"""Lists of all solutions of poses of six hinges: what each solver lists, misses and makes up.
 
-The solutions of a target come from any solver and from the search; MuJoCo's kinematics confirms
-each within the limits. Solutions that differ by whole revolutions count once.
+The solutions of a target come from any solver and from a search from random starts; MuJoCo's
+kinematics confirms each within the limits. Solutions that differ by whole revolutions count once.
 """
 
 import importlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,35 +14,64 @@ from plumbob.reference import Target, rotation, solve_ik
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.formats import urdf
 
-from ...harness.block import Block, Group, Measured, Scale
-from ...harness.isolation import in_a_fresh_process
-from ...harness.progress import announce
-from ...peers.axes import REVOLUTION, all_within
-from ...peers.catalogue import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM
-from ...peers.peer import Peer
-from ...peers.protocol import Ask
-from ...problems.evaluate import Targets, angle_between, evaluator_of
-from ...problems.robot_targets import STRATA, robot_targets
-from ...problems.robots import ROBOTS, UnableError, is_installed, robot, title
-from . import BRANCHES, EXACT, LARGEST_COUNT, SAME, STARTS, TOLERANCE
+from ..harness.block import Block, Group, Measured, Scale
+from ..harness.isolation import in_a_fresh_process
+from ..harness.progress import announce
+from ..harness.record import Record
+from ..harness.values import Floats1, Integers1, Values
+from ..peers.axes import REVOLUTION, all_within
+from ..peers.catalogue import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM
+from ..peers.peer import Peer
+from ..peers.protocol import Ask
+from ..problems.evaluate import Targets, angle_between, evaluator_of
+from ..problems.robot_targets import STRATA, robot_targets
+from ..problems.robots import ROBOTS, UnableError, is_installed, robot, title
 
 SUITE = "ik"
+# The task of records.
+BRANCHES = "branches"
 HINGES = 6
-# Targets of a stratum per target of a scale.
-_TARGETS = 0.05
+# Targets of a stratum per target of a scale, and random starts of the search at a target.
+_TARGETS, STARTS = 0.05, 128
+# A solution within EXACT [m] and [rad] of the target must be listed; beyond TOLERANCE a solution is
+# false. Near singular poses, solvers without a last polish stay between the two tolerances.
+EXACT, TOLERANCE = 1e-9, 1e-6
+# Solutions are the same within this [rad]: near singular poses an error moves angles by its root.
+SAME = 1e-3
+# More solutions of six joints are members of a continuum (Primrose 1986).
+LARGEST_COUNT = 16
 # Rounds in which calls are timed.
 ROUNDS = 5
 # Time limit of all solvers of a robot [s].
 PATIENCE = 1800.0
 
 
-class BranchJob(NamedTuple):
-    """Targets of a robot, and a solver to list their solutions."""
+class BranchWords(Values, frozen=True, kw_only=True):
+    """The version of the solver, and the starts of the search."""
 
-    robot: str
-    peer: Peer
-    target_count: int  # of a stratum
-    seed: int
+    version: str
+    starts: int
+
+
+class BranchValues(BranchWords, frozen=True):
+    """The lists of a solver, an entry for each target with isolated solutions.
+
+    Attributes:
+        solutions: how many solutions it lists, of those that any solver or the search finds.
+        missing: how many of those it does not list.
+        wrong: how many of its solutions do not reach the target.
+        seconds: how long a call takes, the median of all rounds [s].
+        singular: how many further targets lie on a continuum of solutions.
+    """
+
+    solutions: Integers1
+    missing: Integers1
+    wrong: Integers1
+    seconds: Floats1
+    singular: int
+
+
+KINDS = {BRANCHES: BranchValues}
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -60,6 +89,15 @@ def blocks(scale: Scale) -> Iterator[Block]:
             group, size = Group(problem, compare, job), count * len(STRATA)
             measure = group.measure_alone
             yield Block(SUITE, problem, solver, measure, settings, size, facts, group=group)
+
+
+class BranchJob(NamedTuple):
+    """Targets of a robot, and a solver to list their solutions."""
+
+    robot: str
+    peer: Peer
+    target_count: int  # of a stratum
+    seed: int
 
 
 def compare(jobs: Sequence[BranchJob]) -> list[Measured]:
@@ -150,3 +188,67 @@ def _seconds(solves: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]:
         for m in rng.permutation(modules):
             seconds[m][i] = [solve().time.seconds for solve in solves[m]]
     return {m: np.median(times, axis=0) for m, times in seconds.items()}
+
+
+# What is shown.
+
+from ..tables.captions import Captions
+from ..tables.columns import text, words_in
+from ..tables.results import grouped, listed
+from ..tables.table import Column, Summary, listing, words
+
+
+def _column(title: str, read: Callable[[BranchValues], Any], **looks: Any) -> Column:
+    """Return a column of the numbers of records, None in a record without numbers."""
+    return Column(title, read=lambda r: read(r.values) if r.has_numbers else None, **looks)
+
+
+COLUMNS = (
+    text("robot", lambda record: record.title),
+    text("solver", lambda record: record.solver),
+    _column("solutions", lambda lists: lists.solutions.sum(), best="greatest"),
+    _column("missing", lambda lists: lists.missing.sum(), best="least"),
+    _column("false", lambda lists: lists.wrong.sum(), best="least"),
+    _column("time, median", lambda lists: np.median(lists.seconds), unit="µs", best="least"),
+    text("remark", lambda record: record.values.remark),
+    _column("targets", lambda lists: len(lists.solutions), folded=True),
+    _column("targets with missing ones", lambda lists: (lists.missing > 0).sum(), folded=True),
+    _column("singular targets", lambda lists: lists.singular, folded=True),
+)
+
+
+def _summary(records: Sequence[Record]) -> Summary:
+    measured = grouped((r for r in records if r.has_numbers), lambda record: record.solver)
+    points = (
+        f"{solver}: {words(_total(members, 'missing'))} missing, "
+        f"{words(_total(members, 'wrong'))} false; {listed([*map(_time, members)])}"
+        for solver, members in measured.items()
+    )
+    ours = measured.get(PLUMBOB, [])
+    solutions, missing = (_total(ours, name) for name in ("solutions", "missing"))
+    sentence = f"Plumbob lists {words(solutions)} of {words(solutions + missing)} solutions."
+    return listing(sentence * bool(ours), points)
+
+
+def _total(records: Sequence[Record], name: str) -> int:
+    return sum(int(getattr(record.values, name).sum()) for record in records)
+
+
+def _time(record: Record) -> str:
+    return f"{record.title} {words_in(float(np.median(record.values.seconds)), 'µs')}"
+
+
+_CAPTIONS = Captions(
+    __file__,
+    starts=words(STARTS),
+    exact=words(EXACT),
+    tolerance=words(TOLERANCE),
+    same=words(SAME),
+    largest=words(LARGEST_COUNT),
+)
+
+branches = _CAPTIONS.layout(
+    "branches", lambda results: results.all(SUITE, task=BRANCHES), _summary, columns=COLUMNS
+)
+
+LAYOUTS = (branches,)
