@@ -15,14 +15,14 @@ from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers.peer import LINEARISED
+from ...peers.registry import LINEARISED
+from ...problems import published
 from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
 from ...tables.columns import words_in
 from ...tables.layout import Row
 from ...tables.results import Results, counted, grouped, label, listed, most_often
 from ...tables.table import NO_SUMMARY, Summary, words
-from ..published import problem as published
 from . import LIU, MISSING, MOTION, MOTION_TARGETS, NEAR, ONE_STEP, SOLVED, STABILITY, TARGETS
 from .measurement import AMPLITUDE, BISECTION, GROWTH, STABILITY_SIZE, STABILITY_STEPS
 from .readings import Point, points

@@ -11,9 +11,9 @@ import numpy as np
 from plumbob.reference import scenes, solve_ik
 
 from ...harness.block import Block, Measured, Scale
-from ...peers import catalogue
-from ...peers.ik import toolbox, trac_ik
-from ...peers.peer import ONE_START, RESTARTS, Peer, Run
+from ...peers import registry
+from ...peers.registry import ONE_START, RESTARTS, Peer, PeerEntry
+from ...problems import published
 from ...problems.chains import TargetsForSkeleton, unit
 from ...problems.evaluate import Targets, Tolerance
 from ...problems.robot_targets import uniform_targets
@@ -21,7 +21,6 @@ from ...problems.robots import is_installed
 from ..chain.measurement import SolverLimits, blocks_of_users
 from ..robots.measurement import SUITE, RobotJob
 from . import FABRIK, TOOLBOX, TRAC_IK
-from . import problem as published
 
 # Random targets per target of a scale, and how many are timed.
 _TARGETS = 5
@@ -29,7 +28,7 @@ _TIMED_TARGETS = 200
 _SEED = 2011
 _LIMITS = SolverLimits(published.FABRIK.tolerance, published.FABRIK.iterations)
 # The solvers fast enough for 10,000 targets, with restarts as in TRAC-IK.
-_FAST = (catalogue.PLUMBOB_LM, toolbox.PEER, trac_ik.PEER)
+_FAST = (registry.PLUMBOB_LM, registry.TOOLBOX, registry.TRAC_IK)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -40,7 +39,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
         for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK.rates):
             if is_installed(robot):
                 targets = partial(uniform_targets, robot, count, middle=True)
-                job = _job(robot, peer, peer.first(RESTARTS), tolerance, targets, count)
+                job = _job(robot, peer, peer.entry(RESTARTS), tolerance, targets, count)
                 facts = {"task": TRAC_IK, "robot": robot, "title": robot}
                 yield job.block(f"published/trac_ik/{robot}", facts)
     tolerance = Tolerance(*[math.sqrt(2.0 * published.TOOLBOX.half_square)] * 2)
@@ -53,20 +52,20 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield from _fabrik(stratum, distance, scale)
 
 
-def _toolbox() -> Iterator[tuple[Peer, Run, float | None]]:
+def _toolbox() -> Iterator[tuple[Peer, PeerEntry, float | None]]:
     """Yield solvers without restarts, with the published share of infeasible targets."""
-    plumbob, other = catalogue.PLUMBOB_LM, toolbox.PEER
-    entry, iterations = plumbob.first(ONE_START), {"iterations": published.TOOLBOX.iterations}
+    plumbob, toolbox = registry.PLUMBOB_LM, registry.TOOLBOX
+    entry, iterations = plumbob.entry(ONE_START), {"iterations": published.TOOLBOX.iterations}
     yield plumbob, replace(entry, settings={**entry.settings, **iterations}), None
-    for search in published.TOOLBOX.searches if other.is_installed else ():
+    for search in published.TOOLBOX.searches if toolbox.is_installed else ():
         settings = {**search.settings, "searches": 1, "limits": False, **iterations}
-        yield other, Run(ONE_START, settings, search.title), search.infeasible
+        yield toolbox, PeerEntry(ONE_START, settings, note=search.title), search.infeasible
 
 
 def _job(
     robot: str,
     peer: Peer,
-    entry: Run,
+    entry: PeerEntry,
     tolerance: Tolerance,
     targets: Callable[[], Targets],
     count: int,

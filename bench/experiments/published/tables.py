@@ -6,7 +6,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers import catalogue
+from ...peers import registry
+from ...problems import published
 from ...tables.captions import Captions
 from ...tables.layout import Row
 from ...tables.results import Results, counted, grouped, label
@@ -14,7 +15,6 @@ from ...tables.table import Summary, listing, words
 from ..robots.readings import Score
 from ..robots.tables import RULE
 from . import FABRIK, TOOLBOX, TRAC_IK
-from . import problem as published
 
 
 def _rows(results: Results) -> list[Row]:
@@ -44,7 +44,7 @@ def _about(score: Score) -> Row:
 
 def _of_trac_ik(records: Sequence[Record]) -> Iterator[Row]:
     """Yield success rates and mean times, robot by robot, the published solvers first."""
-    titles = {peer.label_of(entry): peer.name for peer in catalogue.PEERS for entry in peer.runs}
+    titles = {peer.label_of(entry): peer.name for peer in registry.PEERS for entry in peer.entries}
     for robot, members in grouped(published.TRAC_IK.rates, lambda rate: rate.robot).items():
         rates = {rate.solver: rate for rate in members}
         measured = {titles.get(r.solver, r.solver): r for r in records if r.values.robot == robot}

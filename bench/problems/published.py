@@ -1,6 +1,6 @@
 """Published numbers of solvers, and the measurements as far as known.
 
-`problem.toml` holds the facts, each with its source.
+`published.toml` holds the facts, each with its source.
 """
 
 import tomllib
