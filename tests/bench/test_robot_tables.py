@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from table_cells import by_solver, column, rows
 
-from plumbob.bench.experiments.published.tables import published_ik
+from plumbob.bench.experiments.published import published_ik
 from plumbob.bench.experiments.robots.figures import FIGURES
 from plumbob.bench.experiments.robots.tables import (
     outcomes,
