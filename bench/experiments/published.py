@@ -14,8 +14,9 @@ from ..harness import metrics
 from ..harness.block import Block, Measured, Scale
 from ..harness.record import Record
 from ..harness.values import Floats1, Values
-from ..peers import registry
-from ..peers.registry import ONE_START, RESTARTS, Peer, PeerEntry
+from ..peers import catalogue
+from ..peers.ik import toolbox, trac_ik
+from ..peers.peer import ONE_START, RESTARTS, Peer, Run
 from ..problems import published
 from ..problems.chains import TargetsForSkeleton, unit
 from ..problems.evaluate import Targets, Tolerance
@@ -35,7 +36,7 @@ _LIMITS: dict[str, Any] = {
     "max_iterations": published.FABRIK.iterations,
 }
 # The solvers fast enough for 10,000 targets, with restarts as in TRAC-IK.
-_FAST = (registry.PLUMBOB_LM, registry.TOOLBOX, registry.TRAC_IK)
+_FAST = (catalogue.PLUMBOB_LM, toolbox.PEER, trac_ik.PEER)
 
 
 class FabrikWords(Values, frozen=True, kw_only=True):
@@ -62,7 +63,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
         for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK.rates):
             if is_installed(robot):
                 targets = partial(uniform_targets, robot, count, middle=True)
-                job = _job(robot, peer, peer.entry(RESTARTS), tolerance, targets, count)
+                job = _job(robot, peer, peer.first(RESTARTS), tolerance, targets, count)
                 facts = {"task": TRAC_IK, "robot": robot, "title": robot}
                 yield job.block(f"published/trac_ik/{robot}", facts)
     tolerance = Tolerance(*[math.sqrt(2.0 * published.TOOLBOX.half_square)] * 2)
@@ -75,20 +76,20 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield from _fabrik(stratum, distance, scale)
 
 
-def _toolbox() -> Iterator[tuple[Peer, PeerEntry, float | None]]:
+def _toolbox() -> Iterator[tuple[Peer, Run, float | None]]:
     """Yield solvers without restarts, with the published share of infeasible targets."""
-    plumbob, toolbox = registry.PLUMBOB_LM, registry.TOOLBOX
-    entry, iterations = plumbob.entry(ONE_START), {"iterations": published.TOOLBOX.iterations}
+    plumbob, other = catalogue.PLUMBOB_LM, toolbox.PEER
+    entry, iterations = plumbob.first(ONE_START), {"iterations": published.TOOLBOX.iterations}
     yield plumbob, replace(entry, settings={**entry.settings, **iterations}), None
-    for search in published.TOOLBOX.searches if toolbox.is_installed else ():
+    for search in published.TOOLBOX.searches if other.is_installed else ():
         settings = {**search.settings, "searches": 1, "limits": False, **iterations}
-        yield toolbox, PeerEntry(ONE_START, settings, note=search.title), search.infeasible
+        yield other, Run(ONE_START, settings, search.title), search.infeasible
 
 
 def _job(
     robot: str,
     peer: Peer,
-    entry: PeerEntry,
+    entry: Run,
     tolerance: Tolerance,
     targets: Callable[[], Targets],
     count: int,
@@ -194,7 +195,7 @@ def _rows(results: Results) -> Iterator[PublishedNumber]:
 
 def _of_trac_ik(records: Sequence[Record]) -> Iterator[PublishedNumber]:
     """Yield success rates and mean times, robot by robot, the published solvers first."""
-    titles = {peer.label_of(entry): peer.name for peer in registry.PEERS for entry in peer.entries}
+    titles = {peer.label_of(entry): peer.name for peer in catalogue.PEERS for entry in peer.runs}
     for robot, members in grouped(published.TRAC_IK.rates, lambda rate: rate.robot).items():
         rates = {rate.solver: rate for rate in members}
         measured = {titles.get(r.solver, r.solver): r for r in records if r.values.robot == robot}

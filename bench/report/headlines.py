@@ -30,7 +30,7 @@ from ..experiments.robots.readings import (
     times_of_both,
     together,
 )
-from ..experiments.timing.tables import is_ranked, median_time, ranked_by_time
+from ..experiments.timing import is_ranked, median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import catalogue

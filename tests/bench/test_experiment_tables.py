@@ -13,13 +13,12 @@ import pytest
 from table_cells import column, rows
 
 from plumbob import bench
-from plumbob.bench.experiments import SUITES, cloth
+from plumbob.bench.experiments import SUITES, cloth, timing
 from plumbob.bench.experiments.arm.tables import accuracy
 from plumbob.bench.experiments.chain.tables import beyond_reach, rivals
 from plumbob.bench.experiments.check import tables as check
 from plumbob.bench.experiments.closed_curves.tables import jitter
 from plumbob.bench.experiments.cloth_peers import SOLVED
-from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.report.sections import SECTIONS, tables
 from plumbob.bench.tables.latex import escaped
 from plumbob.bench.tables.results import Results, label

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from plumbob.bench.experiments import timing
 from plumbob.bench.experiments.robots.readings import STARTS, overall
-from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import FINISHED
 from plumbob.bench.peers import catalogue

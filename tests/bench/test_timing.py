@@ -10,20 +10,20 @@ import pytest
 
 from plumbob.bench import clock
 from plumbob.bench.experiments import Scale
-from plumbob.bench.experiments.timing import case as timing_case
-from plumbob.bench.experiments.timing import cloth, kinematics, measurement, robots
-from plumbob.bench.experiments.timing.case import (
+from plumbob.bench.experiments import timing as measurement
+from plumbob.bench.experiments.parts import timing_cases
+from plumbob.bench.experiments.parts.timing_cases import copying, stream, streaming
+from plumbob.bench.experiments.timing import (
     COMPILED,
     LIMIT,
     PREPARED,
+    ROUNDS,
+    SWEEPS,
     TIGHT,
     TimedCase,
     TimedWork,
-    copying,
-    stream,
-    streaming,
+    cases,
 )
-from plumbob.bench.experiments.timing.measurement import ROUNDS, SWEEPS, cases
 from plumbob.bench.harness import run
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile
@@ -175,7 +175,7 @@ def test_a_stream_reads_and_writes_all_that_it_says(cores, minimum, slices, monk
         assert (sink[: len(source)] == 2.0).all()
         assert (sink[len(source) :] == 1.0).all()
 
-    monkeypatch.setattr(timing_case, "_stream", watched)
+    monkeypatch.setattr(timing_cases, "_stream", watched)
     case = streaming(WORK, 320, 560, cores=cores, minimum=minimum)
     with set_num_threads(cores):
         case.prepare()()
@@ -185,13 +185,13 @@ def test_a_stream_reads_and_writes_all_that_it_says(cores, minimum, slices, monk
 
 
 def test_every_batch_moves_what_its_limit_moves_on_as_many_cores():
-    cases = list(kinematics.cases())
+    cases = list(timing_cases.kinematics_cases())
     limits = {case.work.problem: case for case in cases if case.solver == LIMIT}
     for case in cases:
         limit = limits[case.work.problem]
         assert (limit.cores, limit.operations) == (case.cores, case.operations)
     assert {case.cores for case in cases} == {1, None}
-    for name, (skeleton, batch) in kinematics.models().items():
+    for name, (skeleton, batch) in timing_cases.skeletons().items():
         rotations = np.zeros((batch, skeleton.joint_count, 4))
         rotations[..., 0] = 1.0
         pose = forward_kinematics(skeleton, rotations)
@@ -206,10 +206,10 @@ def test_mujoco_is_timed_from_its_own_state_without_conversions_and_energies(
 ):
     """They were 15 to 25 % of its time."""
     problem = cloth_swing(1, size=5)
-    start = cloth.moving(problem)
+    start = timing_cases.moving(problem)
     engine = MujocoMassSpring(problem.system, h=problem.h / count, integrator=integrator)
     expected = engine.step(start, steps=count).positions
-    call = cloth.mujoco_steps(problem, integrator, count, is_tight=True)
+    call = timing_cases.mujoco_steps(problem, integrator, count, is_tight=True)
     for name in ("write", "read"):
         monkeypatch.setattr(MujocoMassSpring, name, None)
     call()
@@ -223,11 +223,11 @@ def test_mujoco_is_timed_from_its_own_state_without_conversions_and_energies(
 def test_mujoco_is_timed_at_its_default_tolerance_and_shown_at_a_tight_one_with_both_errors():
     """The errors belong to the step of a direct solve; one that is only shown leads nowhere."""
     default, problem = mujoco.MjOption(), cloth_swing(1)
-    cases = {case.solver: case for case in cloth.cases()
+    cases = {case.solver: case for case in timing_cases.cloth_cases()
              if case.work.problem == "cloth/x1/implicit Euler, linearised once"}  # fmt: skip
-    start = cloth.moving(problem).positions
+    start = timing_cases.moving(problem).positions
     step = ImplicitEuler(problem.system, h=problem.h, solver="gauss_newton")
-    exact = step.step(cloth.moving(problem)).state.positions
+    exact = step.step(timing_cases.moving(problem)).state.positions
     errors = {}
     for solver in ("MuJoCo", TIGHT):
         engine = cases[solver].prepare()()
@@ -252,38 +252,38 @@ def test_the_error_of_a_case_is_on_record(monkeypatch):
 
 
 def test_mujoco_has_the_pose_before_only_where_that_is_said():
-    skeleton, _ = kinematics.models()["10 balls"]
+    skeleton, _ = timing_cases.skeletons()["10 balls"]
     engine = SKELETON_ENGINES["MuJoCo"](skeleton)
-    engine.update_kinematics(coordinates(engine, kinematics._local_rotations(skeleton)))
-    model, data = kinematics.preset_pose(skeleton).args
+    engine.update_kinematics(coordinates(engine, timing_cases._local_rotations(skeleton)))
+    model, data = timing_cases.preset_pose(skeleton).args
     np.testing.assert_array_equal(data.xpos, engine.data.xpos)
     data.xpos[:] = 0.0
-    kinematics.preset_pose(skeleton)()
+    timing_cases.preset_pose(skeleton)()
     mujoco.mj_kinematics(model, data)
     np.testing.assert_array_equal(data.xpos, engine.data.xpos)
 
 
 def test_a_loop_over_an_engine_ends_in_the_last_pose_of_our_batch():
-    skeleton, _ = kinematics.models()["30-joint tree"]
-    batch = kinematics.compiled_poses(skeleton, 3)().positions
+    skeleton, _ = timing_cases.skeletons()["30-joint tree"]
+    batch = timing_cases.compiled_poses(skeleton, 3)().positions
     for name in SKELETON_ENGINES:
-        loop = kinematics.engine_poses(name, skeleton, 3)
+        loop = timing_cases.engine_poses(name, skeleton, 3)
         engine = inspect.getclosurevars(loop).nonlocals["call"].__self__
         assert len(loop()) == 3
         np.testing.assert_allclose(engine.pose().positions, batch[-1], atol=1e-13)
 
 
-@pytest.mark.parametrize("name", robots.ROBOTS)
+@pytest.mark.parametrize("name", timing_cases.ROBOTS)
 def test_kinematics_and_jacobians_of_a_robot_are_equal_in_all_engines(name):
     if not is_installed(name):
         pytest.skip("the package of robots is not installed")
     timed = robot(name)
     model = (urdf.parse if timed.is_chain else mjcf.parse)(timed.text).articulation
     tip, link = model.index(timed.effectors[0]), timed.effectors[0]
-    pose = robots.timed_call("kinematics", COMPILED, name, 1)()
-    prepared = robots.timed_call("kinematics", PREPARED, name, 1)()
-    data = robots.timed_call("kinematics", "MuJoCo", name, 1)()
-    call = robots.timed_call("kinematics", "Pinocchio", name, 1)
+    pose = timing_cases.timed_call("kinematics", COMPILED, name, 1)()
+    prepared = timing_cases.timed_call("kinematics", PREPARED, name, 1)()
+    data = timing_cases.timed_call("kinematics", "MuJoCo", name, 1)()
+    call = timing_cases.timed_call("kinematics", "Pinocchio", name, 1)
     call()
     engine_model, engine_data = call.args[:2]
     positions = [
@@ -292,18 +292,18 @@ def test_kinematics_and_jacobians_of_a_robot_are_equal_in_all_engines(name):
         engine_data.oMf[engine_model.getFrameId(link)].translation,
     ]
     np.testing.assert_allclose(positions, [pose.positions[tip]] * 3, atol=1e-13)
-    batch = robots.timed_call("jacobians", COMPILED, name, 3)()
+    batch = timing_cases.timed_call("jacobians", COMPILED, name, 3)()
     for engine in ("Pinocchio", "MuJoCo"):
-        *_, last = robots.timed_call("jacobians", engine, name, 3)()
+        *_, last = timing_cases.timed_call("jacobians", engine, name, 3)()
         np.testing.assert_allclose(last, batch[-1], atol=1e-13)
-        single = robots.timed_call("jacobians", engine, name, 1)()
+        single = timing_cases.timed_call("jacobians", engine, name, 1)()
         np.testing.assert_allclose(single, batch[0], atol=1e-13)
 
 
 def test_robots_are_timed_by_us_and_by_both_engines_a_pose_and_a_batch():
-    solvers = {case.work.problem: set() for case in robots.cases()}
-    for case in robots.cases():
+    solvers = {case.work.problem: set() for case in timing_cases.robot_cases()}
+    for case in timing_cases.robot_cases():
         solvers[case.work.problem].add(case.solver)
-        assert case.operations == (1 if "one pose" in case.work.title else robots.POSES)
+        assert case.operations == (1 if "one pose" in case.work.title else timing_cases.POSES)
     assert all({COMPILED, "Pinocchio", "MuJoCo"} <= names for names in solvers.values())
     assert {problem.partition("/")[0] for problem in solvers} == {"kinematics", "jacobians"}

@@ -1,6 +1,6 @@
 """The cases of the timing for pytest-benchmark, outside of the report.
 
-Run `pytest bench/experiments/timing/time_cases.py --benchmark-autosave`, and the same with
+Run `pytest tools/time_cases.py --benchmark-autosave`, and the same with
 `--benchmark-compare` after a change; `-k linearised` chooses by name.
 """
 
@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from plumbob.bench.experiments.timing.case import TimedCase
-from plumbob.bench.experiments.timing.measurement import cases
+from plumbob.bench.experiments.timing import TimedCase, cases
 from plumbob.reference import set_backend, set_num_threads
 
 

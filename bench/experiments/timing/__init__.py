@@ -1,1 +1,0 @@
-"""Timing of forward kinematics, solves and steps, a file for each subject."""
