@@ -1,6 +1,6 @@
-"""Experiments and suites: an experiment is a folder, a suite is a group of experiments.
+"""Experiments and suites: an experiment is a file, a suite is a group of experiments.
 
-A folder of `bench/experiments` holds a measurement, its tables and its figures.
+A file of `bench/experiments` holds a measurement, its tables and its figures.
 """
 
 import functools
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 class Experiment(NamedTuple):
-    """A folder of `bench/experiments`, not imported."""
+    """A file or folder of `bench/experiments`, not imported."""
 
-    package: str  # the folder, by its full name as a package
+    package: str  # the file or folder, by its full name as a module
     suite: str  # its name on the command line; experiments may share a suite
     chapter: str  # the section of the report that shows it
     # whether times are among its numbers, or a budget of time ends its work; timed blocks share no

@@ -87,23 +87,20 @@ def test_a_new_peer_is_a_file_and_stands_in_the_tables(tmp_path, monkeypatch, in
     assert "Stays put" in [row[0] for row in robot_tables.participants(results).rows]
 
 
-FOLDER = {
-    "__init__.py": "",
-    "values.py": """
+EXPERIMENT = """
+from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.values import Values
 
 class Sum(Values, frozen=True):
     sum: int
 
 KINDS = {"": Sum}
-""",
-    "measurement.py": """
-from plumbob.bench.harness.block import Block
 
 def blocks(scale):
     yield Block("sums", "1 + 1", "Python", lambda: {"sum": 2}, facts={"title": "One"})
-""",
-    "tables.py": """
+
+# What is shown.
+
 from plumbob.bench.tables.layout import Layout
 from plumbob.bench.tables.table import Column
 
@@ -121,15 +118,11 @@ sums = Layout(
 )
 
 LAYOUTS = (sums,)
-""",
-}
+"""
 
 
-def test_a_new_experiment_is_a_folder_and_a_line(tmp_path, monkeypatch):
-    folder = tmp_path / "sums_experiment"
-    folder.mkdir()
-    for name, text in FOLDER.items():
-        (folder / name).write_text(text)
+def test_a_new_experiment_is_a_file_and_a_line(tmp_path, monkeypatch):
+    (tmp_path / "sums_experiment.py").write_text(EXPERIMENT)
     monkeypatch.syspath_prepend(tmp_path)
     line = Experiment("sums_experiment", "sums", "speed")
     plumbob.bench.experiments.EXPERIMENTS.append(line)

@@ -56,11 +56,12 @@ FACTS = re.compile(
     r"|^Published: 6,561|published with (?:10,000|20 runs)|table 1$|at most 5 ms for TRAC-IK"
     r"|float64|25 digits|an error of 1 is that"
 )
+SHOWING = ("tables", "figures", "readings", "headlines", "sections")
 SOURCES = sorted(
     path
-    for name in ("tables", "figures", "readings", "headlines", "sections")
-    for path in Path(bench.__file__).parent.rglob(f"{name}.*")
+    for path in Path(bench.__file__).parent.rglob("*.*")
     if path.suffix in {".py", ".toml"}
+    if path.stem in SHOWING or path.parent.name == "experiments"
 )
 
 
@@ -72,7 +73,8 @@ def phrases(path):
         for texts in [*parts, *tables.get("figures", {}).values()]:
             yield from (" ".join(t.split()) for t in texts.values() if isinstance(t, str))
         return
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    text = path.read_text(encoding="utf-8")
+    tree = ast.parse(text.partition("# What is shown.")[2] or text)
     bodies = [node.body for node in ast.walk(tree) if isinstance(getattr(node, "body", 0), list)]
     docs = {id(body[0].value) for body in bodies if body and isinstance(body[0], ast.Expr)}
     for node in ast.walk(tree):

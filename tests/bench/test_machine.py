@@ -3,6 +3,7 @@
 import ast
 import shutil
 import socket
+import symtable
 import sys
 from pathlib import Path
 
@@ -81,29 +82,29 @@ EXPERIMENT_FILES = [
 ]
 
 
-def bound_and_read(text):
-    """The names that a module binds at its head, and all names that it reads."""
-    tree, bound = ast.parse(text), set()
-    for node in tree.body:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            bound.add(node.name)
-        elif isinstance(node, ast.Import | ast.ImportFrom):
-            bound |= {(alias.asname or alias.name).partition(".")[0] for alias in node.names}
-        else:
-            bound |= {n.id for n in ast.walk(node) if is_name(n, ast.Store)}
-    return bound, {node.id for node in ast.walk(tree) if is_name(node, ast.Load)}
+def bound_names(text):
+    """The names that a module binds at its head."""
+    symbols = symtable.symtable(text, "", "exec").get_symbols()
+    return {s.get_name() for s in symbols if s.is_assigned() or s.is_imported() or s.is_namespace()}
 
 
-def is_name(node, context):
-    return isinstance(node, ast.Name) and isinstance(node.ctx, context)
+def read_names(table):
+    """The names of a module that it reads, also in its functions."""
+    is_module = table.get_type() == "module"
+    for symbol in table.get_symbols():
+        if symbol.is_referenced() and (is_module or symbol.is_global()):
+            yield symbol.get_name()
+    for child in table.get_children():
+        yield from read_names(child)
 
 
 @pytest.mark.parametrize("path", EXPERIMENT_FILES, ids=lambda path: path.stem)
 def test_a_measurement_reads_no_name_bound_below_the_digested_text(path):
-    measuring = machine.measuring_part(path)
-    bound, read = bound_and_read(measuring)
-    bound_below, _ = bound_and_read(path.read_bytes()[len(measuring) :])
-    assert read & bound_below - bound == set()
+    measuring = machine.measuring_part(path).decode()
+    bound = bound_names(measuring)
+    bound_below = bound_names(path.read_text(encoding="utf-8")[len(measuring) :])
+    read = {*read_names(symtable.symtable(measuring, "", "exec"))}
+    assert read & bound_below == set()
     assert bound & bound_below == set()
 
 
