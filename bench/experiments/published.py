@@ -145,22 +145,24 @@ class PublishedNumber(NamedTuple):
     mark: str = ""
     quantity: str = ""
     published: float | None = None
-    measured: float | None = None
-    low: float | None = None
-    high: float | None = None
-
-    def scored(self, score: Score) -> "PublishedNumber":
-        """Return the number as measured of a solver."""
-        about = {"solver": score.solver, "targets": score.total, "mark": score.limits}
-        return self._replace(record=score.records[0], **about)
+    values: Sequence[float] = ()  # as measured: the number, and the bounds of its interval
 
     def of(
-        self, quantity: str, number: float | None, measured: Sequence[float] = ()
+        self, quantity: str, number: float | None, values: Sequence[float] = ()
     ) -> "PublishedNumber":
-        """Return a number of the same solver; `measured` may have the bounds of the interval."""
-        numbers = [None if np.isnan(x) else x for x in measured]
-        bounds = dict(zip(("measured", "low", "high"), numbers, strict=False))
-        return self._replace(quantity=quantity, published=number, **bounds)
+        """Return a number of the same solver."""
+        return self._replace(quantity=quantity, published=number, values=tuple(values))
+
+    def measured(self, place: int = 0) -> float | None:
+        """Return the number as measured, or a bound; None if unknown."""
+        known = place < len(self.values) and not np.isnan(self.values[place])
+        return self.values[place] if known else None
+
+
+def _scored(row: PublishedNumber, score: Score) -> PublishedNumber:
+    """Return a row as measured of a solver."""
+    row = row._replace(solver=score.solver, record=score.records[0])
+    return row._replace(targets=score.total, mark=score.limits)
 
 
 COLUMNS = (
@@ -169,10 +171,10 @@ COLUMNS = (
     text("solver", lambda row: row.solver),
     text("quantity", lambda row: row.quantity),
     Column("published", read=lambda row: row.published),
-    Column("measured", read=lambda row: row.measured),
+    Column("measured", read=lambda row: row.measured()),
     text("mark", lambda row: row.mark),
-    Column("measured, 95 % low", folded=True, read=lambda row: row.low),
-    Column("measured, 95 % high", folded=True, read=lambda row: row.high),
+    Column("measured, 95 % low", folded=True, read=lambda row: row.measured(1)),
+    Column("measured, 95 % high", folded=True, read=lambda row: row.measured(2)),
     Column("targets", folded=True, read=lambda row: row.targets),
     text("source", lambda row: row.source, folded=True),
 )
@@ -204,7 +206,7 @@ def _of_trac_ik(records: Sequence[Record]) -> Iterator[PublishedNumber]:
             row, share, time = PublishedNumber("TRAC-IK", robot, solver, source), [], []
             if record := measured.get(solver):
                 score = Score(robot, "", record.solver, (record,))
-                row, share = row.scored(score), _percent(score, score.solved)
+                row, share = _scored(row, score), _percent(score, score.solved)
                 time = [1e3 * metrics.mean(score.seconds)]
             yield row.of("solved [%]", percent, share)
             yield row.of("time, mean [ms]", milliseconds, time)
@@ -215,7 +217,7 @@ def _of_toolbox(record: Record) -> Iterator[PublishedNumber]:
     score = Score(record.title, "", record.solver, (record,))
     rate = record.values.infeasible
     source = "" if rate is None else published.TOOLBOX.source
-    row = PublishedNumber("Robotics Toolbox", record.title, "", source).scored(score)
+    row = _scored(PublishedNumber("Robotics Toolbox", record.title, "", source), score)
     yield row.of("declared infeasible [%]", rate, _percent(score, score.all("claims", 0) != 1))
     yield row.of("not solved within the limits [%]", None, _percent(score, ~score.solved))
     median = metrics.median_interval(score.seconds)
@@ -247,16 +249,17 @@ def _percent(score: Score, hits: np.ndarray) -> list[float]:
 
 
 def _summary(rows: Sequence[PublishedNumber]) -> Summary:
-    complete = [row for row in rows if None not in (row.published, row.measured)]
+    complete = [row for row in rows if None not in (row.published, row.measured())]
     sentence = f"{counted(len(complete), 'published figure')} can be compared with ours."
     return listing(sentence, map(_point, complete))
 
 
 def _point(row: PublishedNumber) -> str:
-    interval = "" if row.low is None else f"{words(row.low)}–{words(row.high)}, "
+    low, high = row.measured(1), row.measured(2)
+    interval = "" if low is None else f"{words(low)}–{words(high)}, "
     mark = f", {row.mark}" if row.mark else ""
     return (
-        f"{row.problem}, {row.solver}: {row.quantity} {words(row.measured)} "
+        f"{row.problem}, {row.solver}: {row.quantity} {words(row.measured())} "
         f"({interval}n = {words(row.targets)}), published {words(row.published)}{mark}"
     )
 

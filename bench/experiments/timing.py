@@ -17,10 +17,10 @@ import numpy as np
 
 from plumbob.reference import set_backend, set_num_threads
 
+from ..clock import pace
 from ..harness import metrics
 from ..harness.block import Block, Measured, Scale
 from ..harness.isolation import in_a_fresh_process
-from ..harness.machine import pace
 from ..harness.progress import announce
 from ..harness.record import Record
 from ..harness.values import Floats2, Values

@@ -98,6 +98,11 @@ def read_names(table):
         yield from read_names(child)
 
 
+def test_a_name_read_in_a_function_is_seen():
+    text = "def mean(r):\n    x = r\n    return [label(y) for y in x]"
+    assert {*read_names(symtable.symtable(text, "", "exec"))} == {"label"}
+
+
 @pytest.mark.parametrize("path", EXPERIMENT_FILES, ids=lambda path: path.stem)
 def test_a_measurement_reads_no_name_bound_below_the_digested_text(path):
     measuring = machine.measuring_part(path).decode()
