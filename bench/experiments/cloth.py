@@ -127,21 +127,17 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
         metrics.relative_error(end.positions, x.positions, y)
         for end, x, y in zip(ends, exact, inertial, strict=True)
     ]
-    motions = {
-        "distance": ends,
-        "drift": motion(start, STEPS, integrator)[1:],
-        "path": [start] * STEPS,
+
+    def distances(states: Sequence[State]) -> FloatArray:
+        pairs = zip(states, exact, strict=True)
+        return np.array([metrics.rms_distance(a.positions, b.positions) for a, b in pairs])
+
+    return {
+        "error": np.array(errors),
+        "distance": distances(ends),
+        "drift": distances(motion(start, STEPS, integrator)[1:]),
+        "path": distances([start] * STEPS),
     }
-    distances = {
-        name: np.array(
-            [
-                metrics.rms_distance(a.positions, b.positions)
-                for a, b in zip(states, exact, strict=True)
-            ]
-        )
-        for name, states in motions.items()
-    }
-    return {"error": np.array(errors), **distances}
 
 
 def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
@@ -190,21 +186,18 @@ from .pictures.figures import falling_cloth
 CAPTIONS = Captions(__file__)
 
 
-class SolverRow(NamedTuple):
-    """A solver on a cloth: its iterations of a step, and its steps of few iterations by number."""
-
-    cloth: str
-    solver: str
-    step: Record | None
-    few: dict[int, Record]
+# A row: the records of a solver on a cloth, of a step and of steps of few iterations.
+SolverRecords = Sequence[Record]
 
 
-def _of_step(read: Callable[[IterationErrors], Any]) -> Callable[[SolverRow], Any]:
-    return lambda row: read(row.step.values) if row.step else None
+def _of(task: str, read: Callable[[Any], Any], count: int = 0) -> Callable[[SolverRecords], Any]:
+    """Return a reader of the record of a task, if given with so many iterations; else None."""
 
+    def cell(row: SolverRecords) -> Any:
+        values = (r.values for r in row if r.task == task)
+        return next((read(v) for v in values if count in (0, v.iterations)), None)
 
-def _of_few(count: int, read: Callable[[TruncatedSteps], Any]) -> Callable[[SolverRow], Any]:
-    return lambda row: read(row.few[count].values) if count in row.few else None
+    return cell
 
 
 def _after(quantity: str, count: int, **looks: Any) -> Column:
@@ -215,83 +208,84 @@ def _after(quantity: str, count: int, **looks: Any) -> Column:
         return numbers[count] if count < numbers.size else None
 
     title, group = f"{quantity} after {words(count)}", f"{quantity} after"
-    return Column(title, group=group, read=_of_step(read), **looks)
+    return Column(title, group=group, read=_of(ONE_STEP, read), **looks)
 
 
 def _iterations_to(error: str, **looks: Any) -> Column:
-    read = _of_step(lambda step: metrics.first_below(step.error, float(error)))
+    read = _of(ONE_STEP, lambda step: metrics.first_below(step.error, float(error)))
     return Column(f"iterations to {error}", best="least", group="iterations to", read=read, **looks)
 
 
 def _truncated(count: int) -> Iterator[Column]:
     """Yield the columns of steps of so many iterations."""
     title = f"steps of {counted(count, 'iteration')}"
-    column, of = partial(Column, group=title, folded=True), partial(_of_few, count)
-    yield column(f"{title}, median error", read=of(lambda s: metrics.spread(s.error).median))
-    yield column(f"{title}, largest error", read=of(lambda s: metrics.spread(s.error).largest))
-    yield column(f"{title}, drift", unit="m", read=of(lambda s: s.drift[-1]))
-    yield column(f"{title}, drift relative to the path", unit="%", read=of(_relative_drift))
+    quantities: tuple[tuple[str, str, Callable[[TruncatedSteps], float]], ...] = (
+        ("median error", "", lambda steps: metrics.spread(steps.error).median),
+        ("largest error", "", lambda steps: metrics.spread(steps.error).largest),
+        ("drift", "m", lambda steps: steps.drift[-1]),
+        ("drift relative to the path", "%", _relative_drift),
+    )
+    for name, unit, read in quantities:
+        cell = _of(FEW, read, count)
+        yield Column(f"{title}, {name}", unit, group=title, folded=True, read=cell)
 
 
 def _relative_drift(steps: TruncatedSteps) -> float:
     return metrics.ratio(float(steps.drift[-1]), float(steps.path[-1]))
 
 
+def _cloth(row: SolverRecords) -> str:
+    return f"lab cloth, {row[0].title}"
+
+
+_solved = _iterations_to(SOLVED).read
+_tried = _of(ONE_STEP, lambda step: step.error.size - 1)
+
 CONVERGENCE = (
-    text("cloth", lambda row: row.cloth),
-    text("solver", lambda row: row.solver),
+    text("cloth", _cloth),
+    text("solver", lambda row: label(row[0].solver)),
     *(_after("error", count, best="least") for count in (1, 10, 100)),
     *map(_iterations_to, ("1e-2", "1e-4")),
-    Column("smallest error", best="least", read=_of_step(lambda step: step.error.min())),
+    Column("smallest error", best="least", read=_of(ONE_STEP, lambda step: step.error.min())),
     _after("error", 1000, best="least", folded=True),
     *(_iterations_to(d, folded=True) for d in DECADES if d not in ("1e-2", "1e-4")),
-    Column("iterations tried", read=_of_step(lambda step: step.error.size - 1), folded=True),
+    Column("iterations tried", read=_tried, folded=True),
     *(_after("residual", count, folded=True) for count in (1, 10, 100, 1000)),
     *(column for count in FEW_ITERATIONS for column in _truncated(count)),
 )
 
 
-def _convergence_rows(results: Results) -> list[SolverRow]:
-    """Return a row for every solver on every cloth, cloth by cloth."""
+def _convergence_rows(results: Results) -> list[SolverRecords]:
+    """Return the records of every solver on every cloth, cloth by cloth."""
     records = [r for task in (ONE_STEP, FEW) for r in results.all("cloth", task=task)]
-    rows = [
-        SolverRow(
-            f"lab cloth, {title}",
-            label(solver),
-            next((r for r in group if r.task == ONE_STEP), None),
-            {r.values.iterations: r for r in group if r.task == FEW},
-        )
-        for (title, solver), group in grouped(records, lambda r: (r.title, r.solver)).items()
-    ]
-    return [row for cloth in grouped(rows, lambda row: row.cloth).values() for row in cloth]
+    cloths = grouped(records, lambda r: r.title).values()
+    return [row for cloth in cloths for row in grouped(cloth, lambda r: r.solver).values()]
 
 
-def _convergence_summary(rows: Sequence[SolverRow]) -> Summary:
+def _convergence_summary(rows: Sequence[SolverRecords]) -> Summary:
     points = [
-        f"{cloth}: {listed([_count(row) for row in of_cloth if row.step])}"
-        for cloth, of_cloth in grouped(rows, lambda row: row.cloth).items()
+        f"{cloth}: {listed([_count(row) for row in of_cloth if _tried(row)])}"
+        for cloth, of_cloth in grouped(rows, _cloth).items()
     ]
-    points += [_single_iterations(row) for row in rows if 1 in row.few]
-    cloths = grouped((row for row in rows if _solved(row)), lambda row: row.cloth)
-    firsts = [min(of_cloth, key=_solved).solver for of_cloth in cloths.values()]
+    few = (record for row in rows for record in row if record.task == FEW)
+    points += [_single_iterations(record) for record in few if record.values.iterations == 1]
+    cloths = grouped((row for row in rows if _solved(row)), _cloth).values()
+    firsts = [label(min(of_cloth, key=_solved)[0].solver) for of_cloth in cloths]
     fewest = f"by {most_often(firsts, 'cloth')}" if firsts else "by no solver"
     sentence = f"An error of {SOLVED} is reached in the fewest iterations {fewest}."
     return Summary(sentence, tuple(points))
 
 
-_solved = _iterations_to(SOLVED).read
-
-
-def _count(row: SolverRow) -> str:
+def _count(row: SolverRecords) -> str:
     count = _solved(row)
-    tried = _of_step(lambda step: step.error.size - 1)(row)
-    return f"{row.solver} {f'more than {words(tried)}' if count is None else words(count)}"
+    iterations = f"more than {words(_tried(row))}" if count is None else words(count)
+    return f"{label(row[0].solver)} {iterations}"
 
 
-def _single_iterations(row: SolverRow) -> str:
-    steps: TruncatedSteps = row.few[1].values
+def _single_iterations(record: Record) -> str:
+    steps: TruncatedSteps = record.values
     return (
-        f"{row.cloth}, {settings([row.few[1]], 'steps')} steps of one local/global iteration "
+        f"{_cloth([record])}, {settings([record], 'steps')} steps of one local/global iteration "
         f"each: a median error of {words_in(metrics.spread(steps.error).median, '%')}; the "
         f"cloth drifts by {words(float(steps.drift[-1]))} m, "
         f"{words_in(_relative_drift(steps), '%')} of its path"

@@ -1,7 +1,7 @@
 """The energy of a swinging cloth by integrator, over ten thousand steps."""
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 from plumbob.reference import MassSpring, State, scenes, symplectic_euler
@@ -17,9 +17,11 @@ H, STEPS, EVERY = 1 / 60, 10_000, 10
 # Steps after which the cloth hangs well below its start, near its rest.
 FALLING = 120
 TOLERANCE = 1e-10
-# The integrators of MuJoCo, by its names.
-MUJOCO = ("implicit", "implicitfast", "discrete", "RK4")
-INTEGRATORS = ("symplectic Euler", "implicit Euler", *MUJOCO)
+# Two of ours, and MuJoCo's by its names.
+INTEGRATORS = (
+    *("symplectic Euler", "implicit Euler"),
+    *("implicit", "implicitfast", "discrete", "RK4"),
+)
 
 
 class SwingWords(Values, frozen=True, kw_only=True):
@@ -51,28 +53,19 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 def swing(name: str, integrator: str, steps: int = STEPS) -> Measured:
     """Let the cloth swing; keep its energy above rest, relative to the start."""
-    from plumbob.crosscheck.mass_spring.integrators import energy_series
+    from plumbob.crosscheck.mass_spring.integrators import SIMULATORS, energy_series, implicit
 
     system, start, rest = long_swing(name)
-    simulation = simulations()[integrator]
+    # The faster of two integrators in agreement step by step. Local/global converges in a dozen
+    # iterations at this stiffness, each a hundredth of the cost of a Newton iteration.
+    ours = {
+        "symplectic Euler": SIMULATORS["symplectic Euler"],
+        "implicit Euler": partial(implicit, "local_global", tolerance=TOLERANCE),
+    }
+    simulation = ours.get(integrator) or SIMULATORS[f"MuJoCo {integrator}"]
     times, energies = energy_series(simulation, system, start, H, steps=steps, every=EVERY)
     above = energies - rest
     return {"time": times, "left": above / above[0]}
-
-
-def simulations() -> dict[str, Callable[[MassSpring, float], Callable[..., State]]]:
-    """Return the simulation of each integrator, the faster of two that agree step by step.
-
-    Local/global converges in a dozen iterations at this stiffness, each a hundredth of the cost
-    of a Newton iteration.
-    """
-    from plumbob.crosscheck.mass_spring.integrators import SIMULATORS, implicit
-
-    return {
-        "symplectic Euler": SIMULATORS["symplectic Euler"],
-        "implicit Euler": partial(implicit, "local_global", tolerance=TOLERANCE),
-        **{name: SIMULATORS[f"MuJoCo {name}"] for name in MUJOCO},
-    }
 
 
 @functools.cache
