@@ -19,8 +19,8 @@ from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import JobOutcome, Solved, WorkerProcess
 from ...harness.measure import not_installed
-from ...peers import registry
-from ...peers.registry import EXPLICIT, ITERATED, LINEARISED, UNDECLARED, ClothPeer
+from ...peers import catalogue
+from ...peers.peer import EXPLICIT, ITERATED, LINEARISED, UNDECLARED, Peer
 from ...problems import published
 from ...problems.falling_cloth import (
     FRAME,
@@ -100,7 +100,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
     Each missing package has a block. Larger cloths and the cloth of Liu et al. are for the full
     scale.
     """
-    peers = registry.cloth_peers(scale.entrants)
+    peers = catalogue.cloth_peers(scale.entrants)
     for package in dict.fromkeys(peer.package for peer in peers if not peer.is_installed):
         yield _block(MISSING, "all", package, partial(not_installed, package), {})
     installed = [peer for peer in peers if peer.is_installed]
@@ -144,25 +144,24 @@ def _cloths(scale: Scale) -> Iterator[_Cloth]:
             yield _Cloth(own.name, settings, [fall], own)
 
 
-def _works(peer: ClothPeer, cloth: _Cloth, sweep: int) -> Iterator[Block]:
+def _works(peer: Peer, cloth: _Cloth, sweep: int) -> Iterator[Block]:
     """Yield the motion of a cloth, and its step unless the solver is explicit."""
     settings = {**cloth.settings, "version": peer.version, "sweep": sweep}
     size = sum(fall.level.size for fall in cloth.falls)
-    names = (
-        {MOTION: "motion"} if peer.kind == EXPLICIT else {ONE_STEP: "one step", MOTION: "motion"}
-    )
+    names = {} if peer.run.kind == EXPLICIT else {ONE_STEP: "one step"}
+    names[MOTION] = "motion"
     for task, name in names.items():
         measure = partial(work, task, peer, cloth.falls)
-        facts = {"kind": peer.kind, "arbiter": _ARBITERS[task]}
+        facts = {"kind": peer.run.kind, "arbiter": _ARBITERS[task]}
         facts |= {"cloth": cloth.name} if cloth.own else {}
         name, more = f"{name}/{cloth.name}", {"size": size, "facts": facts}
         block = _block(task, name, peer.title, measure, settings, **more).of(peer.entrant)
         yield block.on(cloth.own) if cloth.own else block
 
 
-def _stability_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
+def _stability_blocks(peer: Peer, sizes: tuple[Level, ...]) -> Iterator[Block]:
     """Yield the limit of stability of an explicit solver without iterations."""
-    if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
+    if peer.run.kind in (EXPLICIT, UNDECLARED) and not peer.run.settings.get("iterations"):
         stiffnesses = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
         measure, size = partial(stability, peer, stiffnesses), len(stiffnesses)
         version = {"size": STABILITY_SIZE, "version": peer.version}
@@ -177,30 +176,30 @@ class Rung(NamedTuple):
     settings: Mapping[str, Any]
 
 
-def step_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
+def step_rungs(peer: Peer, frequency: float) -> list[Rung]:
     """Return the rungs for a step of a frame, from cheap to expensive."""
-    if peer.kind == ITERATED:
-        return [_rung(peer, _counted(n, "iteration"), iterations=n) for n in peer.ladder]
+    if peer.run.kind == ITERATED:
+        return [_rung(peer, _counted(n, "iteration"), iterations=n) for n in peer.run.ladder]
     return [_rung(peer, "1 step", substeps=1)]
 
 
-def motion_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
+def motion_rungs(peer: Peer, frequency: float) -> list[Rung]:
     """Return the rungs for a motion: steps of part of a frame, which are nearer to the truth."""
     stable = [explicit_substeps(frequency, margin) for margin in MARGINS]
     substeps = {EXPLICIT: stable, LINEARISED: PARTS, UNDECLARED: sorted({*PARTS, *stable})}
-    rungs = [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps.get(peer.kind, ())]
-    for n, iterations in peer.motion:
+    rungs = [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps.get(peer.run.kind, ())]
+    for n, iterations in peer.run.motion:
         label = f"{_counted(n, 'step')} of {_counted(iterations, 'iteration')}"
         rungs.append(_rung(peer, label, substeps=n, iterations=iterations))
-    if peer.converges:
+    if peer.run.converges:
         for n in PARTS:
             label = f"{_counted(n, 'step')} to {RESIDUAL_LABEL}"
             rungs.append(_rung(peer, label, tolerance=RESIDUAL, substeps=n))
     return rungs
 
 
-def _rung(peer: ClothPeer, label: str, **settings: float) -> Rung:
-    return Rung(label, {**peer.settings, **peer.spec, **settings})
+def _rung(peer: Peer, label: str, **settings: float) -> Rung:
+    return Rung(label, {**peer.run.settings, **peer.spec, **settings})
 
 
 def _counted(count: int, name: str) -> str:
@@ -211,7 +210,7 @@ def _counted(count: int, name: str) -> str:
 _unfinished: dict[tuple[str, int], str] = {}
 
 
-def _performed(peer: ClothPeer, cloth: FallingCloth, rung: Rung, shape: Shape) -> JobOutcome:
+def _performed(peer: Peer, cloth: FallingCloth, rung: Rung, shape: Shape) -> JobOutcome:
     """Return the outcome of a rung; an unfinished solver is not tried again."""
     task = peer.title, len(cloth.start.positions)
     if task in _unfinished:
@@ -223,7 +222,7 @@ def _performed(peer: ClothPeer, cloth: FallingCloth, rung: Rung, shape: Shape) -
     return outcome
 
 
-def work(task: str, peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
+def work(task: str, peer: Peer, falls: Sequence[Fall]) -> Measured:
     """Take the same step, or move on for the same frames, at increasing cost.
 
     Keep the time for a frame and the error of the last, infinite if not reached.
@@ -294,7 +293,7 @@ def motion_error(positions: np.ndarray, truth: ClothTruth, extent: float = SIDE)
     return max(metrics.rms_distance(positions[-1], truth.true[-1]) / truth.path, truth.unsure)
 
 
-def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
+def stability(peer: Peer, stiffnesses: tuple[float, ...]) -> Measured:
     """Find the longest stable step of an explicit solver, on hanging cloths."""
     limits, frequencies, remarks = [], [], []
     for stiffness in stiffnesses:
@@ -305,7 +304,7 @@ def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
         stable = partial(is_stable, peer, system, start, rest)
         implicit_step = _IMPLICIT_MULTIPLE * 2.0 / np.sqrt(largest)
         try:
-            if peer.kind == UNDECLARED and stable(implicit_step):
+            if peer.run.kind == UNDECLARED and stable(implicit_step):
                 raise ArithmeticError(f"stable at {implicit_step:.2g} s, as implicit steps are")
             limits.append(stability_limit(stable, FRAME))
         except ArithmeticError as error:
@@ -319,15 +318,13 @@ def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
     }
 
 
-def is_stable(
-    peer: ClothPeer, system: MassSpring, start: State, rest: np.ndarray, h: float
-) -> bool:
+def is_stable(peer: Peer, system: MassSpring, start: State, rest: np.ndarray, h: float) -> bool:
     """Return whether the particles stay near their rest for many steps of length h.
 
     Raises:
         ArithmeticError: if the solver fails.
     """
-    settings = {**peer.settings, **peer.spec, "substeps": STABILITY_STEPS}
+    settings = {**peer.run.settings, **peer.spec, "substeps": STABILITY_STEPS}
     shape = Shape(1, 1, h * STABILITY_STEPS)
     arrays, entrant = system.arrays, peer.entrant_name
     job = ClothJob(peer.module, arrays, start, settings, shape, entrant)
@@ -365,7 +362,7 @@ def liu_2013(solver: str) -> Measured:
     cloth = falling_cloth(published.LIU_2013_SIZE, published.LIU_2013_STIFFNESS)
     frame = published.LIU_2013_FRAME
     settings = {"solver": solver, **published.LIU_2013[solver].settings}
-    shape, peer = Shape(1, LIU_REPEATS, frame), registry.cloth_peers()[0]
+    shape, peer = Shape(1, LIU_REPEATS, frame), catalogue.cloth_peers()[0]
     outcome = worker_process().perform(job(peer, cloth, settings, shape))
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
@@ -375,9 +372,7 @@ def liu_2013(solver: str) -> Measured:
     return {"seconds": seconds, "error": error, "vertices": cloth.system.particle_count}
 
 
-def job(
-    peer: ClothPeer, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape
-) -> ClothJob:
+def job(peer: Peer, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape) -> ClothJob:
     """Return the job of moving a cloth from its start."""
     system = cloth.system.arrays
     return ClothJob(peer.module, system, cloth.start, settings, shape, peer.entrant_name)

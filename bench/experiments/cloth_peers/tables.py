@@ -15,7 +15,7 @@ from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers.registry import LINEARISED
+from ...peers.peer import LINEARISED
 from ...problems import published
 from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.captions import Captions
