@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Any
 
 from plumbob.reference import MassSpring, State, scenes, symplectic_euler
 
@@ -58,7 +59,7 @@ def swing(name: str, integrator: str, steps: int = STEPS) -> Measured:
     system, start, rest = long_swing(name)
     # The faster of two integrators in agreement step by step. Local/global converges in a dozen
     # iterations at this stiffness, each a hundredth of the cost of a Newton iteration.
-    ours = {
+    ours: dict[str, Any] = {
         "symplectic Euler": SIMULATORS["symplectic Euler"],
         "implicit Euler": partial(implicit, "local_global", tolerance=TOLERANCE),
     }

@@ -316,9 +316,9 @@ def cloth_cases() -> Iterator[TimedCase]:
             work = _work("cloth", name, title, group)
             yield TimedCase(work, COMPILED, partial(reference, problem))
             yield TimedCase(work, PLAIN, partial(reference, problem), backend="python")
-            for name, engine in engines.items():
+            for solver, engine in engines.items():
                 error = partial(step_error, engine, problem) if len(engines) > 1 else None
-                yield TimedCase(work, name, partial(engine, problem), error=error)
+                yield TimedCase(work, solver, partial(engine, problem), error=error)
         yield solving(_work("cloth", name, LOCAL_GLOBAL, group), problem)
     large, group = cloth_swing(1, LARGE), f"{LARGE} × {LARGE} particles"
     work = _work("cloth", group, LOCAL_GLOBAL)
