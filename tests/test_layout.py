@@ -27,7 +27,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LINES = PROJECT["tool"]["plumbob"]["lines"]
 FOLDERS = set(ROOMS) - GROUND - {"plumbob"}  # linked into `plumbob`, imported as its packages
 BENCH = [  # each may import those before it
-    "problems", "peers", "harness", "tables", "figures", "motion", "experiments",
+    "problems", "peers", "harness", "tables", "ranking", "figures", "motion", "experiments",
     "comparison", "report", "show",
 ]  # fmt: skip
 LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # llvmlite is numba's own

@@ -6,7 +6,7 @@ import pytest
 
 from plumbob.bench.comparison.rows import ChangeVerdict
 from plumbob.bench.experiments.check import files
-from plumbob.bench.experiments.robots.readings import OUTCOMES
+from plumbob.bench.ranking.scores import OUTCOMES
 from plumbob.reference.outcome import Outcome
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.screen.words import VERDICTS

@@ -13,10 +13,9 @@ import timeit
 
 import numpy as np
 
-from plumbob.bench.experiments.cloth_peers.truth import truth_of
-from plumbob.bench.harness import metrics
 from plumbob.bench.peers import catalogue
 from plumbob.bench.peers.peer import EXPLICIT, ITERATED, LINEARISED
+from plumbob.bench.problems.cloth_truth import rms_distance, truth_of
 from plumbob.bench.problems.falling_cloth import FRAME, explicit_substeps, falling_cloth
 from plumbob.reference import MassSpring, State
 
@@ -60,8 +59,8 @@ def result(peer, settings):
             begin = time.perf_counter()
             mover.advance()
             seconds.append(time.perf_counter() - begin)
-    path = metrics.rms_distance(cloth.start.positions, truth)
-    return metrics.rms_distance(mover.positions(), truth) / path, 1e3 * float(np.median(seconds))
+    path = rms_distance(cloth.start.positions, truth)
+    return rms_distance(mover.positions(), truth) / path, 1e3 * float(np.median(seconds))
 
 
 def fixed_costs():

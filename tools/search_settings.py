@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from plumbob.bench.experiments.robots.measurement import TOLERANCE
+from plumbob.bench.experiments.robots import TOLERANCE
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
 from plumbob.bench.harness.timing import attempt, digest_of, restarted, seed_shared_generators

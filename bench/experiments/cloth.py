@@ -27,6 +27,7 @@ from ..problems.cloth_swing import (
     integrator_of,
     motion,
 )
+from ..problems.cloth_truth import rms_distance
 
 # The tasks of its records.
 ONE_STEP, FEW, DAMPERS = "one step", "few iterations", "dampers"
@@ -130,7 +131,7 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
 
     def distances(states: Sequence[State]) -> FloatArray:
         pairs = zip(states, exact, strict=True)
-        return np.array([metrics.rms_distance(a.positions, b.positions) for a, b in pairs])
+        return np.array([rms_distance(a.positions, b.positions) for a, b in pairs])
 
     return {
         "error": np.array(errors),

@@ -22,8 +22,7 @@ from ..problems.chains import TargetsForSkeleton, unit
 from ..problems.evaluate import Targets, Tolerance
 from ..problems.robot_targets import uniform_targets
 from ..problems.robots import is_installed
-from .robots.measurement import SUITE, RobotJob
-from .robots.values import RobotSolves
+from .robots import SUITE, RobotJob, RobotSolves
 
 # The tasks of records.
 TRAC_IK, TOOLBOX, FABRIK = "TRAC-IK’s table", "the toolbox’s table", "FABRIK’s table"
@@ -125,12 +124,12 @@ def iterations(problem: TargetsForSkeleton, solver: str) -> Measured:
 
 # What is shown.
 
+from ..ranking.scores import Score
 from ..tables.captions import Captions
 from ..tables.columns import text
 from ..tables.results import Results, counted, grouped, label
 from ..tables.table import Column, Summary, listing, words
-from .robots.readings import Score
-from .robots.tables import RULE
+from .robots import RULE
 
 
 class PublishedNumber(NamedTuple):

@@ -202,19 +202,22 @@ def shape(timer: Timer, seconds: float) -> tuple[int, int]:
 
 # What is shown.
 
+import re
+
 from ..figures.chart import MARKS, Panel, Series, series
 from ..figures.chart_sketch import declared_chart
 from ..figures.sketch import Sketch
 from ..tables.captions import Captions
-from ..tables.columns import text, words_in
+from ..tables.columns import folded, text, words_in
 from ..tables.layout import Layout
 from ..tables.results import (
     PRECISION,
     Results,
     by_problem,
+    first_of_kinds,
     grouped,
     leaders,
-    most_often,
+    only_first,
     solvers,
     steadiness,
 )
@@ -234,7 +237,8 @@ def median_time(record: Record) -> float:
 
 
 def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
-    """Return the solvers by the medians of shared sweeps, None without any."""
+    """Return the ranked solvers by the medians of shared sweeps, None without any."""
+    records = list(filter(is_ranked, records))
     sweeps = {_label(record.solver): _scores(record) for record in records}
     groups = {record.values.together for record in records}
     if len(groups) > 1 or len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
@@ -259,6 +263,12 @@ class TimeRow(NamedTuple):
     copy: Record | None
     medians: dict[str, float]
     spread: metrics.Timing  # median, interval and percentiles of the rounds [s]
+    ranking: metrics.Ranking | None  # of the work
+
+    @property
+    def kind(self) -> str:
+        """The kind of the work: "one pose a call", "many poses a call"."""
+        return re.sub(r"^[\d,]+ (?=poses|targets)", "many ", self.time.values.work)
 
     @property
     def half_width(self) -> float | None:
@@ -286,8 +296,8 @@ def _rows(subject: str, results: Results) -> list[TimeRow]:
         spreads = {record.solver: metrics.timing(record.values.seconds) for record in records}
         medians = {solver: spread.median for solver, spread in spreads.items()}
         times = {record.solver: record for record in records}
-        copy = times.pop(LIMIT, None)
-        rows += [TimeRow(time, copy, medians, spreads[name]) for name, time in times.items()]
+        copy, ranking = times.pop(LIMIT, None), ranked_by_time(records)
+        rows += [TimeRow(t, copy, medians, spreads[name], ranking) for name, t in times.items()]
     return rows
 
 
@@ -312,6 +322,7 @@ def _columns(unit: str, rows: Sequence[TimeRow]) -> list[Column]:
         Column("95 % interval of the median, ±", "%", read=lambda row: row.half_width),
         Column("relative to compiled", read=lambda row: row.relative_to(COMPILED)),
         text("remark", lambda row: "; ".join(_remarks(row))),
+        *folded(text("kind of work", lambda row: row.kind)),
         Column("10th percentile", unit, folded=True, read=lambda row: row.spread.low),
         Column("90th percentile", unit, folded=True, read=lambda row: row.spread.high),
         Column("rounds", folded=True, read=lambda row: row.spread.rounds),
@@ -336,12 +347,11 @@ def _summary(unit: str, rows: Sequence[TimeRow]) -> Summary:
         works = grouped(group, lambda row: row.time.values.work).items()
         sentences = [f"{work}: {_times(unit, members)}" for work, members in works]
         points.append(f"{name} – {'; '.join(sentences)}")
-    rivals = [row.time for row in rows if is_ranked(row.time)]
-    by_work = grouped(rivals, lambda record: record.title).values()
-    firsts = [ranking.order[0] for ranking in map(ranked_by_time, by_work) if ranking]
+    ranked = {row.time.title: row for row in rows if row.ranking}
+    firsts = [(row.kind, only_first(row.ranking)) for row in ranked.values() if row.ranking]
     fastest = "No two implementations were timed together."
     if firsts:
-        fastest = f"The fastest implementation is {most_often(firsts, 'comparison')}."
+        fastest = f"Ties aside, the fastest is {first_of_kinds(firsts, 'comparison')}."
     noise = _noise(rows)
     warning = f" {steadiness(noise)}" if noise > PRECISION else ""
     return Summary(fastest + warning, tuple(points))
@@ -353,7 +363,7 @@ def _times(unit: str, rows: Sequence[TimeRow]) -> str:
     times = ", ".join(_time(row, unit) for row in rivals)
     if rivals and rivals[0].copy:
         times += f" ({words(rivals[0].relative_to(LIMIT))} times a plain copy)"
-    ranking = ranked_by_time([row.time for row in rivals])
+    ranking = rows[0].ranking
     if ranking is None:
         return times + (" – timed separately, not ranked" if len(rivals) > 1 else "")
     return f"{times} – first: {leaders(ranking)}"
@@ -363,6 +373,12 @@ def _time(row: TimeRow, unit: str) -> str:
     half = row.half_width
     width = "" if half is None else f" ± {round(100 * half, 1):g} %"
     return f"{_label(row.time.solver)} {words_in(row.spread.median, unit)}{width}"
+
+
+def _leads(row: TimeRow) -> dict[str, bool]:
+    """Return whether an implementation is first, or ties with the first."""
+    is_first = row.ranking is not None and _label(row.time.solver) in row.ranking.first
+    return {"median": is_first} if is_ranked(row.time) else {}
 
 
 def timing_chart(subject: str, unit: str, results: Results) -> Sketch | None:
@@ -393,6 +409,7 @@ def _layout(subject: str, unit: str) -> Layout:
         measured=lambda rows: {"steadiness": steadiness(_noise(rows))},
         columns=partial(_columns, unit),
         ranked=lambda row: is_ranked(row.time),
+        leads=_leads,
         figures=(partial(timing_chart, subject, unit),),
     )
 

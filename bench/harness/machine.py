@@ -25,7 +25,7 @@ _PACKAGES = ("reference", "crosscheck", "verify", "bench", "plumbob/process")
 # Folders that only show numbers, never imported by a measurement; others may change a number.
 PRESENTATION = (
     *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),
-    *("bench/tables", "verify/screen"),
+    *("bench/ranking", "bench/tables", "verify/screen"),
 )
 # Likewise in every experiment, beside the captions NAME.toml.
 PRESENTATION_FILES = (

@@ -73,7 +73,7 @@ def share(hits: NDArray[np.bool_]) -> Share:
     return Share(count, total, float(low), float(high))
 
 
-def wilson(rates: Floats, total: int) -> tuple[Floats, Floats]:
+def wilson(rates: Floats, total: int | Floats) -> tuple[Floats, Floats]:
     """Return bounds of the true rates in 95 % of samples of this size (Wilson 1927)."""
     z = _NORMAL
     centre = (rates + z**2 / (2 * total)) / (1 + z**2 / total)
@@ -207,12 +207,25 @@ def relative_spread(values: Floats) -> float:
     return float((high - low) / (2.0 * median))
 
 
-def within_budget(seconds: Floats, solved: NDArray[np.bool_], budgets: Floats) -> Floats:
-    """Return the share of all targets solved within each budget of time, (budget,)."""
-    if not np.size(seconds):
-        return np.full(np.shape(budgets), math.nan)
-    hits = np.sort(np.asarray(seconds)[np.asarray(solved, dtype=bool)])
-    return np.searchsorted(hits, budgets, side="right") / np.size(seconds)
+def within_budget(
+    share: Share, seconds: Floats, budgets: Floats
+) -> tuple[Floats, tuple[Floats, Floats]]:
+    """Return the share of all targets solved within each budget, and its interval, (budget,).
+
+    `seconds` are the times of some of the solved targets. The result is p q: p is the share that is
+    solved, q the part of these times within the budget. Its variance is q² Var p + p² Var q; the
+    interval is Wilson's for as many trials as have this variance. NaN if no solved target is timed.
+    """
+    count, p = np.size(seconds), share.hits / max(1, share.total)
+    if share.hits and not count:
+        rates = np.full(np.shape(budgets), math.nan)
+        return rates, (rates, rates)
+    q = np.searchsorted(np.sort(seconds), budgets, side="right") / max(1, count)
+    rates = p * q
+    variance = q**2 * p * (1 - p) / max(1, share.total) + p**2 * q * (1 - q) / max(1, count)
+    trials = np.where((q == 0.0) & (p > 0.0), count / max(p, 1e-300), max(1.0, share.total))
+    np.divide(rates * (1 - rates), variance, out=trials, where=variance > 0.0)
+    return rates, wilson(rates, trials)
 
 
 def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Floats) -> Floats:
@@ -282,11 +295,6 @@ def excess(residual: Floats, distance: Floats, reach: float) -> Floats:
 def relative_error(x: Floats, exact: Floats, start: Floats) -> float:
     """Return |x - exact| / |start - exact|."""
     return float(np.linalg.norm(x - exact) / np.linalg.norm(start - exact))
-
-
-def rms_distance(x: Floats, y: Floats) -> float:
-    """Return the root mean square distance between the points of x and of y [m]."""
-    return float(np.sqrt(np.mean(np.sum((x - y) ** 2, axis=-1))))
 
 
 def ratio(a: float, b: float) -> float:

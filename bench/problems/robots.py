@@ -28,6 +28,8 @@ from plumbob.reference.formats import urdf
 PACKAGE = "example-robot-data"
 _FOLDER = "cmeel.prefix/share/example-robot-data/robots"
 TWO_REVOLUTIONS = 4.0 * math.pi
+# The tasks of records: targets within a robot's reach, or out of reach.
+REACHABLE, UNREACHABLE = "reachable", "unreachable"
 # A limit counts as kept to this [rad]; some peers keep limits in single precision.
 LIMIT_TOLERANCE = 1e-6
 

@@ -8,7 +8,7 @@ from plumbob.process.paths import check_regular
 from plumbob.text.printable import shortened, visible
 
 from ..experiments import SUITES
-from ..experiments.robots.figures import robot_maps
+from ..figures.robot_map import robot_maps
 from ..figures.sketch import Drawing, drawn
 from ..harness.record import FINISHED, Record
 from ..peers.packages import peers_command

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..experiments import chain, cloth_peers
-from ..experiments.cloth_peers.readings import Point, points
-from ..experiments.robots import readings
+from ..experiments.cloth_peers import Point, points
 from ..harness import metrics
 from ..harness.record import FIRST_TARGETS
 from ..peers import catalogue
+from ..ranking import scores
 from ..tables.columns import words_in
 from ..tables.results import Results, counted, grouped, label, listed
-from ..tables.table import words
+from ..tables.table import percent, words
 
 # The most cloths with a sentence of their own.
 MAX_CLOTHS = 3
@@ -34,10 +34,10 @@ class Headline(NamedTuple):
 
 def standings(results: Results) -> list[Headline]:
     """Return the ranks of the user's solvers task by task, then their failures."""
-    chains = [r for r in results.all("ik", task=chain.CHAIN) if r.facts["stratum"] != chain.BEYOND]
-    ranks = [*_target_ranks("chain of balls", "accuracy", readings.by_robot(chains))]
-    for start in readings.STARTS:
-        groups = readings.in_groups(readings.fields_of(results, start))
+    chains = [r for r in results.all("ik", task=chain.CHAIN) if r.values.stratum != chain.BEYOND]
+    ranks = [*_target_ranks("chain of balls", "accuracy", scores.by_robot(chains))]
+    for start in scores.STARTS:
+        groups = scores.in_groups(scores.fields_of(results, start))
         for group, fields in groups.items():
             robots = f"robots ({group})" if len(groups) > 1 else "robots"
             ranks += _target_ranks(f"{robots}, {start}", "robots_overall", fields)
@@ -51,7 +51,7 @@ def standings(results: Results) -> list[Headline]:
 def _failures(results: Results, suite: str) -> Iterator[Headline]:
     """Yield the first failure of each solver, and on how many problems it failed."""
     entered = results.all(suite, failed=True, entrant=True)
-    for records in grouped(entered, lambda record: str(record.facts.get("door"))).values():
+    for records in grouped(entered, lambda record: str(record.measured.get("door"))).values():
         if sentences := [f"{r.problem}: {why}" for r in records if (why := r.failed or r.trouble)]:
             name = min((record.solver for record in records), key=len)
             problems = f"{len(sentences)} of {counted(len(records), 'problem')}"
@@ -60,62 +60,56 @@ def _failures(results: Results, suite: str) -> Iterator[Headline]:
 
 
 def _target_ranks(
-    task: str, table: str, fields: dict[str, list[readings.Score]]
+    task: str, table: str, fields: dict[str, list[scores.Score]]
 ) -> Iterator[Headline]:
     """Yield the ranks of solvers among the solvers that finished the same targets."""
-    scores = [score for field in fields.values() for score in field]
-    for solver in dict.fromkeys(s.solver for s in scores if s.records[0].facts.get("entrant")):
-        problems = {score.robots for score in scores if score.solver == solver}
-        equal_fields = {r: readings.on_targets_of(solver, field) for r, field in fields.items()}
-        rows = {row.solver: row for row in readings.together(problems, equal_fields)}
+    entries = [score for field in fields.values() for score in field]
+    for solver in dict.fromkeys(s.solver for s in entries if s.records[0].is_entrant):
+        problems = {score.robots for score in entries if score.solver == solver}
+        equal_fields = {r: scores.on_targets_of(solver, field) for r, field in fields.items()}
+        rows = {row.solver: row for row in scores.together(problems, equal_fields)}
         yield Headline("", f"{solver}, {task}", _rank(rows[solver], rows), table)
 
 
-def _rank(row: readings.Score, rows: Mapping[str, readings.Score]) -> str:
+def _rank(row: scores.Score, rows: Mapping[str, scores.Score]) -> str:
     """Return a sentence on a solver: its rank, share solved, the best share, relative times."""
     order, first = row.success
-    share = f"it solves {percent(row.share)} of {counted(row.share.total, 'target')}"
-    if any(FIRST_TARGETS in record.facts for record in row.records):
+    share = f"it solves {in_percent(row.share)} of {counted(row.share.total, 'target')}"
+    if any(FIRST_TARGETS in record.measured for record in row.records):
         share += ", the first of each problem because the solver is slow"
     if not row.is_ranked or not row.share.hits:
         why = f"it is marked “{row.limits}”" if row.limits else "it solves no target"
         return f"{row.solver} is not ranked: {why}."
     if row.solver not in first:
-        share += f", the best solver, {full_name(order[0])}, {percent(rows[order[0]].share)}"
+        share += f", the best solver, {full_name(order[0])}, {in_percent(rows[order[0]].share)}"
     if len(order) > 1:
         rivals = _fastest([solver for solver in row.time.order if solver != row.solver])
-        ratios = {rival: readings.ratio_of_times(rows[rival], row) for rival in rivals}
+        ratios = {rival: scores.ratio_of_times(rows[rival], row) for rival in rivals}
         speeds = [speed(ratio, rival) for rival, ratio in ratios.items() if ratio.value > 0.0]
         share += f"; where both solve, it is {listed(speeds)}" if speeds else ""
     place = 1 if row.solver in first else order.index(row.solver) + 1
     tie = f", in a tie of {len(first)}" if row.solver in first and len(first) > 1 else ""
     unfinished = len(rows) - len(order)
-    unranked = f" ({counted(unfinished, 'solver')} did not finish)" if unfinished else ""
+    unranked = f" ({counted(unfinished, 'solver')} not ranked)" if unfinished else ""
     return f"{row.solver} ranks {place} of {len(order)}{tie}{unranked}: {share}."
 
 
-def percent(share: metrics.Share) -> str:
-    """Return a share in three digits, or in as many as tell the share from 100 %."""
-    rate = 100 * share.hits / share.total
-    digits = next(n for n in range(3, 12) if rate == 100 or float(f"{rate:.{n}g}") < 100)
-    return f"{rate:.{digits}g} %"
+def in_percent(share: metrics.Share) -> str:
+    """Return a share as in the tables: "96.7 %"."""
+    return f"{percent(share.hits / share.total, share.total)} %"
 
 
 def full_name(solver: str) -> str:
     """Return how a solver is written in a sentence: "pink (20 restarts)", "Plumbob LM (ours)"."""
     name, *details = label(solver).split(", ")
-    details += ["ours"] * catalogue.is_ours(solver)
+    details += ["ours"] * (catalogue.is_ours(solver) and name != "ours")
     return f"{name} ({', '.join(details)})" if details else name
 
 
 def best_rival(solver: str, order: Sequence[str]) -> str:
-    """Return the first solver of other authors than a solver's, "" if there is none.
-
-    A loop of ours on another engine's kinematics is no solver of other authors.
-    """
+    """Return the first solver of other authors than a solver's, "" if there is none."""
     authors = catalogue.engine_of(solver)
-    rivals = (s for s in order if catalogue.engine_of(s) != authors and not catalogue.is_loop(s))
-    return next(rivals, "")
+    return next((rival for rival in order if catalogue.engine_of(rival) != authors), "")
 
 
 def _fastest(order: Sequence[str]) -> list[str]:
@@ -129,6 +123,11 @@ def factor(ratio: float) -> str:
     return f"{ratio:.{0 if ratio >= 10 else 1 if ratio >= 1.1 else 2}f}"
 
 
+def span(numbers: Sequence[float]) -> str:
+    """Return the least and the greatest factor: "1.3 to 1.9"."""
+    return " to ".join(dict.fromkeys(map(factor, metrics.extent(np.array(numbers)))))
+
+
 def speed(ratio: metrics.Interval, rival: str) -> str:
     """Return how much faster a solver is than a rival, by the ratio of the rival's time to its."""
     mean, low, high = ratio
@@ -140,7 +139,7 @@ def speed(ratio: metrics.Interval, rival: str) -> str:
 
 def _cloth_ranks(task: str, field: Sequence[Point]) -> Iterator[Headline]:
     """Yield the ranks of solvers by their errors, cloth by cloth."""
-    for solver in dict.fromkeys(p.solver for p in field if p.record.facts.get("entrant")):
+    for solver in dict.fromkeys(p.solver for p in field if p.record.is_entrant):
         cloths = dict.fromkeys(point.cloth for point in field if point.solver == solver)
         by_cloth = [[point for point in field if point.cloth == cloth] for cloth in cloths]
         ranks, details = zip(*(_cloth_rank(points, solver) for points in by_cloth), strict=True)

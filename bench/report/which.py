@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..experiments.robots import REACHABLE
-from ..experiments.robots.readings import Score, by_robot
 from ..harness import metrics
 from ..peers import catalogue, packages
+from ..problems.robots import REACHABLE
+from ..ranking.scores import Score, by_robot
 from ..tables.columns import text, words_in
 from ..tables.results import Results, counted, grouped, listed
 from ..tables.table import Column, Summary, Table, cells
-from .standings import full_name, percent
+from .standings import full_name, in_percent
 
 
 def solvers_on_robot(results: Results, name: str) -> Table:
@@ -46,11 +46,10 @@ def solvers_on_robot(results: Results, name: str) -> Table:
 def advice(entries: Sequence[Score]) -> str:
     """Return which solver to choose: the fastest of the solvers tied with the best."""
     first = [e for e in entries if e.solver in e.success.first and e.share.hits]
-    first = [entry for entry in first if not catalogue.is_loop(entry.solver)]
     if not first:
         return "No solver reaches a target: does --link name the link that you mean?"
     best = min(first, key=_median)
-    share = f"it solves {percent(best.share)} of the targets"
+    share = f"it solves {in_percent(best.share)} of the targets"
     time = f"with a median of {words_in(_median(best), 'µs')}"
     solvers = len(set(map(_title, first)))
     if solvers == 1:

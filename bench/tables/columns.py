@@ -1,7 +1,8 @@
 """Cells and columns that many tables have."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,21 @@ from .table import Cell, Column, in_unit, words
 def text(title: str, read: Callable[[Any], Cell], folded: bool = False) -> Column:
     """Return a column of words."""
     return Column(title, words=True, read=read, folded=folded)
+
+
+def folded(*columns: Column) -> tuple[Column, ...]:
+    """Return columns that are shown on demand only."""
+    return tuple(replace(column, folded=True) for column in columns)
+
+
+def number(value: float) -> float | None:
+    """Return the cell of a number, None of NaN."""
+    return None if math.isnan(value) else value
+
+
+def extremes(sizes: Collection[int]) -> list[int]:
+    """Return the least and the greatest number, once if equal; empty without any."""
+    return sorted({min(sizes), max(sizes)}) if sizes else []
 
 
 def quantile_cells(title: str, quantiles: Iterable[Cell]) -> dict[str, Cell]:

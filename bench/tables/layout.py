@@ -4,8 +4,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ..harness.record import Record
 from ..peers import catalogue
+from .columns import extremes
 from .results import Results, settings
 from .table import (
     NO_SUMMARY,
@@ -17,10 +20,13 @@ from .table import (
     cells,
     ranked_rows,
     with_rows,
+    words,
 )
 
 # Returns the sketch of a figure, None if its records are missing.
 Figure = Callable[[Results], Any]
+# Arrays with an entry for each target, and the suites whose residuals are such an array.
+_OF_TARGETS, _TARGETED_SUITES = ("solved", "converged", "solutions"), ("arm", "ik", "tracking")
 NOT_MEASURED = "Nothing of this is on record yet."
 # The package of an engine, by its name in the catalogue.
 _PACKAGES = {
@@ -56,7 +62,13 @@ class Layout:
     leads: Callable[[Any], Mapping[str, bool]] = lambda subject: {}
 
     def __call__(self, results: Results) -> Table:
-        """Return the table with a row for each subject, the best of each group first."""
+        """Return the table with a row for each subject, the best of each group first.
+
+        Our own loops on other engines are shown, and never best.
+        """
+        return results.once(self._table)
+
+    def _table(self, results: Results) -> Table:
         subjects = list(self.subjects(results))
         columns = tuple(self.columns(subjects) if callable(self.columns) else self.columns)
         measured = self.measured
@@ -71,7 +83,7 @@ class Layout:
             measured,
             self.summary(subjects) if subjects else NO_SUMMARY,
             self.compared,
-            frozenset(i for i, subject in enumerate(subjects) if not self.ranked(subject)),
+            frozenset(i for i, s in enumerate(subjects) if not self.ranked(s) or is_loop(s)),
             tuple(map(source, subjects)),
             provenance(list(dict.fromkeys(records_of(subjects)))),
         )
@@ -99,6 +111,11 @@ class Layout:
         return replace(table, best=frozenset((best_cells(table) - {*decided}) | winning))
 
 
+def is_loop(subject: Any) -> bool:
+    """Return whether the row of this subject is of our own loop on another engine."""
+    return any(map(catalogue.is_loop, source(subject).solvers[:1]))
+
+
 def source(subject: Any) -> Source:
     """Return the measurements behind the row of this subject."""
     records = [record for record in records_of(subject) if record.has_numbers]
@@ -109,11 +126,13 @@ def source(subject: Any) -> Source:
 
 
 def records_of(subject: Any) -> Iterator[Record]:
-    """Yield the records in a subject; only its attribute `record` if present."""
+    """Yield the records in a subject; only its attribute `record` or `records` if present."""
     if isinstance(subject, Record):
         yield subject
     elif isinstance(getattr(subject, "record", None), Record):
         yield subject.record
+    elif isinstance(getattr(subject, "records", None), tuple):
+        yield from subject.records
     elif isinstance(subject, Mapping):
         yield from records_of(tuple(subject.values()))
     elif isinstance(subject, tuple | list):
@@ -142,13 +161,20 @@ def _distinct(texts: Iterable[str]) -> str:
 
 
 def _samples(records: Sequence[Record]) -> str:
-    """Return the number of targets or rounds of a record: "n = 20 to 200"."""
-    names = ("solved", "seconds", "residual")
-    arrays = [a for record in records for n, a in record.numbers().items() if n in names]
-    counts = sorted({array.size for array in arrays if array.size > 1})
-    if not counts:
-        return ""
-    return f"n = {counts[0]:,}" + (f" to {counts[-1]:,}" if counts[1:] else "")
+    """Return the number of targets of a record, and of rounds: "20 to 200 targets, 3 rounds"."""
+    counts: dict[str, set[int]] = {"target": set(), "round": set()}
+    for record in records:
+        numbers = record.numbers()
+        names = (*_OF_TARGETS, *["residual"] * (record.suite in _TARGETED_SUITES))
+        arrays = [numbers[name] for name in names if name in numbers]
+        counts["target"] |= {array.size for array in arrays}
+        seconds = numbers.get("seconds", np.empty(0))
+        if seconds.ndim > 1:  # (round, target), or (sweep, round) without targets
+            counts["round"].add(len(seconds) if arrays else seconds.size)
+    extents = {noun: extremes(sizes - {0, 1}) for noun, sizes in counts.items()}
+    return ", ".join(
+        f"{' to '.join(map(words, sizes))} {noun}s" for noun, sizes in extents.items() if sizes
+    )
 
 
 def _machine(machine: Mapping[str, Any]) -> str:

@@ -21,6 +21,7 @@ NAMED_TIES = 3
 
 Subject = TypeVar("Subject")
 Key = TypeVar("Key", bound=Hashable)
+Made = TypeVar("Made")
 
 
 class Results:
@@ -37,6 +38,14 @@ class Results:
         self.every = [printable(record) for record in records if not record.superseded]
         self.records = [record for record in self.every if not record.failed]
         self.failed = [record for record in self.every if record.failed]
+        self._made: dict[tuple[Any, ...], Any] = {}
+
+    def once(self, make: Callable[..., Made], *arguments: Hashable) -> Made:
+        """Return what a function makes of the results and arguments, made at the first request."""
+        if (key := (make, *arguments)) not in self._made:
+            self._made[key] = make(self, *arguments)
+        made: Made = self._made[key]
+        return made
 
     @property
     def entrants(self) -> frozenset[str]:
@@ -119,11 +128,30 @@ def counted(count: int, noun: str) -> str:
 
 
 def most_often(firsts: Sequence[str], noun: str) -> str:
-    """Return the name most often first, "nobody" without names: "A on 3 of 5 robots"."""
-    if not firsts:
-        return "nobody"
-    name, count = Counter(firsts).most_common(1)[0]
+    """Return the name most often first: "A on 3 of 5 robots", "nobody on 2 robots".
+
+    A name is "" where solvers of different engines tie.
+    """
+    names = Counter(filter(None, firsts))
+    if not names:
+        return f"nobody on {counted(len(firsts), noun)}"
+    name, count = names.most_common(1)[0]
     return f"{name} on {count} of {counted(len(firsts), noun)}"
+
+
+def first_of_kinds(firsts: Iterable[tuple[str, str]], noun: str) -> str:
+    """Return the name most often first of each kind: "A on 3 of 3 robots (one start) and ...".
+
+    `firsts` are pairs of a kind, "" if there is one only, and a name as in `most_often`.
+    """
+    kinds = grouped(firsts, lambda pair: pair[0])
+    parts = ((kind, most_often([name for _, name in kinds[kind]], noun)) for kind in kinds)
+    return listed([f"{part} ({kind})" if kind else part for kind, part in parts])
+
+
+def only_first(ranking: Ranking) -> str:
+    """Return the first of a ranking, "" if there is none or another ties with the first."""
+    return ranking.first[0] if len(ranking.first) == 1 else ""
 
 
 def leaders(ranking: Ranking) -> str:

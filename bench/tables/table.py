@@ -298,8 +298,16 @@ def _number(number: float) -> str:
 def _share(share: Share) -> str:
     if share.total == 0:
         return "–"
-    digits = max(1, len(str(share.total - 1)) - 2)  # so that one miss shows
     rates = (share.hits / share.total, share.low, share.high)
-    texts = (f"{100 * rate:.{digits}f}".rstrip("0").rstrip(".") for rate in rates)
-    percent, low, high = texts
-    return f"{share.hits:,}/{share.total:,} = {percent} % ({low}–{high})"
+    rate, low, high = (percent(rate, share.total) for rate in rates)
+    return f"{share.hits:,}/{share.total:,} = {rate} % ({low}–{high})"
+
+
+def percent(rate: float, total: int) -> str:
+    """Return a share of so many trials in per cent: "96.7", never "100" if one is missed."""
+    return f"{100 * rate:.{decimals(total)}f}".rstrip("0").rstrip(".")
+
+
+def decimals(total: int) -> int:
+    """Return the decimals of a share of so many trials in per cent, by which one miss shows."""
+    return max(1, len(str(total - 1)) - 2)

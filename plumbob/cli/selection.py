@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
-from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
 from plumbob.bench.harness.block import Block, Choice, Scale
 from plumbob.bench.peers import catalogue, opening
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.problems import files
 from plumbob.bench.problems.own import OwnProblem
+from plumbob.bench.problems.robots import REACHABLE, UNREACHABLE
 from plumbob.reference.arguments import name_list
 from plumbob.text.printable import visible
 

@@ -11,7 +11,7 @@ import pytest
 
 import plumbob.bench.experiments
 from plumbob.bench.experiments import Scale, blocks, cloth, newton
-from plumbob.bench.experiments.robots import tables as robot_tables
+from plumbob.bench.experiments import robots as robot_tables
 from plumbob.bench.figures.style import COLOURS
 from plumbob.bench.harness import run, timing
 from plumbob.bench.harness.experiment import Experiment

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import Scale
+from plumbob.bench.experiments import cloth_peers as peers_cloth
 from plumbob.bench.experiments.cloth_peers import (
     MOTION,
     MOTION_TARGETS,
@@ -17,16 +18,15 @@ from plumbob.bench.experiments.cloth_peers import (
     ONE_STEP,
     SOLVED,
     TARGETS,
-    tables,
-    truth,
+    Rung,
+    motion_rungs,
+    step_rungs,
 )
-from plumbob.bench.experiments.cloth_peers import measurement as peers_cloth
-from plumbob.bench.experiments.cloth_peers.measurement import Rung, motion_rungs, step_rungs
-from plumbob.bench.experiments.cloth_peers.truth import first_step, true_motion, truth_of
-from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import JobOutcome, WorkerProcess
 from plumbob.bench.peers import catalogue
 from plumbob.bench.peers.peer import EXPLICIT, LINEARISED, Peer, Run
+from plumbob.bench.problems import cloth_truth as truth
+from plumbob.bench.problems.cloth_truth import first_step, rms_distance, true_motion, truth_of
 from plumbob.bench.problems.falling_cloth import (
     FRAME,
     MASS,
@@ -133,7 +133,7 @@ def test_the_truth_is_where_symplectic_euler_goes_at_order_one(cloth):
     coarse, fine = (
         symplectic(cloth.system, cloth.start, steps, FRAME / steps) for steps in (200, 400)
     )
-    errors = [metrics.rms_distance(state.positions, true) for state in (coarse, fine)]
+    errors = [rms_distance(state.positions, true) for state in (coarse, fine)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
 
 
@@ -195,7 +195,7 @@ def test_a_solver_begins_anew_from_where_it_is_put(peer, cloth):
         mover.advance()
     tolerance = PRECISION[peer.engine]
     np.testing.assert_allclose(ends[0], ends[1], atol=tolerance)
-    assert metrics.rms_distance(ends[0], cloth.start.positions) > 1e-2
+    assert rms_distance(ends[0], cloth.start.positions) > 1e-2
     pinned = cloth.system.pinned
     np.testing.assert_allclose(ends[0][pinned], cloth.start.positions[pinned], atol=tolerance)
 
@@ -249,7 +249,7 @@ def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
         cloth = one_spring()
     exact = first_step(cloth).positions
     ends = moved(peer, cloth, iterations=many)
-    assert metrics.rms_distance(ends, exact) < 20 * PRECISION[peer.engine] + 1e-9
+    assert rms_distance(ends, exact) < 20 * PRECISION[peer.engine] + 1e-9
 
 
 @pytest.fixture
@@ -540,7 +540,7 @@ def test_the_table_of_one_step_ranks_by_time_to_the_criterion_then_by_error(make
         make.worked("Newton engine, VBD", seconds=(1e-3, 0.5)),
         make.worked("Plumbob Newton"),
     ]
-    table = tables.one_step(Results(records))
+    table = peers_cloth.one_step(Results(records))
     assert column(table, "solver") == ["Plumbob Newton", "Newton engine, VBD", "MuJoCo discrete"]
     assert column(table, "time to 1e-2 [ms]") == [10.0, 500.0, None]
     assert column(table, "time to 1e-4 [ms]") == [10.0, 500.0, None]
@@ -559,7 +559,7 @@ def test_sweeps_are_joined_and_their_differences_reported(make):
         for i, seconds in ((3, 9e-3), (1, 1e-3), (2, 3e-3))
         for solver, error in (("steady", 1e-5), ("random", 1e-5 * i))
     ]
-    table = tables.one_step(Results(records))
+    table = peers_cloth.one_step(Results(records))
     assert column(table, "time to 1e-4 [ms]") == [3.0, 3.0]
     assert column(table, "slowest over fastest sweep") == pytest.approx([9.0, 9.0])
     assert column(table, "difference between sweeps") == pytest.approx([0.0, 2e-5])
@@ -571,7 +571,7 @@ def test_sweeps_are_joined_and_their_differences_reported(make):
 def test_the_table_of_motions_ranks_by_time_to_the_truth(make):
     farther = make.fell("MuJoCo RK4", error=[np.inf, np.inf, 3e-2])
     near = make.fell("Plumbob Newton", error=[np.inf, 5e-2, 5e-3])
-    table = tables.motion(Results([farther, make.fell("MuJoCo Euler"), near]))
+    table = peers_cloth.motion(Results([farther, make.fell("MuJoCo Euler"), near]))
     assert column(table, "solver") == ["Plumbob Newton", "MuJoCo Euler", "MuJoCo RK4"]
     assert column(table, "time to 10 % [ms]") == [1.0, 1.0, 1000.0]
     assert column(table, "time to 1 % [ms]") == [1000.0, None, None]
@@ -587,14 +587,14 @@ def test_the_table_of_motions_ranks_by_time_to_the_truth(make):
 def test_one_linear_solve_is_labelled_a_linearised_step(make):
     facts = {"kind": LINEARISED, "rungs": ["1 step"], "remarks": [""]}
     arrays = {"sizes": [20], "seconds": [1e-3], "error": [0.4]}
-    table = tables.one_step(Results([make.worked("MuJoCo discrete", **arrays, facts=facts)]))
+    table = peers_cloth.one_step(Results([make.worked("MuJoCo discrete", **arrays, facts=facts)]))
     assert column(table, "remark") == ["one linearised step"]
 
 
 def test_a_missing_engine_has_a_row_in_both_tables(make):
     notes, facts = {"remark": "not installed"}, {"task": "missing"}
     missing = make.record("cloth", "peers/all", "newton", notes=notes, facts=facts)
-    for table in (tables.one_step(Results([missing])), tables.motion(Results([missing]))):
+    for table in (peers_cloth.one_step(Results([missing])), peers_cloth.motion(Results([missing]))):
         (row,) = table.rows
         assert row[:2] == ("every cloth", "newton")
         assert "not installed" in row
@@ -602,14 +602,14 @@ def test_a_missing_engine_has_a_row_in_both_tables(make):
 
 def test_a_limit_of_stability_stands_beside_the_motions_in_units_of_the_theory(make):
     records = [make.bounded("a", 0.02), make.bounded("b", np.nan), make.fell("a"), make.fell("b")]
-    table = tables.motion(Results(records))
+    table = peers_cloth.motion(Results(records))
     assert column(table, "stable up to [2/ω]") == [pytest.approx(1.0), None]
     assert column(table, "longest stable step [ms]")[0] == 20.0
 
 
 def test_the_published_times_stand_beside_ours(make):
     record = make.sample("as_liu", solver="local_global", arrays={"seconds": [0.03]})
-    table = tables.liu_2013(Results([record]))
+    table = peers_cloth.liu(Results([record]))
     assert table.rows == (("local/global", "10 iterations", 50.0, 30.0, 0.5),)
     assert "abstract" in table.measured
     (point,) = table.summary.points

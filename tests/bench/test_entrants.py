@@ -10,7 +10,7 @@ import pytest
 
 from plumbob.bench.experiments.arm.tables import residuals_chart
 from plumbob.bench.experiments.chain.tables import iterations_chart
-from plumbob.bench.experiments.cloth_peers import tables as cloth_tables
+from plumbob.bench.experiments.cloth_peers import truth_chart
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import timing
 from plumbob.bench.harness.record import RecordFile
@@ -104,7 +104,7 @@ def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
     for name in ("cloth_peers_motion", "entered"):
         assert "My symplectic Euler" in cells(made("cloth")[name]), name
     assert "My symplectic Euler" not in cells(made("cloth")["cloth_peers_step"])
-    assert "My symplectic Euler" in drawn(cloth_tables.truth_chart(Results(records()))).svg
+    assert "My symplectic Euler" in drawn(truth_chart(Results(records()))).svg
     # The same method is the same to rounding, in every number but the times.
     ours, theirs = (
         next(one for one in records(name) if one.problem == "peers/motion/k1000")
@@ -412,7 +412,7 @@ def test_a_cloth_of_a_python_file_stands_in_the_same_tables(folder):
     )
     rows = [row[:2] for row in made("cloth")["cloth_peers_motion"].rows]
     assert set(rows) == {("hammock", "My symplectic Euler"), ("hammock", "Plumbob Newton")}
-    assert "hammock" in drawn(cloth_tables.truth_chart(Results(records()))).svg
+    assert "hammock" in drawn(truth_chart(Results(records()))).svg
 
 
 URDF = """<robot name="r"><link name="b"/><link name="l1"/><link name="l2"/><link name="t"/>

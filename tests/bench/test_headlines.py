@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import timing
-from plumbob.bench.experiments.robots.readings import STARTS, overall
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import FINISHED
 from plumbob.bench.peers import catalogue
+from plumbob.bench.ranking.scores import STARTS, overall
 from plumbob.bench.report import headlines
-from plumbob.bench.report.standings import percent
+from plumbob.bench.report.standings import in_percent
 from plumbob.bench.tables.layout import source
 from plumbob.bench.tables.results import Results
 
@@ -21,7 +21,7 @@ WRITTEN = "Plumbob LM (first phase, ours)"
 
 N = 200
 KINEMATICS = "Fastest in forward kinematics"
-NOBODY = "No engine is the fastest beyond chance in forward kinematics (1 case)."
+NOBODY = "In forward kinematics, no engine is the fastest beyond chance (1 case)."
 MOST, FASTEST = "Most poses solved, yours, one start", "Fastest, yours, one start"
 
 
@@ -51,11 +51,14 @@ def test_the_best_and_the_best_other_are_named_and_ours_are_marked(run, first, s
     best, other = marked.get(first, first), marked.get(second, second)
     records = [run(first, 190, 1e-4), run(second, 100, 1e-4)]
     assert sentence(records, MOST) == (
-        f"On the arm from one start, {best} solves the most poses: 95 % of 200; the best other "
+        f"On the arm, from one start, {best} solves the most poses: 95 % of 200; the best other "
         f"solver is {other} with 50 %."
     )
-    more = f"pink solves more poses than {WRITTEN} from one start on 1 of 1 robot of yours"
-    assert (f"{more} (the arm), by 45 percentage points." in wins(records)) == (first == "pink")
+    more = f"pink solves more than {WRITTEN}, one start, yours, on 1 of 1 case (the arm), by 45 "
+    tables = ("Robots: all robots and strata together", "Each robot: success, time and accuracy")
+    for table in tables:
+        line = f"{more}percentage points (“solved” in “{table}”)."
+        assert (line in wins(records)) == (first == "pink")
     assert (wins(records) == []) == (first != "pink")
 
 
@@ -72,7 +75,7 @@ def test_of_solvers_that_solve_as_much_the_fastest_is_named_first(run):
     """Not the host, whose records are the first."""
     records = [run(OURS, N, 2e-4), run("mink", N, 3e-4), run("pink", N, 1e-4)]
     assert sentence(records, MOST) == (
-        f"On the arm from one start, pink and {WRITTEN} solve the most poses: each 100 % of "
+        f"On the arm, from one start, pink and {WRITTEN} solve the most poses: each 100 % of "
         "200, and 3 solvers tie within chance."
     )
 
@@ -82,9 +85,9 @@ def test_the_share_within_a_time_counts_the_timed_poses_that_are_solved_in_it(ru
     times = np.where(np.arange(N) % 2, 2e-5, 2e-4)
     records = [run(OURS, N, seconds=times), run("pink", 150, seconds=6e-4), run("slow", N, 1.0)]
     assert sentence(records, "Solved within a time, yours, one start") == (
-        f"On the arm from one start, within 100 µs {WRITTEN} solves 50 % of the poses and pink, "
+        f"On the arm, from one start, within 100 µs {WRITTEN} solves 50 % of the poses and pink, "
         f"the best other solver, 0 %; within 1,000 µs {WRITTEN} solves 100 % of the poses and "
-        "pink, the best other solver, 75 %."
+        "pink, the best other solver, 75 % (n = 200)."
     )
 
 
@@ -99,7 +102,7 @@ def test_the_most_solved_share_of_several_seeds_is_their_mean_with_its_span(make
             make.solving("b", 24, count=240),
         )
     ]  # fmt: skip
-    assert "a solves the most poses: 50 % of 240, 0.0 to 100.0 by seed;" in sentence(records, MOST)
+    assert "a solves the most poses: 50 % of 240, 0 to 100 by seed;" in sentence(records, MOST)
     (row,) = (score for score in overall(Results(records)) if score.solver == "a")
     assert row.shares_by_seed == [1.0, 0.0]
     assert row.mean_times_by_seed == pytest.approx([1e-3, 0.1])
@@ -117,7 +120,7 @@ def test_our_loop_on_an_engine_and_our_other_solvers_are_nobodys_rivals(run):
         assert "pink" in sentence(records, question)
         assert loop not in sentence(records, question)
     ahead = [run(loop, 199, 1e-6), run(OURS, 20, 1e-3), run("pink", 30, 1e-3)]
-    assert sentence(ahead, MOST).startswith("On the arm from one start, pink solves the most")
+    assert sentence(ahead, MOST).startswith("On the arm, from one start, pink solves the most")
     assert not any(loop in win for win in wins(ahead))
 
 
@@ -126,14 +129,14 @@ def test_a_solver_cut_short_is_not_ranked(run):
     records = [run("a", 150), run("b", 20), cut]
     for question in (MOST, FASTEST):
         assert "slow" not in sentence(records, question)
-        assert sentence(records, question).startswith("On the arm from one start, a solves ")
+        assert sentence(records, question).startswith("On the arm, from one start, a solves ")
     assert headlines.headlines(Results([records[0], cut])) == []
 
 
 def test_solvers_are_compared_where_most_pairs_of_robot_and_solver_are(run):
     records = [run(s, 150, robot=r) for s in ("a", "b") for r in ("arm", "ur5", "hand")]
     ours = [r for r in records if r.problem != "robots/ur5"]
-    assert sentence(ours, MOST).startswith("On the 2 robots of yours from one start, a ")
+    assert sentence(ours, MOST).startswith("On all 2 robots, from one start, a ")
     assert "of 400" in sentence(ours, MOST)
     one = [run("c", 199, robot="arm")]
     assert "of 400" in sentence([*ours, *one], MOST)  # 2 x 2 pairs against 3
@@ -151,7 +154,7 @@ def test_robots_that_no_setting_has_seen_come_first_and_are_never_mixed_with_oth
     made = headlines.headlines(Results(records))
     groups = [h.question.split(", ", 1)[1] for h in made if h.question.startswith("Most")]
     assert groups == [f"{g}, {start}" for g in ("held out", "tuning") for start in STARTS[::-1]]
-    assert all(h.sentence.startswith("On the 2 held-out robots with restarts, ") for h in made[:3])
+    assert all(h.sentence.startswith("On all 2 robots held out, with restarts, ") for h in made[:3])
     assert "50 % of 400" in made[2].sentence
     assert "95 % of 200" in sentence(records, "Most poses solved, tuning, restarts")
 
@@ -163,7 +166,8 @@ def test_a_solver_of_the_user_leads_where_it_is_the_best(run):
     for question in (MOST, FASTEST):
         assert ", Mine " in sentence(records, question)
         assert f"{WRITTEN}" in sentence(records, question)
-    assert len([win for win in wins(records) if win.startswith("Mine ")]) == 2
+    lines = [win for win in wins(records) if win.startswith("Mine ")]
+    assert len(lines) == 5  # shares and times of all robots, of each, and where both solve
 
 
 def test_a_solver_that_solves_nothing_leads_and_ties_nowhere(run):
@@ -177,8 +181,8 @@ def test_the_fastest_leads_by_a_factor_over_the_best_other(run):
     spread = np.geomspace(1.0, 1.2, N)
     records = [run("a", N, 1e-3 * spread), run("b", N, 4e-3 * spread[::-1])]
     assert sentence(records, FASTEST) == (
-        "On the arm from one start, a is the fastest of the solvers that solve the most: it is 4.0 "
-        "times faster than b, the next."
+        "On the arm, from one start, a is the fastest of the solvers that solve the most: it is "
+        "4.0 times faster than b, the next."
     )
     hasty = [run("a", 190, 1e-4), run("hasty", 5, 1e-6), run("b", 190)]
     assert ", b is the fastest of the solvers that solve the most" in sentence(hasty, FASTEST)
@@ -195,18 +199,19 @@ def test_a_miss_costs_no_time_and_a_solver_that_is_faster_where_both_solve_wins(
         run("mink", 100, 2e-4),
     ]
     assert sentence(records, FASTEST) == (
-        f"On the arm from one start, {WRITTEN} solves more poses than any other solver and "
+        f"On the arm, from one start, {WRITTEN} solves more poses than any other solver and "
         "is, where both solve, 3.0 times slower than pink, the fastest other one there."
     )
     assert wins(records) == [
-        f"pink is faster, where both solve, than {WRITTEN} from one start on 1 of 1 robot "
-        "of yours (the arm), by a factor of 3.0."
+        f"pink is faster than {WRITTEN}, one start, yours, on 1 of 1 case (the arm), by a factor "
+        "of 3.0 (“time relative to ours, where both solve” in “Each robot: success, time and "
+        "accuracy”)."
     ]
 
 
 def test_a_share_is_never_rounded_to_all():
-    assert percent(metrics.Share(99_999, 100_000, 0.9, 1.0)) == "99.999 %"
-    assert percent(metrics.Share(5, 5, 0.9, 1.0)) == "100 %"
+    assert in_percent(metrics.Share(99_999, 100_000, 0.9, 1.0)) == "99.999 %"
+    assert in_percent(metrics.Share(5, 5, 0.9, 1.0)) == "100 %"
 
 
 def in_sweeps(make, solver, rounds):
@@ -237,8 +242,9 @@ def test_headline_and_table_name_the_same_leader_by_the_same_medians(make, facto
             "than the best other engine, Plumbob (ours)."
         )
         assert wins(records) == [
-            "Pinocchio is faster than Plumbob (ours) in forward kinematics on 1 of 1 case (10 "
-            f"balls, one pose a call), by a factor of {ratio}."
+            "Pinocchio is faster than Plumbob (compiled, ours), one pose a call, on 1 of 1 case "
+            f"(10 balls, one pose a call), by a factor of {ratio} (“median” in “Time of forward "
+            "kinematics, for one pose”)."
         ]
 
 
@@ -253,7 +259,7 @@ def test_of_two_calls_of_ours_the_faster_one_races(make):
     assert wins(records) == []
     slow = in_sweeps(make, "Plumbob, prepared", 3.0 * rounds)
     records = [records[0], slow, in_sweeps(make, "Pinocchio", 0.5 * rounds)]
-    assert wins(records)[0].endswith("by a factor of 2.0.")
+    assert "by a factor of 2.0 " in wins(records)[0]
 
 
 def median_of(table):
@@ -306,7 +312,8 @@ def test_a_motion_is_a_race_of_its_own(make):
     ]
     assert sentence(records, "Fastest in a motion within 1 % of the truth") == (
         "In a motion within 1 % of the truth, Newton engine is the fastest on 1 of 1 cloth, "
-        "5.0 times faster than the best other engine, Plumbob (ours)."
+        "5.0 times faster than the best other engine, Plumbob (ours); each runs on one core, "
+        "Newton engine in single precision."
     )
 
 
@@ -327,9 +334,11 @@ def test_a_step_is_solved_first_by_an_engine(make):
     )
     mine = make.worked("Mine", error=(1e-3, 1e-9), seconds=(1e-4, 2e-4))
     assert ", Mine is the fastest" in sentence([newton, mine], question)
+    title = "One implicit step of a falling cloth: time to the minimiser"
     assert wins([newton, mine]) == [
-        "Mine is faster than Plumbob (ours) in a step solved to 1e-4 on 1 of 1 cloth (20 × 20, "
-        "1,000 N/m), by a factor of 10."
+        "Mine is faster than Plumbob Newton (ours) on 1 of 1 cloth (20 × 20, 1,000 N/m), by a "
+        f"factor of 10 (“time to {target}” in “{title}”)."
+        for target in ("1e-4", "1e-2")
     ]
 
 

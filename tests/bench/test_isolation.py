@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments import Scale
-from plumbob.bench.experiments.robots import measurement as robots
-from plumbob.bench.experiments.robots.tables import outcomes, robot_by_robot
+from plumbob.bench.experiments import Scale, robots
+from plumbob.bench.experiments.robots import outcomes, robot_by_robot
 from plumbob.bench.harness import timing
 from plumbob.bench.harness.isolation import Finished, Solved, WorkerProcess, raised
 from plumbob.bench.harness.measure import record_of

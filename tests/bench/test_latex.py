@@ -150,5 +150,12 @@ def test_numbers_are_aligned_by_siunitx_and_the_best_are_bold_ties_too():
 def test_a_note_says_how_many_on_which_machine_with_what(records):
     (made,) = [t for t in sections.tables(Results(records)) if t.name == "accuracy"]
     note = latex(made).split(r"\end{tabular}")[1]
-    for fact in ("Starts:", "n = 2 to 3", "tolerance 1.0e-4", "slide", "Plumbob 0.0", "2000-01-02"):
+    for fact in (
+        "Starts:",
+        "2 to 3 targets",
+        "tolerance 1.0e-4",
+        "slide",
+        "Plumbob 0.0",
+        "2000-01-02",
+    ):
         assert fact in note

@@ -8,10 +8,10 @@ import pytest
 
 from plumbob.bench.comparison.answers import is_time
 from plumbob.bench.experiments import Scale
-from plumbob.bench.experiments.robots.readings import STARTS, overall
 from plumbob.bench.harness import run
 from plumbob.bench.harness.block import Choice
 from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.ranking.scores import STARTS, overall
 from plumbob.bench.tables.results import Results
 
 PROBLEMS = ("robots/ur5", "robots/z1", "unreachable/ur5", "chain/near", "published/toolbox/ur5")

@@ -40,7 +40,7 @@ def only_shows(path):
 def test_an_edit_of_any_file_changes_the_digest_unless_it_only_shows_numbers(copy):
     files = machine.source_files()
     assert files == sorted(p for p in every_file(copy) if not only_shows(p.relative_to(copy)))
-    once_left_out = ("peers/cloth/plumbob.py", "experiments/cloth_peers/job.py")
+    once_left_out = ("peers/cloth/plumbob.py", "experiments/cloth_peers.py")
     assert {copy / "bench" / name for name in once_left_out} <= set(files)
     assert all((copy / name).exists() for name in machine.PRESENTATION)
     digests = {machine.source_digest()}

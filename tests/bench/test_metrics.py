@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from plumbob.bench.harness import metrics
+from plumbob.bench.problems.cloth_truth import rms_distance
 
 
 @pytest.mark.parametrize("total", [1, 7, 200, 100_000])
@@ -32,7 +33,7 @@ def test_closed_forms():
     x, exact, start = np.array([[1.0, 0]]), np.array([[0.0, 0]]), np.array([[0.0, 4]])
     assert metrics.relative_error(x, exact, start) == 0.25
     points = np.array([[3.0, 4, 0], [0, 0, 0]])
-    assert metrics.rms_distance(points, np.zeros((2, 3))) == pytest.approx(math.sqrt(12.5))
+    assert rms_distance(points, np.zeros((2, 3))) == pytest.approx(math.sqrt(12.5))
     assert metrics.first_below(np.array([1.0, 0.1, 0.2, 0.01]), 0.1) == 1
     assert metrics.first_below(np.array([1.0, np.nan]), 0.1) is None
     assert metrics.timing(np.arange(11.0))[:4] == (5.0, 1.0, 9.0, 11)
@@ -55,20 +56,36 @@ def test_bend_of_a_right_angle_and_of_a_straight_line():
 solves = st.lists(st.tuples(st.floats(1e-6, 10.0), st.booleans()), min_size=1, max_size=30)
 
 
-@given(solves)
-def test_a_budget_curve_rises_to_the_success(made):
+@given(solves, st.integers(0, 30))
+def test_a_budget_curve_rises_to_the_share_of_all_targets_with_its_interval(made, untimed):
+    """Though only some are timed."""
     seconds, solved = (np.array(column) for column in zip(*made, strict=True))
-    curve = metrics.within_budget(seconds, solved, np.array([0.0, 1e-4, 0.1, 1.0, 10.0]))
+    share = metrics.share(np.append(solved, np.arange(untimed) % 3 == 0))
+    budgets = np.array([0.0, 1e-4, 0.1, 1.0, 10.0])
+    curve, (low, high) = metrics.within_budget(share, seconds[solved], budgets)
+    if share.hits and not solved.any():
+        assert np.isnan(curve).all()
+        return
     assert (np.diff(curve) >= 0).all()
     assert curve[0] == 0
-    assert curve[-1] == metrics.share(solved).hits / len(solved)
+    assert (curve[-1], low[-1], high[-1]) == pytest.approx(
+        (share.hits / share.total, share.low, share.high)
+    )
 
 
 def test_a_budget_counts_targets_solved_in_exactly_that_time():
-    seconds, solved = np.array([1.0, 2.0, 3.0, 0.5]), np.array([True, True, False, False])
-    curve = metrics.within_budget(seconds, solved, np.array([0.9, 1.0, 2.0, 5.0]))
+    share, budgets = metrics.share(np.arange(4) < 2), np.array([0.9, 1.0, 2.0, 5.0])
+    curve, (low, high) = metrics.within_budget(share, np.array([1.0, 2.0]), budgets)
     assert curve.tolist() == [0.0, 0.25, 0.5, 0.5]
-    assert np.isnan(metrics.within_budget(np.array([]), np.array([]), np.ones(2))).all()
+    assert ((low <= curve) & (curve <= high)).all()
+
+
+def test_fewer_timed_targets_widen_the_interval_within_a_budget():
+    share, half = metrics.share(np.ones(1000, dtype=bool)), np.array([1.5])
+    few, many = (
+        metrics.within_budget(share, np.tile([1.0, 2.0], count), half)[1] for count in (10, 500)
+    )
+    assert few[1] - few[0] > 5 * (many[1] - many[0])
 
 
 @given(st.lists(st.tuples(*[st.tuples(st.floats(1e-6, 10.0), st.booleans())] * 3), min_size=1))

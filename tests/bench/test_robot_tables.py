@@ -8,8 +8,8 @@ import pytest
 from table_cells import by_solver, column, rows
 
 from plumbob.bench.experiments.published import published_ik
-from plumbob.bench.experiments.robots.figures import FIGURES
-from plumbob.bench.experiments.robots.tables import (
+from plumbob.bench.experiments.robots import (
+    FIGURES,
     outcomes,
     over_all,
     participants,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import SCALES
-from plumbob.bench.experiments.robots import UNREACHABLE, measurement
+from plumbob.bench.experiments import robots as measurement
 from plumbob.bench.peers import catalogue
 from plumbob.bench.problems.evaluate import (
     AGREEMENT,
@@ -38,6 +38,7 @@ from plumbob.bench.problems.robots import (
     CHARACTER,
     LIMIT_TOLERANCE,
     ROBOTS,
+    UNREACHABLE,
     AbsentError,
     group_of,
     is_installed,

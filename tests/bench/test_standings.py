@@ -77,13 +77,13 @@ def test_a_slow_solver_is_ranked_on_the_targets_that_it_was_given(make):
     reason = "20 targets, the first of each problem because the solver is slow; where both solve, "
     assert f"{reason}it is 2.0 times slower than mink" in standing.sentence
     (other,) = standings(Results([*rivals, slow, make.solving("Other", 150, mine=True)]))[1:]
-    assert other.sentence.startswith("Other ranks 2 of 3 (1 solver did not finish): it solves 75 %")
+    assert other.sentence.startswith("Other ranks 2 of 3 (1 solver not ranked): it solves 75 %")
 
 
 def test_a_rank_is_among_those_that_finished(make):
     rivals = [make.solving("pink", 100), make.solving("mink", 18, begun=18)]
     standing = only([*rivals, make.solving("Mine", 20, mine=True)])
-    assert standing.sentence.startswith("Mine ranks 2 of 2 (1 solver did not finish): it solves ")
+    assert standing.sentence.startswith("Mine ranks 2 of 2 (1 solver not ranked): it solves ")
 
 
 def chained(make, solver, residuals, seconds, stratum="near", mine=False):
@@ -91,7 +91,7 @@ def chained(make, solver, residuals, seconds, stratum="near", mine=False):
     made = make.reached(stratum, solver)
     solved = np.asarray(residuals) <= 1e-4
     arrays = {"residual": residuals, "solved": solved}
-    arrays["seconds"] = np.full(len(residuals), seconds)
+    arrays["seconds"] = np.full((1, len(residuals)), seconds)
     made = replace(made.with_measured(**arrays), size=float(len(residuals)))
     return make.entered(made) if mine else made
 
@@ -106,7 +106,9 @@ def test_on_chains_ours_are_called_so_and_what_is_beyond_reach_does_not_count(ma
     ]
     standing = only(records)
     assert standing.question == "Mine, chain of balls"
-    assert standing.sentence.startswith("Mine ranks 3 of 3: it solves 25 % of 20 targets, the best")
+    assert standing.sentence.startswith(
+        "Mine ranks 2 of 2 (1 solver not ranked): it solves 25 % of 20 targets, the best"
+    )
     assert "times slower than FABRIK (ours)" in standing.sentence
     assert "LM, MuJoCo" not in standing.sentence  # a loop of ours
     assert standing.table == "accuracy"
@@ -212,7 +214,7 @@ def test_a_bench_ends_with_the_solver_of_the_user_and_who_leads(
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
         assert f"Yours: {standing.sentence}" in said
     assert lines[0].startswith("Yours: Mine ranks 3 of 3: ")
-    assert said.index("trouble on 1 of 2 problems") < said.index("Best: On the arm from one start")
+    assert said.index("trouble on 1 of 2 problems") < said.index("Best: On the arm, from one start")
 
 
 def test_a_bench_without_leaders_ends_with_what_its_tables_say(tmp_path, records, capsys):

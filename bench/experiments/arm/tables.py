@@ -9,6 +9,7 @@ from ...figures.chart_sketch import declared_chart
 from ...figures.sketch import Sketch
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import catalogue
 from ...tables.captions import Captions
 from ...tables.columns import quantile_cells, spread_of
 from ...tables.layout import Row
@@ -47,7 +48,8 @@ def _summary(rows: Sequence[Row]) -> Summary:
         solver: {(row["record"].problem, row["start"]): row["hits"] for row in members}
         for solver, members in grouped(rows, lambda row: str(row["solver"])).items()
     }
-    ranking = _ranking(hits)
+    rivals = {solver: hits[solver] for solver in hits if not catalogue.is_loop(solver)}
+    ranking = _ranking(rivals)
     first = f"Over all problems most targets are solved by {leaders(ranking)}." if ranking else ""
     points = (
         f"{solver}: {words(metrics.share(np.concatenate([*problems.values()])))}"

@@ -12,8 +12,8 @@ from markupsafe import Markup
 
 from plumbob.text import html
 
-from ...experiments.robots.figures import RobotMap
 from ...figures import svg
+from ...figures.robot_map import RobotMap
 from ...figures.sketch import Drawing
 from ...harness.record import Record
 from ...motion import motion

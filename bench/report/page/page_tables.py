@@ -12,7 +12,7 @@ from markupsafe import Markup
 from ...figures.sketch import Drawing
 from ...harness.metrics import Share
 from ...tables.results import label
-from ...tables.table import Cell, Source, Table, best_cells, number_of, words
+from ...tables.table import Cell, Source, Table, best_cells, decimals, number_of, words
 from ...tables.writers import POWER, csv_names
 
 # The column replaced by the page's switch between one start and restarts.
@@ -159,15 +159,13 @@ def _texts(table: Table, j: int) -> list[Markup]:
 
 
 def _share(share: Share) -> Markup:
-    """Return a share to a tenth of a percent with its interval; 100.0 % only without a miss."""
+    """Return a share with its interval, rounded as in other texts, with all of its decimals."""
     if not share.total:
         return Markup("–")
-    rate = 100 * share.hits / share.total
-    rate = min(rate, 99.9) if share.hits < share.total else rate
-    rate = max(rate, 0.1) if share.hits else rate
-    low, high = (f"{100 * bound:.1f}" for bound in (share.low, share.high))
+    rates, digits = (share.hits / share.total, share.low, share.high), decimals(share.total)
+    rate, low, high = (f"{100 * rate:.{digits}f}" for rate in rates)
     title = f"{words(share.hits)} of {words(share.total)}"
-    return Markup(f'<span title="{title}">{rate:.1f} %</span> <small>({low}–{high})</small>')
+    return Markup(f'<span title="{title}">{rate} %</span> <small>({low}–{high})</small>')
 
 
 def _bars(table: Table, j: int) -> list[str]:

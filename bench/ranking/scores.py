@@ -4,27 +4,28 @@ A solver is unranked if unfinished, if a time limit ends its solves, or if its t
 most solvers'. Robots for tuning, robots held out and the character are never averaged together.
 """
 
+import functools
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...harness import metrics
-from ...harness.metrics import Floats, Ranking, Share
-from ...harness.record import FIRST_TARGETS, Record
-from ...peers import catalogue
-from ...peers.peer import ONE_START, PORTFOLIO, RESTARTS
-from ...problems.robot_targets import seed_indices
-from ...problems.robots import LIMIT_TOLERANCE
-from ...tables.results import Results, grouped, listed
-from ...tables.table import words
-from . import REACHABLE, UNREACHABLE
+from ..harness import metrics
+from ..harness.metrics import Floats, Ranking, Share
+from ..harness.record import FIRST_TARGETS, Record
+from ..peers import catalogue
+from ..peers.peer import ONE_START, PORTFOLIO, RESTARTS
+from ..problems.robot_targets import seed_indices
+from ..problems.robots import LIMIT_TOLERANCE, REACHABLE, UNREACHABLE
+from ..tables.results import Results, grouped, listed
+from ..tables.table import words
 
 STARTS = (ONE_START, PORTFOLIO, RESTARTS)
 # The least time of an unsolved target in a mean of times [s].
 PENALTY = 0.1
+# The probability at which two solvers differ.
+ALPHA = 1.0 - metrics.CONFIDENCE
 # Added to times before their geometric mean is taken: microseconds must not decide [s].
 SHIFT = 1e-5
 # Solvers with different robots of a group are compared over the two largest sets.
@@ -37,7 +38,8 @@ OUTCOMES = (
 _NO_RANKING = Ranking((), ())
 
 
-class Score(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Score:
     """A solver over all targets of a robot, or of several."""
 
     robots: str  # their names, or a phrase
@@ -47,9 +49,12 @@ class Score(NamedTuple):
     has_same_targets: bool = True  # whether it was given the targets of most solvers
     success: Ranking = _NO_RANKING  # the ranking of the solvers by targets solved
     time: Ranking = _NO_RANKING  # the ranking by time for the same targets
+    # the ranking of ours and of rivals by their times for the targets that both solve
+    paired: Ranking = _NO_RANKING
+    ratio_to_ours: float = np.nan  # its time over ours for the targets that both solve
     least_time: float = np.nan  # the least geometric mean of times of any solver [s]
-    # the least distance within limits of any solver, out of reach [m], (target,)
-    best_distances: Floats = np.zeros(0)
+    # the least distance within limits of any solver, out of reach [m], (attempted target,)
+    best_distances: Floats = field(default_factory=lambda: np.zeros(0))
 
     @property
     def total(self) -> int:
@@ -59,7 +64,7 @@ class Score(NamedTuple):
     @property
     def group(self) -> str:
         """The group of its robots: "tuning", "held out", "character", or "yours"."""
-        return str(self.records[0].facts.get("group", ""))
+        return str(self.records[0].measured.get("group", ""))
 
     @property
     def is_finished(self) -> bool:
@@ -68,15 +73,15 @@ class Score(NamedTuple):
 
     def attempted(self, name: str) -> np.ndarray:
         """Return an array of the attempted targets, (target,)."""
-        return np.concatenate([record.arrays[name] for record in self.records])
+        return np.concatenate([record.measured[name] for record in self.records])
 
     def all(self, name: str, default: float) -> np.ndarray:
         """Return an array of all targets, with a default for the others, (target,)."""
-        arrays = [(record.arrays[name], total(record)) for record in self.records]
+        arrays = [(record.measured[name], total(record)) for record in self.records]
         padded = [np.pad(a, (0, n - a.size), constant_values=default) for a, n in arrays]
         return np.concatenate(padded)
 
-    @property
+    @functools.cached_property
     def solved(self) -> np.ndarray:
         """Which of all targets are solved, (target,)."""
         return self.all("solved", False)
@@ -102,7 +107,7 @@ class Score(NamedTuple):
 
     def _by_seed(self, numbers: np.ndarray, sizes: Sequence[int]) -> list[float]:
         """Return the mean of the numbers of each seed; a record has so many."""
-        seeds = self.records[0].details.seeds
+        seeds = self.records[0].values.seeds
         indices = np.concatenate([seed_indices(size, seeds) for size in sizes])
         return [float(np.mean(numbers[indices == k])) for k in range(seeds) if k in indices]
 
@@ -110,15 +115,15 @@ class Score(NamedTuple):
         """Return which of all targets in a stratum are solved, (target,)."""
         return self.solved[np.concatenate(list(map(_strata, self.records))) == stratum]
 
-    @property
+    @functools.cached_property
     def seconds(self) -> Floats:
         """The time of each timed target, the median of its rounds [s], (timed target,)."""
         return np.concatenate([np.median(rounds_of(record), axis=0) for record in self.records])
 
-    @property
+    @functools.cached_property
     def timed_solved(self) -> np.ndarray:
         """Which of the timed targets are solved, (timed target,)."""
-        parts = [r.arrays["solved"][: rounds_of(r).shape[1]] for r in self.records]
+        parts = [r.measured["solved"][: rounds_of(r).shape[1]] for r in self.records]
         return np.concatenate(parts)
 
     @property
@@ -126,39 +131,64 @@ class Score(NamedTuple):
         """Whether there are times of all of its robots."""
         return all(rounds_of(record).size for record in self.records)
 
-    @property
+    @functools.cached_property
     def penalised(self) -> Floats:
         """The time of each timed target, or the penalty where unsolved [s]."""
         return metrics.penalised(self.seconds, self.timed_solved, PENALTY)
 
-    @property
-    def mean_time(self) -> float:
-        """The geometric mean of the penalised times [s]; NaN without times."""
+    @functools.cached_property
+    def mean_time(self) -> metrics.Interval:
+        """The geometric mean of the penalised times and its interval [s]; NaN without times."""
         if not self.is_timed:
-            return np.nan
-        return float(np.exp(np.mean(np.log(self.penalised + SHIFT))) - SHIFT)
+            return metrics.Interval(np.nan, np.nan, np.nan)
+        sizes = [rounds_of(record).shape[1] for record in self.records]
+        return metrics.shifted_geometric_mean(self.penalised, SHIFT, sizes)
+
+    def solved_within(self, seconds: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
+        """Return the share of all targets solved within each time, and its 95 % interval, (time,).
+
+        The share that is solved at all is of all targets, as in the tables; which part of the
+        solved takes no longer is known from the timed targets.
+        """
+        return metrics.within_budget(self.share, self.seconds[self.timed_solved], seconds)
 
     @property
-    def median_time(self) -> float:
-        """The median time of the solved targets [s]; NaN without any."""
-        return metrics.spread(self.seconds[self.timed_solved]).median if self.is_timed else np.nan
+    def sample(self) -> str:
+        """The number of targets, and of the timed ones: "n = 60, 24 timed"."""
+        timed = self.seconds.size
+        return f"n = {words(self.total)}" + f", {words(timed)} timed" * (timed < self.total)
+
+    @property
+    def false_successes(self) -> Share:
+        """The share of attempted targets that the solver reports as solved, and that are not."""
+        return metrics.share((self.attempted("claims") == 1) & ~self.attempted("solved"))
+
+    @property
+    def claims(self) -> int:
+        """The number of targets on which the solver reports success or failure."""
+        return int(np.sum(self.attempted("claims") >= 0))
+
+    @property
+    def trouble(self) -> str:
+        """The first error of the solver, "" without errors."""
+        return next((record.trouble for record in self.records if record.trouble), "")
 
     @property
     def disputed(self) -> int:
         """The number of answers placed differently by the two engines."""
-        return sum(np.size(record.arrays.get("disputed", ())) for record in self.records)
+        return sum(np.size(record.measured.get("disputed", ())) for record in self.records)
 
     @property
     def relative_time(self) -> float:
         """The geometric mean of times over the least of any solver."""
-        return metrics.ratio(self.mean_time, self.least_time)
+        return metrics.ratio(self.mean_time.value, self.least_time)
 
-    @property
+    @functools.cached_property
     def outcomes(self) -> Counter[str]:
         """The number of targets by outcome; the sum is the number of given targets."""
         return sum(map(_outcomes, self.records), Counter())
 
-    @property
+    @functools.cached_property
     def distances(self) -> Floats:
         """The distance from each target attempted; NaN without an answer within limits [m]."""
         return np.where(
@@ -168,18 +198,21 @@ class Score(NamedTuple):
     @property
     def limits(self) -> str:
         """Why the solver is not ranked, "" if ranked."""
-        is_limited = any(record.facts.get("time_limited") for record in self.records)
+        is_limited = any(record.measured.get("time_limited") for record in self.records)
         reasons = {
             "not finished": not self.is_finished,
             f"time-limited{self._repeats}": is_limited,
             f"other targets, {words(self.total)}": not self.has_same_targets,
+            "our loop on another engine": catalogue.is_loop(self.solver),
         }
         return "; ".join(reason for reason, applies in reasons.items() if applies)
 
     @property
     def _repeats(self) -> str:
         """The least and the largest share solved in repeated runs, "" without repetition."""
-        counts = [record.arrays["repeats"] for record in self.records if "repeats" in record.arrays]
+        counts = [
+            record.measured["repeats"] for record in self.records if "repeats" in record.measured
+        ]
         if len(counts) < len(self.records):
             return ""
         shares = 100.0 * np.sum(counts, axis=0) / self.total
@@ -205,19 +238,19 @@ class Score(NamedTuple):
 
 def total(record: Record) -> int:
     """Return the number of targets given to the solver of a record, attempted or not."""
-    return record.facts.get(FIRST_TARGETS, max(int(record.size), record.arrays["solved"].size))
+    return record.measured.get(FIRST_TARGETS, max(int(record.size), record.measured["solved"].size))
 
 
 def rounds_of(record: Record) -> Floats:
     """Return the times of a record [s], (round, timed target)."""
-    seconds = record.arrays.get("seconds")
+    seconds = record.measured.get("seconds")
     return np.empty((1, 0)) if seconds is None else np.atleast_2d(seconds)
 
 
 def drift(scores: Iterable[Score]) -> str:
     """Return a sentence on how much the machine's speed changed while solvers took turns."""
-    records = {id(r): r for score in scores for r in score.records if "control" in r.arrays}
-    controls = [np.empty(0), *(record.arrays["control"] for record in records.values())]
+    records = {id(r): r for score in scores for r in score.records if "control" in r.measured}
+    controls = [np.empty(0), *(record.measured["control"] for record in records.values())]
     seconds = np.concatenate(controls)
     if not seconds.size:
         return ""
@@ -230,16 +263,16 @@ def drift(scores: Iterable[Score]) -> str:
 
 def _strata(record: Record) -> np.ndarray:
     """Return the stratum of every target: strata alternate, attempted or not."""
-    strata = record.arrays["stratum"]
-    following = np.arange(strata.size, total(record)) % max(len(record.details.strata), 1)
+    strata = record.measured["stratum"]
+    following = np.arange(strata.size, total(record)) % max(len(record.values.strata), 1)
     return np.concatenate([strata, following])
 
 
 def _outcomes(record: Record) -> Counter[str]:
-    solves, details = record.values, record.details
+    solves = record.values
     has_answer = np.isfinite(solves.position)
-    reached = has_answer & (solves.position <= details.tolerance)
-    reached &= solves.rotation <= details.tolerance_rotation
+    reached = has_answer & (solves.position <= solves.tolerance)
+    reached &= solves.rotation <= solves.tolerance_rotation
     raised = np.zeros_like(has_answer) if solves.exception is None else solves.exception
     success = has_answer & (solves.claims == 1)
     conditions = [solves.solved, reached, success, has_answer, raised]
@@ -257,6 +290,10 @@ def scores(results: Results, task: str = REACHABLE) -> list[Score]:
 
 def fields_of(results: Results, start: str, task: str = REACHABLE) -> dict[str, list[Score]]:
     """Return every solver with a start, robot by robot."""
+    return results.once(_fields, start, task)
+
+
+def _fields(results: Results, start: str, task: str) -> dict[str, list[Score]]:
     return by_robot(results.all("ik", task=task, kind=start), start)
 
 
@@ -264,7 +301,7 @@ def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score
     """Return the solvers with solves on record: registered solvers first, in order."""
     registered = [peer.label_of(entry) for peer in catalogue.PEERS for entry in peer.runs]
     places = {solver: place for place, solver in enumerate(registered)}
-    robots = grouped((r for r in records if "solved" in r.arrays), lambda record: record.title)
+    robots = grouped((r for r in records if "solved" in r.measured), lambda record: record.title)
     for members in robots.values():
         members.sort(key=lambda record: places.get(record.solver, len(places)))
     return {robot: _field(robot, start, members) for robot, members in robots.items()}
@@ -273,18 +310,16 @@ def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score
 def on_targets_of(solver: str, field: list[Score]) -> list[Score]:
     """Return the solvers of a robot on the first targets if a slow solver got these only."""
     records = [score.records[0] for score in field]
-    own = next((r for r in records if r.solver == solver and FIRST_TARGETS in r.facts), None)
+    own = next((r for r in records if r.solver == solver and FIRST_TARGETS in r.measured), None)
     if own is None:
         return field
     count, timed_count = total(own), rounds_of(own).shape[1]
 
     def first_targets(record: Record) -> Record:
-        solved, seconds = record.arrays["solved"][:count], rounds_of(record)[:, :timed_count]
-        words = {n: v for n, v in record.measured.items() if n not in record.arrays}
+        solved, seconds = record.measured["solved"][:count], rounds_of(record)[:, :timed_count]
+        words = {n: v for n, v in record.measured.items() if not isinstance(v, np.ndarray)}
         words[FIRST_TARGETS] = min(count, total(record))
-        return replace(
-            record, measured={**words, "solved": solved, "seconds": seconds, "setup": 0.0}
-        )
+        return replace(record, measured={**words, "solved": solved, "seconds": seconds})
 
     return _field(field[0].robots, field[0].start, list(map(first_targets, records)))
 
@@ -298,14 +333,38 @@ def _field(robot: str, start: str, records: Sequence[Record]) -> list[Score]:
 
 def _ranked(field: Sequence[Score]) -> list[Score]:
     """Return solvers on the same targets with the rankings among them."""
-    ranked = [score for score in field if score.is_ranked]
-    success = metrics.ranking({score.solver: score.solved for score in ranked})
-    times = {s.solver: -np.log(s.penalised + SHIFT) for s in ranked if s.is_timed}
+    ranked = {score.solver: score for score in field if score.is_ranked}
+    success = metrics.ranking({solver: score.solved for solver, score in ranked.items()})
+    times = {s: -np.log(score.penalised + SHIFT) for s, score in ranked.items() if score.is_timed}
     longest = max(map(len, times.values()), default=0)
     time = metrics.ranking({solver: logs for solver, logs in times.items() if len(logs) == longest})
-    mean_times = [score.mean_time for score in field if score.is_timed]
-    least_time = min(mean_times, default=np.nan)
-    return [s._replace(success=success, time=time, least_time=least_time) for s in field]
+    paired, ratios = _paired([ranked[solver] for solver in time.order])
+    least_time = min((s.mean_time.value for s in field if s.is_timed), default=np.nan)
+    return [
+        replace(score, success=success, time=time, paired=paired, least_time=least_time,
+                ratio_to_ours=ratios.get(score.solver, np.nan))
+        for score in field
+    ]  # fmt: skip
+
+
+def _paired(field: Sequence[Score]) -> tuple[Ranking, dict[str, float]]:
+    """Return the ranking of the best of ours and its rivals by their times where both solve.
+
+    The ratios are the times over ours. Solvers in the field are in the order of their times. A
+    rival that is faster beyond chance is first; else ours is, with the rivals that tie.
+    """
+    own = next((score for score in field if catalogue.is_ours(score.solver)), None)
+    if own is None:
+        return _NO_RANKING, {}
+    rivals = [s for s in field if catalogue.engine_of(s.solver) != catalogue.engine_of(own.solver)]
+    logs = {rival.solver: np.subtract(*np.log(times_of_both(rival, own))) for rival in rivals}
+    ratios = {own.solver: 1.0} | {s: float(np.exp(metrics.mean(x))) for s, x in logs.items()}
+    chances = metrics.adjusted([metrics.chance_of_pairs(x, 0.0 * x) for x in logs.values()])
+    order = sorted(ratios, key=lambda solver: (np.isnan(ratios[solver]), ratios[solver]))
+    beyond = {s for s, chance in zip(logs, chances, strict=True) if chance <= ALPHA}
+    faster = [solver for solver in order if solver in beyond and ratios[solver] < 1.0]
+    ties = [s for s in order if s not in beyond and not np.isnan(ratios[s])]
+    return Ranking(tuple(order), tuple(faster[:1] or ties)), ratios
 
 
 def overall(results: Results) -> list[Score]:
@@ -313,6 +372,10 @@ def overall(results: Results) -> list[Score]:
 
     Solvers are compared only over their common robots of a group.
     """
+    return results.once(_overall)
+
+
+def _overall(results: Results) -> list[Score]:
     scores = [score for start in STARTS for score in over_sets(fields_of(results, start))]
     groups = list(dict.fromkeys(score.group for score in scores))
     return sorted(scores, key=lambda score: (groups.index(score.group), -len(score.records)))
@@ -321,8 +384,8 @@ def overall(results: Results) -> list[Score]:
 def in_groups(fields: dict[str, list[Score]]) -> dict[str, dict[str, list[Score]]]:
     """Return solvers, robot by robot, in the groups of robots."""
     groups: dict[str, dict[str, list[Score]]] = {}
-    for robot, field in fields.items():
-        groups.setdefault(field[0].group, {})[robot] = field
+    for robot, members in fields.items():
+        groups.setdefault(members[0].group, {})[robot] = members
     return groups
 
 
@@ -368,7 +431,7 @@ def _over_robots(title: str, parts: Sequence[Score]) -> Score:
     """Return the score of a solver over several robots."""
     records = tuple(record for part in parts for record in part.records)
     same = all(part.has_same_targets for part in parts)
-    return parts[0]._replace(robots=title, records=records, has_same_targets=same)
+    return replace(parts[0], robots=title, records=records, has_same_targets=same)
 
 
 def out_of_reach(results: Results) -> list[Score]:
@@ -384,7 +447,9 @@ def out_of_reach(results: Results) -> list[Score]:
             score.distances, (0, key[1] - score.distances.size), constant_values=np.inf
         )
         best[key] = np.fmin(best.get(key, np.inf), distances)
-    return [s._replace(best_distances=best[s.robots, s.solved.size]) for s in beyond]
+    return [
+        replace(s, best_distances=best[s.robots, s.solved.size][: s.distances.size]) for s in beyond
+    ]
 
 
 def ratio_of_times(rival: Score, score: Score) -> metrics.Interval:

@@ -15,8 +15,7 @@ from plumbob.crosscheck.mass_spring.exact_step import ExactStep, exact_step
 from plumbob.reference import ImplicitEuler, runge_kutta
 from plumbob.reference.arguments import FloatArray
 
-from ...harness import metrics
-from ...problems.falling_cloth import FRAME, FallingCloth, explicit_substeps
+from .falling_cloth import FRAME, FallingCloth, explicit_substeps
 
 # Newton's rounding floor is above this value, so errors of 1e-8 can be measured.
 TOLERANCE, MAX_ITERATIONS = 1e-14, 200
@@ -41,10 +40,10 @@ def truth_of(cloth: FallingCloth, frames: int) -> ClothTruth:
     """Return the reference solutions for a cloth."""
     substeps = explicit_substeps(cloth.beat, _COARSE)
     coarse, middle, fine = (true_motion(cloth, frames, n * substeps) for n in (1, 2, 4))
-    distance = metrics.rms_distance(middle[-1], fine[-1])
-    order = math.log2(metrics.rms_distance(coarse[-1], middle[-1]) / distance)
+    distance = rms_distance(middle[-1], fine[-1])
+    order = math.log2(rms_distance(coarse[-1], middle[-1]) / distance)
     inertial = inertial_positions(cloth, cloth.frame)
-    path = metrics.rms_distance(fine[-1], cloth.start.positions)
+    path = rms_distance(fine[-1], cloth.start.positions)
     first = first_step(cloth, cloth.frame)
     return ClothTruth(inertial, first, fine, path, order, distance / path)
 
@@ -78,3 +77,8 @@ def true_motion(cloth: FallingCloth, frames: int, substeps: int) -> FloatArray:
             state = runge_kutta(cloth.system, state, cloth.frame / substeps)
         positions.append(state.positions)
     return np.array(positions)
+
+
+def rms_distance(x: FloatArray, y: FloatArray) -> float:
+    """Return the root mean square distance between the points of x and of y [m]."""
+    return float(np.sqrt(np.mean(np.sum((x - y) ** 2, axis=-1))))

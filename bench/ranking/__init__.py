@@ -1,0 +1,1 @@
+"""Rankings of solvers, made once from the records, for every sentence, table, map and chart."""
