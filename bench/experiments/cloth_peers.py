@@ -80,6 +80,7 @@ class FallWords(Values, frozen=True, kw_only=True):
     remarks: tuple[str, ...] = ()  # on each setting, (rung,)
     kind: str = ""  # how the solver's settings differ, see `Run`
     sweep: int = 1  # the pass over all solvers in which it was measured
+    arbiter: str = ""  # the engine whose answer counts as the truth
 
 
 class Work(FallWords, frozen=True):

@@ -41,6 +41,7 @@ class CertifiedWords(Values, frozen=True, kw_only=True):
     tolerance: float
     start: str
     coverage: str = ""
+    why: str = ""  # the sentence of the bound
 
 
 class CertifiedStep(CertifiedWords, frozen=True, kw_only=True):

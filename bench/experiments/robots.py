@@ -79,6 +79,9 @@ class RobotWords(Values, frozen=True, kw_only=True):
     joints: int = 0
     freedom: int = 0
     target: str = ""
+    group: str = ""  # of the robot, never averaged with another group
+    arbiter: str = ""  # the engine that evaluates the answers
+    time_limited: bool = False  # whether a time limit ends the solves
     robot: str = ""  # of a published table
     infeasible: float | None = None  # published share of infeasible targets [%]
 

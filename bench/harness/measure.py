@@ -25,9 +25,7 @@ def measure(block: Block) -> Record:
     begin = time.perf_counter()
     try:
         measured = block.measure()
-        record = record_of(block, measured, time.perf_counter() - begin)
-        record.check()
-        return record
+        return _checked(block, measured, time.perf_counter() - begin)
     except Exception as error:  # an exception of a solver is its result
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
             raise KeyboardInterrupt from None
@@ -42,10 +40,18 @@ def measure_together(blocks: Sequence[Block]) -> list[Record]:
     except Exception as error:
         results = [failure(describe(error))] * len(blocks)
     seconds = (time.perf_counter() - begin) / len(blocks)
-    records = [record_of(*pair, seconds) for pair in zip(blocks, results, strict=True)]
-    for record in records:
+    return [_checked(*pair, seconds) for pair in zip(blocks, results, strict=True)]
+
+
+def _checked(block: Block, measured: Measured, seconds: float) -> Record:
+    """Return the record of a result; a result of another type than declared is a failure."""
+    record = record_of(block, measured, seconds)
+    try:
         record.check()
-    return records
+        record.check_names()
+    except ValueError as error:
+        return record_of(block, failure(describe(error)), seconds)
+    return record
 
 
 def failure(why: str) -> Measured:

@@ -143,6 +143,15 @@ class Record:
         if not self.superseded:
             self.values  # noqa: B018
 
+    def check_names(self) -> None:
+        """Check that all measured values are declared by the experiment.
+
+        Raises:
+            ValueError: naming those that are not.
+        """
+        if kind := kind_of(self.suite, self.task):
+            values.check_names(kind, self.measured)
+
     @property
     def task(self) -> str:
         """The kind of its numbers among the kinds of its suite, "" if there is a single kind."""
@@ -167,11 +176,6 @@ class Record:
     def title(self) -> str:
         """How the problem is written."""
         return str(self.measured.get("title", self.problem))
-
-    # Names of former fields, until no code uses them.
-    arrays = property(numbers)
-    facts = notes = property(lambda self: self.measured)
-    details = property(lambda self: self.values)
 
     @property
     def key(self) -> Key:

@@ -4,7 +4,7 @@ Settings and measured values are read into the type. A record with a missing fie
 another type, is refused.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar, get_args
 
 import msgspec
@@ -25,11 +25,19 @@ class Values(msgspec.Struct, frozen=True, eq=False, kw_only=True):
 
     The words of a block stand in a class of their own, each with a default; the class below adds
     the numbers. A record without numbers, as of a solver that is not installed, has the words only.
-    A None field is not on record. A name other than an identifier is given as
-    `msgspec.field(name="cold wall")`.
+    A None field is not on record.
     """
 
+    title: str = ""  # of the problem, as written
+    task: str = ""  # the kind of the numbers among the kinds of a suite
     remark: str = ""  # on the numbers, or why there are none
+    failed: str = ""  # the exception of a measurement without a result
+    trouble: str = ""  # the most frequent exception of the solver, with its count
+    entrant: bool = False  # whether a user entered the solver
+    door: str = ""  # how the user's solver is reached
+    digest: str = ""  # of the files of the user's solver
+    problem_digest: str = ""  # of a user's problem, or the seed of its targets
+    first_targets: int | None = None  # so many of the first targets only, for a slow solver
 
 
 Typed = TypeVar("Typed", bound=msgspec.Struct)
@@ -63,18 +71,18 @@ def words_of(kind: type[Values]) -> type[Values]:
 
 
 def _names(kind: type[Values]) -> set[str]:
-    return {field.encode_name for field in msgspec.structs.fields(kind)}
+    return {field.name for field in msgspec.structs.fields(kind)}
 
 
-def stored(values: Values) -> dict[str, Any]:
-    """Return values by their names on record, without defaults."""
-    fields = ((f, getattr(values, f.name)) for f in msgspec.structs.fields(values))
-    return {f.encode_name: value for f, value in fields if not _is_default(f, value)}
+def check_names(kind: type[Values], measured: Iterable[str]) -> None:
+    """Check that all names of measured values are declared.
 
-
-def _is_default(field: msgspec.structs.FieldInfo, value: Any) -> bool:
-    is_empty_list = isinstance(value, list) and not value
-    return value is field.default or is_empty_list
+    Raises:
+        ValueError: naming those that are not, such as a misspelt one.
+    """
+    if unknown := sorted({*measured} - _names(kind)):
+        expected = f"expected values that {kind.__name__} declares"
+        raise ValueError(f"measured: {expected}, got {', '.join(unknown)[:100]}")
 
 
 def _array(kind: Any, nested: Any) -> np.ndarray:

@@ -115,7 +115,7 @@ def _with_remark(headline: Headline, remark: str) -> Headline:
 
 def scale(results: Results) -> str:
     """Return the scale of the records: "Quick run: 20 targets of each kind", "" if unknown."""
-    names = dict.fromkeys(r.notes.get("scale", "") for r in results.all(FINISHED))
+    names = dict.fromkeys(r.measured.get("scale", "") for r in results.all(FINISHED))
     name = listed(list(filter(None, names)))
     records = results.all("ik", task=REACHABLE)
     counts = {int(r.size) // max(1, len(r.values.strata)) for r in records} - {0}

@@ -323,6 +323,12 @@ def test_a_measurement_of_another_type_is_a_failure():
     assert not measure(replace(BLOCK, measure=lambda: {"time": TIMES, "left": LEFT})).failed
 
 
+def test_a_misspelt_number_or_word_is_a_failure():
+    misspelt = replace(BLOCK, measure=lambda: {"time": TIMES, "left": LEFT, "lift": 1.0})
+    why = "ValueError: measured: expected values that Swing declares, got lift"
+    assert measure(misspelt).failed == why
+
+
 @pytest.mark.parametrize("notes", [{"failed": "no memory"}, {"remark": "not installed"}])
 def test_a_record_without_numbers_has_no_values(notes):
     back = decode(encode(record_of(BLOCK, notes, 1.0)))
