@@ -7,8 +7,6 @@ settings that no other beats in both. On a quiet machine: `python tools/search_c
 """
 
 import importlib
-import itertools
-import time
 import timeit
 
 import numpy as np
@@ -22,36 +20,39 @@ from plumbob.reference import MassSpring, State
 SIZE, STIFFNESS, FRAMES, REPEATS = 16, 3e3, 3, 3
 SUBSTEPS, ITERATIONS = (1, 2, 5, 10, 20, 40, 80), (1, 2, 5, 10, 20, 50)
 MARGINS, XPBD_ITERATIONS = (1.1, 1.5, 2, 3, 4, 8), (1, 2, 4, 10)
-CONJUGATE_GRADIENTS = ((100, 1e-8), (1000, 1e-8), (5000, 1e-15))
+SETTLED = {"iterations": 5000, "tolerance": 1e-15}
+CONJUGATE_GRADIENTS = ({"iterations": 100}, {"iterations": 1000}, SETTLED)
 LIMIT = 0.01
 
 
 def grid(peer):
-    """Yield the settings of a solver that are tried."""
+    """The settings of a solver that are tried."""
     frequency = falling_cloth(SIZE, STIFFNESS).frequency
     stable = [explicit_substeps(frequency, margin) for margin in MARGINS]
+    substeps, options = SUBSTEPS, [{}]
     if "XPBD" in peer.title:
-        for substeps, iterations in itertools.product([10, *stable], XPBD_ITERATIONS):
-            yield {"substeps": substeps, "iterations": iterations}
+        substeps, options = [10, *stable], [{"iterations": count} for count in XPBD_ITERATIONS]
     elif peer.run.kind == EXPLICIT:
-        yield from ({"substeps": substeps} for substeps in stable)
+        substeps = stable
     elif peer.title.startswith("MuJoCo discrete"):
-        for substeps, (iterations, tolerance) in itertools.product(SUBSTEPS, CONJUGATE_GRADIENTS):
-            yield {"substeps": substeps, "iterations": iterations, "tolerance": tolerance}
-    elif peer.run.kind == LINEARISED:
-        yield from ({"substeps": substeps} for substeps in SUBSTEPS)
-    else:
-        iterated = ITERATIONS[:4] if peer.run.converges else ITERATIONS
-        for substeps, iterations in itertools.product(SUBSTEPS, iterated):
-            yield {"substeps": substeps, "iterations": iterations}
+        options = CONJUGATE_GRADIENTS
+    elif peer.run.kind != LINEARISED:
+        counts = ITERATIONS[:4] if peer.run.converges else ITERATIONS
+        options = [{"iterations": count} for count in counts]
+    return [{"substeps": count, **option} for count in substeps for option in options]
+
+
+def prepare(peer, system, settings):
+    """The mover of a solver, by its adapter."""
+    adapter = importlib.import_module(peer.module)
+    return adapter.prepare(system, FRAME, **{**peer.run.settings, **settings})
 
 
 def result(peer, settings):
-    """Return the error of the motion over the distance moved, and the time for a frame [ms]."""
+    """The error of the motion over the distance moved, and the time for a frame [ms]."""
     cloth = falling_cloth(SIZE, STIFFNESS)
     truth = truth_of(cloth, FRAMES).true[-1]
-    adapter = importlib.import_module(peer.module)
-    mover = adapter.prepare(cloth.system, FRAME, **{**peer.run.settings, **settings})
+    mover = prepare(peer, cloth.system, settings)
     seconds = []
     for _ in range(REPEATS):
         mover.begin(cloth.start)
@@ -70,12 +71,9 @@ def fixed_costs():
     print("| solver | a step [µs] |")
     print("| --- | ---: |")
     for peer in filter(lambda peer: peer.is_installed, catalogue.cloth_peers()):
-        settings = {"iterations": 1} if peer.run.kind == ITERATED else {}
+        iterations = {"iterations": 1} if peer.run.kind == ITERATED else {}
         try:
-            adapter = importlib.import_module(peer.module)
-            mover = adapter.prepare(
-                system, FRAME, **{**peer.run.settings, **settings}, substeps=100
-            )
+            mover = prepare(peer, system, {"substeps": 100, **iterations})
         except ValueError:
             continue  # takes square cloths only
         mover.begin(start)

@@ -1,22 +1,18 @@
 """Search the settings of all solvers for robots, ours included, on the tuning robots.
 
-    python tools/search_settings.py [--solver NAME ...] [--results FILE]
+    python tools/search_settings.py [--solver NAME ...] [--anew] [--results FILE]
 
-Every solver gets the same care: at most 64 settings, listed in the file beside, on the same 200
+Every solver gets the same care: at most 64 settings, listed in the file beside, on the same 120
 targets of each tuning robot, which no table of the bench contains. All settings are tried on the
-first targets; the best quarter, the authors' defaults and the bench's earlier settings on all. The
-file of results continues an interrupted search.
+first targets; the best, the authors' defaults and the bench's own settings on all. The file of
+results continues an interrupted search; a solver of another version is tried again.
 """
 
 import argparse
-import contextlib
 import functools
-import importlib
 import itertools
-import json
-import math
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,168 +20,190 @@ import msgspec
 import numpy as np
 
 from plumbob.bench.experiments.robots import TOLERANCE
-from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
-from plumbob.bench.harness.timing import attempt, digest_of, restarted, seed_shared_generators
+from plumbob.bench.harness.timing import Job, answers
+from plumbob.bench.peers import peer as peers
 from plumbob.bench.peers.catalogue import PEERS
-from plumbob.bench.peers.peer import Peer
 from plumbob.bench.problems.evaluate import Targets, arbiter_of, evaluator_of
-from plumbob.bench.problems.robot_targets import STRATA, robot_targets
+from plumbob.bench.problems.robot_targets import robot_targets
 from plumbob.bench.problems.robots import TUNING
 
 RESULTS = Path(__file__).with_name("settings.jsonl")
 # Settings of a solver at the most, targets of each robot, and those on which all are tried.
-MAXIMUM, COUNT, SCREENED = 64, 200, 40
+MAXIMUM, COUNT, SCREENED = 64, 120, 24
+# The best settings on the first targets that are tried on all.
+FINALISTS = 3
+# Targets drawn in each stratum; a search takes the first of these.
+DRAWN = 34
 SEED = 2011
 # Processor times within this factor of each other are taken for equal.
 EQUAL_TIMES = 1.25
 # Added to times before their geometric mean, and subtracted from it [s].
 _SHIFT = 1e-5
-# A worker is ended that has not finished a robot after so long [s].
-_PATIENCE = 3600.0
+# The iterations of all attempts together, and the settings by which a solver divides them itself.
+ITERATIONS = {
+    peers.PORTFOLIO: peers.PORTFOLIO_ITERATIONS,
+    peers.RESTARTS: peers.RESTART_ITERATIONS,
+}
+OWN_ATTEMPTS = {"phases", "restarts", "searches", "seconds"}
 Settings = dict[str, Any]
-
-
-class SettingsSearch(NamedTuple):
-    """The settings of a solver, from one start or with restarts."""
-
-    solver: str
-    start: str  # `ONE_START` or `RESTARTS`
-    default: Settings  # of its authors
-    before: Settings  # of the bench before the search
-    candidates: tuple[Settings, ...]  # the settings among which is chosen, the default first
-
-    @property
-    def peer(self) -> Peer:
-        """The solver."""
-        return next(peer for peer in PEERS if peer.title == self.solver)
-
-    @property
-    def settings(self) -> list[Settings]:
-        """All settings that are tried."""
-        return [*self.candidates, *([] if self.before in self.candidates else [self.before])]
 
 
 class SettingsTrial(msgspec.Struct, frozen=True):
     """A solver with settings on the first targets of each tuning robot."""
 
     solver: str
-    start: str
-    settings: dict[str, Any]
+    kind: str  # one start, portfolio or restarts
+    settings: dict[str, Any]  # of its adapter; `bench_restarts` are restarts by the bench
     version: str  # of the solver's package
-    targets: int  # of each robot
     microseconds: float  # of processors for a target, the geometric mean
-    bits: str  # whether it solves each target, robot by robot, four in a digit to base 16
-    exceptions: int = 0  # targets over which it raised, or its process was lost
-    trouble: str = ""  # the first of these
+    bits: str  # whether each target is solved, robot by robot, four in a digit to base 16
+    targets: int  # of each robot
+    exceptions: int = 0  # targets over which the solver raised, or its process was lost
+    trouble: str = ""  # the first exception
+
+    @property
+    def key(self) -> tuple[str, str, Settings]:
+        """What no two trials of a file share."""
+        return self.solver, self.kind, self.settings
 
     @property
     def solved(self) -> np.ndarray:
-        """Whether it solves each target, (robot, target)."""
+        """Whether each target is solved, (robot, target)."""
         bits = np.unpackbits(np.frombuffer(bytes.fromhex(self.bits), dtype=np.uint8))
         count = len(TUNING) * self.targets
         return bits[:count].reshape(len(TUNING), self.targets).astype(bool)
 
     @property
     def share(self) -> float:
-        """The share of targets that it solves."""
+        """The share of solved targets."""
         return float(np.mean(self.solved))
+
+    @property
+    def screened_share(self) -> float:
+        """The share of solved targets among the first."""
+        return float(np.mean(self.solved[:, :SCREENED]))
+
+
+class SettingsSearch(NamedTuple):
+    """The settings of a solver for one start, a portfolio or restarts."""
+
+    solver: str
+    kind: str
+    candidates: tuple[Settings, ...]  # the authors' defaults first
+    bench: Settings  # of the bench, among the candidates
+
+    @property
+    def peer(self) -> peers.Peer:
+        """The solver."""
+        return peer_of(self.solver)
+
+    def own(self, trials: Iterable[SettingsTrial], count: int) -> list[SettingsTrial]:
+        """Return the trials of this search on at least so many targets of each robot."""
+        return [
+            trial
+            for trial in trials
+            if (trial.solver, trial.kind) == (self.solver, self.kind)
+            and trial.settings in self.candidates
+            and trial.targets >= count
+        ]
+
+    def finalists(self, trials: Sequence[SettingsTrial]) -> list[Settings]:
+        """Return the settings to try on all targets, from their trials on the first."""
+        shares = [
+            (-trial.screened_share, self.candidates.index(trial.settings)) for trial in trials
+        ]
+        best = [self.candidates[i] for _, i in sorted(shares)[:FINALISTS]]
+        best += [self.candidates[0], self.bench]
+        return [settings for i, settings in enumerate(best) if settings not in best[:i]]
+
+
+def peer_of(solver: str) -> peers.Peer:
+    """Return a solver by its title."""
+    return next(peer for peer in PEERS if peer.title == solver)
 
 
 def searches() -> list[SettingsSearch]:
-    """Return the searches of `tuning.toml`."""
+    """Return the searches of `search_settings.toml`."""
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    return [_search(**row) for row in tomllib.loads(text)["searches"]]
+    return [
+        _search(solver, kind, axes, kinds.get("authors", {}))
+        for solver, kinds in tomllib.loads(text).items()
+        for kind, axes in kinds.items()
+        if kind != "authors"
+    ]
 
 
 def _search(
-    solver: str, start: str, default: Settings, before: Settings, axes: list[dict[str, list[Any]]]
+    solver: str, kind: str, axes: dict[str, list[Any]], authors: Settings
 ) -> SettingsSearch:
     points = [
-        [dict(zip(axis, values, strict=True)) for values in zip(*axis.values(), strict=True)]
-        for axis in axes
+        [value if isinstance(value, dict) else {name: value} for value in values]
+        for name, values in axes.items()
     ]
-    products = [functools.reduce(dict.__or__, parts) for parts in itertools.product(*points)]
-    candidates = [default, *(settings for settings in products if settings != default)]
-    return SettingsSearch(solver, start, default, before, tuple(candidates))
+    candidates = list[Settings]()
+    for point in itertools.product(*points):
+        settings = functools.reduce(dict.__or__, point, authors)
+        is_divided = kind in ITERATIONS and not OWN_ATTEMPTS & settings.keys()
+        restarts = ITERATIONS[kind] // settings["iterations"] - 1 if is_divided else 0
+        candidates.append(_with_restarts(settings, restarts))
+    run = peer_of(solver).first(kind)
+    bench = _with_restarts(dict(run.settings), run.restarts)
+    candidates += [bench] * (bench not in candidates)
+    return SettingsSearch(solver, kind, tuple(candidates), bench)
+
+
+def _with_restarts(settings: Settings, restarts: int) -> Settings:
+    return {**settings, "bench_restarts": restarts} if restarts else settings
 
 
 def tuning_targets(name: str, count: int) -> Targets:
     """Return the first targets of a tuning robot, the strata alternating, and random starts."""
-    targets = robot_targets(name, -(-COUNT // len(STRATA)), SEED)
+    targets = robot_targets(name, DRAWN, SEED)
     return Targets(*(part[:count] for part in targets))
 
 
-def answers(peer: Peer, name: str, count: int, settings: Settings) -> dict[str, Any]:
-    """Return a solver's answers to targets of a robot, and their processor times [s]."""
-    options, robot = dict(settings), evaluator_of(name).robot
-    restarts = options.pop("bench_restarts", 0)
-    ask = importlib.import_module(peer.module).prepare(robot, TOLERANCE, **options)
-    ask = restarted(ask, robot, restarts) if restarts else ask
-    targets, seconds, errors = tuning_targets(name, count), [], []
-    attempt(ask(targets.request(0)))  # which compiles
-    q = np.full(targets.starts.shape, math.nan)
-    for i in range(count):
-        solve = ask(request := targets.request(i))
-        seed_shared_generators(digest_of(*request))
-        output = attempt(solve)
-        q[i] = math.nan if output.q is None else output.q
-        errors += [output.error] if output.error else []
-        seconds.append(output.time.seconds if output.time else math.nan)
-    return {"q": q, "seconds": seconds, "errors": errors}
-
-
-def trial(
-    worker: WorkerProcess, search: SettingsSearch, settings: Settings, count: int
-) -> SettingsTrial:
-    """Try settings in a worker's process; a robot over which that is lost is not solved."""
+def trial(search: SettingsSearch, settings: Settings, count: int) -> SettingsTrial:
+    """Try settings on the first targets of each robot; unanswered targets are not solved."""
+    options = dict(settings)
+    restarts, engine = options.pop("bench_restarts", 0), arbiter_of(search.peer.built_on)
     solved = np.zeros((len(TUNING), count), dtype=bool)
     seconds, errors = list[float](), list[str]()
     for robot, name in enumerate(TUNING):
-        try:
-            values = worker.calculate(answers, search.peer, name, count, settings)
-            targets = tuning_targets(name, count)
-            engine = arbiter_of(search.peer.built_on)
-            evaluation = evaluator_of(name).evaluate(targets, values["q"], TOLERANCE, engine)
-            solved[robot] = evaluation.solved
-            seconds += values["seconds"]
-            errors += values["errors"]
-        except RuntimeError as error:
-            errors += [f"{name}: {error}"] * count
+        evaluator, targets = evaluator_of(name), tuning_targets(name, count)
+        twice = Targets(*(np.concatenate([part[:1], part]) for part in targets))
+        request = (search.peer.module, evaluator.robot, twice, TOLERANCE, options, restarts)
+        outcome = answers(Job(*request, warms_up=False))
+        output = outcome.solved[1:]  # the first target is solved before, uncounted
+        errors += [answer.trouble for answer in output if answer.trouble]
+        errors += [outcome.trouble] * (count - len(output))
+        if output:
+            q = np.array([answer.q for answer in output])
+            solved[robot, : len(q)] = evaluator.evaluate(targets, q, TOLERANCE, engine).solved
+            seconds += [answer.seconds for answer in output]
     time = 1e6 * shifted_geometric_mean(np.array(seconds), _SHIFT).value if seconds else 0.0
-    bits = np.packbits(solved).tobytes().hex()
-    names = (*search[:2], settings, search.peer.version)
-    return SettingsTrial(
-        *names, count, round(time, 1), bits, len(errors), errors[0] if errors else ""
-    )
-
-
-def finalists(search: SettingsSearch, trials: Sequence[SettingsTrial]) -> list[Settings]:
-    """Return the settings to try on all targets, from their trials on the first."""
-    candidates = [trial for trial in trials if trial.settings in search.candidates]
-    order = sorted(candidates, key=lambda trial: -trial.share)[: math.ceil(len(candidates) / 4)]
-    best = [*(trial.settings for trial in order), search.default, search.before]
-    return [settings for i, settings in enumerate(best) if settings not in best[:i]]
+    bits, version = np.packbits(solved).tobytes().hex(), search.peer.version
+    result = (settings, version, round(time, 1), bits, count, len(errors), "".join(errors[:1]))
+    return SettingsTrial(search.solver, search.kind, *result)
 
 
 def best_trial(search: SettingsSearch, trials: Sequence[SettingsTrial]) -> SettingsTrial:
     """Return the best of the trials on all targets.
 
-    Trials tie with the greatest share that McNemar's paired test cannot tell from it. Of these,
-    those tie whose times are equal to the fastest; of these it is the default, if there and without
-    exceptions, or the one with the greatest share.
+    Trials tie with the greatest share that McNemar's paired test cannot tell from it. The fastest
+    of these tie whose times are equal. Without exceptions the authors' defaults are preferred, then
+    the bench's own settings, then the greatest share.
     """
-    candidates = [trial for trial in trials if trial.settings in search.candidates]
-    best = max(candidates, key=lambda trial: trial.share).solved.ravel()
+    trials = search.own(trials, COUNT)
+    best = max(trials, key=lambda trial: trial.share).solved.ravel()
     tied = [
-        trial
-        for trial in candidates
-        if chance_of_pairs(best, trial.solved.ravel()) > 1.0 - CONFIDENCE
+        trial for trial in trials if chance_of_pairs(best, trial.solved.ravel()) > 1.0 - CONFIDENCE
     ]
     limit = EQUAL_TIMES * min(trial.microseconds for trial in tied)
     fast = [trial for trial in tied if trial.microseconds <= limit]
     fast = [trial for trial in fast if not trial.exceptions] or fast
-    return max(fast, key=lambda trial: (trial.settings == search.default, trial.share))
+    preferred = (search.candidates[0], search.bench)
+    return max(fast, key=lambda trial: (*map(trial.settings.__eq__, preferred), trial.share))
 
 
 def read(path: Path) -> list[SettingsTrial]:
@@ -194,32 +212,22 @@ def read(path: Path) -> list[SettingsTrial]:
     return [msgspec.json.decode(line, type=SettingsTrial) for line in lines]
 
 
-def trials_of(
-    search: SettingsSearch, trials: Sequence[SettingsTrial], count: int
-) -> list[SettingsTrial]:
-    """Return the trials of a search on so many targets of each robot, in its order."""
-    trials = [
-        trial
-        for trial in trials
-        if (trial.solver, trial.start, trial.targets) == (*search[:2], count)
-    ]
-    own_trials = [trial for trial in trials if trial.settings in search.settings]
-    return sorted(own_trials, key=lambda trial: search.settings.index(trial.settings))
+def write(path: Path, trials: Iterable[SettingsTrial]) -> None:
+    """Write trials to a file of results, a line each."""
+    path.write_bytes(b"".join(msgspec.json.encode(trial) + b"\n" for trial in trials))
 
 
 def perform(search: SettingsSearch, path: Path) -> Iterator[SettingsTrial]:
-    """Perform the missing trials of a search; append each to the file and yield it."""
-    with contextlib.closing(WorkerProcess(_PATIENCE)) as worker:
-        for count in (SCREENED, COUNT):
-            trials = read(path)
-            first = trials_of(search, trials, SCREENED)
-            settings = finalists(search, first) if count == COUNT else search.settings
-            finished = [trial.settings for trial in trials_of(search, trials, count)]
-            for missing in (part for part in settings if part not in finished):
-                result = trial(worker, search, missing, count)
-                with path.open("ab") as file:
-                    file.write(msgspec.json.encode(result) + b"\n")
-                yield result
+    """Perform the missing trials of a search; store each in the file and yield it."""
+    version = search.peer.version
+    for count in (SCREENED, COUNT):
+        trials = [other for other in search.own(read(path), SCREENED) if other.version == version]
+        settings = search.finalists(trials) if count == COUNT else search.candidates
+        finished = [other.settings for other in trials if other.targets >= count]
+        for missing in (part for part in settings if part not in finished):
+            result = trial(search, missing, count)
+            write(path, [*(other for other in read(path) if other.key != result.key), result])
+            yield result
 
 
 def main() -> None:
@@ -228,16 +236,21 @@ def main() -> None:
     names = list(dict.fromkeys(search.solver for search in searches()))
     parser.add_argument("--solver", action="append", choices=names, help="by default all")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE")
+    parser.add_argument("--anew", action="store_true", help="forget the solvers' earlier trials")
     arguments = parser.parse_args()
-    for search in searches():
-        if search.solver not in (arguments.solver or names) or not search.peer.is_installed:
-            continue
+    chosen = [s for s in searches() if s.solver in (arguments.solver or names)]
+    installed = [search for search in chosen if search.peer.is_installed]
+    if arguments.anew:
+        forgotten = {search.solver for search in installed}
+        trials = read(arguments.results)
+        write(arguments.results, [trial for trial in trials if trial.solver not in forgotten])
+    for search in installed:
         for result in perform(search, arguments.results):
             figures = f"{100 * result.share:5.1f} %  {result.microseconds:8.0f} µs"
-            print(figures, json.dumps(result.settings), result.trouble, flush=True)
-        best = best_trial(search, trials_of(search, read(arguments.results), COUNT))
-        print(f"{search.solver}, {search.start}: {json.dumps(best.settings)}", flush=True)
+            print(figures, result.settings, result.trouble, flush=True)
+        best = best_trial(search, read(arguments.results))
+        print(f"{search.solver}, {search.kind}: {best.settings}", flush=True)
 
 
-if __name__ == "__main__":  # the worker imports this file by its name
-    importlib.import_module("search_settings").main()
+if __name__ == "__main__":
+    main()

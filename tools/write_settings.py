@@ -6,11 +6,11 @@ A page has `<!-- search: SOLVER -->` and `<!-- end -->`, or `all solvers` for th
 figure of the search is typed by hand: `tests/bench/test_tuning.py` compares the pages with it.
 """
 
+import itertools
 import json
 import re
 from pathlib import Path
 
-import numpy as np
 import search_settings as tuning
 
 from plumbob.bench.harness import metrics
@@ -32,17 +32,19 @@ def interval(solved):
     return f"{percent(share.hits / share.total)} ({percent(share.low)}–{percent(share.high)})"
 
 
+def value_text(value):
+    """A value of a setting as text."""
+    return json.dumps(value) if isinstance(value, bool) else value or repr(value)
+
+
 def written(settings):
     """Settings as text; `bench_restarts` are restarts by the bench."""
-    return ", ".join(
-        f"`{name}` {json.dumps(value) if isinstance(value, bool) else value or repr(value)}"
-        for name, value in settings.items()
-    )
+    return ", ".join(f"`{name}` {value_text(value)}" for name, value in settings.items())
 
 
 def table(head, rows):
-    """A table in Markdown; columns after the first texts are numbers, to the right."""
-    rule = ["---:" if name.endswith(("%", "tried")) else "---" for name in head]
+    """A table in Markdown; columns of percentages, counts and times are numbers, to the right."""
+    rule = ["---:" if name.endswith(("%", "tried", "µs")) else "---" for name in head]
     return "\n".join(f"| {' | '.join(map(str, cells))} |" for cells in (head, rule, *rows)) + "\n"
 
 
@@ -51,65 +53,65 @@ class Results:
 
     def __init__(self, search, trials):
         self.search = search
-        self.screened = tuning.trials_of(search, trials, tuning.SCREENED)
-        self.trials = tuning.trials_of(search, trials, tuning.COUNT)
-        self.default = self.full(search.default)
-        self.before = self.full(search.before)
-        self.chosen = tuning.best_trial(search, self.trials)
+        self.screened = search.own(trials, tuning.SCREENED)
+        self.default, self.bench = map(self.of, (search.candidates[0], search.bench))
+        self.chosen = tuning.best_trial(search, trials)
 
-    def full(self, settings):
-        """The trial of these settings on all targets."""
-        return next(trial for trial in self.trials if trial.settings == settings)
+    def of(self, settings):
+        """The trial of these settings."""
+        return next(trial for trial in self.screened if trial.settings == settings)
 
     def overview(self):
         """The row of the table of all solvers."""
-        shares = [percent(trial.share) for trial in (self.default, self.before)]
-        chosen = [interval(self.chosen.solved), written(self.chosen.settings)]
-        return [self.search.solver, self.search.start, len(self.search.settings), *shares, *chosen]
+        shares = [percent(trial.share) for trial in (self.default, self.bench)]
+        chosen = [interval(self.chosen.solved), f"{self.chosen.microseconds:.0f}"]
+        names = [self.search.solver, self.search.kind, len(self.search.candidates)]
+        return [*names, *shares, *chosen, written(self.chosen.settings)]
 
     def roles(self):
         """The three settings of interest; equal ones share a row."""
         roles = {}
         for role, trial in (
             ("authors’ defaults", self.default),
-            ("before", self.before),
+            ("bench", self.bench),
             ("chosen", self.chosen),
         ):
             roles.setdefault(json.dumps(trial.settings), ([], trial))[0].append(role)
         for names, trial in roles.values():
-            robots = [percent(share) for share in trial.solved.mean(axis=1)]
-            yield [", ".join(names), written(trial.settings), *robots, percent(trial.share)]
+            shares = [percent(share) for share in (*trial.solved.mean(axis=1), trial.share)]
+            yield [self.search.kind, ", ".join(names), written(trial.settings), *shares]
 
-    def values(self):
-        """The best share of each value of each setting, on the targets that all were tried on."""
-        for name in self.search.default:
-            trials = [trial for trial in self.screened if name in trial.settings]
-            values = list(dict.fromkeys(trial.settings[name] for trial in trials))
-            for value in values if len(values) > 1 else ():
-                shares = [trial.share for trial in trials if trial.settings[name] == value]
-                cells = [f"`{name}`", written({name: value}).split(" ", 1)[1], len(shares)]
-                yield [*cells, percent(np.max(shares)), percent(np.median(shares))]
+    def best_share(self, name, value):
+        """The best share on the first targets with a value of a setting, "" if not tried."""
+        trials = [trial for trial in self.screened if trial.settings.get(name) == value]
+        shares = [trial.screened_share for trial in trials]
+        return percent(max(shares)) if shares else ""
 
-    def page(self):
-        """The tables of a solver's page."""
-        robots = [f"{title(name)} %" for name in TUNING]
-        head = ["settings", "values", *robots, "all %"]
-        trials = f"{self.search.start}: {len(self.search.settings)} settings tried"
-        count = f"On the first {tuning.SCREENED} targets of each robot:"
-        by_value = table(["setting", "value", "tried", "best %", "median %"], self.values())
-        return "\n".join([f"**{trials}**\n", table(head, self.roles()), count + "\n", by_value])
+
+def page(results):
+    """The tables of a solver's page, from its searches."""
+    head = ["", "settings", "values", *(f"{title(name)} %" for name in TUNING), "all %"]
+    roles = table(head, [row for result in results for row in result.roles()])
+    rows, candidates = [], [settings for r in results for settings in r.search.candidates]
+    for name in dict.fromkeys(itertools.chain(*candidates)):
+        values = dict.fromkeys(settings[name] for settings in candidates if name in settings)
+        for value in values if len(values) > 1 else ():
+            cells = [result.best_share(name, value) for result in results]
+            rows.append([f"`{name}`", value_text(value), *cells])
+    head = ["setting", "value", *(f"{result.search.kind} %" for result in results)]
+    text = f"Best share with each value, on the first {tuning.SCREENED} targets of each robot:\n"
+    return "\n".join([roles, text, table(head, rows)])
 
 
 def contents():
     """The text between the marks, by solver."""
     trials = tuning.read(tuning.RESULTS)
     results = [Results(search, trials) for search in tuning.searches()]
-    head = ["solver", "", "tried", "defaults %", "before %", "chosen, with 95 % interval, %"]
-    parts = {ALL: table([*head, "chosen settings"], [result.overview() for result in results])}
-    for result in results:
-        name = result.search.solver
-        parts[name] = "\n".join(filter(None, (parts.get(name), result.page())))
-    return parts
+    head = ["solver", "", "tried", "defaults %", "bench %", "chosen, with 95 % interval, %", "µs"]
+    rows = [result.overview() for result in results]
+    solvers = itertools.groupby(results, lambda result: result.search.solver)
+    parts = {solver: page(list(own_results)) for solver, own_results in solvers}
+    return {ALL: table([*head, "chosen settings"], rows), **parts}
 
 
 def filled(text, parts):
@@ -120,8 +122,8 @@ def filled(text, parts):
 def main():
     """Fill all pages of the folder."""
     parts = contents()
-    for page in sorted(FOLDER.glob("*.md")):
-        page.write_text(filled(page.read_text(encoding="utf-8"), parts), encoding="utf-8")
+    for path in sorted(FOLDER.glob("*.md")):
+        path.write_text(filled(path.read_text(encoding="utf-8"), parts), encoding="utf-8")
 
 
 if __name__ == "__main__":
