@@ -41,9 +41,11 @@ class Run:
         return "seconds" in self.settings
 
 
-def short_attempts(settings: Mapping[str, Any], note: str = "{}") -> Run:
-    """Return the portfolio of eight attempts, the first from the start, which the bench makes."""
-    count, iterations = SHORT_ATTEMPTS
+def short_attempts(
+    settings: Mapping[str, Any], note: str = "{}", count: int = SHORT_ATTEMPTS[0]
+) -> Run:
+    """Return the portfolio of so many attempts, the first from the start, made by the bench."""
+    iterations = PORTFOLIO_ITERATIONS // count
     attempts = note.format(f"{count} attempts of {iterations}")
     return Run(PORTFOLIO, {"iterations": iterations, **settings}, attempts, count - 1)
 

@@ -23,14 +23,6 @@ FEW = 4
 ROUNDED = 1
 # The first phase alone.
 PLAIN = {"iterations": 100, "restarts": 0, "phases": 1}
-# The settings of the bench that are to be changed to those chosen.
-CHANGES = {
-    ("roboplan OInK", "portfolio"),
-    ("Drake", "portfolio"),
-    ("DART", "portfolio"),
-    ("PyBullet", "portfolio"),
-    ("Robotics Toolbox ik_LM", "one start"),
-}
 # A search of each solver, of portfolios where there are any.
 ROWS = {
     search.solver: search
@@ -58,9 +50,7 @@ def test_every_setting_was_tried_and_the_finalists_on_all_targets(search):
     assert not tuning.best_trial(search, TRIALS).trouble
 
 
-def test_the_bench_uses_the_settings_that_the_search_chose(search, request):
-    if (search.solver, search.kind) in CHANGES:
-        request.applymarker(pytest.mark.xfail(reason="settings to change", strict=True))
+def test_the_bench_uses_the_settings_that_the_search_chose(search):
     chosen = dict(tuning.best_trial(search, TRIALS).settings)
     restarts = chosen.pop("bench_restarts", 0)
     runs = [run for run in search.peer.runs if run.kind == search.kind]

@@ -29,7 +29,8 @@ PEER = Peer(
         # The search chose IPOPT (docs/peers/drake.md); SNOPT is what Drake chooses itself.
         Run(ONE_START, {"solver": "IPOPT", "iterations": 200, **_SETTINGS}, "IPOPT"),
         Run(ONE_START, {"iterations": 200, **_SNOPT}, "SNOPT"),
-        short_attempts(_SNOPT, "SNOPT, {}"),
+        # Twelve iterations of SNOPT arrive nowhere: the search chose two attempts of fifty.
+        short_attempts(_SNOPT, "SNOPT, {}", count=2),
         restarted(50, _SNOPT, "SNOPT, {}"),
     ),
     use="constraints beside the pose",

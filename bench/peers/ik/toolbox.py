@@ -24,7 +24,8 @@ PEER = Peer(
     "Levenberg-Marquardt with random searches",
     "poses and limits of one chain of hinges",
     (
-        Run(ONE_START, {"searches": 1, "iterations": 30, "damping": "chan", "factor": 1.0}),
+        # As the search chose: 1.5 points more solved than by the 30 iterations of its authors.
+        Run(ONE_START, {"searches": 1, "iterations": 1000, "damping": "chan", "factor": 0.01}),
         Run(PORTFOLIO, {"searches": 8, "iterations": 12, **_DAMPING}, "8 searches of 12"),
         Run(RESTARTS, {"searches": 100, "iterations": 30, **_DAMPING}, "100 searches"),
     ),
