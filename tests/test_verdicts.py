@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from plumbob.bench.comparison.rows import ChangeVerdict
-from plumbob.bench.experiments.check import files
 from plumbob.bench.ranking.scores import OUTCOMES
+from plumbob.cli import file_readings as files
 from plumbob.reference.outcome import Outcome
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.screen.words import VERDICTS

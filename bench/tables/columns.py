@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,9 @@ import numpy as np
 from ..harness import metrics
 from ..harness.record import Record
 from .table import Cell, Column, in_unit, words
+
+# The names of the quantiles of a spread, in its order.
+QUANTILES = ("median", "95 %", "largest")
 
 
 def text(title: str, read: Callable[[Any], Cell], folded: bool = False) -> Column:
@@ -30,6 +34,24 @@ def number(value: float) -> float | None:
 def extremes(sizes: Collection[int]) -> list[int]:
     """Return the least and the greatest number, once if equal; empty without any."""
     return sorted({min(sizes), max(sizes)}) if sizes else []
+
+
+def of_numbers(read: Callable[[Any], Cell]) -> Callable[[Record], Cell]:
+    """Return what reads a cell from the values of a record, None without numbers."""
+    return lambda record: read(record.values) if record.has_numbers else None
+
+
+def quantiles(
+    title: str, names: Iterable[str], read: Callable[[Any], Sequence[Cell]], unit: str = ""
+) -> tuple[Column, ...]:
+    """Return columns of the named quantiles of a spread, which is read from the row's subject."""
+
+    def cell(name: str, subject: Any) -> Cell:
+        return read(subject)[QUANTILES.index(name)]
+
+    return tuple(
+        Column(f"{title}, {name}", unit, group=title, read=partial(cell, name)) for name in names
+    )
 
 
 def quantile_cells(title: str, quantiles: Iterable[Cell]) -> dict[str, Cell]:

@@ -41,9 +41,10 @@ def check_files(paths: Sequence[str]) -> int:
     """Compare how each engine reads the files at some paths; return 1 if two disagree."""
     if not paths:
         raise ValueError("--files: expected folders or files, got none")
-    from plumbob.bench.experiments.check.files import lines_on, summary
     from plumbob.crosscheck.engines import ABSENT
     from plumbob.crosscheck.robots.files import check, find
+
+    from .file_readings import lines_on, summary
 
     search = find(paths)
     readings, output = [], sys.stdout

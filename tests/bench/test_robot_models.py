@@ -3,12 +3,12 @@
 import pytest
 from table_cells import column
 
-from plumbob.bench.experiments.robot_models.measurement import (
+from plumbob.bench.experiments.robot_models import (
     compare,
     compare_effectors,
     effector_differences,
+    readers,
 )
-from plumbob.bench.experiments.robot_models.tables import readers
 from plumbob.bench.peers.catalogue import KINEMATICS, SINGLE_PRECISION
 from plumbob.bench.peers.ik import drake
 from plumbob.bench.problems.robots import CHARACTER, ROBOTS, is_installed

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.check.tables import verdicts
+from plumbob.bench.experiments.check import verdicts
 from plumbob.bench.harness.record import Record
 from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.claims import (

@@ -5,6 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from plumbob.bench.tables.columns import text
+from plumbob.bench.tables.table import Column, Summary, Table, cells, words
 from plumbob.crosscheck.engines.file_kind import FRAGMENT
 from plumbob.crosscheck.robots import files
 from plumbob.crosscheck.robots.files import (
@@ -16,9 +18,6 @@ from plumbob.crosscheck.robots.files import (
     FileSelection,
 )
 from plumbob.text.printable import visible
-
-from ...tables.columns import text
-from ...tables.table import Column, Summary, Table, cells, words
 
 # Outcomes by which files are counted; the first two are shown even where there are none.
 READ = (AGREES, DIFFERS, files.DEVIATES)

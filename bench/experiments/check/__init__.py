@@ -1,1 +1,0 @@
-"""The reference against both engines: verdicts, and any files of the user's."""

@@ -1,4 +1,0 @@
-"""Robots and characters from files of others, read by engines and by us."""
-
-# The task of records on the bench's own robots in engines of peers.
-PEERS = "peers"
