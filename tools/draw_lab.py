@@ -10,7 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from plumbob.bench.experiments.pictures import ARM, figures, measurement
+from plumbob.bench.experiments import pictures
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.block import SCALES
 from plumbob.bench.harness.measure import record_of
@@ -44,10 +44,10 @@ def draw_plumb_bob(name: str) -> None:
     """Draw the custom curve as the report does, before and after resampling."""
     records = [
         record_of(block, block.measure(), 0.0)
-        for block in measurement.blocks(SCALES["quick"])
-        if block.facts["task"] == ARM
+        for block in pictures.blocks(SCALES["quick"])
+        if block.facts["task"] == pictures.ARM
     ]
-    sketch = figures.arm_draws(Results(records))
+    sketch = pictures.arm_draws(Results(records))
     assert sketch
     paper = '<rect width="100%" height="100%" fill="white"/>\n <defs>'
     text = drawn(sketch).svg.replace("<defs>", paper, 1)

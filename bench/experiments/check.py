@@ -3,17 +3,9 @@
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from plumbob.reference.arguments import distinct_texts
-
-from ..harness import metrics
 from ..harness.block import Block, Measured, Scale
 from ..harness.record import Record
 from ..harness.values import Values
-from ..peers.catalogue import MUJOCO, PINOCCHIO
-from ..tables.captions import Captions
-from ..tables.columns import folded, of_numbers, text
-from ..tables.results import counted, listed
-from ..tables.table import NO_SUMMARY, Column, Summary, in_unit, words
 
 
 class ClaimWords(Values, frozen=True, kw_only=True):
@@ -73,6 +65,15 @@ def evaluate(name: str) -> Measured:
 
 
 # What is shown.
+
+from plumbob.reference.arguments import distinct_texts
+
+from ..harness import metrics
+from ..peers.catalogue import MUJOCO, PINOCCHIO
+from ..tables.captions import Captions
+from ..tables.columns import folded, of_numbers, text
+from ..tables.results import counted, listed
+from ..tables.table import NO_SUMMARY, Column, Summary, in_unit, words
 
 # A claim against an engine names the engine in the description of a side.
 ENGINES = (PINOCCHIO, MUJOCO)

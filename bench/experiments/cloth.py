@@ -182,7 +182,7 @@ from ..tables.results import (
 )
 from ..tables.table import Column, Summary, words
 from .cloth_peers import DECADES, SOLVED
-from .pictures.figures import falling_cloth
+from .pictures import falling_cloth
 
 CAPTIONS = Captions(__file__)
 

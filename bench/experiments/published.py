@@ -12,6 +12,7 @@ from plumbob.reference import scenes, solve_ik
 
 from ..harness import metrics
 from ..harness.block import Block, Measured, Scale
+from ..harness.chain_targets import SolverLimits, blocks_of_users
 from ..harness.record import Record
 from ..harness.values import Floats1, Values
 from ..peers import catalogue
@@ -98,8 +99,6 @@ def _job(
 
 def _fabrik(stratum: str, distance: float, scale: Scale) -> Iterator[Block]:
     """Yield targets at a distance from the root of a straight chain, in random directions."""
-    from .chain.measurement import SolverLimits, blocks_of_users
-
     chain = published.FABRIK
     skeleton, rest = scenes.ball_chain(links=chain.links, link_length=chain.length)
     rng = np.random.default_rng(_SEED)

@@ -18,10 +18,6 @@ from ..peers import catalogue
 from ..peers.catalogue import KINEMATICS
 from ..peers.peer import Peer
 from ..problems.robots import ROBOTS, is_installed, robot, title
-from ..tables.captions import Captions
-from ..tables.columns import folded, text
-from ..tables.results import Results, by_problem, counted, grouped, listed, settings
-from ..tables.table import Column, Summary, words
 
 if TYPE_CHECKING:
     from plumbob.crosscheck.robots.models import RobotFile
@@ -79,19 +75,21 @@ def blocks(scale: Scale) -> Iterator[Block]:
     from plumbob.crosscheck.robots.comparisons import CONFIGURATIONS
     from plumbob.crosscheck.robots.models import PACKAGES, models
 
-    settings: dict[str, int | str] = {"configurations": CONFIGURATIONS}
+    configurations = {"configurations": CONFIGURATIONS}
     for family in PACKAGES:
         for model in models(family):
             for engine in ROBOT_ENGINES:
                 measure = partial(compare, engine, model)
                 facts = {"title": model.name}
-                yield Block(SUITE, f"{family}/{model.name}", engine, measure, settings, facts=facts)
+                yield Block(
+                    SUITE, f"{family}/{model.name}", engine, measure, configurations, facts=facts
+                )
     for name in filter(is_installed, ROBOTS):
         for peer in (peer for peer in KINEMATICS if peer.version):
-            settings = {"configurations": ROBOT_CONFIGURATIONS, "version": peer.version}
+            version = {"configurations": ROBOT_CONFIGURATIONS, "version": peer.version}
             facts = {"task": PEERS, "title": title(name)}
             measure = partial(compare_effectors, peer, name)
-            yield Block(SUITE, f"peers/{name}", peer.title, measure, settings, facts=facts)
+            yield Block(SUITE, f"peers/{name}", peer.title, measure, version, facts=facts)
 
 
 def compare(engine: str, model: "RobotFile") -> Measured:
@@ -144,6 +142,11 @@ def effector_differences(module: str, name: str) -> Mapping[str, float]:
 
 
 # What is shown.
+
+from ..tables.captions import Captions
+from ..tables.columns import folded, text
+from ..tables.results import Results, by_problem, counted, grouped, listed, settings
+from ..tables.table import Column, Summary, words
 
 QUANTITIES = ("positions", "rotations", "jacobians")
 # The records of a file in both engines, or of a robot of the bench in the engine of a peer.

@@ -13,6 +13,8 @@ from plumbob.reference.formats import urdf
 from .chains import TargetsForSkeleton, unit
 from .robots import robot
 
+# The task of records on a curve.
+CURVE = "curve"
 # Samples of each curve, as taken in the lab; the custom curve is resampled from a raw drawing.
 FRAMES = {"circle": 150, "square": 150, "heart": 150, "triangle": 150, "star": 400}
 CUSTOM = "plumb_bob"

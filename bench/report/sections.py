@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
-from ..experiments.pictures.figures import arm_motion, cloth_motion
+from ..experiments.pictures import arm_motion, cloth_motion
 from ..harness.experiment import Experiment
 from ..motion.motion import Scene
 from ..tables.layout import Layout

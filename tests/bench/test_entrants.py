@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.arm.tables import residuals_chart
-from plumbob.bench.experiments.chain.tables import iterations_chart
+from plumbob.bench.experiments.arm import residuals_chart
+from plumbob.bench.experiments.chain import iterations_chart
 from plumbob.bench.experiments.cloth_peers import truth_chart
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import timing

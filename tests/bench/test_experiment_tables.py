@@ -14,9 +14,9 @@ from table_cells import column, rows
 
 from plumbob import bench
 from plumbob.bench.experiments import SUITES, check, cloth, timing
-from plumbob.bench.experiments.arm.tables import accuracy
-from plumbob.bench.experiments.chain.tables import beyond_reach, rivals
-from plumbob.bench.experiments.closed_curves.tables import jitter
+from plumbob.bench.experiments.arm import accuracy
+from plumbob.bench.experiments.chain import beyond_reach, rivals
+from plumbob.bench.experiments.closed_curves import jitter
 from plumbob.bench.experiments.cloth_peers import SOLVED
 from plumbob.bench.report.sections import SECTIONS, tables
 from plumbob.bench.tables.latex import escaped

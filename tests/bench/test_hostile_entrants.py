@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hostile_programs import LIMITS, running
 
-from plumbob.bench.experiments.chain import measurement as chain
+from plumbob.bench.harness import chain_targets as chain
 from plumbob.bench.harness import timing
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.progress import TROUBLE, listening

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 
-from plumbob.bench.experiments.pictures.figures import arm_motion, cloth_motion
+from plumbob.bench.experiments.pictures import arm_motion, cloth_motion
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.motion import motion
 from plumbob.bench.motion.motion import Moving, Scene, data_of

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from plumbob.bench.experiments import SCALES, SUITES, blocks
-from plumbob.bench.experiments.arm.tables import accuracy, residuals_chart
-from plumbob.bench.experiments.chain.tables import beyond_reach, iterations_chart
+from plumbob.bench.experiments.arm import accuracy, residuals_chart
+from plumbob.bench.experiments.chain import beyond_reach, iterations_chart
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening

@@ -42,7 +42,7 @@ from ...problems.chains import chain_targets
 from ...problems.cloth_swing import MIDDLE, ClothSwing, cloth_swing, converged_motion, motion
 from ...problems.evaluate import MUJOCO, PINOCCHIO, mujoco_model, pinocchio_model, to_pinocchio
 from ...problems.robots import CHARACTER, BenchRobot, is_installed, robot
-from ..chain.measurement import MAX_ITERATIONS, TOLERANCE
+from ..chain import MAX_ITERATIONS, TOLERANCE
 from ..timing import COMPILED, LIMIT, PLAIN, PREPARED, PRESET, TIGHT, TimedCase, TimedWork
 
 # Bytes of each joint: its local rotation is read, its position and global rotation are written.

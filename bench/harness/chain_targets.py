@@ -1,4 +1,4 @@
-"""Inverse kinematics of a ten-ball chain, by us, on the kinematics of engines, and by users."""
+"""Targets of chains of balls, solved by us, on the kinematics of engines, and by users."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -7,39 +7,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.engines import SKELETON_ENGINES
-from plumbob.crosscheck.engines.skeleton_engine import forward_kinematics_by
-from plumbob.reference import IK_SOLVERS, forward_kinematics, solve_ik
+from plumbob.reference import forward_kinematics, solve_ik
 from plumbob.reference.arguments import FloatArray
 
-from ...harness import metrics
-from ...harness.block import Block, Group, Measured, Scale
-from ...harness.isolation import JobOutcome, raised
-from ...harness.measure import failure, not_asked
-from ...harness.record import FIRST_TARGETS
-from ...harness.timing import Job, answers, first_targets, times_in_turns
-from ...peers import catalogue, chain_loops
-from ...peers.entrant import CHAIN_TASK
-from ...peers.protocol import NoAnswerError, describe
-from ...problems import chains
-from ...problems.evaluate import arbiter_of
-from . import CHAIN
+from ..peers import catalogue
+from ..peers.protocol import NoAnswerError, describe
+from ..problems import chains
+from . import metrics
+from .block import Block, Group, Measured, Scale
+from .isolation import JobOutcome, raised
+from .measure import failure
+from .record import FIRST_TARGETS
+from .timing import Job, answers, first_targets, times_in_turns
 
 SUITE = "ik"
-TOLERANCE = 1e-4
-# Beyond reach: of the distance from the closest pose; small, to require a straight chain.
-BEYOND_TOLERANCE = 1e-6
-MAX_ITERATIONS = 1000
-# Targets in a stratum, and out of reach, per target of a scale, and the least number. A solver in
-# Python may need seconds for a target that takes all iterations.
-_TARGETS, _TARGETS_BEYOND, _LEAST_TARGETS = 0.25, 0.05, 3
 # The figure shows the residuals of the first HISTORY iterations. A user's solver is followed over
 # fewer targets and iterations: each iteration count takes a solve from the start.
 HISTORY = 200
 FOLLOWED_TARGETS, FOLLOWED_ITERATIONS = 10, 20
 # Time every fourth target, at most 20, three times each.
 PER_TIMED, ROUNDS, MAX_TIMED = 4, 3, 20
-NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
 NOT_FOLLOWED = "not followed, for its answers do not depend on max_iterations"
 
 
@@ -48,30 +35,6 @@ class SolverLimits(NamedTuple):
 
     tolerance: float
     max_iterations: int
-
-
-def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield every stratum, and a user's targets, for every solver."""
-    for stratum in chains.STRATA:
-        share = _TARGETS_BEYOND if stratum == chains.BEYOND else _TARGETS
-        problem = chains.chain_targets(
-            stratum,
-            min(scale.targets, max(_LEAST_TARGETS, round(share * scale.targets))),
-            scale.seed,
-        )
-        tolerance = BEYOND_TOLERANCE if stratum == chains.BEYOND else TOLERANCE
-        digest = {} if scale.seed == chains.SEED else {"problem_digest": f"seed {scale.seed}"}
-        for block in _blocks_on(problem, stratum, SolverLimits(tolerance, MAX_ITERATIONS), scale):
-            yield replace(block, facts={**block.facts, **digest})
-    limits = SolverLimits(TOLERANCE, MAX_ITERATIONS)
-    for own in scale.problems:
-        if own.targets is not None:
-            yield from (b.on(own) for b in _blocks_on(own.targets, "yours", limits, scale))
-    facts = {"task": CHAIN, "stratum": chains.BEYOND, "title": "every chain"}
-    for entrant in scale.entrants:
-        if entrant.offers(SUITE) and CHAIN_TASK not in entrant.tasks:
-            measure = partial(not_asked, NO_BALLS)
-            yield Block(SUITE, "chain/all", entrant.name, measure, facts=facts).of(entrant)
 
 
 class ChainJob(NamedTuple):
@@ -109,25 +72,6 @@ def _answer_of(job: ChainJob) -> Measured:
         return failure(describe(error))
 
 
-def _blocks_on(
-    problem: chains.TargetsForSkeleton, stratum: str, limits: SolverLimits, scale: Scale
-) -> Iterator[Block]:
-    """Yield targets for every solver of ours, the loop on each engine, and users' solvers."""
-    facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
-    adapters: dict[str, dict[str, str]] = {solver: {"solver": solver} for solver in IK_SOLVERS}
-    loops = [loop for loop in catalogue.LOOPS if loop.engine in SKELETON_ENGINES]
-    adapters |= {loop.name: {"engine": loop.engine} for loop in loops}
-    for name, settings in adapters.items():
-        job = job_of(problem, limits, chain_loops.__name__, settings)
-        answers = partial(solve_one_by_one, problem, job, limits)
-        if name in IK_SOLVERS:
-            answers = partial(solve_targets, problem, name, limits, record=True)
-        block = ChainJob(answers, job).block(problem, name, limits)
-        yield replace(block, size=len(problem.targets), facts=facts)
-    for block in blocks_of_users(problem, limits, scale, followed=stratum != chains.BEYOND):
-        yield replace(block, size=len(problem.targets), facts={**facts, **block.facts})
-
-
 def blocks_of_users(
     problem: chains.TargetsForSkeleton, limits: SolverLimits, scale: Scale, followed: bool = False
 ) -> Iterator[Block]:
@@ -159,6 +103,10 @@ def solve_targets(
 
     `record` keeps residuals by iteration.
     """
+    from plumbob.crosscheck.engines import SKELETON_ENGINES, forward_kinematics_by
+
+    from ..problems.evaluate import arbiter_of
+
     options: dict[str, Any] = {**limits._asdict(), "record": record}
     solution = solve_ik(problem.skeleton, problem.starts, problem.targets, solver, **options)
     engine = SKELETON_ENGINES[arbiter_of("")](problem.skeleton)
