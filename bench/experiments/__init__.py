@@ -1,4 +1,4 @@
-"""The experiments, a file each; `harness.experiment` lists the files."""
+"""The experiments, a file each; `harness/experiments.toml` lists the files."""
 
 from ..harness.block import SCALES, Block, Measured, Scale
 from ..harness.experiment import EXPERIMENTS, SUITES, blocks

@@ -18,20 +18,21 @@ if TYPE_CHECKING:
 
 
 class Experiment(NamedTuple):
-    """A file or folder of `bench/experiments`, not imported."""
+    """A file of `bench/experiments`, not imported."""
 
-    package: str  # the file or folder, by its full name as a module
+    module: str  # the file, by its full name as a module
     suite: str  # its name on the command line; experiments may share a suite
     chapter: str  # the section of the report that shows it
     # whether times are among its numbers, or a budget of time ends its work; timed blocks share no
     # machine with others while they are measured
     times: bool = True
+    subject: str = ""  # of its suite, at the first experiment of the suite
 
     def part(self, name: str) -> Any:
         """Return its module, or the file of its folder with this part."""
-        module = importlib.import_module(self.package)
+        module = importlib.import_module(self.module)
         is_folder = hasattr(module, "__path__")
-        return importlib.import_module(f"{self.package}.{name}") if is_folder else module
+        return importlib.import_module(f"{self.module}.{name}") if is_folder else module
 
     def blocks(self, scale: Scale) -> Iterator[Block]:
         """Yield its blocks; engines are imported only now."""
@@ -40,13 +41,12 @@ class Experiment(NamedTuple):
 
 
 _CATALOGUE = tomllib.loads(Path(__file__).with_name("experiments.toml").read_text(encoding="utf-8"))
-_FOLDERS = f"{__package__.rpartition('.')[0]}.experiments"
-# The suites of the command line with their subjects, and the experiments in order.
-SUITES: dict[str, str] = _CATALOGUE["suites"]
+_FOLDER = f"{__package__.rpartition('.')[0]}.experiments"
+# The experiments in order, and the suites of the command line with their subjects.
 EXPERIMENTS = [
-    Experiment(**{**row, "package": f"{_FOLDERS}.{row['package']}"})
-    for row in _CATALOGUE["experiments"]
+    Experiment(f"{_FOLDER}.{name}", **{"suite": name, **line}) for name, line in _CATALOGUE.items()
 ]
+SUITES = {e.suite: e.subject for e in EXPERIMENTS if e.subject}
 
 
 def blocks(suite: str, scale: Scale) -> Iterator[Block]:
