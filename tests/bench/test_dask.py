@@ -76,10 +76,10 @@ def few(monkeypatch):
 # What takes times says so.
 
 
-@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda e: e.package.rsplit(".")[-1])
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda e: e.module.rsplit(".")[-1])
 def test_every_experiment_states_whether_it_takes_times(experiment):
     """One that reads the stopwatch or keeps seconds shares no machine while it is measured."""
-    folder = ROOT / Path(*experiment.package.split(".")[1:])
+    folder = ROOT / Path(*experiment.module.split(".")[1:])
     files = [path for path in folder.glob("*.py") if path.name != "tables.py"]
     files += [path for path in [folder.with_suffix(".py")] if path.exists()]
     text = "".join(measuring_part(path).decode() for path in files)
