@@ -83,7 +83,7 @@ def test_every_experiment_states_whether_it_takes_times(experiment):
     files = [path for path in folder.glob("*.py") if path.name != "tables.py"]
     files += [path for path in [folder.with_suffix(".py")] if path.exists()]
     text = "".join(measuring_part(path).decode() for path in files)
-    words = ("clock import", '"seconds"', ".seconds", "times_in_turns", "RobotJob")
+    words = ("clock import", "ChainJob", '"seconds"', ".seconds", "times_in_turns", "RobotJob")
     assert experiment.times == any(word in text for word in words)
     assert {block.times for block in experiment.blocks(TINY)} == {experiment.times}
 
