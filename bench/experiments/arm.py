@@ -104,7 +104,15 @@ from ..tables.captions import Captions
 from ..tables.columns import folded, quantiles, spread_of, spread_of_iterations, text
 from ..tables.results import Results, by_problem, grouped, label, leaders
 from ..tables.table import INTERVAL, Column, Summary, words
-from .chain import ALLOWED, PROBLEM, REMARK, SOLVER, histories, within_tolerance
+from .chain import (
+    ALLOWED,
+    PROBLEM,
+    REMARK,
+    SOLVER,
+    histories,
+    share_within_tolerance,
+    within_tolerance,
+)
 
 STARTS = {None: "random", False: "rest", True: "last solution"}
 _CAPTIONS = Captions(__file__)
@@ -124,10 +132,6 @@ def _start(record: Record) -> str:
     return STARTS[record.values.warm]
 
 
-def _share(record: Record) -> metrics.Share:
-    return metrics.share(within_tolerance(record))
-
-
 def _median_time(record: Record) -> float | None:
     seconds = record.measured.get("seconds")
     return None if seconds is None else float(np.median(seconds))
@@ -138,7 +142,7 @@ COLUMNS = (
     PROBLEM,
     text("start", _start),
     SOLVER,
-    Column("within tolerance", note=INTERVAL, best="greatest", read=_share),
+    Column("within tolerance", note=INTERVAL, best="greatest", read=share_within_tolerance),
     *_residual(["largest"]),
     Column("time, median", "µs", read=_median_time),
     *quantiles("iterations", ["median"], spread_of_iterations),

@@ -155,6 +155,11 @@ def within_tolerance(record: Record) -> np.ndarray:
     return np.asarray(record.values.residual <= record.values.tolerance)
 
 
+def share_within_tolerance(record: Record) -> metrics.Share:
+    """Return how many residuals are within the tolerance."""
+    return metrics.share(within_tolerance(record))
+
+
 # Beyond reach.
 
 

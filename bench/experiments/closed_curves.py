@@ -135,7 +135,7 @@ from ..tables.captions import Captions
 from ..tables.columns import folded, spread_of, text, words_in
 from ..tables.results import Results, by_problem, grouped, label
 from ..tables.table import Cell, Column, Summary, in_unit, words
-from .chain import within_tolerance
+from .chain import share_within_tolerance
 
 # Rotations within this share of each other are equally large.
 ALIKE = 0.01
@@ -166,10 +166,6 @@ def _by_mode(results: Results, task: str) -> dict[tuple[str, str], dict[str, Rec
 
 def _largest_rotation(record: Record) -> float:
     return metrics.spread(record.values.largest_angle[:-1]).largest
-
-
-def _share(record: Record) -> metrics.Share:
-    return metrics.share(within_tolerance(record))
 
 
 def _in_modes(
@@ -205,7 +201,7 @@ COLUMNS = (
     *_in_modes("mean iterations", [WARM, NEAREST], lambda r: metrics.mean(r.values.iterations)),
     *folded(
         *_in_modes("mean iterations", [COLD], lambda r: metrics.mean(r.values.iterations)),
-        *_in_modes("within tolerance", MODES, _share, best="greatest"),
+        *_in_modes("within tolerance", MODES, share_within_tolerance, best="greatest"),
         *_in_modes("largest path error", MODES, lambda r: spread_of(r, "residual")[2], "m"),
         *_in_modes("mean rotation", MODES, lambda r: metrics.mean(r.values.mean_angle[:-1]), "°"),
         *_drifts(WARM),
@@ -236,7 +232,7 @@ def _points(curves: Sequence[ClosedCurve]) -> Iterator[str]:
         records = [curve.by_mode[mode] for curve in curves]
         worst = max(records, key=_largest_rotation)
         angle = words_in(_largest_rotation(worst), "°")
-        hits, total = np.sum([_share(record)[:2] for record in records], axis=0)
+        hits, total = np.sum([share_within_tolerance(record)[:2] for record in records], axis=0)
         frames = f"{words(int(hits))} of {words(int(total))} frames"
         yield f"{mode}: {angle} ({worst.title}, {label(worst.solver)}); {frames}"
 

@@ -33,15 +33,10 @@ SOLVED = 50
 SWUNG, EVERY, THINNED, PLACES = 200, 4, 2, 6
 
 
-class ArmWords(Values, frozen=True, kw_only=True):
-    """Whether the curve was resampled."""
-
-    evened: bool
-
-
-class ArmDrawing(ArmWords, frozen=True):
+class ArmDrawing(Values, frozen=True):
     """The arm on a curve, point by point [m], [rad], with the joints in a few frames."""
 
+    evened: bool  # whether the curve was resampled
     curve: Floats2
     residual: Floats1
     iterations: Integers1
@@ -59,43 +54,28 @@ class ClothDrawing(Values, frozen=True):
     pinned: Integers1
 
 
-class MovingArmWords(Values, frozen=True, kw_only=True):
-    """The position of the motion in the order."""
-
-    order: int
-
-
-class MovingArm(MovingArmWords, frozen=True):
+class MovingArm(Values, frozen=True):
     """The arm's joints [m], (frame, joint, 3), the curve, and the error of each frame [m]."""
 
+    order: int  # the position of the motion in the order
     positions: Floats3
     curve: Floats2
     error: Floats1
 
 
-class MovingClothWords(Values, frozen=True, kw_only=True):
-    """The step [s], the interval of recorded steps, the iteration limit, the position in order."""
-
-    h: float
-    every: int
-    iterations: int
-    order: int
-
-
-class MovingCloth(MovingClothWords, frozen=True):
+class MovingCloth(Values, frozen=True):
     """A cloth's particles [m], (frame, particle, 3), the error of each [m], the pins."""
 
+    h: float  # the step [s]
+    every: int  # the interval of recorded steps
+    iterations: int  # the iteration limit
+    order: int  # the position of the motion in the order
     positions: Floats3
     distance: Floats2
     pinned: Integers1
 
 
-KINDS = {
-    ARM: ArmDrawing,
-    CLOTH: ClothDrawing,
-    ARM_MOTION: MovingArm,
-    CLOTH_MOTION: MovingCloth,
-}
+KINDS = {ARM: ArmDrawing, CLOTH: ClothDrawing, ARM_MOTION: MovingArm, CLOTH_MOTION: MovingCloth}
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -209,11 +189,7 @@ def arm_draws(results: Results) -> Sketch | None:
     drawings = [
         (r.values.evened, r.values.curve, r.values.spacing, r.values.ghosts) for r in records
     ]
-    return Sketch(
-        **CAPTIONS.figure("arm_draws"),
-        data=drawings,
-        draw=_draw_arms,
-    )
+    return Sketch(**CAPTIONS.figure("arm_draws"), data=drawings, draw=_draw_arms)
 
 
 def falling_cloth(results: Results) -> Sketch | None:
@@ -222,11 +198,8 @@ def falling_cloth(results: Results) -> Sketch | None:
     if not records:
         return None
     cloth: ClothDrawing = records[0].values
-    return Sketch(
-        **CAPTIONS.figure("falling_cloth"),
-        data=(cloth.positions, cloth.time, cloth.pinned),
-        draw=_draw_cloths,
-    )
+    data = (cloth.positions, cloth.time, cloth.pinned)
+    return Sketch(**CAPTIONS.figure("falling_cloth"), data=data, draw=_draw_cloths)
 
 
 def _draw_arms(drawings: Any) -> "Figure":

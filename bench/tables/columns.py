@@ -54,12 +54,6 @@ def quantiles(
     )
 
 
-def quantile_cells(title: str, quantiles: Iterable[Cell]) -> dict[str, Cell]:
-    """Return the cells of a median, a 95th percentile and a maximum by their titles."""
-    names = ("median", "95 %", "largest")
-    return {f"{title}, {name}": cell for name, cell in zip(names, quantiles, strict=True)}
-
-
 def spread_of(record: Record, name: str) -> Sequence[int | float]:
     """Return median, 95th percentile and maximum of an array; of counts, as whole numbers."""
     array = record.measured[name]
