@@ -10,6 +10,7 @@ from ..experiments.cloth_peers import Point, points
 from ..harness import metrics
 from ..harness.record import FIRST_TARGETS
 from ..peers import catalogue
+from ..problems.chains import BEYOND
 from ..ranking import scores
 from ..tables.columns import words_in
 from ..tables.results import Results, counted, grouped, label, listed
@@ -34,7 +35,7 @@ class Headline(NamedTuple):
 
 def standings(results: Results) -> list[Headline]:
     """Return the ranks of the user's solvers task by task, then their failures."""
-    chains = [r for r in results.all("ik", task=chain.CHAIN) if r.values.stratum != chain.BEYOND]
+    chains = [r for r in results.all("ik", task=chain.CHAIN) if r.values.stratum != BEYOND]
     ranks = [*_target_ranks("chain of balls", "accuracy", scores.by_robot(chains))]
     for start in scores.STARTS:
         groups = scores.in_groups(scores.fields_of(results, start))
