@@ -121,7 +121,7 @@ def test_the_bench_measures_and_reports(results, folder):
         assert results[name][0] == 0, results[name][1]
     records = list(map(json.loads, (folder / "out" / "records.jsonl").read_text().splitlines()))
     assert {"chain/near", "robots/ur5"} <= {
-        r["problem"] for r in records if "solved" in r["arrays"]
+        r["problem"] for r in records if "solved" in r["measured"]
     }
     assert {r["facts"].get("arbiter", "MuJoCo") for r in records} == {"MuJoCo"}
     table = (folder / "out" / "tables" / "check.csv").read_text()

@@ -54,22 +54,26 @@ class ClothDrawing(Values, frozen=True):
     pinned: Integers1
 
 
-class MovingArm(Values, frozen=True):
+class MovingWords(Values, frozen=True, kw_only=True):
+    """The position of a motion in the order."""
+
+    order: int
+
+
+class MovingArm(MovingWords, frozen=True):
     """The arm's joints [m], (frame, joint, 3), the curve, and the error of each frame [m]."""
 
-    order: int  # the position of the motion in the order
     positions: Floats3
     curve: Floats2
     error: Floats1
 
 
-class MovingCloth(Values, frozen=True):
+class MovingCloth(MovingWords, frozen=True):
     """A cloth's particles [m], (frame, particle, 3), the error of each [m], the pins."""
 
     h: float  # the step [s]
     every: int  # the interval of recorded steps
     iterations: int  # the iteration limit
-    order: int  # the position of the motion in the order
     positions: Floats3
     distance: Floats2
     pinned: Integers1

@@ -26,7 +26,7 @@ def _draw_chart(chart: Chart) -> "Figure":
 def declared_chart(
     declared: Mapping[str, Any], panels: Iterable[Panel], entrants: frozenset[str], **fields: Any
 ) -> Sketch | None:
-    """Return the sketch of a chart declared in a `tables.toml`; None without panels.
+    """Return the sketch of a chart declared in a file of captions; None without panels.
 
     `fields` are the undeclared or different fields of `Chart`.
     """
