@@ -123,7 +123,7 @@ def test_the_bench_measures_and_reports(results, folder):
     assert {"chain/near", "robots/ur5"} <= {
         r["problem"] for r in records if "solved" in r["measured"]
     }
-    assert {r["facts"].get("arbiter", "MuJoCo") for r in records} == {"MuJoCo"}
+    assert {r["measured"].get("arbiter", "MuJoCo") for r in records} == {"MuJoCo"}
     table = (folder / "out" / "tables" / "check.csv").read_text()
     assert f'"{CLAIMS[0]}",{NOT_CHECKED}' in table
     assert "1 of 1 claims held" in (folder / "out" / "index.html").read_text()
