@@ -28,15 +28,14 @@ class Experiment(NamedTuple):
     times: bool = True
     subject: str = ""  # of its suite, at the first experiment of the suite
 
-    def part(self, name: str) -> Any:
-        """Return its module, or the file of its folder with this part."""
-        module = importlib.import_module(self.module)
-        is_folder = hasattr(module, "__path__")
-        return importlib.import_module(f"{self.module}.{name}") if is_folder else module
+    @property
+    def content(self) -> Any:
+        """The module, imported only now."""
+        return importlib.import_module(self.module)
 
     def blocks(self, scale: Scale) -> Iterator[Block]:
         """Yield its blocks; engines are imported only now."""
-        for block in self.part("measurement").blocks(scale):
+        for block in self.content.blocks(scale):
             yield replace(block, times=self.times)
 
 
@@ -74,7 +73,7 @@ def kind_of(suite: str, task: str) -> "type[Values] | None":
     kinds: dict[str, type[Values]] = {}
     for experiment in EXPERIMENTS:
         if experiment.suite == suite:
-            kinds |= experiment.part("values").KINDS
+            kinds |= experiment.content.KINDS
     if kinds and task not in kinds:
         raise ValueError(f"task: expected one of {', '.join(map(repr, kinds))}, got {task[:40]!r}")
     return kinds.get(task)

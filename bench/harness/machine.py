@@ -27,10 +27,6 @@ PRESENTATION = (
     *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),
     *("bench/ranking", "bench/tables", "verify/screen"),
 )
-# Likewise in every experiment, beside the captions NAME.toml.
-PRESENTATION_FILES = (
-    *("tables.py", "tables.toml", "participants.py", "figures.py", "readings.py", "files.py"),
-)
 # The line of an experiment's file above which it measures, and below which it only shows numbers.
 SHOWN = b"# What is shown."
 
@@ -116,9 +112,7 @@ def source_files() -> list[Path]:
     for path in (path for name in _PACKAGES for path in (ROOT / name).rglob("*") if path.is_file()):
         parts = path.relative_to(ROOT).parts
         shows = any("/".join(parts[:n]) in PRESENTATION for n in range(2, 4))
-        is_captions = len(parts) == 3 and path.suffix == ".toml"
-        if parts[:2] == ("bench", "experiments"):
-            shows |= is_captions or path.name in PRESENTATION_FILES
+        shows |= parts[:2] == ("bench", "experiments") and path.suffix == ".toml"  # captions
         if not shows and "__pycache__" not in parts:
             files.append(path)
     return sorted(files)

@@ -46,7 +46,7 @@ MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:
     """Return the tables of an experiment, imported only now."""
-    layouts: tuple[Layout, ...] = experiment.part("tables").LAYOUTS
+    layouts: tuple[Layout, ...] = experiment.content.LAYOUTS
     return layouts
 
 

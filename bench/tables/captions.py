@@ -10,7 +10,7 @@ from ..harness.record import Record
 from .columns import lengths_of_steps
 from .layout import Layout, records_of
 from .results import Results, settings
-from .table import NO_SUMMARY, Column, Summary
+from .table import NO_SUMMARY, Summary
 
 
 class Captions:
@@ -20,11 +20,9 @@ class Captions:
     """
 
     def __init__(self, module: str, **constants: str) -> None:
-        """Read the file beside a module, given by its `__file__`; without it, tables.toml."""
+        """Read the file beside a module, given by its `__file__`."""
         path = Path(module).with_suffix(".toml")
-        path = path if path.exists() else path.with_name("tables.toml")
         self._tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        self._columns = self._tables.pop("columns", {}), self._tables.pop("folded", {})
         self._figures = self._tables.pop("figures", {})
         shared: dict[str, str] = self._tables.pop("shared", {})
         self.shared = {key: _on_one_line(text, constants) for key, text in shared.items()}
@@ -40,7 +38,6 @@ class Captions:
     ) -> Layout:
         """Return the layout of a table with its texts from the file.
 
-        The columns are a field, `columns`; without it, the columns declared in the file.
         `measured` returns, from the subjects of the table, the words in braces of the sentence on
         the measurement. Other braces hold the settings of the subjects' records. The fields are the
         fields of `Layout` beside the texts.
@@ -50,8 +47,6 @@ class Captions:
         captions: dict[str, Any] = {
             key: _on_one_line(text, self._constants) for key, text in texts.items()
         }
-        if name in self._columns[0]:
-            captions["columns"] = self.columns(name)
         names = {field for _, field, _, _ in Formatter().parse(template) if field}
 
         def sentence(rows: Any) -> str:
@@ -71,16 +66,6 @@ class Captions:
             for key, field in self._figures[name].items()
         }
         return {"name": name, **fields}
-
-    def columns(self, name: str) -> tuple[Column, ...]:
-        """Return the columns of a table; each shows a row's cell under its title."""
-        visible, folded = self._columns
-        looks = [*visible[name], *({**look, "folded": True} for look in folded.get(name, []))]
-        return tuple(_column(title, **look) for look in looks for title in look["titles"])
-
-
-def _column(title: str, titles: list[str], **looks: Any) -> Column:
-    return Column(title, read=lambda row: row.get(title), **looks)
 
 
 def _setting(records: list[Record], name: str) -> str:

@@ -35,8 +35,6 @@ _PACKAGES = {
     catalogue.NEWTON: "newton",
     "SciPy": "scipy",
 }
-# The cells of a row by the titles of their columns, and the records or scores behind them.
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

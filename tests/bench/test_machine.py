@@ -32,8 +32,7 @@ def every_file(root):
 
 def only_shows(path):
     if path.is_relative_to("bench/experiments"):
-        is_captions = len(path.parts) == 3 and path.suffix == ".toml"
-        return is_captions or path.name in machine.PRESENTATION_FILES
+        return path.suffix == ".toml"
     return any(path.is_relative_to(name) for name in machine.PRESENTATION)
 
 
